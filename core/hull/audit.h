@@ -1,0 +1,25 @@
+#ifndef HULLD_CORE_HULL_AUDIT_H_
+#define HULLD_CORE_HULL_AUDIT_H_
+
+#include <absl/status/status.h>
+
+#include <span>
+
+#include "core/hull/hull.h"
+
+namespace hulld {
+
+// Checks a snapshot by other means than the builder: rational arithmetic only. Checks finite and
+// canonical coordinates and order, that every vertex is used, planar strictly convex facets, a
+// closed manifold with V - E + F = 2, strict local convexity at every edge, and global convexity
+// (Mehlhorn et al. 1996, Checking Geometric Programs). OK, or INTERNAL with the first finding.
+// Cost: O(V) exact operations, about 10 us each.
+absl::Status AuditHull(const Hull& hull);
+
+// Checks that every point is in the closed hull. OK, or INTERNAL naming the first point that is
+// not. Cost: O(n F).
+absl::Status AuditContainment(const Hull& hull, std::span<const Vector> points);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_AUDIT_H_

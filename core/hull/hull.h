@@ -1,0 +1,64 @@
+#ifndef HULLD_CORE_HULL_HULL_H_
+#define HULLD_CORE_HULL_HULL_H_
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace hulld {
+
+// A point or a direction: three doubles, the caller's length unit where it is a point.
+using Vector = Eigen::Vector3d;
+
+// A segment of a hull's boundary between two facets, by vertex indices; tail < head.
+struct Edge {
+  uint32_t tail;
+  uint32_t head;
+  friend bool operator==(const Edge&, const Edge&) = default;
+  friend auto operator<=>(const Edge&, const Edge&) = default;
+};
+
+// The canonical snapshot of a convex hull: immutable, readable by any thread, the same bits for the
+// same point set whatever the order in which the points came.
+//
+// Vertices are the extreme points, in lexicographic order (x, then y, then z); -0 is stored as +0.
+// Facets are maximal coplanar polygons, each from its lowest vertex, counter-clockwise seen from
+// outside, sorted by their vertex sequences. A hull of dimension 2 has one facet, which stands for
+// both its sides (its second vertex is lower than its last); of dimension 1, no facet and one edge;
+// of dimension 0, one vertex; of dimension -1, nothing. Edges are sorted.
+class Hull {
+ public:
+  Hull() = default;
+
+  // Assembles a snapshot from parts that already are canonical. `facet_starts` has one entry per
+  // facet and one more. Requires what the class comment promises; AuditHull checks it.
+  Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> facet_starts,
+       std::vector<uint32_t> facet_vertices, std::vector<Edge> edges);
+
+  int dimension() const { return dimension_; }
+  bool empty() const { return dimension_ < 0; }
+  std::span<const Vector> vertices() const { return vertices_; }
+  std::span<const Edge> edges() const { return edges_; }
+  size_t facet_count() const { return facet_starts_.empty() ? 0 : facet_starts_.size() - 1; }
+  // The vertex indices of facet i, 0 <= i < facet_count().
+  std::span<const uint32_t> facet(size_t i) const {
+    return std::span(facet_vertices_)
+        .subspan(facet_starts_[i], facet_starts_[i + 1] - facet_starts_[i]);
+  }
+  // Largest absolute coordinate; 0 when empty.
+  double max_abs_coordinate() const { return max_abs_coordinate_; }
+
+ private:
+  int dimension_ = -1;
+  double max_abs_coordinate_ = 0;
+  std::vector<Vector> vertices_;
+  std::vector<uint32_t> facet_starts_;
+  std::vector<uint32_t> facet_vertices_;
+  std::vector<Edge> edges_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_HULL_H_

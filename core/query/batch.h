@@ -1,0 +1,35 @@
+#ifndef HULLD_CORE_QUERY_BATCH_H_
+#define HULLD_CORE_QUERY_BATCH_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/query/collision.h"
+
+namespace hulld {
+
+// A hull at a pose; the hull must outlive the call.
+struct PlacedHull {
+  const Hull* hull;
+  Pose X_WH;
+};
+
+// Indices of a pair into a table of placements.
+struct PlacedPair {
+  uint32_t a;
+  uint32_t b;
+};
+
+// Answers every pair, in parallel on `threads` OpenMP threads; results[i] belongs to pairs[i] and
+// does not depend on the number of threads. Requires indices in range and valid poses. After
+// should_stop said so the rest is CANCELLED.
+std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
+                                                    std::span<const PlacedPair> pairs,
+                                                    const QueryOptions& options, int threads);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_BATCH_H_
