@@ -25,7 +25,8 @@ absl::Status ValidatePose(const Pose& pose) {
     if (absl::Status s = CheckFinite("translation", kTranslation[i], pose.t[i]); !s.ok()) return s;
   }
   if (pose.q == std::array<double, 4>{0, 0, 0, 0}) {
-    return absl::InvalidArgumentError("rotation is zero; any other finite quaternion is a rotation");
+    return absl::InvalidArgumentError(
+        "rotation is zero; any other finite quaternion is a rotation");
   }
   return absl::OkStatus();
 }

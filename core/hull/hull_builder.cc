@@ -1,0 +1,175 @@
+#include "core/hull/hull_builder.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/hull/canonical_snapshot.h"
+#include "core/hull/polygon_boundary.h"
+#include "core/hull/surface.h"
+#include "core/hull/vertex_table.h"
+#include "core/numeric/orientation.h"
+
+namespace hulld {
+namespace {
+
+// A block of at most this many points is not worth a copy of the builder for the sake of stopping
+// within it.
+constexpr size_t kUninterruptedPoints = 1024;
+// Points between two polls of should_stop.
+constexpr size_t kPointsPerPoll = 256;
+
+absl::Status CheckFinite(std::span<const Vector> points) {
+  constexpr const char* kNames[] = {"x", "y", "z"};
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (std::isfinite(points[i][k])) continue;
+      return absl::InvalidArgumentError(absl::StrCat(
+          "points[", i, "].", kNames[k], " is ", std::isnan(points[i][k]) ? "NaN" : "infinite"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+bool LexicographicallyLess(const Vector& a, const Vector& b) {
+  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+}
+
+}  // namespace
+
+// The hull in the stage of its dimension: loose vertices up to dimension 1, then a polygon, then a
+// surface.
+class HullBuilder::State {
+ public:
+  void BeginBlock() { vertices_.BeginBlock(); }
+  void Insert(const Vector& point) {
+    switch (dimension()) {
+      case -1:
+        return GrowToPoint(point);
+      case 0:
+        return GrowToSegment(point);
+      case 1:
+        return InsertIntoSegment(point);
+      case 2:
+        return InsertIntoPolygon(point);
+      default:
+        return surface_->Insert(vertices_, point);
+    }
+  }
+
+  int dimension() const {
+    if (surface_) return 3;
+    if (polygon_) return 2;
+    return static_cast<int>(ends_.size()) - 1;
+  }
+  const VertexTable& vertices() const { return vertices_; }
+
+  Hull Snapshot() const {
+    if (surface_) return SnapshotOf(vertices_, *surface_);
+    if (polygon_) return SnapshotOfPolygon(vertices_, polygon_->Loop());
+    return SnapshotOfEnds(vertices_, ends_);
+  }
+
+ private:
+  void GrowToPoint(const Vector& point) { ends_.push_back(vertices_.Add(point)); }
+
+  void GrowToSegment(const Vector& point) {
+    if (point == vertices_[ends_[0]]) return vertices_.CountDuplicate(ends_[0]);
+    ends_.push_back(vertices_.Add(point));
+    if (LexicographicallyLess(point, vertices_[ends_[0]])) std::swap(ends_[0], ends_[1]);
+  }
+
+  // On one line, order along it and lexicographic order agree.
+  void InsertIntoSegment(const Vector& point) {
+    const CoordinatePlane plane = ProjectionOf(vertices_[ends_[0]], vertices_[ends_[1]], point);
+    if (plane.first >= 0) {
+      const VertexId id = vertices_.Add(point);
+      plane_ = {vertices_[ends_[0]], vertices_[ends_[1]], point};
+      polygon_.emplace(vertices_, plane, ends_[0], ends_[1], id);
+      return;
+    }
+    for (const VertexId end : ends_) {
+      if (point == vertices_[end]) return vertices_.CountDuplicate(end);
+    }
+    if (LexicographicallyLess(point, vertices_[ends_[0]])) return ReplaceEnd(0, point);
+    if (LexicographicallyLess(vertices_[ends_[1]], point)) return ReplaceEnd(1, point);
+  }
+
+  void ReplaceEnd(int end, const Vector& point) {
+    vertices_.Remove(ends_[end]);
+    ends_[end] = vertices_.Add(point);
+  }
+
+  void InsertIntoPolygon(const Vector& point) {
+    if (Orient3d(plane_[0], plane_[1], plane_[2], point) == 0) {
+      return polygon_->Insert(vertices_, point);
+    }
+    const std::vector<VertexId> loop = polygon_->Loop();
+    surface_.emplace(vertices_, loop, vertices_.Add(point));
+    polygon_.reset();
+  }
+
+  VertexTable vertices_;
+  // Dimensions 0 and 1: the vertices, in lexicographic order.
+  std::vector<VertexId> ends_;
+  std::optional<PolygonBoundary> polygon_;
+  // Dimension 2: three points, not collinear, that span the plane.
+  std::array<Vector, 3> plane_;
+  std::optional<Surface> surface_;
+};
+
+HullBuilder::HullBuilder() : state_(std::make_unique<State>()) {}
+HullBuilder::HullBuilder(const HullBuilder& other)
+    : state_(std::make_unique<State>(*other.state_)) {}
+HullBuilder& HullBuilder::operator=(const HullBuilder& other) {
+  if (this != &other) state_ = std::make_unique<State>(*other.state_);
+  return *this;
+}
+HullBuilder::HullBuilder(HullBuilder&&) noexcept = default;
+HullBuilder& HullBuilder::operator=(HullBuilder&&) noexcept = default;
+HullBuilder::~HullBuilder() = default;
+
+absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
+                                             const AddLimits& limits) {
+  if (absl::Status status = CheckFinite(points); !status.ok()) return status;
+  const bool may_stop = limits.should_stop && points.size() > kUninterruptedPoints;
+  const bool may_exceed = vertex_count() + points.size() > limits.max_vertices;
+  std::unique_ptr<State> before;
+  if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
+
+  state_->BeginBlock();
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (may_stop && i % kPointsPerPoll == 0 && limits.should_stop()) {
+      state_ = std::move(before);
+      return absl::CancelledError("stopped while adding points; the hull is as before");
+    }
+    // Adding +0 turns -0 into +0 and changes nothing else.
+    state_->Insert(points[i] + Vector::Zero());
+  }
+  if (vertex_count() > limits.max_vertices) {
+    const size_t reached = vertex_count();
+    state_ = std::move(before);
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the hull would have ", reached, " vertices; the limit is ", limits.max_vertices));
+  }
+  PointCounts counts;
+  counts.received = points.size();
+  counts.outside = state_->vertices().outside();
+  counts.duplicate = state_->vertices().duplicate();
+  counts.inside = counts.received - counts.outside - counts.duplicate;
+  return counts;
+}
+
+int HullBuilder::dimension() const { return state_->dimension(); }
+
+size_t HullBuilder::vertex_count() const { return state_->vertices().size(); }
+
+Hull HullBuilder::Snapshot() const { return state_->Snapshot(); }
+
+}  // namespace hulld

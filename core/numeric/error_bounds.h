@@ -1,0 +1,70 @@
+#ifndef HULLD_CORE_NUMERIC_ERROR_BOUNDS_H_
+#define HULLD_CORE_NUMERIC_ERROR_BOUNDS_H_
+
+// Every floating-point error bound of core, with its derivation. All assume IEEE doubles, round to
+// nearest, gradual underflow (no FTZ/DAZ) and no contraction to FMA.
+namespace hulld {
+
+// Unit roundoff: |fl(x op y) - x op y| <= u |x op y| without underflow.
+inline constexpr double kUnitRoundoff = 0x1p-53;
+
+// |fl(det) - det| <= factor * fl(permanent) for the 3x3 determinant of rounded coordinate
+// differences, without underflow. Proven: Shewchuk 1997, Adaptive Precision Floating-Point
+// Arithmetic, table 2 (o3derrboundA).
+inline constexpr double kOrient3dErrorFactor = (7 + 56 * kUnitRoundoff) * kUnitRoundoff;
+
+// The same for 2x2. Proven: Shewchuk 1997 (ccwerrboundA).
+inline constexpr double kOrient2dErrorFactor = (3 + 16 * kUnitRoundoff) * kUnitRoundoff;
+
+// What underflow adds to the two bounds above. A product that underflows errs by at most 2^-1075;
+// sums never err by underflow. 2x2: two products. 3x3 with differences of at most D: six products
+// times D, and three products: (6 D + 3) 2^-1075 and roundings of these, less than (D + 1) times
+// this. Proven.
+inline constexpr double kUnderflowError = 0x1p-1070;
+
+// Expansion arithmetic of degree-3 polynomials in coordinate differences is exact when every
+// non-zero coordinate is at least the first in magnitude (its lowest bit is then at least 2^-358,
+// so every product of three is a multiple of 2^-1074) and none exceeds the second (differences
+// below 2^331, sums of products below 2^996, so that splitting cannot overflow). Proven.
+inline constexpr double kExpansionMin = 0x1p-306;
+inline constexpr double kExpansionMax = 0x1p330;
+
+// Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
+// largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
+// between these two, so that no quantity that matters overflows, and what underflow adds (below
+// 2^-1074 times 2^400 times small counts) is far below 2^-53 of the slack in the factors that
+// follow. Proven.
+inline constexpr double kFilterMinSize = 0x1p-300;
+inline constexpr double kFilterMaxSize = 0x1p300;
+
+// Entries of the rotation matrix R(q)/|q|^2, computed from q scaled by a power of two to a largest
+// component in [1/2, 1): each numerator is a sum of at most 4 products (error at most 7 u |q|^2),
+// the squared norm has relative error at most 4 u, the quotient one rounding more: |error| <= 12 u
+// < 16 u, as no entry exceeds 1. Proven.
+inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
+
+// A Minkowski vertex w = R_A a - R_B b - (t_B - t_A): each rotated component errs by at most 3 * 16
+// u M (matrix) and 3 u * 3 M (products and sums), that is 57 u M; the difference of translations by
+// u |t|; two subtractions by at most 2 u times 3 M_A + 3 M_B + |t|. In total at most 64 u S per
+// component; 128 u leaves slack. Proven.
+inline constexpr double kMinkowskiErrorFactor = 128 * kUnitRoundoff;
+
+// A support value n . w over all w: the direction turned into a hull's frame errs by at most 3 * 16
+// u |n| + 9 u |n| = 57 u |n| per component, hence the dot product by at most 3 * 57 u |n| M + 9 u
+// |n| M = 180 u |n| M; the translation's part errs by at most 16 u |n| |t|, the final sums by at
+// most 4 u * 3 |n| S. In total below 200 u |n| S, |n| the largest component of n; 512 u leaves
+// slack for a direction that itself errs by up to 64 u |n| per component (3 * 64 u |n| S more).
+// Proven.
+inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
+
+// det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most d =
+// 128 u S each, W <= 4 S: first order 3 * 6 * W^2 d = 18 W^2 d, higher orders below W^2 d / 100,
+// rounding at most 6 * 5 u W^3 <= W^2 d. Times W^2 d. Proven.
+inline constexpr double kTetrahedronErrorFactor = 24;
+
+// Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
+// u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). Proven.
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_NUMERIC_ERROR_BOUNDS_H_
