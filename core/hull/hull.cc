@@ -4,6 +4,21 @@
 #include <utility>
 
 namespace hulld {
+namespace {
+
+Vector MeanOfAxisExtremes(const std::vector<Vector>& vertices) {
+  Vector mean = Vector::Zero();
+  for (int axis = 0; axis < 3 && !vertices.empty(); ++axis) {
+    const auto [low, high] =
+        std::minmax_element(vertices.begin(), vertices.end(),
+                            [axis](const Vector& a, const Vector& b) { return a[axis] < b[axis]; });
+    // Each divided first, so that no sum overflows.
+    mean += *low / 6 + *high / 6;
+  }
+  return mean;
+}
+
+}  // namespace
 
 Hull::Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> facet_starts,
            std::vector<uint32_t> facet_vertices, std::vector<Edge> edges)
@@ -15,6 +30,7 @@ Hull::Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> fa
   for (const Vector& v : vertices_) {
     max_abs_coordinate_ = std::max(max_abs_coordinate_, v.cwiseAbs().maxCoeff());
   }
+  center_ = MeanOfAxisExtremes(vertices_);
 }
 
 }  // namespace hulld

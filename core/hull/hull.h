@@ -49,10 +49,14 @@ class Hull {
   }
   // Largest absolute coordinate; 0 when empty.
   double max_abs_coordinate() const { return max_abs_coordinate_; }
+  // The mean of the six vertices that are extreme along the coordinate axes, rounded: a place in
+  // the hull to search from. Zero when empty.
+  const Vector& center() const { return center_; }
 
  private:
   int dimension_ = -1;
   double max_abs_coordinate_ = 0;
+  Vector center_ = Vector::Zero();
   std::vector<Vector> vertices_;
   std::vector<uint32_t> facet_starts_;
   std::vector<uint32_t> facet_vertices_;

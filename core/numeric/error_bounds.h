@@ -62,6 +62,17 @@ inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 // rounding at most 6 * 5 u W^3 <= W^2 d. Times W^2 d. Proven.
 inline constexpr double kTetrahedronErrorFactor = 24;
 
+// The cross product of two computed edges with components at most e and f, whose ends err by at
+// most d each as above: |error| <= 2 (2.1 d (e + f) + (2.1 d)^2) + 6 u e f, and u f <= 4 u S <= d
+// / 32. Times d (e + f + 3 d). Proven.
+inline constexpr double kNormalErrorFactor = 5;
+
+// The gap between two hulls along a computed normal n that errs by at most h per component, over
+// Minkowski vertices with components at most 4 S: 3 (h 4 S + |n| d) + rounding of at most 60 u |n|
+// S <= |n| d / 2. As kGapNormalFactor h S + kGapPositionFactor |n| d. Proven.
+inline constexpr double kGapNormalFactor = 12.5;
+inline constexpr double kGapPositionFactor = 4;
+
 // Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
 // u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). Proven.
 

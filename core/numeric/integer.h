@@ -21,19 +21,22 @@ struct IntegerVector {
 
   const Integer& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
   Integer& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+
+  // Friends, so that they are candidates for nothing but IntegerVector: Integer claims to be
+  // constructible from much.
   friend bool operator==(const IntegerVector&, const IntegerVector&) = default;
+  friend IntegerVector operator+(const IntegerVector& a, const IntegerVector& b) {
+    return {a.x + b.x, a.y + b.y, a.z + b.z};
+  }
+  friend IntegerVector operator-(const IntegerVector& a, const IntegerVector& b) {
+    return {a.x - b.x, a.y - b.y, a.z - b.z};
+  }
+  friend IntegerVector operator-(const IntegerVector& a) { return {-a.x, -a.y, -a.z}; }
+  friend IntegerVector operator*(const Integer& s, const IntegerVector& a) {
+    return {s * a.x, s * a.y, s * a.z};
+  }
 };
 
-inline IntegerVector operator+(const IntegerVector& a, const IntegerVector& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-inline IntegerVector operator-(const IntegerVector& a, const IntegerVector& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-inline IntegerVector operator-(const IntegerVector& a) { return {-a.x, -a.y, -a.z}; }
-inline IntegerVector operator*(const Integer& s, const IntegerVector& a) {
-  return {s * a.x, s * a.y, s * a.z};
-}
 inline Integer Dot(const IntegerVector& a, const IntegerVector& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
@@ -44,6 +47,11 @@ inline bool IsZero(const IntegerVector& a) {
   return a.x.is_zero() && a.y.is_zero() && a.z.is_zero();
 }
 inline int Sign(const Integer& a) { return a.sign(); }
+// A direction across d; requires d not zero.
+inline IntegerVector AnyPerpendicular(const IntegerVector& d) {
+  if (!d.y.is_zero() || !d.z.is_zero()) return {0, d.z, -d.y};
+  return {0, 0, d.x};
+}
 
 // The exponent e of the lowest set bit of x: x is an odd multiple of 2^e. Requires x finite and not
 // 0. Exact, subnormals included.

@@ -1,0 +1,313 @@
+#include "core/hull/audit.h"
+
+#include <absl/status/statusor.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "core/numeric/integer.h"
+
+namespace hulld {
+namespace {
+
+// Integers that are proportional to the points' coordinates, exactly.
+struct IntegerPoints {
+  int exponent;
+  std::vector<IntegerVector> points;
+};
+
+constexpr int kAboveAllExponents = 1024;
+
+IntegerPoints ToIntegers(std::span<const Vector> points, std::span<const Vector> also = {}) {
+  int exponent = kAboveAllExponents;
+  for (const Vector& p : points) exponent = LowestBitExponent(p, exponent);
+  for (const Vector& p : also) exponent = LowestBitExponent(p, exponent);
+  IntegerPoints result{exponent, {}};
+  result.points.reserve(points.size());
+  for (const Vector& p : points) result.points.push_back(ToInteger(p, exponent));
+  return result;
+}
+
+template <typename... Parts>
+absl::Status Finding(const Parts&... parts) {
+  return absl::InternalError(absl::StrCat(parts...));
+}
+
+absl::Status CheckVertices(const Hull& hull) {
+  const std::span<const Vector> v = hull.vertices();
+  for (size_t i = 0; i < v.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (!std::isfinite(v[i][k])) return Finding("vertex ", i, " is not finite");
+      if (v[i][k] == 0 && std::signbit(v[i][k])) return Finding("vertex ", i, " holds -0");
+    }
+    if (i > 0 &&
+        !std::lexicographical_compare(v[i - 1].begin(), v[i - 1].end(), v[i].begin(), v[i].end())) {
+      return Finding("vertices ", i - 1, " and ", i, " are out of order");
+    }
+  }
+  return absl::OkStatus();
+}
+
+// The normal of a facet by its first corner, not normalized; zero if the corner is straight.
+IntegerVector NormalOf(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet) {
+  return Cross(v[facet[1]] - v[facet[0]], v[facet[2]] - v[facet[0]]);
+}
+
+absl::Status CheckFacet(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet,
+                        size_t index) {
+  const size_t n = facet.size();
+  if (n < 3) return Finding("facet ", index, " has fewer than three vertices");
+  for (const uint32_t u : facet) {
+    if (u >= v.size()) return Finding("facet ", index, " names vertex ", u, ", which is not there");
+  }
+  if (*std::min_element(facet.begin(), facet.end()) != facet[0]) {
+    return Finding("facet ", index, " does not start at its lowest vertex");
+  }
+  const IntegerVector normal = NormalOf(v, facet);
+  for (size_t i = 0; i < n; ++i) {
+    const IntegerVector& a = v[facet[i]];
+    const IntegerVector& b = v[facet[(i + 1) % n]];
+    const IntegerVector& c = v[facet[(i + 2) % n]];
+    if (Sign(Dot(normal, a - v[facet[0]])) != 0) return Finding("facet ", index, " is not planar");
+    if (Sign(Dot(normal, Cross(b - a, c - b))) <= 0) {
+      return Finding("facet ", index, " is not strictly convex");
+    }
+    const bool in_fan = i >= 1 && i + 1 < n;
+    if (in_fan && Sign(Dot(normal, Cross(a - v[facet[0]], b - v[facet[0]]))) <= 0) {
+      return Finding("facet ", index, " winds more than once");
+    }
+  }
+  return absl::OkStatus();
+}
+
+// A directed edge and the facet to its left.
+using FacetByEdge = std::map<std::pair<uint32_t, uint32_t>, size_t>;
+
+absl::StatusOr<FacetByEdge> CheckManifold(const Hull& hull) {
+  FacetByEdge left;
+  std::vector<Edge> edges;
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    const std::span<const uint32_t> facet = hull.facet(f);
+    for (size_t i = 0; i < facet.size(); ++i) {
+      const uint32_t tail = facet[i];
+      const uint32_t head = facet[(i + 1) % facet.size()];
+      if (!left.emplace(std::pair(tail, head), f).second) {
+        return Finding("edge ", tail, "-", head, " is used twice in one direction");
+      }
+      if (tail < head) edges.push_back({tail, head});
+    }
+  }
+  for (const auto& [edge, facet] : left) {
+    if (!left.contains({edge.second, edge.first})) {
+      return Finding("edge ", edge.first, "-", edge.second, " bounds one facet only");
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  if (!std::equal(edges.begin(), edges.end(), hull.edges().begin(), hull.edges().end())) {
+    return Finding("the edges are not those of the facets, sorted");
+  }
+  return left;
+}
+
+absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left) {
+  std::vector<size_t> parent(hull.facet_count());
+  std::iota(parent.begin(), parent.end(), size_t{0});
+  const auto root = [&](size_t f) {
+    while (parent[f] != f) f = parent[f] = parent[parent[f]];
+    return f;
+  };
+  for (const auto& [edge, facet] : left) {
+    parent[root(facet)] = root(left.at({edge.second, edge.first}));
+  }
+  std::vector<char> used(hull.vertices().size(), 0);
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    if (root(f) != root(0)) return Finding("the surface is in several pieces");
+    for (const uint32_t u : hull.facet(f)) used[u] = 1;
+  }
+  if (std::find(used.begin(), used.end(), 0) != used.end()) {
+    return Finding("a vertex is on no facet");
+  }
+  const auto characteristic = static_cast<int64_t>(hull.vertices().size()) -
+                              static_cast<int64_t>(hull.edges().size()) +
+                              static_cast<int64_t>(hull.facet_count());
+  if (characteristic != 2) return Finding("V - E + F is ", characteristic, ", not 2");
+  return absl::OkStatus();
+}
+
+// Every facet's neighbour across an edge bends strictly inwards.
+absl::Status CheckLocalConvexity(const std::vector<IntegerVector>& v, const Hull& hull,
+                                 const FacetByEdge& left) {
+  for (const auto& [edge, f] : left) {
+    const std::span<const uint32_t> other = hull.facet(left.at({edge.second, edge.first}));
+    const size_t tail = std::find(other.begin(), other.end(), edge.first) - other.begin();
+    const IntegerVector& beyond = v[other[(tail + 1) % other.size()]];
+    if (Sign(Dot(NormalOf(v, hull.facet(f)), beyond - v[edge.first])) >= 0) {
+      return Finding("edge ", edge.first, "-", edge.second, " is not strictly convex");
+    }
+  }
+  return absl::OkStatus();
+}
+
+// A closed surface that is locally convex is convex when a point lies below all its facets and a
+// ray from there meets it once. Coordinates are multiplied by the number of vertices, so that their
+// mean is an integer.
+absl::Status CheckGlobalConvexity(const std::vector<IntegerVector>& v, const Hull& hull) {
+  const Integer count = v.size();
+  IntegerVector mean = {0, 0, 0};
+  for (const IntegerVector& p : v) mean = mean + p;
+  const auto from_mean = [&](uint32_t u) { return count * v[u] - mean; };
+
+  IntegerVector ray = {0, 0, 0};
+  for (const uint32_t u : hull.facet(0)) ray = ray + from_mean(u);
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    const std::span<const uint32_t> facet = hull.facet(f);
+    if (Sign(Dot(NormalOf(v, facet), from_mean(facet[0]))) <= 0) {
+      return Finding("the mean of the vertices is not below facet ", f);
+    }
+    bool pierced = true;
+    for (size_t i = 0; i < facet.size() && pierced; ++i) {
+      const IntegerVector side =
+          Cross(from_mean(facet[i]), from_mean(facet[(i + 1) % facet.size()]));
+      pierced = Sign(Dot(side, ray)) >= 0;
+    }
+    if (pierced != (f == 0)) return Finding("a ray from inside meets facets 0 and ", f);
+  }
+  return absl::OkStatus();
+}
+
+absl::Status AuditSolid(const std::vector<IntegerVector>& v, const Hull& hull) {
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    if (absl::Status s = CheckFacet(v, hull.facet(f), f); !s.ok()) return s;
+    if (f > 0 && !std::lexicographical_compare(hull.facet(f - 1).begin(), hull.facet(f - 1).end(),
+                                               hull.facet(f).begin(), hull.facet(f).end())) {
+      return Finding("facets ", f - 1, " and ", f, " are out of order");
+    }
+  }
+  if (hull.facet_count() < 4) return Finding("a solid has at least four facets");
+  const absl::StatusOr<FacetByEdge> left = CheckManifold(hull);
+  if (!left.ok()) return left.status();
+  if (absl::Status s = CheckConnected(hull, *left); !s.ok()) return s;
+  if (absl::Status s = CheckLocalConvexity(v, hull, *left); !s.ok()) return s;
+  return CheckGlobalConvexity(v, hull);
+}
+
+absl::Status AuditPolygon(const std::vector<IntegerVector>& v, const Hull& hull) {
+  if (hull.facet_count() != 1 || hull.facet(0).size() != v.size()) {
+    return Finding("a polygon has one facet, with all vertices");
+  }
+  const std::span<const uint32_t> facet = hull.facet(0);
+  if (absl::Status s = CheckFacet(v, facet, 0); !s.ok()) return s;
+  if (facet[1] > facet.back()) return Finding("the polygon is not the canonical way round");
+  std::vector<Edge> edges;
+  for (size_t i = 0; i < facet.size(); ++i) {
+    const auto [low, high] = std::minmax(facet[i], facet[(i + 1) % facet.size()]);
+    edges.push_back({low, high});
+  }
+  std::sort(edges.begin(), edges.end());
+  if (!std::equal(edges.begin(), edges.end(), hull.edges().begin(), hull.edges().end())) {
+    return Finding("the edges are not those of the polygon, sorted");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status AuditEnds(const Hull& hull) {
+  const size_t expected = static_cast<size_t>(hull.dimension() + 1);
+  if (hull.vertices().size() != expected) return Finding("wrong number of vertices");
+  if (hull.facet_count() != 0) return Finding("facets on a hull of dimension below 2");
+  if (hull.edges().size() != (expected == 2 ? 1u : 0u)) return Finding("wrong number of edges");
+  if (expected == 2 && hull.edges()[0] != Edge{0, 1}) return Finding("the edge is not 0-1");
+  return absl::OkStatus();
+}
+
+// Whether the point is surely below the facet: by doubles, with a generous bound; false when that
+// is not certain.
+class FacetFilter {
+ public:
+  FacetFilter(const IntegerVector& normal, const Vector& origin)
+      : normal_(ToScaledDoubles(normal)), origin_(origin) {}
+  bool IsSurelyBelow(const Vector& point) const {
+    const Vector offset = point - origin_;
+    const double size = offset.cwiseAbs().sum();
+    // The normal errs by 2^-52 relative to its largest component (below 2^63), offset and dot
+    // product by a few 2^-53.
+    return size > 1e-280 && normal_.dot(offset) < -0x1p-48 * 0x1p63 * size;
+  }
+
+ private:
+  Vector normal_;
+  Vector origin_;
+};
+
+absl::Status SolidContainment(const IntegerPoints& v, const Hull& hull,
+                              std::span<const Vector> points) {
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    const std::span<const uint32_t> facet = hull.facet(f);
+    const IntegerVector normal = NormalOf(v.points, facet);
+    const FacetFilter filter(normal, hull.vertices()[facet[0]]);
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (filter.IsSurelyBelow(points[i])) continue;
+      const IntegerVector p = ToInteger(points[i], v.exponent);
+      if (Sign(Dot(normal, p - v.points[facet[0]])) > 0) {
+        return Finding("points[", i, "] is outside facet ", f);
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+bool PolygonContains(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet,
+                     const IntegerVector& p) {
+  const IntegerVector normal = NormalOf(v, facet);
+  if (Sign(Dot(normal, p - v[facet[0]])) != 0) return false;
+  for (size_t i = 0; i < facet.size(); ++i) {
+    const IntegerVector& a = v[facet[i]];
+    const IntegerVector& b = v[facet[(i + 1) % facet.size()]];
+    if (Sign(Dot(normal, Cross(b - a, p - a))) < 0) return false;
+  }
+  return true;
+}
+
+bool SegmentContains(const IntegerVector& a, const IntegerVector& b, const IntegerVector& p) {
+  const IntegerVector u = b - a;
+  return IsZero(Cross(u, p - a)) && Sign(Dot(u, p - a)) >= 0 && Sign(Dot(u, b - p)) >= 0;
+}
+
+bool FlatContains(const std::vector<IntegerVector>& v, const Hull& hull, const IntegerVector& p) {
+  switch (hull.dimension()) {
+    case 2:
+      return PolygonContains(v, hull.facet(0), p);
+    case 1:
+      return SegmentContains(v[0], v[1], p);
+    case 0:
+      return v[0] == p;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+absl::Status AuditHull(const Hull& hull) {
+  if (absl::Status s = CheckVertices(hull); !s.ok()) return s;
+  if (hull.dimension() < 2) return AuditEnds(hull);
+  const IntegerPoints v = ToIntegers(hull.vertices());
+  return hull.dimension() == 2 ? AuditPolygon(v.points, hull) : AuditSolid(v.points, hull);
+}
+
+absl::Status AuditContainment(const Hull& hull, std::span<const Vector> points) {
+  const IntegerPoints v = ToIntegers(hull.vertices(), points);
+  if (hull.dimension() == 3) return SolidContainment(v, hull, points);
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!FlatContains(v.points, hull, ToInteger(points[i], v.exponent))) {
+      return Finding("points[", i, "] is outside");
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace hulld

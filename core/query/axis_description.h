@@ -1,0 +1,21 @@
+#ifndef HULLD_CORE_QUERY_AXIS_DESCRIPTION_H_
+#define HULLD_CORE_QUERY_AXIS_DESCRIPTION_H_
+
+#include "core/numeric/integer.h"
+#include "core/query/collision.h"
+#include "core/query/exact_pair.h"
+
+namespace hulld {
+
+// Names an axis n (world frame, n.(a - b) <= 0 throughout, not zero): its direction rounded to unit
+// length, the features of A and B that it supports, exactly, and its kind by these: the normal of a
+// whole facet (of A first), the cross product of two edges, else FLAT when A - B is flat, else
+// GENERAL. Cost: O(V) and a scan of the facets.
+SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n);
+
+// n rounded to unit length.
+Vector UnitDirection(const IntegerVector& n);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_AXIS_DESCRIPTION_H_

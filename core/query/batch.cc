@@ -1,0 +1,29 @@
+#include "core/query/batch.h"
+
+#include <absl/status/status.h>
+
+#include <algorithm>
+
+namespace hulld {
+
+std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
+                                                    std::span<const PlacedPair> pairs,
+                                                    const QueryOptions& options, int threads) {
+  std::vector<absl::StatusOr<Answer>> answers(pairs.size(), absl::CancelledError("stopped"));
+  QueryOptions each = options;
+  each.threads = 1;
+  const auto count = static_cast<int64_t>(pairs.size());
+  // Pairs differ in cost by orders of magnitude, hence small pieces handed out as threads come
+  // free.
+  constexpr int kPairsPerPiece = 16;
+#pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
+  for (int64_t i = 0; i < count; ++i) {
+    if (each.should_stop && each.should_stop()) continue;
+    const PlacedHull& a = placements[pairs[i].a];
+    const PlacedHull& b = placements[pairs[i].b];
+    answers[i] = CheckCollision(*a.hull, a.X_WH, *b.hull, b.X_WH, each);
+  }
+  return answers;
+}
+
+}  // namespace hulld

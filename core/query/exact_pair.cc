@@ -1,0 +1,133 @@
+#include "core/query/exact_pair.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace hulld {
+namespace {
+
+// Above the exponent of any double's lowest bit.
+constexpr int kAboveAllExponents = 1024;
+
+// A quaternion as integers without common power of two, its homogeneous matrix and squared norm.
+struct IntegerRotation {
+  IntegerVector rows[3];
+  Integer norm_squared;
+};
+
+IntegerRotation RotationOf(const std::array<double, 4>& q) {
+  int exponent = kAboveAllExponents;
+  for (const double component : q) {
+    if (component != 0) exponent = std::min(exponent, LowestBitExponent(component));
+  }
+  const Integer w = ToInteger(q[0], exponent);
+  const Integer x = ToInteger(q[1], exponent);
+  const Integer y = ToInteger(q[2], exponent);
+  const Integer z = ToInteger(q[3], exponent);
+  const Integer ww = w * w;
+  const Integer xx = x * x;
+  const Integer yy = y * y;
+  const Integer zz = z * z;
+  const Integer wx = 2 * (w * x);
+  const Integer wy = 2 * (w * y);
+  const Integer wz = 2 * (w * z);
+  const Integer xy = 2 * (x * y);
+  const Integer xz = 2 * (x * z);
+  const Integer yz = 2 * (y * z);
+  return {{{ww + xx - yy - zz, xy - wz, xz + wy},
+           {xy + wz, ww - xx + yy - zz, yz - wx},
+           {xz - wy, yz + wx, ww - xx - yy + zz}},
+          ww + xx + yy + zz};
+}
+
+int ExponentOf(const Hull& hull) {
+  int exponent = kAboveAllExponents;
+  for (const Vector& v : hull.vertices()) exponent = LowestBitExponent(v, exponent);
+  return exponent;
+}
+
+}  // namespace
+
+ExactPair::ExactPair(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+                     const FloatPair& filter)
+    : filter_(&filter) {
+  const IntegerRotation R_A = RotationOf(X_WA.q);
+  const IntegerRotation R_B = RotationOf(X_WB.q);
+  a_ = {&a, ExponentOf(a), {}, {}, {}};
+  b_ = {&b, ExponentOf(b), {}, {}, {}};
+  const int shift_exponent =
+      LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents));
+  const int common = std::min({a_.exponent, b_.exponent, shift_exponent});
+  for (int i = 0; i < 3; ++i) {
+    a_.rows[i] = (R_B.norm_squared << (a_.exponent - common)) * R_A.rows[i];
+    b_.rows[i] = (R_A.norm_squared << (b_.exponent - common)) * R_B.rows[i];
+  }
+  a_.shift = {0, 0, 0};
+  b_.shift =
+      R_A.norm_squared * R_B.norm_squared * (ToInteger(X_WB.t, common) - ToInteger(X_WA.t, common));
+}
+
+IntegerVector ExactPair::ToWorld(const Side& side, const IntegerVector& own) {
+  return {Dot(side.rows[0], own), Dot(side.rows[1], own), Dot(side.rows[2], own)};
+}
+
+const IntegerVector& ExactPair::Vertex(Side& side, uint32_t i) {
+  if (const auto found = side.vertices.find(i); found != side.vertices.end()) return found->second;
+  const IntegerVector own = ToInteger(side.hull->vertices()[i], side.exponent);
+  return side.vertices.emplace(i, ToWorld(side, own) + side.shift).first->second;
+}
+
+void ExactPair::CacheAllVertices() {
+  for (uint32_t i = 0; i < a().vertices().size(); ++i) VertexA(i);
+  for (uint32_t i = 0; i < b().vertices().size(); ++i) VertexB(i);
+}
+
+std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
+  std::vector<uint32_t> all(side.hull->vertices().size());
+  std::iota(all.begin(), all.end(), 0u);
+  return all;
+}
+
+std::vector<uint32_t> ExactPair::Farthest(Side& side, const std::vector<uint32_t>& candidates,
+                                          const IntegerVector& n) {
+  std::vector<uint32_t> farthest;
+  Integer best;
+  for (const uint32_t i : candidates) {
+    const Integer value = Dot(n, Vertex(side, i));
+    if (!farthest.empty() && value < best) continue;
+    if (farthest.empty() || value > best) {
+      farthest.clear();
+      best = value;
+    }
+    farthest.push_back(i);
+  }
+  return farthest;
+}
+
+std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n) {
+  if (!filter_->usable() || IsZero(n)) return Farthest(a_, AllOf(a_), n);
+  return Farthest(a_, filter_->CandidatesA(ToScaledDoubles(n)), n);
+}
+
+std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n) {
+  if (!filter_->usable() || IsZero(n)) return Farthest(b_, AllOf(b_), -n);
+  return Farthest(b_, filter_->CandidatesB(ToScaledDoubles(n)), -n);
+}
+
+uint32_t ExactPair::FarthestA(const IntegerVector& n) { return FeatureA(n).front(); }
+
+uint32_t ExactPair::FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
+
+IntegerVector ExactPair::SumOfVertices(const Side& side) {
+  IntegerVector own = {0, 0, 0};
+  for (const Vector& v : side.hull->vertices()) own = own + ToInteger(v, side.exponent);
+  return ToWorld(side, own) + Integer(side.hull->vertices().size()) * side.shift;
+}
+
+IntegerVector ExactPair::CenterDifference() const {
+  return Integer(b().vertices().size()) * SumOfVertices(a_) -
+         Integer(a().vertices().size()) * SumOfVertices(b_);
+}
+
+}  // namespace hulld

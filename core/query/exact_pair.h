@@ -1,0 +1,76 @@
+#ifndef HULLD_CORE_QUERY_EXACT_PAIR_H_
+#define HULLD_CORE_QUERY_EXACT_PAIR_H_
+
+#include <cstdint>
+#include <functional>
+#include <unordered_map>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/numeric/integer.h"
+#include "core/query/float_pair.h"
+#include "core/query/pose.h"
+
+namespace hulld {
+
+// A pair of posed hulls in integers, exactly.
+//
+// With Q the quaternions' integers and N = |Q|^2, the world coordinates, shifted by -t_A and
+// multiplied by N_A N_B and a power of two, are integers: N_B R(Q_A) P_A for A, and N_A R(Q_B) P_B
+// + N_A N_B (T_B - T_A) for B. Degree 5 in the input; some 280 bits at a common exponent. The
+// floating-point pair, where it is usable, narrows down which vertices can be farthest, so that
+// only these are multiplied out.
+class ExactPair {
+ public:
+  // `filter` must outlive the pair and describe the same hulls and poses. Requires both hulls not
+  // empty.
+  ExactPair(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+            const FloatPair& filter);
+
+  const Hull& a() const { return *a_.hull; }
+  const Hull& b() const { return *b_.hull; }
+
+  const IntegerVector& VertexA(uint32_t i) { return Vertex(a_, i); }
+  const IntegerVector& VertexB(uint32_t i) { return Vertex(b_, i); }
+  // Multiplies out every vertex: from then on all functions may be called by several threads at
+  // once.
+  void CacheAllVertices();
+
+  // The vertices of A farthest along n, ascending.
+  std::vector<uint32_t> FeatureA(const IntegerVector& n);
+  // The vertices of B farthest against n, ascending.
+  std::vector<uint32_t> FeatureB(const IntegerVector& n);
+  // The lowest of them.
+  uint32_t FarthestA(const IntegerVector& n);
+  uint32_t FarthestB(const IntegerVector& n);
+
+  // A positive multiple of a point in the relative interior of A - B: the difference of the means
+  // of the vertices.
+  IntegerVector CenterDifference() const;
+
+ private:
+  struct Side {
+    const Hull* hull;
+    // Exponent of the integers that stand for the hull's own coordinates.
+    int exponent;
+    // world = matrix * own + shift.
+    IntegerVector rows[3];
+    IntegerVector shift;
+    std::unordered_map<uint32_t, IntegerVector> vertices;
+  };
+
+  static IntegerVector ToWorld(const Side& side, const IntegerVector& own);
+  static const IntegerVector& Vertex(Side& side, uint32_t i);
+  static IntegerVector SumOfVertices(const Side& side);
+  static std::vector<uint32_t> Farthest(Side& side, const std::vector<uint32_t>& candidates,
+                                        const IntegerVector& n);
+  std::vector<uint32_t> AllOf(const Side& side) const;
+
+  const FloatPair* filter_;
+  Side a_;
+  Side b_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_EXACT_PAIR_H_

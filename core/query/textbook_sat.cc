@@ -1,0 +1,292 @@
+#include "core/query/textbook_sat.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/integer.h"
+#include "core/query/axis_description.h"
+#include "core/query/exact_pair.h"
+#include "core/query/exact_search.h"
+#include "core/query/float_pair.h"
+
+namespace hulld {
+namespace {
+
+// Axes between two looks at should_stop.
+constexpr uint64_t kAxesPerPoll = 64;
+constexpr uint64_t kNone = UINT64_MAX;
+
+// What one axis shows.
+enum class Gap { kOverlap, kZero, kSeparated };
+
+// A normal in floating point; each component within `error` of the exact one.
+struct FloatNormal {
+  Vector n;
+  double error;
+};
+
+// The candidate axes of a pair, by index. After construction all functions may be called by several
+// threads at once.
+class AxisTable {
+ public:
+  AxisTable(ExactPair& exact, const FloatPair& filter)
+      : exact_(exact),
+        filter_(filter),
+        facets_a_(exact.a().facet_count()),
+        facets_b_(exact.b().facet_count()),
+        edges_b_(exact.b().edges().size()),
+        edge_pairs_(exact.a().edges().size() * edges_b_) {
+    exact_.CacheAllVertices();
+    AppendFlatAxes();
+    for (uint32_t i = 0; i < exact_.a().vertices().size(); ++i) {
+      positions_a_.push_back(filter_.PositionA(i));
+    }
+    for (uint32_t i = 0; i < exact_.b().vertices().size(); ++i) {
+      positions_b_.push_back(filter_.PositionB(i));
+    }
+  }
+
+  uint64_t size() const { return facets_a_ + facets_b_ + edge_pairs_ + flat_axes_.size(); }
+
+  AxisKind KindOf(uint64_t axis) const {
+    if (axis < facets_a_) return AxisKind::kFacetA;
+    if (axis < facets_a_ + facets_b_) return AxisKind::kFacetB;
+    if (axis < facets_a_ + facets_b_ + edge_pairs_) return AxisKind::kEdgeEdge;
+    return AxisKind::kFlat;
+  }
+
+  Gap Test(uint64_t axis) {
+    if (filter_.usable() && KindOf(axis) != AxisKind::kFlat) {
+      const FloatNormal normal = Filtered(axis);
+      const double gap = FloatGap(normal.n);
+      const double d = kMinkowskiErrorFactor * filter_.size();
+      const double bound = kGapNormalFactor * normal.error * filter_.size() +
+                           kGapPositionFactor * normal.n.cwiseAbs().maxCoeff() * d;
+      // Written so that a bound that underflowed to zero, or a NaN, is never certain.
+      if (bound > kLeastBound && gap > bound) return Gap::kSeparated;
+      if (bound > kLeastBound && gap < -bound) return Gap::kOverlap;
+    }
+    return ExactGap(Exact(axis));
+  }
+
+  // The exact axis, turned so that it points from A towards B. Requires a gap of at least zero.
+  IntegerVector Oriented(uint64_t axis) {
+    const IntegerVector n = Exact(axis);
+    return SignOfGap(n) >= 0 ? n : -n;
+  }
+
+ private:
+  // Far above the underflow threshold, so that the bound itself is accurate.
+  static constexpr double kLeastBound = 0x1p-900;
+
+  // Facet corners, or the ends of an edge of A and of an edge of B.
+  std::pair<Edge, Edge> EdgePair(uint64_t axis) const {
+    const uint64_t pair = axis - facets_a_ - facets_b_;
+    return {exact_.a().edges()[pair / edges_b_], exact_.b().edges()[pair % edges_b_]};
+  }
+
+  FloatNormal Filtered(uint64_t axis) const {
+    Vector e;
+    Vector f;
+    const auto use_facet = [&](std::span<const uint32_t> facet, const std::vector<Vector>& v) {
+      e = v[facet[1]] - v[facet[0]];
+      f = v[facet[2]] - v[facet[0]];
+    };
+    if (axis < facets_a_) {
+      use_facet(exact_.a().facet(axis), positions_a_);
+    } else if (axis < facets_a_ + facets_b_) {
+      use_facet(exact_.b().facet(axis - facets_a_), positions_b_);
+    } else {
+      const auto [edge_a, edge_b] = EdgePair(axis);
+      e = positions_a_[edge_a.head] - positions_a_[edge_a.tail];
+      f = positions_b_[edge_b.head] - positions_b_[edge_b.tail];
+    }
+    const double d = kMinkowskiErrorFactor * filter_.size();
+    const double sizes = e.cwiseAbs().maxCoeff() + f.cwiseAbs().maxCoeff();
+    return {e.cross(f), kNormalErrorFactor * d * (sizes + 3 * d)};
+  }
+
+  IntegerVector Exact(uint64_t axis) {
+    if (axis < facets_a_) {
+      const std::span<const uint32_t> facet = exact_.a().facet(axis);
+      return Cross(exact_.VertexA(facet[1]) - exact_.VertexA(facet[0]),
+                   exact_.VertexA(facet[2]) - exact_.VertexA(facet[0]));
+    }
+    if (axis < facets_a_ + facets_b_) {
+      const std::span<const uint32_t> facet = exact_.b().facet(axis - facets_a_);
+      return Cross(exact_.VertexB(facet[1]) - exact_.VertexB(facet[0]),
+                   exact_.VertexB(facet[2]) - exact_.VertexB(facet[0]));
+    }
+    if (axis < facets_a_ + facets_b_ + edge_pairs_) {
+      const auto [edge_a, edge_b] = EdgePair(axis);
+      return Cross(exact_.VertexA(edge_a.head) - exact_.VertexA(edge_a.tail),
+                   exact_.VertexB(edge_b.head) - exact_.VertexB(edge_b.tail));
+    }
+    return flat_axes_[axis - facets_a_ - facets_b_ - edge_pairs_];
+  }
+
+  // The distance between the intervals times |n|; negative when they overlap.
+  double FloatGap(const Vector& n) const {
+    const auto range = [&n](const std::vector<Vector>& positions) {
+      double low = INFINITY;
+      double high = -INFINITY;
+      for (const Vector& p : positions) {
+        const double value = n.dot(p);
+        low = std::min(low, value);
+        high = std::max(high, value);
+      }
+      return std::pair(low, high);
+    };
+    const auto [low_a, high_a] = range(positions_a_);
+    const auto [low_b, high_b] = range(positions_b_);
+    return std::max(low_b - high_a, low_a - high_b);
+  }
+
+  // Sign of min n.B - max n.A.
+  int SignOfGap(const IntegerVector& n) {
+    return Sign(Dot(n, exact_.VertexB(exact_.FarthestB(n)) - exact_.VertexA(exact_.FarthestA(n))));
+  }
+
+  // Parallel edges have no axis.
+  Gap ExactGap(const IntegerVector& n) {
+    if (IsZero(n)) return Gap::kOverlap;
+    const int sign = std::max(SignOfGap(n), SignOfGap(-n));
+    return sign > 0 ? Gap::kSeparated : sign == 0 ? Gap::kZero : Gap::kOverlap;
+  }
+
+  void AppendFlatAxes() {
+    const MinkowskiSpan span = SpanOf(exact_);
+    if (span.dimension == 3) return;
+    if (span.dimension == 2) {
+      flat_axes_.push_back(span.direction);
+      for (const Edge& e : exact_.a().edges()) {
+        flat_axes_.push_back(
+            Cross(span.direction, exact_.VertexA(e.head) - exact_.VertexA(e.tail)));
+      }
+      for (const Edge& e : exact_.b().edges()) {
+        flat_axes_.push_back(
+            Cross(span.direction, exact_.VertexB(e.head) - exact_.VertexB(e.tail)));
+      }
+      return;
+    }
+    if (span.dimension == 1) {
+      const IntegerVector across = AnyPerpendicular(span.direction);
+      flat_axes_.push_back(across);
+      flat_axes_.push_back(Cross(span.direction, across));
+      flat_axes_.push_back(span.direction);
+      return;
+    }
+    for (int i = 0; i < 3; ++i) {
+      IntegerVector unit = {0, 0, 0};
+      unit[i] = 1;
+      flat_axes_.push_back(unit);
+    }
+  }
+
+  ExactPair& exact_;
+  const FloatPair& filter_;
+  uint64_t facets_a_;
+  uint64_t facets_b_;
+  uint64_t edges_b_;
+  uint64_t edge_pairs_;
+  std::vector<IntegerVector> flat_axes_;
+  std::vector<Vector> positions_a_;
+  std::vector<Vector> positions_b_;
+};
+
+void LowerTo(std::atomic<uint64_t>& lowest, uint64_t value) {
+  uint64_t seen = lowest.load(std::memory_order_relaxed);
+  while (value < seen && !lowest.compare_exchange_weak(seen, value, std::memory_order_relaxed)) {
+  }
+}
+
+// The lowest axes that separate and that show a zero gap; axes beyond a separating one are skipped,
+// which hides none lower.
+struct Scan {
+  std::atomic<uint64_t> separated = kNone;
+  std::atomic<uint64_t> zero = kNone;
+  std::atomic<bool> stopped = false;
+
+  void Run(AxisTable& axes, const QueryOptions& options) {
+    const auto blocks = static_cast<int64_t>((axes.size() + kAxesPerPoll - 1) / kAxesPerPoll);
+#pragma omp parallel for schedule(dynamic) \
+    num_threads(std::max(1, options.threads)) if (options.threads > 1)
+    for (int64_t block = 0; block < blocks; ++block) {
+      if (stopped.load(std::memory_order_relaxed)) continue;
+      const uint64_t first = static_cast<uint64_t>(block) * kAxesPerPoll;
+      if (first > separated.load(std::memory_order_relaxed)) continue;
+      if (options.should_stop && options.should_stop()) {
+        stopped = true;
+        continue;
+      }
+      RunBlock(axes, first, std::min(first + kAxesPerPoll, axes.size()));
+    }
+  }
+
+  void RunBlock(AxisTable& axes, uint64_t first, uint64_t end) {
+    for (uint64_t axis = first; axis < end; ++axis) {
+      const Gap gap = axes.Test(axis);
+      if (gap == Gap::kZero) LowerTo(zero, axis);
+      if (gap == Gap::kSeparated) {
+        LowerTo(separated, axis);
+        return;
+      }
+    }
+  }
+};
+
+uint64_t CountAxes(const Hull& a, const Hull& b) {
+  // Flat differences add at most 3 + E_A + E_B, far below any limit's grain; they are counted where
+  // they occur.
+  return a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
+}
+
+}  // namespace
+
+absl::StatusOr<Answer> TextbookSat(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+                                   const QueryOptions& options) {
+  if (const uint64_t count = CountAxes(a, b); count > options.max_textbook_axes) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "textbook SAT would test ", count, " axes; the limit is ", options.max_textbook_axes));
+  }
+  const FloatPair filter(a, X_WA, b, X_WB);
+  ExactPair exact(a, X_WA, b, X_WB, filter);
+  AxisTable axes(exact, filter);
+  Scan scan;
+  scan.Run(axes, options);
+  if (scan.stopped) return absl::CancelledError("stopped in textbook SAT");
+
+  Answer answer;
+  answer.rung = Rung::kExact;
+  answer.analysis.axes_total = axes.size();
+  answer.analysis.axes_tested = axes.size();
+  uint64_t found = kNone;
+  if (scan.separated != kNone) {
+    answer.relation = Relation::kSeparated;
+    found = scan.separated;
+    answer.analysis.axes_tested = found + 1;
+  } else if (scan.zero != kNone) {
+    answer.relation = Relation::kTouching;
+    found = scan.zero;
+  } else {
+    answer.relation = Relation::kOverlapping;
+  }
+  if (found == kNone) return answer;
+  answer.analysis.stage = axes.KindOf(found);
+  answer.analysis.axis_index = found;
+  if (options.want_axis) {
+    answer.axis = DescribeAxis(exact, axes.Oriented(found));
+    answer.axis->kind = axes.KindOf(found);
+  }
+  return answer;
+}
+
+}  // namespace hulld
