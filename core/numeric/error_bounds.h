@@ -50,11 +50,11 @@ inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 inline constexpr double kMinkowskiErrorFactor = 128 * kUnitRoundoff;
 
 // A support value n . w over all w: the direction turned into a hull's frame errs by at most 3 * 16
-// u |n| + 9 u |n| = 57 u |n| per component, hence the dot product by at most 3 * 57 u |n| M + 9 u
-// |n| M = 180 u |n| M; the translation's part errs by at most 16 u |n| |t|, the final sums by at
-// most 4 u * 3 |n| S. In total below 200 u |n| S, |n| the largest component of n; 512 u leaves
-// slack for a direction that itself errs by up to 64 u |n| per component (3 * 64 u |n| S more).
-// Proven.
+// u |n| + 9 u |n| = 57 u |n| per component (|n| the largest component of n), hence the dot product
+// by at most 3 * 57 u |n| M, and its own rounding by 3 u * 3 sqrt(3) |n| M < 16 u |n| M: 187 u |n|
+// M in all. The translation's part errs by at most 12 u |n| |t|, the final sums by at most 11 u |n|
+// S. In total below 200 u |n| S; 512 u leaves room for a direction that itself errs by up to 16 u
+// |n| per component (sqrt(3) * 16 * 3 u |n| M < 84 u |n| M more). Proven.
 inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 
 // det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most d =

@@ -1,6 +1,8 @@
 #ifndef HULLD_CORE_NUMERIC_VECTOR_ALGEBRA_H_
 #define HULLD_CORE_NUMERIC_VECTOR_ALGEBRA_H_
 
+#include <Eigen/Geometry>
+
 #include "core/hull/hull.h"
 
 namespace hulld {

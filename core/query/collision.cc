@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <compare>
 #include <utility>
 
 #include "core/query/axis_description.h"

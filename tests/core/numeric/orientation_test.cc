@@ -1,0 +1,146 @@
+#include "core/numeric/orientation.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/multiprecision/cpp_int.hpp>
+#include <cmath>
+#include <random>
+
+namespace hulld {
+namespace {
+
+using Rational = boost::multiprecision::cpp_rational;
+using Points = std::array<Vector, 4>;
+
+// By rationals, expanded along the last row: a formula unlike the one under test.
+int RationalOrient3d(const Points& p) {
+  Rational m[3][3];
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) m[i][k] = Rational(p[i][k]) - Rational(p[3][k]);
+  }
+  const Rational det = m[2][0] * (m[0][1] * m[1][2] - m[0][2] * m[1][1]) -
+                       m[2][1] * (m[0][0] * m[1][2] - m[0][2] * m[1][0]) +
+                       m[2][2] * (m[0][0] * m[1][1] - m[0][1] * m[1][0]);
+  // det[a-d, b-d, c-d] = -det[b-a, c-a, d-a].
+  return -det.sign();
+}
+
+int Sign(const Points& p) { return Orient3d(p[0], p[1], p[2], p[3]); }
+
+// The sign is exact and obeys the laws of a determinant.
+void ExpectExact(const Points& p) {
+  const int sign = RationalOrient3d(p);
+  ASSERT_EQ(Sign(p), sign) << p[0].transpose() << " / " << p[1].transpose() << " / "
+                           << p[2].transpose() << " / " << p[3].transpose();
+  ASSERT_EQ(Sign({p[1], p[0], p[2], p[3]}), -sign);
+  ASSERT_EQ(Sign({p[0], p[1], p[3], p[2]}), -sign);
+  ASSERT_EQ(Sign({p[1], p[2], p[0], p[3]}), sign);
+}
+
+TEST(Orient3d, PositiveOnTheSideOfTheNormal) {
+  const Vector a(0, 0, 0);
+  const Vector b(1, 0, 0);
+  const Vector c(0, 1, 0);
+  EXPECT_EQ(Orient3d(a, b, c, Vector(0.3, 0.3, 1)), 1);
+  EXPECT_EQ(Orient3d(a, b, c, Vector(0.3, 0.3, -1)), -1);
+  EXPECT_EQ(Orient3d(a, b, c, Vector(7, -9, 0)), 0);
+}
+
+TEST(Orient3d, ExactOnSmallLattices) {
+  std::mt19937_64 random(3);
+  std::uniform_int_distribution<int> coordinate(-2, 2);
+  int zero = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Points p;
+    for (Vector& v : p) v = Vector(coordinate(random), coordinate(random), coordinate(random));
+    ExpectExact(p);
+    zero += Sign(p) == 0;
+  }
+  EXPECT_GT(zero, 1000);
+}
+
+TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const OrientationCounts before = ThreadOrientationCounts();
+  for (const int scale : {-1070, -1000, -700, -320, -300, -100, 0, 100, 320, 340, 700, 1000}) {
+    for (int i = 0; i < 300; ++i) {
+      Points p;
+      for (int k = 0; k < 3; ++k) {
+        p[k] = Vector(unit(random), unit(random), unit(random));
+      }
+      // Rounded, hence nearly in the plane of the others.
+      const double s = unit(random);
+      const double t = unit(random);
+      p[3] = p[0] + s * (p[1] - p[0]) + t * (p[2] - p[0]);
+      for (Vector& v : p) {
+        for (int k = 0; k < 3; ++k) v[k] = std::ldexp(v[k], scale);
+      }
+      ExpectExact(p);
+    }
+  }
+  const OrientationCounts after = ThreadOrientationCounts();
+  EXPECT_GT(after.filter - before.filter, 100u);
+  EXPECT_GT(after.expansion - before.expansion, 1000u);
+  EXPECT_GT(after.integer - before.integer, 1000u);
+}
+
+TEST(Orient3d, ExactOnMixedMagnitudes) {
+  std::mt19937_64 random(5);
+  const double values[] = {0,     1e-310,   -1e-310, 5e-324,   -5e-324, 1e-300,   -1e-160,
+                           1e-30, -1,       1,       1e16,     -1e16,   1e150,    -1e300,
+                           1e308, -1.7e308, 1.7e308, 0x1p-306, 0x1p330, -0x1p-307};
+  std::uniform_int_distribution<size_t> pick(0, std::size(values) - 1);
+  for (int i = 0; i < 5000; ++i) {
+    Points p;
+    for (Vector& v : p)
+      v = Vector(values[pick(random)], values[pick(random)], values[pick(random)]);
+    ExpectExact(p);
+  }
+}
+
+int RationalOrient2d(const Vector& a, const Vector& b, const Vector& c, CoordinatePlane plane) {
+  const auto d = [&](const Vector& p, int k) { return Rational(p[k]) - Rational(c[k]); };
+  return Rational(d(a, plane.first) * d(b, plane.second) - d(a, plane.second) * d(b, plane.first))
+      .sign();
+}
+
+TEST(Orient2d, ExactInEveryPlaneAtEveryScale) {
+  std::mt19937_64 random(6);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const int scale : {-1073, -1060, -600, -540, 0, 400, 600, 1000}) {
+    for (int i = 0; i < 500; ++i) {
+      Vector a(unit(random), unit(random), unit(random));
+      Vector b(unit(random), unit(random), unit(random));
+      Vector c = a + unit(random) * (b - a);
+      for (Vector* v : {&a, &b, &c}) {
+        for (int k = 0; k < 3; ++k) (*v)[k] = std::ldexp((*v)[k], scale);
+      }
+      for (const CoordinatePlane plane : {CoordinatePlane{0, 1}, {1, 2}, {2, 0}}) {
+        ASSERT_EQ(Orient2d(a, b, c, plane), RationalOrient2d(a, b, c, plane));
+      }
+    }
+  }
+}
+
+TEST(Orient2d, OverflowAndUnderflowAreExact) {
+  const Vector big(1.7e308, -1.7e308, 0);
+  EXPECT_EQ(Orient2d(-big, big, Vector(0, 5e-324, 0), {0, 1}), 1);
+  EXPECT_EQ(Orient2d(-big, big, Vector(0, 0, 0), {0, 1}), 0);
+  EXPECT_EQ(Orient2d(Vector(0, 0, 0), Vector(5e-324, 0, 0), Vector(0, 5e-324, 0), {0, 1}), 1);
+}
+
+TEST(ProjectionOf, FindsAPlaneUnlessCollinear) {
+  EXPECT_LT(ProjectionOf(Vector(0, 0, 0), Vector(1, 2, 3), Vector(3, 6, 9)).first, 0);
+  const Vector a(0, 0, 0);
+  const Vector b(0, 0, 1);
+  const Vector c(0, 1, 0);
+  const CoordinatePlane plane = ProjectionOf(a, b, c);
+  ASSERT_GE(plane.first, 0);
+  EXPECT_NE(Orient2d(a, b, c, plane), 0);
+}
+
+}  // namespace
+}  // namespace hulld
