@@ -55,7 +55,7 @@ TEST(Expansion, SumsAndProductsAreExactAndNonoverlapping) {
     const Rational f_exact = (Rational(x[4]) - Rational(x[5])) * (Rational(x[6]) - Rational(x[7]));
     ASSERT_EQ(ValueOf(e), e_exact);
     ASSERT_EQ(ValueOf(e - f), e_exact - f_exact);
-    ASSERT_EQ((e - f).sign(), (e_exact - f_exact).sign());
+    ASSERT_EQ((e - f).sign(), Rational(e_exact - f_exact).sign());
     ExpectNonoverlapping(e - f);
     const auto cubic = (e - f) * Expansion<2>::DifferenceOf(x[0], x[7]);
     ASSERT_EQ(ValueOf(cubic), (e_exact - f_exact) * (Rational(x[0]) - Rational(x[7])));
