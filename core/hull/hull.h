@@ -1,16 +1,14 @@
 #ifndef HULLD_CORE_HULL_HULL_H_
 #define HULLD_CORE_HULL_HULL_H_
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-namespace hulld {
+#include "core/numeric/vector.h"
 
-// A point or a direction: three doubles, the caller's length unit where it is a point.
-using Vector = Eigen::Vector3d;
+namespace hulld {
 
 // A segment of a hull's boundary between two facets, by vertex indices; tail < head.
 struct Edge {

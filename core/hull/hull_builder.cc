@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/hull/block_insertion.h"
 #include "core/hull/canonical_snapshot.h"
 #include "core/hull/polygon_boundary.h"
 #include "core/hull/surface.h"
@@ -24,6 +25,8 @@ namespace {
 constexpr size_t kUninterruptedPoints = 1024;
 // Points between two polls of should_stop.
 constexpr size_t kPointsPerPoll = 256;
+// From this many points on, the order of insertion is worth choosing.
+constexpr size_t kWorthOrdering = 128;
 
 absl::Status CheckFinite(std::span<const Vector> points) {
   constexpr const char* kNames[] = {"x", "y", "z"};
@@ -61,6 +64,18 @@ class HullBuilder::State {
       default:
         return surface_->Insert(vertices_, point);
     }
+  }
+
+  // Inserts all points; false when should_stop, which may be empty, said so.
+  bool InsertAll(std::span<const Vector> points, const std::function<bool()>& should_stop) {
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (surface_ && points.size() - i >= kWorthOrdering) {
+        return InsertBlock(*surface_, vertices_, points.subspan(i), should_stop);
+      }
+      if (i % kPointsPerPoll == 0 && should_stop && should_stop()) return false;
+      Insert(points[i]);
+    }
+    return true;
   }
 
   int dimension() const {
@@ -144,13 +159,9 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
   if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
 
   state_->BeginBlock();
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (may_stop && i % kPointsPerPoll == 0 && limits.should_stop()) {
-      state_ = std::move(before);
-      return absl::CancelledError("stopped while adding points; the hull is as before");
-    }
-    // Adding +0 turns -0 into +0 and changes nothing else.
-    state_->Insert(points[i] + Vector::Zero());
+  if (!state_->InsertAll(points, may_stop ? limits.should_stop : nullptr)) {
+    state_ = std::move(before);
+    return absl::CancelledError("stopped while adding points; the hull is as before");
   }
   if (vertex_count() > limits.max_vertices) {
     const size_t reached = vertex_count();

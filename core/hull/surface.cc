@@ -5,9 +5,24 @@
 #include <map>
 #include <utility>
 
+#include "core/numeric/error_bounds.h"
 #include "core/numeric/orientation.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
+namespace {
+
+// Rounds of aiming at the surface, each at a plane nearer than the last; more is not worth it.
+constexpr int kMostRounds = 64;
+
+// Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
+// many points than where it only tells where to start walking.
+int ResolutionFor(size_t triangles, bool rejects) {
+  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 12 : 96));
+  return std::clamp(static_cast<int>(cells_a_side), 2, 256);
+}
+
+}  // namespace
 
 Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex) {
   std::vector<VertexId> loop(polygon.begin(), polygon.end());
@@ -16,44 +31,89 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
     std::reverse(loop.begin(), loop.end());
   }
   const size_t n = loop.size();
-  for (size_t i = 1; i + 1 < n; ++i) AddTriangle(loop[0], loop[i], loop[i + 1]);
-  for (size_t i = 0; i < n; ++i) AddTriangle(loop[(i + 1) % n], loop[i], apex);
+  for (size_t i = 1; i + 1 < n; ++i) SetTriangle(vertices, NewId(), loop[0], loop[i], loop[i + 1]);
+  for (size_t i = 0; i < n; ++i) SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
+  alive_ = triangles_.size();
   LinkAll();
-  UpdateInterior(vertices);
+  Update(vertices);
 }
 
 void Surface::Insert(VertexTable& vertices, const Vector& point) {
-  const Location location = Locate(vertices, point);
-  last_ = location.triangle;
-  if (location.side == Side::kInside) {
-    CountIfDuplicate(vertices, location, point);
-    return;
+  const double size = SizeWith(vertices, point);
+  std::optional<Location> location;
+  size_t cell = 0;
+  if (directions_) {
+    const DirectionMap::Place place = directions_->PlaceOf(point);
+    ++asked_;
+    if (directions_->IsCertainlyInside(place)) {
+      ++rejected_;
+      return;
+    }
+    cell = place.cell;
+    location = Walk(vertices, point, size, Alive(directions_->hint(cell)));
   }
-  CollectRegion(vertices, location.triangle, point);
-  RemoveRegion(vertices);
-  JoinHorizon(vertices.Add(point));
-  if (interior_) hints_[HintCell(point)] = last_;
-  if (alive_ >= next_update_) UpdateInterior(vertices);
+  if (!location) location = Scan(vertices, point, size);
+  last_ = location->triangle;
+  if (location->side == Side::kInside) {
+    CountIfDuplicate(vertices, location->triangle, point);
+  } else {
+    CollectRegion(vertices, location->triangle, point, size);
+    RemoveVertices(vertices);
+    JoinHorizon(vertices, vertices.Add(point));
+    if (directions_) {
+      extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
+    }
+  }
+  if (directions_) directions_->SetHint(cell, last_);
+  if (alive_ >= next_update_) Update(vertices);
+}
+
+// A dead triangle's first neighbour is one that came in its place.
+TriangleId Surface::Alive(TriangleId id) const {
+  if (id >= triangles_.size()) return last_;
+  while (!IsAlive(id)) id = triangles_[id].neighbours[0];
+  return id;
+}
+
+// What a plane's slope is relative to; infinite where the bound would not hold.
+double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
+  const double size = vertices.max_abs_coordinate() + point.cwiseAbs().maxCoeff();
+  return size <= kPlaneMaxCoordinate ? size : INFINITY;
 }
 
 // +1 when the point sees the triangle from outside, 0 when it lies in its plane.
-int Surface::SideOf(const VertexTable& vertices, TriangleId id, const Vector& point) const {
-  const auto& [a, b, c] = triangles_[id].corners;
+int Surface::SideOf(const VertexTable& vertices, TriangleId id, const Vector& point,
+                    double size) const {
+  const SurfaceTriangle& t = triangles_[id];
+  const double value = t.normal.dot(point) - t.offset;
+  const double bound = static_cast<double>(t.slope) * size;
+  if (value > bound) return 1;
+  if (value < -bound) return -1;
+  const auto& [a, b, c] = t.corners;
   return Orient3d(vertices[a], vertices[b], vertices[c], point);
 }
 
-TriangleId Surface::AddTriangle(VertexId a, VertexId b, VertexId c) {
-  TriangleId id;
+void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b,
+                          VertexId c) {
+  SurfaceTriangle& t = triangles_[id];
+  const Vector e = vertices[b] - vertices[a];
+  const Vector f = vertices[c] - vertices[a];
+  t.corners = {a, b, c};
+  t.normal = Cross(e, f);
+  t.offset = t.normal.dot(vertices[a]);
+  const double slope = kPlaneErrorFactor * e.cwiseAbs().maxCoeff() * f.cwiseAbs().maxCoeff();
+  const bool in_range = slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope;
+  t.slope = in_range ? static_cast<float>(slope * (1 + 0x1p-20)) : INFINITY;
+  t.mark = 0;
+}
+
+TriangleId Surface::NewId() {
   if (free_.empty()) {
-    id = static_cast<TriangleId>(triangles_.size());
-    triangles_.push_back({});
-    region_mark_.push_back(0);
-  } else {
-    id = free_.back();
-    free_.pop_back();
+    triangles_.emplace_back();
+    return static_cast<TriangleId>(triangles_.size() - 1);
   }
-  triangles_[id].corners = {a, b, c};
-  ++alive_;
+  const TriangleId id = free_.back();
+  free_.pop_back();
   return id;
 }
 
@@ -71,51 +131,55 @@ void Surface::LinkAll() {
   }
 }
 
-Surface::Location Surface::Locate(const VertexTable& vertices, const Vector& point) {
-  if (!interior_) return Scan(vertices, point);
-  const std::optional<Location> found = Walk(vertices, point);
-  return found ? *found : Scan(vertices, point);
+// Which side of the plane through the interior point and the edge a, b the point lies on: +1 on the
+// side of a triangle to the left of the edge.
+int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
+                    const Vector& point) const {
+  const Vector& center = directions_->center();
+  const Vector y = point - center;
+  const double value = Dot(y, Cross(vertices[a] - center, vertices[b] - center));
+  const double d = std::max(extent_, y.cwiseAbs().maxCoeff());
+  if (d >= kTripleProductMin && d <= kTripleProductMax) {
+    const double bound = kTripleProductErrorFactor * d * d * d;
+    if (value > bound) return 1;
+    if (value < -bound) return -1;
+  }
+  return Orient3d(center, vertices[a], vertices[b], point);
 }
 
 // Crosses any edge whose plane through the interior point has the point on its far side, starting
 // with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
 // walk is longer than the surface warrants.
-std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point) {
-  const size_t cell = HintCell(point);
-  TriangleId at = hints_[cell];
-  if (at >= triangles_.size() || !IsAlive(at)) at = last_;
-  if (at >= triangles_.size() || !IsAlive(at)) return std::nullopt;
+std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
+                                               double size, TriangleId start) {
+  TriangleId at = start;
+  TriangleId from = kDead;
   const size_t longest = 4 * alive_ + 64;
   for (size_t steps = 0; steps < longest; ++steps) {
-    if (SideOf(vertices, at, point) > 0) {
-      hints_[cell] = at;
-      return Location{Side::kOutside, at};
-    }
+    if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
     random_ = random_ * 1664525u + 1013904223u;
-    const int first = static_cast<int>((random_ >> 16) % 3);
-    bool crossed = false;
-    for (int k = 0; k < 3 && !crossed; ++k) {
-      const int i = (first + k) % 3;
-      const SurfaceTriangle& t = triangles_[at];
-      if (Orient3d(*interior_, vertices[t.corners[i]], vertices[t.corners[(i + 1) % 3]], point) <
-          0) {
-        at = t.neighbours[i];
-        crossed = true;
-      }
+    const uint32_t first = (random_ >> 16) % 3;
+    const SurfaceTriangle& t = triangles_[at];
+    TriangleId next = kDead;
+    for (uint32_t k = 0; k < 3 && next == kDead; ++k) {
+      const uint32_t i = (first + k) % 3;
+      // The edge just crossed has the point on this side, as the sign was exact.
+      if (t.neighbours[i] == from) continue;
+      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point) < 0) next = t.neighbours[i];
     }
-    if (!crossed) {
-      hints_[cell] = at;
-      return Location{Side::kInside, at};
-    }
+    if (next == kDead) return Location{Side::kInside, at};
+    from = at;
+    at = next;
   }
   return std::nullopt;
 }
 
-Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point) const {
-  Location location{Side::kInside, last_};
+Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point,
+                                double size) const {
+  Location location{Side::kInside, Alive(last_)};
   for (TriangleId id = 0; id < triangles_.size(); ++id) {
     if (!IsAlive(id)) continue;
-    const int side = SideOf(vertices, id, point);
+    const int side = SideOf(vertices, id, point, size);
     if (side > 0) return {Side::kOutside, id};
     if (side < 0) continue;
     const auto& corners = triangles_[id].corners;
@@ -128,9 +192,8 @@ Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point
 }
 
 // A point equal to a vertex lies in the cones of that vertex's triangles alone.
-void Surface::CountIfDuplicate(VertexTable& vertices, const Location& location,
-                               const Vector& point) const {
-  for (const VertexId v : triangles_[location.triangle].corners) {
+void Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const {
+  for (const VertexId v : triangles_[id].corners) {
     if (vertices[v] == point) {
       vertices.CountDuplicate(v);
       return;
@@ -138,108 +201,171 @@ void Surface::CountIfDuplicate(VertexTable& vertices, const Location& location,
   }
 }
 
-// The cell of the cube map, round the interior point, that holds the direction to the point: a
-// guess, so rounding is harmless.
-size_t Surface::HintCell(const Vector& point) const {
-  const Vector direction = point * 0.25 - *interior_ * 0.25;
-  int axis = 0;
-  const double largest = direction.cwiseAbs().maxCoeff(&axis);
-  if (!(largest > 0)) return 0;
-  const double half = 0.5 * hint_resolution_;
-  const auto index = [&](double component) {
-    const int i = static_cast<int>((component / largest + 1) * half);
-    return static_cast<size_t>(std::clamp(i, 0, hint_resolution_ - 1));
-  };
-  const size_t face = static_cast<size_t>(2 * axis + (direction[axis] < 0 ? 1 : 0));
-  const size_t n = static_cast<size_t>(hint_resolution_);
-  return (face * n + index(direction[(axis + 1) % 3])) * n + index(direction[(axis + 2) % 3]);
-}
-
-// Looks for an interior point while none is known, and lays out the hints for the present size.
+// Looks for an interior point while none is known, and measures the surface for its present size.
 // Called when the surface has doubled, so the cost of O(F) is amortized.
-void Surface::UpdateInterior(const VertexTable& vertices) {
+void Surface::Update(const VertexTable& vertices) {
   next_update_ = 2 * alive_;
-  if (!interior_) {
-    // The mean of the corners; each divided first, so that no sum overflows.
-    Vector mean = Vector::Zero();
-    const double weight = 1.0 / static_cast<double>(3 * alive_);
+  if (!directions_) {
+    const std::optional<Vector> interior = FindInterior(vertices);
+    if (!interior) return;
+    directions_.emplace(*interior, 1);
     ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-      for (const VertexId v : t.corners) mean += vertices[v] * weight;
+      for (const VertexId v : t.corners) {
+        extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
+      }
     });
-    if (IsStrictlyInside(vertices, mean)) interior_ = mean;
   }
-  hint_resolution_ = 1 + static_cast<int>(std::sqrt(static_cast<double>(alive_) / 6.0));
-  hints_.assign(static_cast<size_t>(6 * hint_resolution_) * hint_resolution_, kDead);
+  MeasureDirections(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
 }
 
-bool Surface::IsStrictlyInside(const VertexTable& vertices, const Vector& point) const {
-  if (!point.allFinite()) return false;
+std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
+  // The mean of the corners; each divided first, so that no sum overflows.
+  Vector mean = Vector::Zero();
+  const double weight = 1.0 / static_cast<double>(3 * alive_);
+  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
+    for (const VertexId v : t.corners) mean += vertices[v] * weight;
+  });
+  if (!mean.allFinite()) return std::nullopt;
+  const double size = SizeWith(vertices, mean);
   bool inside = true;
   ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) {
-    inside = inside && SideOf(vertices, id, point) < 0;
+    inside = inside && SideOf(vertices, id, mean, size) < 0;
   });
-  return inside;
+  return inside ? std::optional<Vector>(mean) : std::nullopt;
+}
+
+void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
+  if (!directions_ || !IsMapWorthwhile()) return;
+  // A tenth as many walks as points, at most.
+  const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
+  const int wanted = std::min(affordable, 2 * ResolutionFor(alive_, true));
+  if (wanted < 4) return;
+  if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
+    MeasureDirections(vertices, wanted);
+  }
+}
+
+void Surface::MeasureDirections(const VertexTable& vertices, int resolution) {
+  measured_at_ = alive_;
+  asked_ = 0;
+  rejected_ = 0;
+  DirectionMap map(directions_->center(), resolution);
+  const int row = resolution + 1;
+  std::vector<double> reach(6 * static_cast<size_t>(row) * static_cast<size_t>(row));
+  TriangleId near = Alive(last_);
+  for (int face = 0; face < 6; ++face) {
+    for (int i = 0; i < row; ++i) {
+      for (int k = 0; k < row; ++k) {
+        // Back and forth, so that each walk starts next to where the last one ended.
+        const int j = i % 2 == 0 ? k : resolution - k;
+        reach[static_cast<size_t>((face * row + i) * row + j)] =
+            Reach(vertices, map.CornerDirection(face, i, j), near);
+        if (i < resolution && j < resolution) {
+          map.SetHint(static_cast<size_t>((face * resolution + i) * resolution + j), near);
+        }
+      }
+    }
+  }
+  map.SetRadii(reach);
+  directions_ = std::move(map);
+}
+
+// A distance m, near the largest, such that the double nearest to center + m * direction is inside;
+// 0 when none was found. `near` is where to start walking, and becomes where the direction leaves
+// the surface.
+double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
+  const Vector center = directions_->center();
+  double m = extent_;
+  // A walk to a point outside ends at any triangle that it sees, hence the rounds.
+  for (int round = 0; round < kMostRounds; ++round) {
+    const SurfaceTriangle& t = triangles_[near];
+    const double climb = t.normal.dot(direction);
+    const double height = t.offset - t.normal.dot(center);
+    if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
+    m *= 1 - 0x1p-30;
+    const Vector point = center + m * direction;
+    const std::optional<Location> location = Walk(vertices, point, SizeWith(vertices, point), near);
+    if (!location) return 0;
+    near = location->triangle;
+    if (location->side == Side::kInside) return m;
+  }
+  return 0;
 }
 
 // Fills region_ with the connected triangles that the point sees or whose planes hold it, and
-// horizon_ with their boundary.
-void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point) {
-  ++mark_;
+// horizon_ with their boundary, in order round it: depth first, the edges of each triangle
+// counter-clockwise from the one it was entered by.
+void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                            double size) {
+  if (++mark_ == 0) {
+    for (SurfaceTriangle& t : triangles_) t.mark = 0;
+    std::fill(vertex_mark_.begin(), vertex_mark_.end(), 0);
+    mark_ = 1;
+  }
   region_.assign(1, first);
   horizon_.clear();
-  region_mark_[first] = mark_;
-  for (size_t k = 0; k < region_.size(); ++k) {
-    for (int i = 0; i < 3; ++i) {
-      const SurfaceTriangle& t = triangles_[region_[k]];
-      const TriangleId next = t.neighbours[i];
-      if (region_mark_[next] == mark_) continue;
-      if (SideOf(vertices, next, point) >= 0) {
-        region_mark_[next] = mark_;
-        region_.push_back(next);
-      } else {
-        horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next});
-      }
+  triangles_[first].mark = mark_;
+  visits_.assign(1, {first, 0, 3});
+  while (!visits_.empty()) {
+    Visit& visit = visits_.back();
+    if (visit.left == 0) {
+      visits_.pop_back();
+      continue;
+    }
+    const SurfaceTriangle& t = triangles_[visit.triangle];
+    const TriangleId id = visit.triangle;
+    const uint32_t i = visit.edge;
+    visit.edge = static_cast<uint8_t>((i + 1) % 3);
+    --visit.left;
+    const TriangleId next = t.neighbours[i];
+    SurfaceTriangle& other = triangles_[next];
+    if (other.mark == mark_) continue;
+    const uint32_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
+    if (SideOf(vertices, next, point, size) >= 0) {
+      other.mark = mark_;
+      region_.push_back(next);
+      visits_.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
+    } else {
+      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
     }
   }
 }
 
-// Removes the triangles of region_ and the vertices that are left without any: those not on the
-// horizon.
-void Surface::RemoveRegion(VertexTable& vertices) {
-  horizon_mark_.resize(vertices.id_bound(), 0);
-  for (const HorizonEdge& edge : horizon_) horizon_mark_[edge.tail] = mark_;
+// Removes the vertices that only triangles of region_ have: those not on the horizon. By Euler's
+// formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
+void Surface::RemoveVertices(VertexTable& vertices) {
+  if (region_.size() + 2 == horizon_.size()) return;
+  vertex_mark_.resize(vertices.id_bound(), 0);
+  for (const HorizonEdge& edge : horizon_) vertex_mark_[edge.tail] = mark_;
   for (const TriangleId id : region_) {
     for (const VertexId v : triangles_[id].corners) {
-      if (horizon_mark_[v] == mark_) continue;
-      horizon_mark_[v] = mark_;
+      if (vertex_mark_[v] == mark_) continue;
+      vertex_mark_[v] = mark_;
       vertices.Remove(v);
     }
-    triangles_[id].corners[0] = kDead;
-    free_.push_back(id);
   }
-  alive_ -= region_.size();
 }
 
-void Surface::JoinHorizon(VertexId apex) {
-  triangle_from_.resize(std::max<size_t>(horizon_mark_.size(), apex + size_t{1}));
-  for (const HorizonEdge& edge : horizon_) {
-    const TriangleId id = AddTriangle(edge.tail, edge.head, apex);
-    triangles_[id].neighbours[0] = edge.beyond;
-    SurfaceTriangle& beyond = triangles_[edge.beyond];
-    for (int i = 0; i < 3; ++i) {
-      if (beyond.corners[i] == edge.head && beyond.corners[(i + 1) % 3] == edge.tail) {
-        beyond.neighbours[i] = id;
-      }
-    }
-    triangle_from_[edge.tail] = id;
-    last_ = id;
+// Joins the apex to the horizon; the new triangles take the places of the region's first.
+void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
+  const size_t old_count = region_.size();
+  const size_t new_count = horizon_.size();
+  while (region_.size() < new_count) region_.push_back(NewId());
+  for (size_t k = 0; k < new_count; ++k) {
+    const HorizonEdge& edge = horizon_[k];
+    const TriangleId id = region_[k];
+    SetTriangle(vertices, id, edge.tail, edge.head, apex);
+    triangles_[id].neighbours = {edge.beyond, region_[k + 1 == new_count ? 0 : k + 1],
+                                 region_[k == 0 ? new_count - 1 : k - 1]};
+    triangles_[edge.beyond].neighbours[edge.edge_beyond] = id;
   }
-  for (const HorizonEdge& edge : horizon_) {
-    const TriangleId id = triangle_from_[edge.tail];
-    const TriangleId next = triangle_from_[edge.head];
-    triangles_[id].neighbours[1] = next;
-    triangles_[next].neighbours[2] = id;
+  for (size_t k = new_count; k < old_count; ++k) {
+    triangles_[region_[k]].corners[0] = kDead;
+    triangles_[region_[k]].neighbours[0] = region_[0];
+    free_.push_back(region_[k]);
   }
+  alive_ = alive_ - old_count + new_count;
+  last_ = region_[0];
 }
 
 }  // namespace hulld

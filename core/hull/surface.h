@@ -7,18 +7,27 @@
 #include <span>
 #include <vector>
 
+#include "core/hull/direction_map.h"
 #include "core/hull/vertex_table.h"
 
 namespace hulld {
 
 using TriangleId = uint32_t;
 
-// A triangle of the surface, counter-clockwise seen from outside; neighbours[i] lies across the
-// edge from corners[i] to corners[(i + 1) % 3].
-struct SurfaceTriangle {
+// A triangle of the surface, counter-clockwise seen from outside, in one cache line. neighbours[i]
+// lies across the edge from corners[i] to corners[(i + 1) % 3].
+struct alignas(64) SurfaceTriangle {
+  // The plane, rounded: normal . p - offset, which errs by at most slope * (|p| + |corner|), |.|
+  // the largest component.
+  Vector normal;
+  double offset;
   std::array<VertexId, 3> corners;
   std::array<TriangleId, 3> neighbours;
+  float slope;
+  // The last insertion whose region this triangle was in.
+  uint32_t mark;
 };
+static_assert(sizeof(SurfaceTriangle) == 64);
 
 // The triangulated boundary of a growing convex polytope of dimension 3, exactly.
 //
@@ -31,8 +40,9 @@ struct SurfaceTriangle {
 // and no horizon vertex redundant.
 //
 // The triangle to start from is found by walking on the surface, towards the one that the ray from
-// a fixed interior point through the new point pierces. Source: Clarkson and Shor 1989 for the
-// incremental hull; Devillers, Pion and Teillaud 2002 for the walk.
+// a fixed interior point through the new point pierces; a map of directions round that point
+// rejects points that are certainly inside and tells where to start. Source: Clarkson and Shor 1989
+// for the incremental hull; Devillers, Pion and Teillaud 2002 for the walk.
 class Surface {
  public:
   // The cone from `apex` over a polygon whose plane does not hold it. `polygon`: vertices in order,
@@ -42,6 +52,18 @@ class Surface {
   // Adds a point. Cost: the triangles removed and created, and a walk of a few exact signs; a scan
   // of all triangles where no double lies strictly inside the polytope.
   void Insert(VertexTable& vertices, const Vector& point);
+
+  // The map of directions, for choosing what to insert and in which order; null where no interior
+  // point is known.
+  const DirectionMap* directions() const { return directions_ ? &*directions_ : nullptr; }
+  // Measures the surface anew when that pays for so many points to be inserted. Does nothing where
+  // no interior point is known. Cost: at most some walks per ten points.
+  void MeasureBefore(const VertexTable& vertices, size_t points);
+  // Tells how many points were looked up in the map and how many it rejected: what it is worth.
+  void CountRejected(size_t asked, size_t rejected) {
+    asked_ += asked;
+    rejected_ += rejected;
+  }
 
   // Calls visit(id, triangle) for every triangle.
   template <typename Visitor>
@@ -53,12 +75,21 @@ class Surface {
   const SurfaceTriangle& triangle(TriangleId id) const { return triangles_[id]; }
   // IDs of triangles lie below this.
   size_t id_bound() const { return triangles_.size(); }
+  size_t triangle_count() const { return alive_; }
 
  private:
+  // An edge of the horizon, its triangle beyond, and which edge it is there.
   struct HorizonEdge {
     VertexId tail;
     VertexId head;
     TriangleId beyond;
+    uint32_t edge_beyond;
+  };
+  // A triangle of the region under traversal, the edge to cross next, and how many are left.
+  struct Visit {
+    TriangleId triangle;
+    uint8_t edge;
+    uint8_t left;
   };
   enum class Side { kInside, kOutside };
   // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
@@ -69,21 +100,28 @@ class Surface {
   };
 
   bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
-  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point) const;
-  TriangleId AddTriangle(VertexId a, VertexId b, VertexId c);
+  TriangleId Alive(TriangleId id) const;
+  double SizeWith(const VertexTable& vertices, const Vector& point) const;
+  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const;
+  void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
+  TriangleId NewId();
   void LinkAll();
 
-  Location Locate(const VertexTable& vertices, const Vector& point);
-  std::optional<Location> Walk(const VertexTable& vertices, const Vector& point);
-  Location Scan(const VertexTable& vertices, const Vector& point) const;
-  void CountIfDuplicate(VertexTable& vertices, const Location& location, const Vector& point) const;
-  size_t HintCell(const Vector& point) const;
-  void UpdateInterior(const VertexTable& vertices);
-  bool IsStrictlyInside(const VertexTable& vertices, const Vector& point) const;
+  std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
+                               TriangleId start);
+  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point) const;
+  Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
+  void CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
+  void Update(const VertexTable& vertices);
+  bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
+  void MeasureDirections(const VertexTable& vertices, int resolution);
+  std::optional<Vector> FindInterior(const VertexTable& vertices) const;
+  double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
-  void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point);
-  void RemoveRegion(VertexTable& vertices);
-  void JoinHorizon(VertexId apex);
+  void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                     double size);
+  void RemoveVertices(VertexTable& vertices);
+  void JoinHorizon(const VertexTable& vertices, VertexId apex);
 
   static constexpr VertexId kDead = UINT32_MAX;
 
@@ -91,25 +129,27 @@ class Surface {
   std::vector<TriangleId> free_;
   size_t alive_ = 0;
 
-  // A point strictly inside, when one is known: it stays so while the polytope grows.
-  std::optional<Vector> interior_;
-  // The count of triangles at which an interior point is looked for again and the hints are laid
-  // anew.
+  // Round a point strictly inside, when one is known: it stays so while the polytope grows.
+  std::optional<DirectionMap> directions_;
+  // Largest distance, by components, of a vertex from that point.
+  double extent_ = 0;
+  // The count of triangles at which the surface is measured anew.
   size_t next_update_ = 0;
-  // Where the last walk in a direction from the interior point ended, per cell of a cube map; may
-  // name a dead triangle.
-  std::vector<TriangleId> hints_;
-  int hint_resolution_ = 1;
+  // Of the points since the last measurement, how many were looked up in the map and rejected by
+  // it.
+  size_t asked_ = 0;
+  size_t rejected_ = 0;
+  // The count of triangles when it was last measured.
+  size_t measured_at_ = 0;
   TriangleId last_ = 0;
   uint32_t random_ = 1;
 
   // Scratch of one insertion.
   std::vector<TriangleId> region_;
-  std::vector<uint64_t> region_mark_;
   std::vector<HorizonEdge> horizon_;
-  std::vector<uint64_t> horizon_mark_;
-  std::vector<TriangleId> triangle_from_;
-  uint64_t mark_ = 0;
+  std::vector<Visit> visits_;
+  std::vector<uint32_t> vertex_mark_;
+  uint32_t mark_ = 0;
 };
 
 }  // namespace hulld

@@ -1,6 +1,7 @@
 #ifndef HULLD_CORE_HULL_VERTEX_TABLE_H_
 #define HULLD_CORE_HULL_VERTEX_TABLE_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -24,58 +25,62 @@ class VertexTable {
   uint64_t outside() const { return outside_; }
   uint64_t duplicate() const { return duplicate_; }
 
-  VertexId Add(const Vector& point) {
-    const Entry entry = {point, block_, /*duplicates=*/0, /*is_new=*/true};
+  // -0 is stored as +0.
+  VertexId Add(const Vector& given) {
+    // Adding +0 turns -0 into +0 and changes nothing else.
+    const Vector point = given + Vector::Zero();
     VertexId id;
     if (free_.empty()) {
-      id = static_cast<VertexId>(entries_.size());
-      entries_.push_back(entry);
+      id = static_cast<VertexId>(points_.size());
+      points_.push_back(point);
+      counts_.push_back({block_, 0, true});
     } else {
       id = free_.back();
       free_.pop_back();
-      entries_[id] = entry;
+      points_[id] = point;
+      counts_[id] = {block_, 0, true};
     }
+    max_abs_coordinate_ = std::max(max_abs_coordinate_, point.cwiseAbs().maxCoeff());
     ++outside_;
     return id;
   }
 
   void CountDuplicate(VertexId id) {
-    Entry& entry = entries_[id];
-    if (entry.block != block_) {
-      entry.block = block_;
-      entry.duplicates = 0;
-      entry.is_new = false;
-    }
-    ++entry.duplicates;
+    Counts& counts = counts_[id];
+    if (counts.block != block_) counts = {block_, 0, false};
+    ++counts.duplicates;
     ++duplicate_;
   }
 
   void Remove(VertexId id) {
-    const Entry& entry = entries_[id];
-    if (entry.block == block_) {
-      duplicate_ -= entry.duplicates;
-      if (entry.is_new) --outside_;
+    const Counts& counts = counts_[id];
+    if (counts.block == block_) {
+      duplicate_ -= counts.duplicates;
+      if (counts.is_new) --outside_;
     }
     free_.push_back(id);
   }
 
-  const Vector& operator[](VertexId id) const { return entries_[id].point; }
+  const Vector& operator[](VertexId id) const { return points_[id]; }
   // Vertices that live.
-  size_t size() const { return entries_.size() - free_.size(); }
+  size_t size() const { return points_.size() - free_.size(); }
   // IDs lie below this.
-  size_t id_bound() const { return entries_.size(); }
+  size_t id_bound() const { return points_.size(); }
+  // Largest absolute coordinate of all vertices that ever lived.
+  double max_abs_coordinate() const { return max_abs_coordinate_; }
 
  private:
-  struct Entry {
-    Vector point;
-    // The block that the two counts below belong to.
+  struct Counts {
+    // The block that the others belong to.
     uint64_t block;
-    uint64_t duplicates;
+    uint32_t duplicates;
     bool is_new;
   };
 
-  std::vector<Entry> entries_;
+  std::vector<Vector> points_;
+  std::vector<Counts> counts_;
   std::vector<VertexId> free_;
+  double max_abs_coordinate_ = 0;
   uint64_t block_ = 0;
   uint64_t outside_ = 0;
   uint64_t duplicate_ = 0;

@@ -29,6 +29,30 @@ inline constexpr double kUnderflowError = 0x1p-1070;
 inline constexpr double kExpansionMin = 0x1p-306;
 inline constexpr double kExpansionMax = 0x1p330;
 
+// The plane of a triangle a, b, c in floating point, with edges e = b - a and f = c - a: the normal
+// n = e x f errs by at most 8 u |e||f| per component (|.| the largest component), hence n . (p - a)
+// by 24 u |e||f| (|p| + |a|); the products and sums of n . p - fl(n . a) by (18 + 6) u |e||f| (|p|
+// + |a|). In total 48 u |e||f| (|p| + |a|) without underflow; 64 u leaves slack for rounding the
+// bound itself. Proven.
+inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
+// The bound is kept as a float per |p| + |a|; outside this range a plane is never certain. Within
+// it, and with |p| and |a| at most kPlaneMaxCoordinate, no product overflows (2^166 * 2^600) and
+// underflow (2^-1074 times at most six coordinates) is below 2^-900 of the bound. Proven.
+inline constexpr double kPlaneMinSlope = 0x1p-120;
+inline constexpr double kPlaneMaxSlope = 0x1p120;
+inline constexpr double kPlaneMaxCoordinate = 0x1p600;
+
+// y . (A x B) for differences y, A, B of doubles, |A|, |B|, |y| at most D: at most 48 u D^3 as
+// above; 64 u leaves slack. Used for D within these bounds, so that nothing overflows or
+// underflows. Proven.
+inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
+inline constexpr double kTripleProductMin = 0x1p-300;
+inline constexpr double kTripleProductMax = 0x1p300;
+
+// What a direction map takes off its radii; its rounding errors are below half of this (see
+// DirectionMap::SetRadii).
+inline constexpr double kDirectionMapMargin = 0x1p-20;
+
 // Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
 // largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
 // between these two, so that no quantity that matters overflows, and what underflow adds (below

@@ -3,7 +3,7 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
-#include "core/hull/hull.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "core/hull/hull.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 

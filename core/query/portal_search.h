@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/numeric/integer.h"
-#include "core/numeric/vector_algebra.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 

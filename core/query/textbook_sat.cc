@@ -12,7 +12,7 @@
 
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/integer.h"
-#include "core/numeric/vector_algebra.h"
+#include "core/numeric/vector.h"
 #include "core/query/axis_description.h"
 #include "core/query/exact_pair.h"
 #include "core/query/exact_search.h"

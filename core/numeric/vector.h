@@ -1,11 +1,13 @@
-#ifndef HULLD_CORE_NUMERIC_VECTOR_ALGEBRA_H_
-#define HULLD_CORE_NUMERIC_VECTOR_ALGEBRA_H_
+#ifndef HULLD_CORE_NUMERIC_VECTOR_H_
+#define HULLD_CORE_NUMERIC_VECTOR_H_
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "core/hull/hull.h"
-
 namespace hulld {
+
+// A point or a direction: three doubles, the caller's length unit where it is a point.
+using Vector = Eigen::Vector3d;
 
 // The operations of IntegerVector for doubles, rounded, so that one algorithm can be written for
 // both.
@@ -20,4 +22,4 @@ inline Vector AnyPerpendicular(const Vector& d) {
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_NUMERIC_VECTOR_ALGEBRA_H_
+#endif  // HULLD_CORE_NUMERIC_VECTOR_H_

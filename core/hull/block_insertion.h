@@ -1,0 +1,45 @@
+#ifndef HULLD_CORE_HULL_BLOCK_INSERTION_H_
+#define HULLD_CORE_HULL_BLOCK_INSERTION_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "core/hull/surface.h"
+#include "core/hull/vertex_table.h"
+
+namespace hulld {
+
+// The numbers 0 ... n-1 in rounds, each four times the one before, every round spread evenly and
+// irregularly over all of them: a biased randomized insertion order without a permutation in
+// memory. Source: Amenta, Choi and Rote 2003, Incremental Constructions con BRIO.
+class InsertionRounds {
+ public:
+  explicit InsertionRounds(size_t n);
+
+  int count() const { return count_; }
+  int RoundOf(uint32_t i) const;
+  // Appends the members of a round. Requires a round other than the last, whose members are most of
+  // the numbers: these are better recognized by RoundOf.
+  void AppendRound(int round, std::vector<uint32_t>& members) const;
+
+ private:
+  // A round is a range of ranks within each group of consecutive numbers.
+  static uint32_t FirstRank(int round) { return round == 0 ? 0 : 1u << (2 * (round - 1)); }
+
+  uint32_t n_;
+  int count_;
+  uint32_t group_mask_;
+};
+
+// Adds a block of points to a surface, in an order that is fast for any input: rounds of growing
+// size, each reduced to the points that the map of directions cannot reject and sorted along the
+// surface, farthest first. Stops and returns false when should_stop, which may be empty, says so.
+bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                 const std::function<bool()>& should_stop);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_BLOCK_INSERTION_H_

@@ -1,0 +1,94 @@
+#ifndef HULLD_CORE_HULL_DIRECTION_MAP_H_
+#define HULLD_CORE_HULL_DIRECTION_MAP_H_
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/hull/hull.h"
+
+namespace hulld {
+
+// A cube map of directions round a point c strictly inside a growing convex set: 6 faces of n x n
+// cells. Each cell holds a radius below which every point in its directions is certainly inside,
+// and a hint where on the surface its directions lead. The set only grows, so what the map holds
+// stays true for ever.
+//
+// Idea: measured by the largest absolute component m of p - c, the gauge of a convex set is convex
+// on a face of the cube, so its maximum over a cell is at a corner: points of the set found along
+// the four corner directions bound the whole cell.
+class DirectionMap {
+ public:
+  // Where a point lies: its cell, and its distance m from c.
+  struct Place {
+    size_t cell;
+    double distance;
+  };
+
+  // Directions only, no radii: nothing is certainly inside.
+  DirectionMap(const Vector& center, int resolution);
+
+  const Vector& center() const { return center_; }
+  int resolution() const { return n_; }
+  size_t cell_count() const { return 6 * static_cast<size_t>(n_) * static_cast<size_t>(n_); }
+
+  // NaN-free for every finite point. The cell may be a neighbour of the true one by rounding; the
+  // radii allow for that.
+  Place PlaceOf(const Vector& point) const {
+    const Vector v = point - center_;
+    const double x = std::abs(v.x());
+    const double y = std::abs(v.y());
+    const double z = std::abs(v.z());
+    const int axis = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
+    const double m = axis == 0 ? x : axis == 1 ? y : z;
+    if (m == 0) return {0, 0};
+    if (!(m >= kLeastDistance && m <= kLargestDistance)) return {0, INFINITY};
+    const double scale = half_ / m;
+    const int i = std::min(n_ - 1, static_cast<int>(v[kNext[axis]] * scale + half_));
+    const int j = std::min(n_ - 1, static_cast<int>(v[kNext[axis + 1]] * scale + half_));
+    const int face = 2 * axis + (v[axis] < 0 ? 1 : 0);
+    return {static_cast<size_t>((face * n_ + i) * n_ + j), m};
+  }
+  bool IsCertainlyInside(const Place& place) const { return place.distance < radii_[place.cell]; }
+  // From 1, at the radius below which points are certainly inside, to 0, infinitely far.
+  double Nearness(const Place& place) const {
+    return place.distance > 0 ? std::min(1.0, radii_[place.cell] / place.distance) : 0.0;
+  }
+
+  uint32_t hint(size_t cell) const { return hints_[cell]; }
+  void SetHint(size_t cell, uint32_t hint) { hints_[cell] = hint; }
+
+  // The direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest component is
+  // +-1.
+  Vector CornerDirection(int face, int i, int j) const;
+  // Sets the radii from `reach`: for every corner, face by face, i major, a distance m such that
+  // the double nearest to c + m * direction, component by component, is in the set. Does nothing
+  // where the shape is too slender for the rounding of this map to be negligible.
+  void SetRadii(std::span<const double> reach);
+
+  // Appends the indices of the points that are not certainly inside, ascending.
+  void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors) const;
+
+ private:
+  void AppendSurvivorsBaseline(std::span<const Vector> points, size_t from,
+                               std::vector<uint32_t>& survivors) const;
+  size_t AppendSurvivorsAvx2(std::span<const Vector> points,
+                             std::vector<uint32_t>& survivors) const;
+
+  static constexpr int kNext[] = {1, 2, 0, 1};
+  static constexpr double kLeastDistance = 0x1p-1000;
+  static constexpr double kLargestDistance = 0x1p1000;
+
+  Vector center_;
+  int n_;
+  double half_;
+  std::vector<double> radii_;
+  std::vector<uint32_t> hints_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_DIRECTION_MAP_H_
