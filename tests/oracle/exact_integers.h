@@ -1,0 +1,40 @@
+#ifndef HULLD_TESTS_ORACLE_EXACT_INTEGERS_H_
+#define HULLD_TESTS_ORACLE_EXACT_INTEGERS_H_
+
+#include <array>
+#include <boost/multiprecision/cpp_int.hpp>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace hulld::oracle {
+
+using Point = std::array<double, 3>;
+
+// Integers of any length. Without expression templates, so that `auto` is always a number.
+using Integer = boost::multiprecision::number<boost::multiprecision::cpp_int_backend<>,
+                                              boost::multiprecision::et_off>;
+using IntegerVector = std::array<Integer, 3>;
+
+// A finite double, exactly: mantissa * 2^exponent, the mantissa odd; zero is 0 * 2^0.
+struct Dyadic {
+  int64_t mantissa = 0;
+  int exponent = 0;
+};
+Dyadic Decompose(double value);
+
+// The values, all times the same power of two: the least one that makes integers of them all. Signs
+// of homogeneous expressions are those of the values. Requires finite values.
+std::vector<Integer> ToIntegers(std::span<const double> values);
+std::vector<IntegerVector> ToIntegerVectors(std::span<const Point> points);
+
+IntegerVector Subtract(const IntegerVector& a, const IntegerVector& b);
+IntegerVector Negate(const IntegerVector& a);
+IntegerVector Cross(const IntegerVector& a, const IntegerVector& b);
+Integer Dot(const IntegerVector& a, const IntegerVector& b);
+bool IsZero(const IntegerVector& a);
+int Sign(const Integer& a);
+
+}  // namespace hulld::oracle
+
+#endif  // HULLD_TESTS_ORACLE_EXACT_INTEGERS_H_
