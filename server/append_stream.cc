@@ -1,0 +1,199 @@
+#include "server/append_stream.h"
+
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/decode.h"
+#include "server/encode.h"
+#include "server/hull_id.h"
+#include "server/random_id.h"
+#include "server/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+absl::Status ValidateWriterId(const std::string& writer_id) {
+  if (writer_id.size() <= Config::kMaxIdCharacters) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("open.writer_id holds ", writer_id.size(),
+                                                 " bytes; the limit is ",
+                                                 Config::kMaxIdCharacters));
+}
+
+void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
+  sums->set_received(sums->received() + counts.received);
+  sums->set_outside(sums->outside() + counts.outside);
+  sums->set_duplicate(sums->duplicate() + counts.duplicate);
+  sums->set_inside(sums->inside() + counts.inside);
+}
+
+}  // namespace
+
+grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendStream::Start(
+    const grpc::CallbackServerContext& context, Admission& admission, Registry& registry) {
+  const std::shared_ptr<AppendStream> stream(new AppendStream(context, registry));
+  stream->self_ = stream;
+  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
+  const std::lock_guard lock(stream->mutex_);
+  if (ticket.ok()) {
+    stream->ticket_ = *std::move(ticket);
+  } else {
+    stream->End(ticket.status());
+  }
+  stream->Proceed();
+  return stream.get();
+}
+
+void AppendStream::OnReadDone(bool ok) {
+  const std::shared_ptr<AppendStream> self = shared_from_this();
+  const std::lock_guard lock(mutex_);
+  reading_ = false;
+  if (!end_.has_value()) {
+    if (ok) {
+      HandleMessage();
+    } else {
+      // The client has said all, or is gone.
+      End(lifetime_.ShouldStop() ? lifetime_.StopStatus() : absl::OkStatus());
+    }
+  }
+  Proceed();
+}
+
+void AppendStream::OnWriteDone(bool ok) {
+  const std::shared_ptr<AppendStream> self = shared_from_this();
+  const std::lock_guard lock(mutex_);
+  writing_ = false;
+  if (!ok) {
+    next_reply_.reset();
+    End(absl::CancelledError("the client is gone"));
+  }
+  Proceed();
+}
+
+void AppendStream::OnCancel() {
+  const std::shared_ptr<AppendStream> self = shared_from_this();
+  lifetime_.Cancel();
+  const std::lock_guard lock(mutex_);
+  next_reply_.reset();
+  End(lifetime_.StopStatus());
+  Proceed();
+}
+
+void AppendStream::OnDone() {
+  if (session_.has_value()) registry_.CloseAppend(*session_);
+  self_.reset();
+}
+
+void AppendStream::HandleMessage() {
+  switch (request_.message_case()) {
+    case v1::AppendPointsRequest::kOpen:
+      return HandleOpen(request_.open());
+    case v1::AppendPointsRequest::kChunk:
+      return HandleChunk(request_.chunk());
+    case v1::AppendPointsRequest::MESSAGE_NOT_SET:
+      return End(absl::InvalidArgumentError("the message is empty; set open or chunk"));
+  }
+}
+
+void AppendStream::HandleOpen(const v1::AppendOpen& open) {
+  if (session_.has_value()) {
+    return End(absl::InvalidArgumentError(
+        "open came twice; one stream appends to one hull, so start another stream"));
+  }
+  if (absl::Status s = ValidateHullId(open.hull_id(), "open.hull_id"); !s.ok()) return End(s);
+  if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return End(s);
+  const std::string writer_id = open.writer_id().empty() ? RandomId() : open.writer_id();
+  const std::weak_ptr<AppendStream> weak = weak_from_this();
+  absl::StatusOr<OpenResult> opened =
+      registry_.OpenAppend(open.hull_id(), writer_id, open.create_if_absent(), [weak] {
+        const std::shared_ptr<AppendStream> stream = weak.lock();
+        if (stream == nullptr) return;
+        const std::lock_guard lock(stream->mutex_);
+        stream->End(absl::FailedPreconditionError(
+            "the hull was deleted while the stream was open; create it and start again"));
+        stream->Proceed();
+      });
+  if (!opened.ok()) return End(opened.status());
+  session_ = std::move(opened->session);
+  if (session_->created_hull) spdlog::info("hull \"{}\" created", open.hull_id());
+  v1::AppendOpened* reply = next_reply_.emplace().mutable_opened();
+  EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
+  EncodeRecord(opened->hull, reply->mutable_hull());
+  reply->set_writer_id(writer_id);
+  reply->set_last_sequence(opened->last_sequence);
+}
+
+void AppendStream::HandleChunk(const v1::AppendChunk& message) {
+  if (!session_.has_value()) {
+    return End(absl::InvalidArgumentError("the first message must be open, not a chunk"));
+  }
+  absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
+  if (!chunk.ok()) return End(chunk.status());
+  request_.Clear();
+  applying_ = true;
+  const std::shared_ptr<AppendStream> self = shared_from_this();
+  const uint64_t sequence = chunk->sequence;
+  registry_.Append(
+      *session_, *std::move(chunk), [self] { return self->lifetime_.ShouldStop(); },
+      [self, sequence](const absl::StatusOr<ChunkResult>& result) {
+        const std::lock_guard lock(self->mutex_);
+        self->applying_ = false;
+        self->HandleResult(sequence, result);
+        self->Proceed();
+      });
+}
+
+void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result) {
+  if (!result.ok()) {
+    const bool stopped = lifetime_.ShouldStop();
+    return End(stopped ? lifetime_.StopStatus() : result.status());
+  }
+  if (finished_) return;
+  if (!next_reply_.has_value()) next_reply_.emplace();
+  // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
+  v1::AppendAck* ack = next_reply_->mutable_ack();
+  EncodeHeader(registry_.store(), result->store_revision, ack->mutable_header());
+  ack->set_sequence(std::max(ack->sequence(), sequence));
+  if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {
+    ack->set_outcome(result->already_applied ? v1::APPEND_OUTCOME_ALREADY_APPLIED
+                                             : v1::APPEND_OUTCOME_APPLIED);
+  }
+  ack->set_durability(EncodeDurability(registry_.store().durability()));
+  ack->set_hull_revision(result->hull_revision);
+  ack->set_vertex_count(result->vertex_count);
+  AddTo(ack->mutable_counts(), result->counts);
+}
+
+void AppendStream::End(const absl::Status& status) {
+  if (end_.has_value()) return;
+  end_ = status;
+  if (!status.ok() && session_.has_value()) {
+    spdlog::debug("append by writer \"{}\" ended: {}", absl::CEscape(session_->writer_id),
+                  status.ToString());
+  }
+}
+
+// Starts whatever may start now. Reading does not wait for writing, so that a client which sends
+// everything before it reads an ack is served too.
+void AppendStream::Proceed() {
+  if (finished_) return;
+  if (!writing_ && next_reply_.has_value()) {
+    writing_ = true;
+    reply_in_flight_ = *std::move(next_reply_);
+    next_reply_.reset();
+    StartWrite(&reply_in_flight_);
+  } else if (!writing_ && end_.has_value() && !applying_) {
+    finished_ = true;
+    Finish(ToGrpc(*end_));
+    return;
+  }
+  if (!end_.has_value() && !reading_ && !applying_) {
+    reading_ = true;
+    StartRead(&request_);
+  }
+}
+
+}  // namespace hulld::server

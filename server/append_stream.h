@@ -1,0 +1,70 @@
+#ifndef HULLD_SERVER_APPEND_STREAM_H_
+#define HULLD_SERVER_APPEND_STREAM_H_
+
+#include <absl/status/status.h>
+#include <grpcpp/grpcpp.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "hulld/v1/hull.pb.h"
+#include "server/admission.h"
+#include "server/call_lifetime.h"
+#include "server/registry.h"
+
+namespace hulld::server {
+
+// One AppendPoints call. It reads a chunk, queues it at the registry, and reads the next one only
+// when that is committed, so that a fast client fills gRPC's window and not our memory. An ack that
+// cannot be sent yet because the one before is still on its way is merged with the next.
+//
+// All state is guarded by one mutex, under which reads, writes and the end are started; gRPC calls
+// back without it.
+class AppendStream
+    : public grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>,
+      public std::enable_shared_from_this<AppendStream> {
+ public:
+  static grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* Start(
+      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry);
+
+ private:
+  AppendStream(const grpc::CallbackServerContext& context, Registry& registry)
+      : registry_(registry), lifetime_(context.deadline()) {}
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override;
+  void OnDone() override;
+
+  // The rest requires the mutex.
+  void HandleMessage();
+  void HandleOpen(const v1::AppendOpen& open);
+  void HandleChunk(const v1::AppendChunk& message);
+  void HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result);
+  void End(const absl::Status& status);
+  void Proceed();
+
+  Registry& registry_;
+  CallLifetime lifetime_;
+  std::optional<Admission::Ticket> ticket_;
+  // Keeps this alive until gRPC is done with it; a queued chunk holds another reference.
+  std::shared_ptr<AppendStream> self_;
+
+  std::mutex mutex_;
+  v1::AppendPointsRequest request_;
+  std::optional<AppendSession> session_;
+  // Waits to be sent; an ack grows while it waits.
+  std::optional<v1::AppendPointsResponse> next_reply_;
+  v1::AppendPointsResponse reply_in_flight_;
+  bool reading_ = false;
+  bool applying_ = false;
+  bool writing_ = false;
+  bool finished_ = false;
+  // Set once the stream is to end, which it does when the replies before are sent.
+  std::optional<absl::Status> end_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_APPEND_STREAM_H_

@@ -1,0 +1,95 @@
+#ifndef HULLD_SERVER_BATCH_STREAM_H_
+#define HULLD_SERVER_BATCH_STREAM_H_
+
+#include <absl/status/statusor.h>
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "core/query/batch.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/admission.h"
+#include "server/call_lifetime.h"
+#include "server/executor.h"
+#include "server/registry.h"
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// One BatchCheckCollisions call. It resolves every hull once, on a reader thread, then answers
+// slices of pairs on the executor, taking turns with other batches; a slice is computed while the
+// one before is sent, and no further ahead.
+class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>,
+                    public std::enable_shared_from_this<BatchStream> {
+ public:
+  // `request` must outlive the call, as gRPC's requests do.
+  static grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* Start(
+      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      WorkerPool& readers, Executor& executor, const v1::BatchCheckCollisionsRequest& request);
+
+ private:
+  BatchStream(const grpc::CallbackServerContext& context, Registry& registry, Executor& executor,
+              const v1::BatchCheckCollisionsRequest& request)
+      : registry_(registry),
+        executor_(executor),
+        request_(request),
+        lifetime_(context.deadline()) {}
+
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override { lifetime_.Cancel(); }
+  void OnDone() override { self_.reset(); }
+
+  size_t pair_count() const { return static_cast<size_t>(request_.pairs_size()) / 2; }
+
+  absl::Status Validate();
+  absl::Status ResolvePlacements();
+  void Open();
+  PlacedPair PairAt(size_t i) const;
+  bool IsAnswerable(const PlacedPair& pair) const;
+  size_t SliceEnd() const;
+  std::vector<absl::StatusOr<Answer>> AnswerPairs(const std::vector<PlacedPair>& pairs) const;
+  absl::Status ComputeSlice();
+  void AdaptSlice(size_t pairs, std::chrono::steady_clock::duration elapsed);
+  // Requires the mutex: starts whatever may start now.
+  void Proceed();
+
+  Registry& registry_;
+  Executor& executor_;
+  const v1::BatchCheckCollisionsRequest& request_;
+  CallLifetime lifetime_;
+  std::optional<Admission::Ticket> ticket_;
+  // Keeps this alive until gRPC is done with it.
+  std::shared_ptr<BatchStream> self_;
+
+  // Owned by the one task that runs for this call, if any.
+  QueryOptions options_;
+  std::vector<std::shared_ptr<const Hull>> hulls_;
+  // Stands in for the hull of placements that cannot be answered.
+  const Hull no_hull_;
+  std::vector<PlacedHull> placements_;
+  std::vector<char> answerable_;  // by placement
+  v1::BatchCheckCollisionsResponse head_;
+  size_t next_pair_ = 0;
+  size_t slice_pairs_ = 0;
+
+  std::mutex mutex_;
+  // The rest is guarded by the mutex.
+  std::deque<v1::BatchCheckCollisionsResponse> ready_;
+  v1::BatchCheckCollisionsResponse in_flight_;
+  bool computing_ = true;
+  bool writing_ = false;
+  bool finished_ = false;
+  // Set once no slice is left to compute.
+  std::optional<absl::Status> end_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_BATCH_STREAM_H_

@@ -1,0 +1,106 @@
+#include "server/collision_service.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <array>
+#include <memory>
+#include <utility>
+
+#include "core/query/collision.h"
+#include "server/batch_stream.h"
+#include "server/decode.h"
+#include "server/encode.h"
+#include "server/hull_id.h"
+#include "server/query_settings.h"
+#include "server/unary_call.h"
+
+namespace hulld::server {
+namespace {
+
+// One pair, ready to be answered by any thread.
+struct PairQuery {
+  HullView a;
+  HullView b;
+  Pose X_WA;
+  Pose X_WB;
+  QueryOptions options;
+};
+
+absl::StatusOr<Pose> ReadPlacement(bool present, const v1::Placement& placement,
+                                   const std::string& field) {
+  if (!present) {
+    return absl::InvalidArgumentError(absl::StrCat(field, " is missing; give a hull ID"));
+  }
+  if (absl::Status s = ValidateHullId(placement.hull_id(), field + ".hull_id"); !s.ok()) return s;
+  return DecodePose(placement.pose(), field + ".pose");
+}
+
+absl::StatusOr<PairQuery> Prepare(Registry& registry, const CallLifetime& lifetime,
+                                  const v1::CheckCollisionRequest& request,
+                                  v1::CheckCollisionResponse* response) {
+  PairQuery query;
+  absl::StatusOr<QueryOptions> options =
+      MakeQueryOptions(request.method(), request.wanted(), registry.limits(), lifetime);
+  if (!options.ok()) return options.status();
+  query.options = *std::move(options);
+  const absl::StatusOr<Pose> X_WA = ReadPlacement(request.has_a(), request.a(), "a");
+  if (!X_WA.ok()) return X_WA.status();
+  query.X_WA = *X_WA;
+  const absl::StatusOr<Pose> X_WB = ReadPlacement(request.has_b(), request.b(), "b");
+  if (!X_WB.ok()) return X_WB.status();
+  query.X_WB = *X_WB;
+
+  const std::array<std::string, 2> ids = {request.a().hull_id(), request.b().hull_id()};
+  absl::StatusOr<Resolved> resolved = registry.Resolve(ids, query.options.should_stop);
+  if (!resolved.ok()) return resolved.status();
+  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
+    if (!hull.ok()) return hull.status();
+  }
+  query.a = *std::move(resolved->hulls[0]);
+  query.b = *std::move(resolved->hulls[1]);
+  EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
+  EncodeVersion(query.a.record, response->mutable_hull_a());
+  EncodeVersion(query.b.record, response->mutable_hull_b());
+  return query;
+}
+
+absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
+                    v1::CheckCollisionResponse* response) {
+  const Hull& a = *query.a.hull;
+  const Hull& b = *query.b.hull;
+  const auto answer = hulld::CheckCollision(a, query.X_WA, b, query.X_WB, query.options);
+  if (!answer.ok()) return NameQueryLimit(answer.status());
+  response->set_relation(EncodeRelation(answer->relation));
+  response->set_rung(EncodeRung(answer->rung));
+  if (wanted.analysis()) EncodeAnalysis(answer->analysis, a, b, response->mutable_analysis());
+  if (!wanted.axis() || !answer->axis.has_value()) return absl::OkStatus();
+  return EncodeAxis(*answer->axis, a, b, response->mutable_axis());
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
+                                                           const v1::CheckCollisionRequest* request,
+                                                           v1::CheckCollisionResponse* response) {
+  return UnaryCall::Start(*context, admission_, [&](UnaryCall* call) {
+    readers_.Submit([this, call, request, response] {
+      absl::StatusOr<PairQuery> query = Prepare(registry_, call->lifetime(), *request, response);
+      if (!query.ok()) return call->End(query.status());
+      if (query->options.method != Method::kTextbookSat) {
+        return call->End(Answer(*query, request->wanted(), response));
+      }
+      query->options.threads = executor_.threads();
+      executor_.Submit([call, request, response, query = *std::move(query)] {
+        call->End(Answer(query, request->wanted(), response));
+      });
+    });
+  });
+}
+
+grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* CollisionService::BatchCheckCollisions(
+    grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest* request) {
+  return BatchStream::Start(*context, admission_, registry_, readers_, executor_, *request);
+}
+
+}  // namespace hulld::server

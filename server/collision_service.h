@@ -1,0 +1,39 @@
+#ifndef HULLD_SERVER_COLLISION_SERVICE_H_
+#define HULLD_SERVER_COLLISION_SERVICE_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include "hulld/v1/collision.grpc.pb.h"
+#include "server/admission.h"
+#include "server/executor.h"
+#include "server/registry.h"
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
+// answered by one of the `readers`, so that it never waits for a batch; TEXTBOOK_SAT, whose loop
+// over axes is parallel, and batches go to the executor.
+class CollisionService : public v1::CollisionService::CallbackService {
+ public:
+  CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
+                   Executor& executor)
+      : registry_(registry), admission_(admission), readers_(readers), executor_(executor) {}
+
+  grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
+                                           const v1::CheckCollisionRequest* request,
+                                           v1::CheckCollisionResponse* response) override;
+  grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchCheckCollisions(
+      grpc::CallbackServerContext* context,
+      const v1::BatchCheckCollisionsRequest* request) override;
+
+ private:
+  Registry& registry_;
+  Admission& admission_;
+  WorkerPool& readers_;
+  Executor& executor_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISION_SERVICE_H_

@@ -1,0 +1,186 @@
+#include "server/config.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+
+namespace hulld::server {
+namespace {
+
+constexpr uint64_t kMaxVertexIndex = std::numeric_limits<uint32_t>::max();
+constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
+
+std::string EnvironmentName(std::string flag) {
+  for (char& c : flag) c = c == '-' ? '_' : static_cast<char>(std::toupper(c));
+  return "HULLD_" + flag;
+}
+
+// Empty when `text` is a number of seconds up to a day; NaN is none.
+std::string CheckSeconds(const std::string& text) {
+  double seconds = -1;
+  const char* end = text.data() + text.size();
+  const auto [parsed, error] = std::from_chars(text.data(), end, seconds);
+  if (error == std::errc() && parsed == end && seconds >= 0 && seconds <= 86400) return "";
+  return absl::StrCat("\"", text, "\" is not a number of seconds from 0 to 86400");
+}
+
+// The settings of a Config bound to the options of one parser.
+class Parser {
+ public:
+  Parser()
+      : app_("hulld keeps 3D convex hulls by ID and answers exact collision queries.", "hulld") {
+    AddServing();
+    AddLimits();
+    app_.set_config("--config", "", "TOML file with the same settings, as in: max-hulls = 1000")
+        ->envname(EnvironmentName("config"))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    app_.allow_config_extras(CLI::config_extras_mode::error);
+    app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
+    app_.footer("Precedence: flag, environment variable, file, default.");
+  }
+
+  // The arguments that stand for the variables that are set.
+  std::vector<std::string> FromEnvironment(const Environment& environment) const {
+    std::vector<std::string> arguments;
+    for (const CLI::Option* option : app_.get_options()) {
+      const std::string variable = option->get_envname();
+      if (variable.empty()) continue;
+      const std::optional<std::string> value = environment(variable);
+      if (value.has_value() && !value->empty()) {
+        arguments.push_back(option->get_name() + "=" + *value);
+      }
+    }
+    return arguments;
+  }
+
+  // OK with print set for --help and --version; INVALID_ARGUMENT with the parser's words.
+  absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
+    try {
+      app_.parse(std::move(arguments));
+    } catch (const CLI::CallForVersion& version) {
+      result->print = std::string(version.what()) + "\n";
+      return absl::OkStatus();
+    } catch (const CLI::CallForHelp&) {
+      result->print = app_.help();
+      return absl::OkStatus();
+    } catch (const CLI::ConfigError& error) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--config: the file holds an unknown key: ", error.what()));
+    } catch (const CLI::FileError& error) {
+      return absl::InvalidArgumentError(absl::StrCat("--config: ", error.what()));
+    } catch (const CLI::Error& error) {
+      return absl::InvalidArgumentError(error.what());
+    }
+    config_.drain_timeout =
+        std::chrono::milliseconds(static_cast<int64_t>(drain_timeout_seconds_ * 1000));
+    result->config = config_;
+    return absl::OkStatus();
+  }
+
+ private:
+  template <typename T>
+  CLI::Option* Add(const std::string& name, T& value, const std::string& description) {
+    return app_.add_option("--" + name, value, description)
+        ->envname(EnvironmentName(name))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->capture_default_str();
+  }
+
+  void AddServing() {
+    Add("listen", config_.listen,
+        "Where to listen: host:port, [v6]:port or unix:path; port 0 picks a free port");
+    app_.add_flag("--insecure", config_.insecure,
+                  "Allow --listen on addresses that other machines can reach, although nothing is "
+                  "encrypted or authenticated")
+        ->envname(EnvironmentName("insecure"))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
+        ->check(CLI::Range(0, 1024));
+    Add("store", config_.store, "Where hulls live")->check(CLI::IsMember({"memory"}));
+    Add("drain-timeout", drain_timeout_seconds_,
+        "Seconds that running calls may take after SIGTERM or SIGINT")
+        ->check(CLI::Validator(CheckSeconds, ""));
+    Add("log-level", config_.log_level, "Least severe messages to log")
+        ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
+    Add("log-format", config_.log_format, "Log as text or as one JSON object per line")
+        ->check(CLI::IsMember({"text", "json"}));
+  }
+
+  void AddLimits() {
+    Limits& limits = config_.limits;
+    constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
+    AddLimit("max-points-per-chunk", limits.max_points_per_chunk,
+             "Points in one message of AppendPoints", kAny);
+    AddLimit("max-vertices-per-hull", limits.max_vertices_per_hull, "Vertices of one hull",
+             kMaxVertexIndex);
+    AddLimit("max-hulls", limits.max_hulls, "Hulls in the store", kAny);
+    AddLimit("max-pairs-per-batch", limits.max_pairs_per_batch, "Pairs in one BatchCheckCollisions",
+             kAny);
+    AddLimit("max-textbook-axes", limits.max_textbook_axes,
+             "Candidate axes of one pair under TEXTBOOK_SAT", kAny);
+    AddLimit("max-message-bytes", config_.max_message_bytes, "Bytes of one message from a client",
+             kMaxGrpcMessageBytes);
+  }
+
+  // CLI::Range alone would take -1 for the largest number.
+  void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
+                uint64_t most) {
+    const auto check = [most](const std::string& text) -> std::string {
+      uint64_t number = 0;
+      const char* end = text.data() + text.size();
+      const auto [parsed, error] = std::from_chars(text.data(), end, number);
+      if (error == std::errc() && parsed == end && number >= 1 && number <= most) return "";
+      return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", most);
+    };
+    Add(name, value, description)->check(CLI::Validator(check, ""));
+  }
+
+  CLI::App app_;
+  Config config_;
+  double drain_timeout_seconds_ = static_cast<double>(Config().drain_timeout.count()) / 1000;
+};
+
+absl::Status WithAdvice(const absl::Status& status, const char* where) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(where, status.message(), " (hulld --help lists the settings)"));
+}
+
+}  // namespace
+
+std::optional<std::string> ProcessEnvironment(const std::string& name) {
+  const char* value = std::getenv(name.c_str());
+  if (value == nullptr) return std::nullopt;
+  return value;
+}
+
+absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments,
+                                             const Environment& environment) {
+  CommandLine result;
+  const std::vector<std::string> variables = Parser().FromEnvironment(environment);
+  // Each variable alone first, so that an error can say where the value came from.
+  for (const std::string& variable : variables) {
+    if (variable.starts_with("--config=")) continue;
+    const absl::Status status = Parser().Parse({variable}, &result);
+    if (!status.ok()) {
+      const std::string flag = variable.substr(2, variable.find('=') - 2);
+      return WithAdvice(status, absl::StrCat(EnvironmentName(flag), ": ").c_str());
+    }
+  }
+  // The last value of an option wins and a file only fills what is still unset, hence this order.
+  std::vector<std::string> all = variables;
+  all.insert(all.end(), arguments.begin(), arguments.end());
+  result = CommandLine();
+  const absl::Status status = Parser().Parse(std::move(all), &result);
+  if (!status.ok()) return WithAdvice(status, "");
+  return result;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,79 @@
+#ifndef HULLD_SERVER_CONFIG_H_
+#define HULLD_SERVER_CONFIG_H_
+
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hulld::server {
+
+// What one caller may ask for; the error that names a limit names its flag.
+struct Limits {
+  uint64_t max_points_per_chunk = 200'000;
+  uint64_t max_vertices_per_hull = 1'000'000;
+  uint64_t max_hulls = 100'000;
+  uint64_t max_pairs_per_batch = 1'000'000;
+  uint64_t max_textbook_axes = 10'000'000;
+};
+
+// Every setting and default of the server.
+struct Config {
+  // "host:port", "[v6]:port" or "unix:path"; port 0 picks a free one.
+  std::string listen = "127.0.0.1:50551";
+  // Allows addresses that other machines can reach, without encryption or authentication.
+  bool insecure = false;
+  // Threads of parallel queries; 0: one per core.
+  int threads = 0;
+  // Where hulls live: "memory".
+  std::string store = "memory";
+  // How long running calls may take after SIGTERM before they are cancelled.
+  std::chrono::milliseconds drain_timeout{10'000};
+  // debug, info, warn or error.
+  std::string log_level = "info";
+  // text or json (one object per line).
+  std::string log_format = "text";
+  // Largest message taken from a client: holds max_points_per_chunk doubles and max_pairs_per_batch
+  // pairs at their defaults.
+  uint64_t max_message_bytes = 16 << 20;
+  Limits limits;
+
+  // Lists: hulls per page when the request says 0, and at most.
+  static constexpr uint32_t kDefaultPageSize = 100;
+  static constexpr uint32_t kMaxPageSize = 1000;
+  // Long replies are cut into messages of about this size.
+  static constexpr size_t kReplyMessageBytes = 1 << 20;
+  // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC
+  // client takes: 2 features x 65536 x (24 bytes of coordinates + at most 5 of index) = 3.6 MiB.
+  static constexpr size_t kMaxFeatureVertices = 1 << 16;
+  // Length of hull IDs and writer IDs.
+  static constexpr size_t kMaxIdCharacters = 256;
+};
+
+// What a command line asks for: to run with `config`, or, when `print` is not empty, to print it
+// and end (--help, --version).
+struct CommandLine {
+  Config config;
+  std::string print;
+};
+
+// Looks up an environment variable; nullopt when it is not set.
+using Environment = std::function<std::optional<std::string>(const std::string&)>;
+
+// The variables of this process.
+std::optional<std::string> ProcessEnvironment(const std::string& name);
+
+// Reads the settings: a flag beats its environment variable (HULLD_MAX_HULLS for --max-hulls),
+// which beats the TOML file named by --config, which beats the default. arguments: without the
+// program's name. INVALID_ARGUMENT: names the flag, variable or file key that is wrong.
+absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments,
+                                             const Environment& environment);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CONFIG_H_

@@ -1,0 +1,33 @@
+#ifndef HULLD_SERVER_DECODE_H_
+#define HULLD_SERVER_DECODE_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/query/collision.h"
+#include "core/query/pose.h"
+#include "hulld/v1/collision.pb.h"
+#include "hulld/v1/geometry.pb.h"
+#include "hulld/v1/hull.pb.h"
+#include "server/registry.h"
+
+namespace hulld::server {
+
+// The chunk of a message; its points may still hold NaN or infinity, which the builder finds.
+// INVALID_ARGUMENT: sequence 0, both fields of points set, or a number of coordinates that is no
+// multiple of three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
+absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points);
+
+// A pose; absent parts mean identity. INVALID_ARGUMENT names `field` and the coordinate.
+absl::StatusOr<Pose> DecodePose(const v1::Pose& message, const std::string& field);
+
+// INVALID_ARGUMENT: a number that stands for no method.
+absl::StatusOr<Method> DecodeMethod(v1::Method method);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_DECODE_H_

@@ -1,0 +1,28 @@
+#ifndef HULLD_SERVER_EXECUTOR_H_
+#define HULLD_SERVER_EXECUTOR_H_
+
+#include <functional>
+
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// The one thread that opens OpenMP regions: OpenMP keeps a team of threads for each thread that
+// opens one, so a second opener would double the threads. Tasks run one after the other, each on
+// the whole team; long work comes in slices that queue again, so that calls take turns.
+class Executor {
+ public:
+  // threads: of the team; 0: one per core.
+  explicit Executor(int threads);
+
+  int threads() const { return threads_; }
+  void Submit(std::function<void()> task) { opener_.Submit(std::move(task)); }
+
+ private:
+  const int threads_;
+  WorkerPool opener_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_EXECUTOR_H_

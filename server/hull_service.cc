@@ -1,0 +1,136 @@
+#include "server/hull_service.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "core/hull/audit.h"
+#include "server/append_stream.h"
+#include "server/config.h"
+#include "server/encode.h"
+#include "server/hull_id.h"
+#include "server/mesh_stream.h"
+#include "server/page_token.h"
+#include "server/unary_call.h"
+
+namespace hulld::server {
+namespace {
+
+void EncodeBox(const Hull& hull, v1::GetHullResponse* response) {
+  if (hull.empty()) return;
+  Vector low = hull.vertices().front();
+  Vector high = low;
+  for (const Vector& vertex : hull.vertices()) {
+    low = low.cwiseMin(vertex);
+    high = high.cwiseMax(vertex);
+  }
+  EncodeVector(low, response->mutable_box_min());
+  EncodeVector(high, response->mutable_box_max());
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* context,
+                                                  const v1::CreateHullRequest* request,
+                                                  v1::CreateHullResponse* response) {
+  return UnaryCall::Answer(*context, admission_, [&] { return Create(*request, response); });
+}
+
+grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>*
+HullService::AppendPoints(grpc::CallbackServerContext* context) {
+  return AppendStream::Start(*context, admission_, registry_);
+}
+
+grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
+                                               const v1::GetHullRequest* request,
+                                               v1::GetHullResponse* response) {
+  return UnaryCall::AnswerOn(readers_, *context, admission_,
+                             [this, request, response](const CallLifetime& lifetime) {
+                               return Get(*request, lifetime, response);
+                             });
+}
+
+grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
+    grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) {
+  return MeshStream::Start(*context, admission_, registry_, readers_, request->hull_id());
+}
+
+grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
+                                                 const v1::ListHullsRequest* request,
+                                                 v1::ListHullsResponse* response) {
+  return UnaryCall::Answer(*context, admission_, [&] { return List(*request, response); });
+}
+
+grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
+                                                  const v1::DeleteHullRequest* request,
+                                                  v1::DeleteHullResponse* response) {
+  return UnaryCall::Answer(*context, admission_, [&] { return Delete(*request, response); });
+}
+
+absl::Status HullService::Create(const v1::CreateHullRequest& request,
+                                 v1::CreateHullResponse* response) {
+  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  const absl::StatusOr<CreateResult> created =
+      registry_.Create(request.hull_id(), request.if_absent());
+  if (!created.ok()) return created.status();
+  if (created->created) spdlog::info("hull \"{}\" created", request.hull_id());
+  EncodeHeader(registry_.store(), created->store_revision, response->mutable_header());
+  EncodeRecord(created->hull, response->mutable_hull());
+  response->set_created(created->created);
+  return absl::OkStatus();
+}
+
+absl::Status HullService::Get(const v1::GetHullRequest& request, const CallLifetime& lifetime,
+                              v1::GetHullResponse* response) {
+  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  const auto resolved =
+      registry_.Resolve(request.hull_id(), [&lifetime] { return lifetime.ShouldStop(); });
+  if (!resolved.ok()) return resolved.status();
+  const auto& [revision, view] = *resolved;
+  EncodeHeader(registry_.store(), revision, response->mutable_header());
+  EncodeRecord(view.record, response->mutable_hull());
+  response->set_edge_count(view.hull->edges().size());
+  response->set_facet_count(view.hull->facet_count());
+  EncodeBox(*view.hull, response);
+  if (request.audit()) {
+    const absl::Status finding = AuditHull(*view.hull);
+    response->mutable_audit()->set_ok(finding.ok());
+    if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status HullService::List(const v1::ListHullsRequest& request,
+                               v1::ListHullsResponse* response) {
+  if (request.page_size() > Config::kMaxPageSize) {
+    return absl::InvalidArgumentError(absl::StrCat("page_size is ", request.page_size(),
+                                                   "; the limit is ", Config::kMaxPageSize));
+  }
+  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), request.prefix());
+  if (!after.ok()) return after.status();
+  const HullPage page =
+      registry_.List(request.prefix(), *after,
+                     request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
+  EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
+  for (const HullRecord& record : page.hulls) EncodeRecord(record, response->add_hulls());
+  if (page.more) {
+    response->set_next_page_token(EncodePageToken(request.prefix(), page.hulls.back().hull_id));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status HullService::Delete(const v1::DeleteHullRequest& request,
+                                 v1::DeleteHullResponse* response) {
+  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  const absl::StatusOr<uint64_t> revision = registry_.Delete(
+      request.hull_id(),
+      request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt);
+  if (!revision.ok()) return revision.status();
+  spdlog::info("hull \"{}\" deleted", request.hull_id());
+  EncodeHeader(registry_.store(), *revision, response->mutable_header());
+  return absl::OkStatus();
+}
+
+}  // namespace hulld::server

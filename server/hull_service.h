@@ -1,0 +1,52 @@
+#ifndef HULLD_SERVER_HULL_SERVICE_H_
+#define HULLD_SERVER_HULL_SERVICE_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include "hulld/v1/hull.grpc.pb.h"
+#include "server/admission.h"
+#include "server/call_lifetime.h"
+#include "server/registry.h"
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// hulld.v1.HullService: the contract in hull.proto over the registry. Calls that only look into
+// records are answered where they arrive; those that need a snapshot, on `readers`.
+class HullService : public v1::HullService::CallbackService {
+ public:
+  HullService(Registry& registry, Admission& admission, WorkerPool& readers)
+      : registry_(registry), admission_(admission), readers_(readers) {}
+
+  grpc::ServerUnaryReactor* CreateHull(grpc::CallbackServerContext* context,
+                                       const v1::CreateHullRequest* request,
+                                       v1::CreateHullResponse* response) override;
+  grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendPoints(
+      grpc::CallbackServerContext* context) override;
+  grpc::ServerUnaryReactor* GetHull(grpc::CallbackServerContext* context,
+                                    const v1::GetHullRequest* request,
+                                    v1::GetHullResponse* response) override;
+  grpc::ServerWriteReactor<v1::GetHullMeshResponse>* GetHullMesh(
+      grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) override;
+  grpc::ServerUnaryReactor* ListHulls(grpc::CallbackServerContext* context,
+                                      const v1::ListHullsRequest* request,
+                                      v1::ListHullsResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteHull(grpc::CallbackServerContext* context,
+                                       const v1::DeleteHullRequest* request,
+                                       v1::DeleteHullResponse* response) override;
+
+ private:
+  absl::Status Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response);
+  absl::Status Get(const v1::GetHullRequest& request, const CallLifetime& lifetime,
+                   v1::GetHullResponse* response);
+  absl::Status List(const v1::ListHullsRequest& request, v1::ListHullsResponse* response);
+  absl::Status Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response);
+
+  Registry& registry_;
+  Admission& admission_;
+  WorkerPool& readers_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_HULL_SERVICE_H_

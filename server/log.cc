@@ -1,0 +1,110 @@
+#include "server/log.h"
+
+#include <grpc/support/log.h>
+#include <spdlog/formatter.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+
+namespace hulld::server {
+namespace {
+
+class JsonFormatter : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
+    const auto since_epoch = message.time.time_since_epoch();
+    const auto millis = std::chrono::duration_cast<std::chrono::milliseconds>(since_epoch).count();
+    const std::time_t seconds = static_cast<std::time_t>(millis / 1000);
+    std::tm utc = {};
+    gmtime_r(&seconds, &utc);
+    char time[64];
+    const size_t length = std::strftime(time, sizeof time, "%Y-%m-%dT%H:%M:%S", &utc);
+    std::snprintf(time + length, sizeof time - length, ".%03dZ", static_cast<int>(millis % 1000));
+    const auto level = spdlog::level::to_string_view(message.level);
+    const std::string line =
+        "{\"time\":\"" + std::string(time) + "\",\"level\":\"" +
+        std::string(level.data(), level.size()) + "\",\"message\":\"" +
+        JsonEscape(std::string(message.payload.data(), message.payload.size())) + "\"}\n";
+    out.append(line.data(), line.data() + line.size());
+  }
+
+  std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<JsonFormatter>();
+  }
+};
+
+spdlog::level::level_enum LevelOf(gpr_log_severity severity) {
+  switch (severity) {
+    case GPR_LOG_SEVERITY_DEBUG:
+    case GPR_LOG_SEVERITY_INFO:
+      return spdlog::level::debug;
+    case GPR_LOG_SEVERITY_ERROR:
+      return spdlog::level::warn;
+  }
+  return spdlog::level::warn;
+}
+
+void LogForGrpc(gpr_log_func_args* arguments) {
+  spdlog::log(LevelOf(arguments->severity), "grpc: {}", arguments->message);
+}
+
+// Length of the UTF-8 character that starts at text[at]; 0 when there is none.
+size_t CharacterLength(const std::string& text, size_t at) {
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(at);
+  if (lead < 0x80) return 1;
+  const size_t length = lead >= 0xF0 ? 4 : lead >= 0xE0 ? 3 : 2;
+  if (lead < 0xC2 || lead > 0xF4 || at + length > text.size()) return 0;
+  for (size_t i = 1; i < length; ++i) {
+    if ((byte(at + i) & 0xC0) != 0x80) return 0;
+  }
+  const unsigned char second = byte(at + 1);
+  const bool overlong = (lead == 0xE0 && second < 0xA0) || (lead == 0xF0 && second < 0x90);
+  const bool surrogate = lead == 0xED && second >= 0xA0;
+  const bool too_big = lead == 0xF4 && second >= 0x90;
+  return overlong || surrogate || too_big ? 0 : length;
+}
+
+}  // namespace
+
+std::string JsonEscape(const std::string& text) {
+  std::string out;
+  out.reserve(text.size());
+  for (size_t i = 0; i < text.size();) {
+    const size_t length = CharacterLength(text, i);
+    const char c = text[i];
+    if (length == 0) {
+      out += "\\ufffd";
+    } else if (c == '"' || c == '\\') {
+      out += {'\\', c};
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
+      char escape[8];
+      std::snprintf(escape, sizeof escape, "\\u%04x", static_cast<unsigned>(c));
+      out += escape;
+    } else {
+      out.append(text, i, length);
+    }
+    i += length == 0 ? 1 : length;
+  }
+  return out;
+}
+
+void SetUpLog(const std::string& level, const std::string& format) {
+  auto logger =
+      std::make_shared<spdlog::logger>("hulld", std::make_shared<spdlog::sinks::stderr_sink_mt>());
+  if (format == "json") {
+    logger->set_formatter(std::make_unique<JsonFormatter>());
+  } else {
+    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+  }
+  logger->set_level(spdlog::level::from_str(level));
+  logger->flush_on(spdlog::level::debug);
+  spdlog::set_default_logger(std::move(logger));
+  gpr_set_log_function(LogForGrpc);
+}
+
+}  // namespace hulld::server

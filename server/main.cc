@@ -1,0 +1,87 @@
+// hulld: keeps 3D convex hulls by ID and answers exact collision queries. See --help.
+
+#include <signal.h>
+#include <spdlog/spdlog.h>
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "server/config.h"
+#include "server/log.h"
+#include "server/server.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr int kExitFailure = 1;
+constexpr int kExitUsage = 2;
+
+sigset_t EndingSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  return signals;
+}
+
+void LogStart(const Config& config, const Server& server) {
+  const Limits& limits = config.limits;
+  spdlog::info(
+      "hulld {}: store {}, limits: {} points per chunk, {} vertices per hull, {} hulls, {} pairs "
+      "per batch, {} textbook axes",
+      HULLD_VERSION, config.store, limits.max_points_per_chunk, limits.max_vertices_per_hull,
+      limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
+  if (config.store == "memory") spdlog::info("hulls live in memory and end with this process");
+  if (config.insecure) spdlog::warn("--insecure: nothing is encrypted or authenticated");
+  spdlog::info("listening on {}", server.address());
+}
+
+// Serves until SIGTERM or SIGINT, then drains. Returns the exit status.
+int Run(const Config& config) {
+  SetUpLog(config.log_level, config.log_format);
+  // Blocked before any thread exists, so that every thread inherits it and this one can wait.
+  const sigset_t signals = EndingSignals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+
+  const absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(config);
+  if (!server.ok()) {
+    spdlog::error("{}", std::string(server.status().message()));
+    return kExitFailure;
+  }
+  LogStart(config, **server);
+  int received = 0;
+  sigwait(&signals, &received);
+  spdlog::info("{} received: draining for at most {} ms; once more ends at once",
+               received == SIGTERM ? "SIGTERM" : "SIGINT", config.drain_timeout.count());
+  pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+  (*server)->BeginDrain();
+  if (!(*server)->WaitIdle(config.drain_timeout)) {
+    spdlog::warn("the drain timeout passed; cancelling the calls that still run");
+  }
+  return 0;
+}
+
+int Main(const std::vector<std::string>& arguments) {
+  const absl::StatusOr<CommandLine> command_line = ParseCommandLine(arguments, ProcessEnvironment);
+  if (!command_line.ok()) {
+    std::fprintf(stderr, "hulld: %s\n", std::string(command_line.status().message()).c_str());
+    return kExitUsage;
+  }
+  if (!command_line->print.empty()) {
+    std::fputs(command_line->print.c_str(), stdout);
+    return 0;
+  }
+  const int status = Run(command_line->config);
+  if (status == 0) spdlog::info("ended");
+  spdlog::shutdown();
+  return status;
+}
+
+}  // namespace
+}  // namespace hulld::server
+
+int main(int argc, char** argv) {
+  return hulld::server::Main(std::vector<std::string>(argv + 1, argv + argc));
+}

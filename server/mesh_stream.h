@@ -1,0 +1,49 @@
+#ifndef HULLD_SERVER_MESH_STREAM_H_
+#define HULLD_SERVER_MESH_STREAM_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "hulld/v1/hull.pb.h"
+#include "server/admission.h"
+#include "server/call_lifetime.h"
+#include "server/registry.h"
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// One GetHullMesh call: one message after the other from one snapshot, the next one made when the
+// one before is sent. It owns itself until gRPC is done with it.
+class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
+ public:
+  static grpc::ServerWriteReactor<v1::GetHullMeshResponse>* Start(
+      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      WorkerPool& readers, const std::string& hull_id);
+
+ private:
+  explicit MeshStream(const grpc::CallbackServerContext& context) : lifetime_(context.deadline()) {}
+
+  void OnWriteDone(bool ok) override;
+  void OnCancel() override { lifetime_.Cancel(); }
+  void OnDone() override { delete this; }
+
+  void Open(Registry& registry, const std::string& hull_id);
+  // Fills message_ with the next piece; false when all are sent.
+  bool NextMessage();
+  void FillVertices(v1::MeshVertices* message);
+  void FillFacets(v1::MeshFacets* message);
+
+  CallLifetime lifetime_;
+  std::optional<Admission::Ticket> ticket_;
+  HullView view_;
+  size_t next_vertex_ = 0;
+  size_t next_facet_ = 0;
+  v1::GetHullMeshResponse message_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_MESH_STREAM_H_

@@ -1,0 +1,23 @@
+#ifndef HULLD_SERVER_QUERY_SETTINGS_H_
+#define HULLD_SERVER_QUERY_SETTINGS_H_
+
+#include <absl/status/statusor.h>
+
+#include "core/query/collision.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/call_lifetime.h"
+#include "server/config.h"
+
+namespace hulld::server {
+
+// The options of core for what a request wants; the query ends with `lifetime`, which must outlive
+// it. INVALID_ARGUMENT: a number that stands for no method.
+absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
+                                              const Limits& limits, const CallLifetime& lifetime);
+
+// An error of core's query in the words of the server: RESOURCE_EXHAUSTED names the limit's flag.
+absl::Status NameQueryLimit(const absl::Status& status);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_QUERY_SETTINGS_H_

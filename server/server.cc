@@ -1,0 +1,86 @@
+#include "server/server.h"
+
+#include <absl/status/status.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "server/listen_address.h"
+#include "server/memory_store.h"
+
+namespace hulld::server {
+namespace {
+
+// At least two, so that one long task does not hold up all others.
+int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
+
+}  // namespace
+
+Server::Server(const Config& config)
+    : store_(std::make_unique<MemoryStore>()),
+      writers_(PoolThreads()),
+      registry_(*store_, config.limits, writers_),
+      readers_(PoolThreads()),
+      executor_(config.threads),
+      hull_service_(registry_, admission_, readers_),
+      collision_service_(registry_, admission_, readers_, executor_),
+      status_service_(registry_, admission_) {}
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
+  std::unique_ptr<Server> server(new Server(config));
+  if (absl::Status s = server->Listen(config); !s.ok()) return s;
+  return server;
+}
+
+absl::Status Server::Listen(const Config& config) {
+  const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
+  if (!address.ok()) return address.status();
+  if (absl::Status s = CheckExposure(*address, config.insecure); !s.ok()) return s;
+  if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
+
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  int port = 0;
+  builder.AddListeningPort(config.listen, grpc::InsecureServerCredentials(), &port);
+  // Without this a second server would share the port without a word.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
+  builder.RegisterService(&hull_service_);
+  builder.RegisterService(&collision_service_);
+  builder.RegisterService(&status_service_);
+  grpc_server_ = builder.BuildAndStart();
+  if (grpc_server_ == nullptr || (port == 0 && !address->is_unix())) {
+    return ExplainBindFailure(*address);
+  }
+  address_ = address->Format(port);
+  grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
+  for (const char* service :
+       {v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
+        v1::StatusService::service_full_name()}) {
+    health->SetServingStatus(service, true);
+  }
+  return absl::OkStatus();
+}
+
+void Server::BeginDrain() {
+  grpc_server_->GetHealthCheckService()->SetServingStatus(false);
+  admission_.BeginDrain();
+}
+
+bool Server::WaitIdle(std::chrono::milliseconds timeout) {
+  return admission_.WaitIdle(std::chrono::steady_clock::now() + timeout);
+}
+
+Server::~Server() {
+  if (grpc_server_ == nullptr) return;
+  admission_.BeginDrain();
+  // Cancels what still runs; core polls for that, so the calls end soon.
+  grpc_server_->Shutdown(std::chrono::system_clock::now());
+  admission_.WaitIdle(std::chrono::steady_clock::time_point::max());
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,67 @@
+#ifndef HULLD_SERVER_SERVER_H_
+#define HULLD_SERVER_SERVER_H_
+
+#include <absl/status/statusor.h>
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "server/admission.h"
+#include "server/collision_service.h"
+#include "server/config.h"
+#include "server/executor.h"
+#include "server/hull_service.h"
+#include "server/registry.h"
+#include "server/status_service.h"
+#include "server/store.h"
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// A running server: store -> registry -> services -> gRPC.
+class Server {
+ public:
+  // Listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs --insecure.
+  // UNAVAILABLE: the address cannot be bound.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config);
+
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+  // Cancels what runs and ends.
+  ~Server();
+
+  // Where it listens, with the port that was chosen.
+  const std::string& address() const { return address_; }
+
+  // Turns health to NOT_SERVING and refuses new calls with UNAVAILABLE; running ones go on.
+  void BeginDrain();
+
+  // After BeginDrain: waits for the running calls; false when some still run at the end.
+  bool WaitIdle(std::chrono::milliseconds timeout);
+
+ private:
+  explicit Server(const Config& config);
+
+  absl::Status Listen(const Config& config);
+
+  // Calls leave their ticket last of all, hence first here.
+  Admission admission_;
+  std::unique_ptr<Store> store_;
+  // Chunks, and everything else that may take longer than moving bytes. Two pools, so that readers
+  // never wait for writers.
+  WorkerPool writers_;
+  Registry registry_;
+  WorkerPool readers_;
+  Executor executor_;
+  HullService hull_service_;
+  CollisionService collision_service_;
+  StatusService status_service_;
+  std::string address_;
+  std::unique_ptr<grpc::Server> grpc_server_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_SERVER_H_

@@ -1,0 +1,139 @@
+#include "server/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <map>
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class ConfigTest : public ::testing::Test {
+ protected:
+  absl::StatusOr<CommandLine> Parse(const std::vector<std::string>& arguments) {
+    return ParseCommandLine(arguments, [this](const std::string& name) {
+      const auto found = environment_.find(name);
+      return found == environment_.end() ? std::nullopt : std::optional(found->second);
+    });
+  }
+
+  Config Accepted(const std::vector<std::string>& arguments) {
+    const absl::StatusOr<CommandLine> parsed = Parse(arguments);
+    EXPECT_TRUE(parsed.ok()) << parsed.status().ToString();
+    return parsed.ok() ? parsed->config : Config();
+  }
+
+  void ExpectRefused(const std::vector<std::string>& arguments, const std::string& what) {
+    const absl::StatusOr<CommandLine> parsed = Parse(arguments);
+    ASSERT_EQ(parsed.status().code(), absl::StatusCode::kInvalidArgument) << what;
+    EXPECT_THAT(std::string(parsed.status().message()), HasSubstr(what));
+  }
+
+  std::string WriteFile(const std::string& text) {
+    const std::string path = ::testing::TempDir() + "/hulld_config_test_" +
+                             ::testing::UnitTest::GetInstance()->current_test_info()->name() +
+                             ".toml";
+    std::ofstream(path) << text;
+    return path;
+  }
+
+  std::map<std::string, std::string> environment_;
+};
+
+TEST_F(ConfigTest, DefaultsAreTheDocumentedOnes) {
+  const Config config = Accepted({});
+  EXPECT_EQ(config.listen, "127.0.0.1:50551");
+  EXPECT_FALSE(config.insecure);
+  EXPECT_EQ(config.drain_timeout, std::chrono::seconds(10));
+  EXPECT_EQ(config.limits.max_points_per_chunk, 200'000);
+  EXPECT_EQ(config.limits.max_vertices_per_hull, 1'000'000);
+  EXPECT_EQ(config.limits.max_hulls, 100'000);
+  EXPECT_EQ(config.limits.max_pairs_per_batch, 1'000'000);
+  EXPECT_EQ(config.limits.max_textbook_axes, 10'000'000);
+}
+
+TEST_F(ConfigTest, FlagBeatsVariableBeatsFileBeatsDefault) {
+  const std::string file = WriteFile("max-hulls = 1\nmax-pairs-per-batch = 1\nthreads = 1\n");
+  environment_["HULLD_MAX_HULLS"] = "2";
+  environment_["HULLD_MAX_PAIRS_PER_BATCH"] = "2";
+  const Config config = Accepted({"--config", file, "--max-hulls", "3"});
+  EXPECT_EQ(config.limits.max_hulls, 3);
+  EXPECT_EQ(config.limits.max_pairs_per_batch, 2);
+  EXPECT_EQ(config.threads, 1);
+  EXPECT_EQ(config.limits.max_points_per_chunk, 200'000);
+}
+
+TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
+  const std::map<std::string, std::string> settings = {
+      {"listen", "unix:/tmp/x"},  {"insecure", "true"},           {"threads", "3"},
+      {"store", "memory"},        {"drain-timeout", "0.5"},       {"log-level", "debug"},
+      {"log-format", "json"},     {"max-points-per-chunk", "11"}, {"max-vertices-per-hull", "12"},
+      {"max-hulls", "13"},        {"max-pairs-per-batch", "14"},  {"max-textbook-axes", "15"},
+      {"max-message-bytes", "16"}};
+  std::vector<std::string> flags;
+  std::map<std::string, std::string> variables;
+  std::string toml;
+  for (const auto& [name, value] : settings) {
+    flags.push_back("--" + name + "=" + value);
+    std::string variable = "HULLD_";
+    for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
+    variables[variable] = value;
+    const bool is_text = name == "listen" || name == "store" || name.starts_with("log");
+    toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
+  }
+  const auto expect_all = [](const Config& config) {
+    EXPECT_EQ(config.listen, "unix:/tmp/x");
+    EXPECT_TRUE(config.insecure);
+    EXPECT_EQ(config.threads, 3);
+    EXPECT_EQ(config.drain_timeout, std::chrono::milliseconds(500));
+    EXPECT_EQ(config.log_level, "debug");
+    EXPECT_EQ(config.log_format, "json");
+    EXPECT_EQ(config.limits.max_points_per_chunk, 11);
+    EXPECT_EQ(config.limits.max_vertices_per_hull, 12);
+    EXPECT_EQ(config.limits.max_hulls, 13);
+    EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
+    EXPECT_EQ(config.limits.max_textbook_axes, 15);
+    EXPECT_EQ(config.max_message_bytes, 16);
+  };
+  expect_all(Accepted(flags));
+  const std::string file = WriteFile(toml);
+  expect_all(Accepted({"--config=" + file}));
+  environment_ = {{"HULLD_CONFIG", file}};
+  expect_all(Accepted({}));
+  environment_ = variables;
+  expect_all(Accepted({}));
+}
+
+TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
+  ExpectRefused({"--max-hulls", "0"}, "--max-hulls: \"0\" is not a whole number from 1");
+  ExpectRefused({"--max-hulls=-1"}, "--max-hulls: \"-1\" is not a whole number");
+  ExpectRefused({"--max-vertices-per-hull", "4294967296"}, "--max-vertices-per-hull");
+  ExpectRefused({"--drain-timeout", "nan"}, "--drain-timeout: \"nan\" is not a number of seconds");
+  ExpectRefused({"--log-level", "loud"}, "--log-level");
+  ExpectRefused({"--store", "disk"}, "--store");
+  ExpectRefused({"--no-such-flag"}, "--no-such-flag");
+  ExpectRefused({"--config", "/nonexistent.toml"}, "--config: /nonexistent.toml");
+  ExpectRefused({"--config", WriteFile("max-hull = 3\n")}, "max-hull");
+  environment_["HULLD_MAX_HULLS"] = "many";
+  ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
+}
+
+TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
+  const absl::StatusOr<CommandLine> help = Parse({"--help"});
+  ASSERT_TRUE(help.ok());
+  for (const char* flag :
+       {"--listen", "--insecure", "--threads", "--store", "--drain-timeout", "--log-level",
+        "--log-format", "--max-points-per-chunk", "--max-vertices-per-hull", "--max-hulls",
+        "--max-pairs-per-batch", "--max-textbook-axes", "--max-message-bytes", "--config"}) {
+    EXPECT_THAT(help->print, HasSubstr(flag));
+  }
+  EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));
+  EXPECT_EQ(Parse({"--version"})->print, "hulld 0.1.0\n");
+}
+
+}  // namespace
+}  // namespace hulld::server
