@@ -1,0 +1,259 @@
+#include "client/client.h"
+
+#include <absl/strings/str_cat.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <grpcpp/security/credentials.h>
+
+#include <algorithm>
+#include <future>
+#include <utility>
+
+#include "client/grpc_status.h"
+
+namespace hulld {
+namespace {
+
+// Replies are cut at about 1 MiB by the server; this only bounds what a wrong one can make us hold.
+constexpr int kMaxReceiveBytes = 64 << 20;
+
+bool IsLoopback(const std::string& target) {
+  const auto starts_with = [&target](const char* prefix) { return target.rfind(prefix, 0) == 0; };
+  return starts_with("127.") || starts_with("localhost:") || starts_with("[::1]:") ||
+         starts_with("unix:");
+}
+
+std::shared_ptr<grpc::Channel> Connect(const std::string& server) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
+  // A retry shall find a server that has come back meanwhile, rather than gRPC's memory of the
+  // failure.
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  // gRPC would ask the proxy of the environment even for this machine's own services.
+  if (IsLoopback(server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+}
+
+absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
+  switch (part.part_case()) {
+    case v1::GetHullMeshResponse::kHeader:
+      mesh->header = part.header();
+      return absl::OkStatus();
+    case v1::GetHullMeshResponse::kVertices:
+      mesh->xyz.insert(mesh->xyz.end(), part.vertices().xyz().begin(), part.vertices().xyz().end());
+      return absl::OkStatus();
+    case v1::GetHullMeshResponse::kFacets:
+      mesh->facet_sizes.insert(mesh->facet_sizes.end(), part.facets().sizes().begin(),
+                               part.facets().sizes().end());
+      mesh->facet_indices.insert(mesh->facet_indices.end(), part.facets().indices().begin(),
+                                 part.facets().indices().end());
+      return absl::OkStatus();
+    case v1::GetHullMeshResponse::PART_NOT_SET:
+      break;
+  }
+  return absl::InternalError("the mesh stream holds a message of an unknown kind");
+}
+
+// Whoever draws or writes the mesh relies on it.
+absl::Status CheckConsistent(const HullMesh& mesh) {
+  if (mesh.xyz.size() != 3 * mesh.header.hull().vertex_count() ||
+      mesh.facet_sizes.size() != mesh.header.facet_count()) {
+    return absl::InternalError("the mesh stream ended early, or its header miscounts");
+  }
+  uint64_t corners = 0;
+  for (const uint32_t size : mesh.facet_sizes) corners += size;
+  if (corners != mesh.facet_indices.size()) {
+    return absl::InternalError("the mesh stream's facet sizes and indices disagree");
+  }
+  const size_t vertices = mesh.vertex_count();
+  const auto in_range = [vertices](uint32_t index) { return index < vertices; };
+  if (!std::all_of(mesh.facet_indices.begin(), mesh.facet_indices.end(), in_range)) {
+    return absl::InternalError("the mesh stream names a vertex that it does not hold");
+  }
+  return absl::OkStatus();
+}
+
+// HealthCheckResponse.status, field 1 of grpc.health.v1; Debian has no generated code for it.
+enum HealthStatus { kUnknown = 0, kServing = 1 };
+
+HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
+  std::vector<grpc::Slice> slices;
+  if (!buffer.Dump(&slices).ok()) return kUnknown;
+  std::string bytes;
+  for (const grpc::Slice& slice : slices) {
+    bytes.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+  }
+  return bytes == std::string("\x08\x01", 2) ? kServing : kUnknown;
+}
+
+}  // namespace
+
+Client::Client(ClientOptions options) : Client(options, Connect(options.server)) {}
+
+Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
+    : options_(std::move(options)),
+      channel_(std::move(channel)),
+      hulls_(v1::HullService::NewStub(channel_)),
+      collisions_(v1::CollisionService::NewStub(channel_)),
+      status_(v1::StatusService::NewStub(channel_)) {}
+
+Deadline Client::NextDeadline() const {
+  return std::chrono::system_clock::now() + options_.timeout;
+}
+
+template <typename Response, typename Request, typename Stub>
+absl::StatusOr<Response> Client::Call(Stub* stub,
+                                      grpc::Status (Stub::*method)(grpc::ClientContext*,
+                                                                   const Request&, Response*),
+                                      const Request& request, bool retry) const {
+  const Deadline deadline = NextDeadline();
+  Response response;
+  const auto attempt = [&] {
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    response.Clear();
+    return FromGrpcStatus((stub->*method)(&context, request, &response));
+  };
+  absl::Status status = retry ? CallWithRetries(options_.retry, deadline, attempt) : attempt();
+  if (!status.ok()) return status;
+  return response;
+}
+
+absl::StatusOr<v1::CreateHullResponse> Client::CreateHull(const std::string& hull_id,
+                                                          bool if_absent) const {
+  v1::CreateHullRequest request;
+  request.set_hull_id(hull_id);
+  request.set_if_absent(if_absent);
+  return Call(hulls_.get(), &v1::HullService::Stub::CreateHull, request, if_absent);
+}
+
+absl::StatusOr<std::unique_ptr<Appender>> Client::OpenAppend(const std::string& hull_id,
+                                                             AppendOptions options) const {
+  v1::AppendOpen open;
+  open.set_hull_id(hull_id);
+  open.set_writer_id(options.writer_id);
+  open.set_create_if_absent(options.create_if_absent);
+  std::unique_ptr<Appender> appender(
+      new Appender(hulls_, std::move(open), std::move(options), options_.timeout, options_.retry));
+  if (absl::Status status = appender->OpenFirst(); !status.ok()) return status;
+  return appender;
+}
+
+absl::StatusOr<v1::GetHullResponse> Client::GetHull(const std::string& hull_id, bool audit) const {
+  v1::GetHullRequest request;
+  request.set_hull_id(hull_id);
+  request.set_audit(audit);
+  return Call(hulls_.get(), &v1::HullService::Stub::GetHull, request, true);
+}
+
+absl::StatusOr<HullMesh> Client::GetHullMesh(const std::string& hull_id) const {
+  v1::GetHullMeshRequest request;
+  request.set_hull_id(hull_id);
+  const Deadline deadline = NextDeadline();
+  HullMesh mesh;
+  absl::Status status = CallWithRetries(options_.retry, deadline, [&] {
+    mesh = HullMesh();
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    const auto reader = hulls_->GetHullMesh(&context, request);
+    absl::Status part_status;
+    v1::GetHullMeshResponse part;
+    while (part_status.ok() && reader->Read(&part)) part_status = AddPart(part, &mesh);
+    if (!part_status.ok()) context.TryCancel();
+    const grpc::Status end = reader->Finish();
+    return part_status.ok() ? FromGrpcStatus(end) : part_status;
+  });
+  if (status.ok()) status = CheckConsistent(mesh);
+  if (!status.ok()) return status;
+  return mesh;
+}
+
+absl::StatusOr<v1::ListHullsResponse> Client::ListHulls(const v1::ListHullsRequest& request) const {
+  return Call(hulls_.get(), &v1::HullService::Stub::ListHulls, request, true);
+}
+
+absl::StatusOr<v1::ListHullsResponse> Client::ListAllHulls(const std::string& prefix,
+                                                           uint64_t limit) const {
+  constexpr uint64_t kLargestPage = 1000;
+  v1::ListHullsResponse all;
+  v1::ListHullsRequest request;
+  request.set_prefix(prefix);
+  do {
+    const uint64_t missing = limit == 0 ? kLargestPage : limit - all.hulls_size();
+    request.set_page_size(static_cast<uint32_t>(std::min(missing, kLargestPage)));
+    absl::StatusOr<v1::ListHullsResponse> page = ListHulls(request);
+    if (!page.ok()) return page.status();
+    *all.mutable_header() = page->header();
+    all.mutable_hulls()->MergeFrom(page->hulls());
+    if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
+      return absl::InternalError("the server answered a page that continues with itself");
+    }
+    all.set_next_page_token(page->next_page_token());
+    request.set_page_token(page->next_page_token());
+  } while (!request.page_token().empty() &&
+           (limit == 0 || static_cast<uint64_t>(all.hulls_size()) < limit));
+  return all;
+}
+
+absl::StatusOr<v1::DeleteHullResponse> Client::DeleteHull(
+    const std::string& hull_id, std::optional<uint64_t> if_revision) const {
+  v1::DeleteHullRequest request;
+  request.set_hull_id(hull_id);
+  if (if_revision) request.set_if_revision(*if_revision);
+  return Call(hulls_.get(), &v1::HullService::Stub::DeleteHull, request, false);
+}
+
+absl::StatusOr<v1::CheckCollisionResponse> Client::CheckCollision(
+    const v1::CheckCollisionRequest& request) const {
+  return Call(collisions_.get(), &v1::CollisionService::Stub::CheckCollision, request, true);
+}
+
+absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
+                                          const BatchReceiver& receive) const {
+  const Deadline deadline = NextDeadline();
+  bool received = false;
+  absl::Status receiver_status;
+  const auto attempt = [&] {
+    grpc::ClientContext context;
+    context.set_deadline(deadline);
+    const auto reader = collisions_->BatchCheckCollisions(&context, request);
+    v1::BatchCheckCollisionsResponse response;
+    while (receiver_status.ok() && reader->Read(&response)) {
+      received = true;
+      receiver_status = receive(response);
+    }
+    if (!receiver_status.ok()) context.TryCancel();
+    return FromGrpcStatus(reader->Finish());
+  };
+  absl::Status status;
+  int failures = 0;
+  do {
+    status = attempt();
+  } while (absl::IsUnavailable(status) && !received &&
+           WaitBeforeRetry(options_.retry, ++failures, deadline));
+  return receiver_status.ok() ? status : receiver_status;
+}
+
+absl::StatusOr<v1::GetStatusResponse> Client::GetStatus() const {
+  return Call(status_.get(), &v1::StatusService::Stub::GetStatus, v1::GetStatusRequest(), true);
+}
+
+absl::Status Client::CheckHealth() const {
+  grpc::GenericStub stub(channel_);
+  grpc::ClientContext context;
+  context.set_deadline(NextDeadline());
+  // An empty HealthCheckRequest asks for the server as a whole.
+  const grpc::Slice empty;
+  const grpc::ByteBuffer request(&empty, 1);
+  grpc::ByteBuffer response;
+  std::promise<grpc::Status> finished;
+  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", grpc::StubOptions(), &request, &response,
+                 [&finished](grpc::Status status) { finished.set_value(std::move(status)); });
+  const grpc::Status status = finished.get_future().get();
+  if (!status.ok()) return FromGrpcStatus(status);
+  if (DecodeHealth(response) == kServing) return absl::OkStatus();
+  return absl::FailedPreconditionError("the server is up but not serving");
+}
+
+}  // namespace hulld

@@ -1,0 +1,118 @@
+#ifndef HULLD_CLIENT_CLIENT_H_
+#define HULLD_CLIENT_CLIENT_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <grpcpp/channel.h>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/appender.h"
+#include "client/retry.h"
+#include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/hull.grpc.pb.h"
+#include "hulld/v1/status.grpc.pb.h"
+
+namespace hulld {
+
+inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
+
+struct ClientOptions {
+  // HOST:PORT, or any other target name of gRPC.
+  std::string server = kDefaultServer;
+  // Deadline of each call, its retries included. An append stream may last longer: there it bounds
+  // the wait for the next acknowledgement.
+  std::chrono::milliseconds timeout{30000};
+  RetryPolicy retry;
+};
+
+// The canonical snapshot of a hull, put together from its stream and checked to be consistent.
+struct HullMesh {
+  v1::MeshHeader header;
+  // Three coordinates per vertex.
+  std::vector<double> xyz;
+  // Vertices per facet, and the vertex indices of all facets one after another.
+  std::vector<uint32_t> facet_sizes;
+  std::vector<uint32_t> facet_indices;
+
+  size_t vertex_count() const { return xyz.size() / 3; }
+};
+
+// A connection to hulld. Connects when first used; any thread may call it.
+//
+// Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
+// came. Calls that are safe to repeat (all but DeleteHull, and CreateHull without if_absent) are
+// retried after UNAVAILABLE as options.retry says.
+class Client {
+ public:
+  explicit Client(ClientOptions options = {});
+  // Over a given channel, such as one within the process.
+  Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel);
+
+  absl::StatusOr<v1::CreateHullResponse> CreateHull(const std::string& hull_id,
+                                                    bool if_absent = false) const;
+
+  // Opens a stream of chunks into a hull.
+  absl::StatusOr<std::unique_ptr<Appender>> OpenAppend(const std::string& hull_id,
+                                                       AppendOptions options = {}) const;
+
+  absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
+
+  // INTERNAL when the stream contradicts itself.
+  absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
+
+  // One page.
+  absl::StatusOr<v1::ListHullsResponse> ListHulls(const v1::ListHullsRequest& request) const;
+
+  // Follows pages until the last, or until `limit` hulls are there (0: no limit). The header is the
+  // last page's; next_page_token is empty unless the limit cut the list.
+  absl::StatusOr<v1::ListHullsResponse> ListAllHulls(const std::string& prefix,
+                                                     uint64_t limit = 0) const;
+
+  // Never retried: a repeated delete could remove a hull that someone has created anew.
+  absl::StatusOr<v1::DeleteHullResponse> DeleteHull(const std::string& hull_id,
+                                                    std::optional<uint64_t> if_revision = {}) const;
+
+  absl::StatusOr<v1::CheckCollisionResponse> CheckCollision(
+      const v1::CheckCollisionRequest& request) const;
+
+  // Passes each message of the answer to `receive`, in order; an error of `receive` ends the call
+  // and is returned. Retried only while nothing was received.
+  using BatchReceiver = std::function<absl::Status(const v1::BatchCheckCollisionsResponse&)>;
+  absl::Status BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
+                                    const BatchReceiver& receive) const;
+
+  absl::StatusOr<v1::GetStatusResponse> GetStatus() const;
+
+  // What grpc.health.v1 says of the whole server: OK when it is serving, FAILED_PRECONDITION when
+  // it is not, UNIMPLEMENTED when the server has no health service. Not retried.
+  absl::Status CheckHealth() const;
+
+  const ClientOptions& options() const { return options_; }
+
+ private:
+  Deadline NextDeadline() const;
+
+  // One unary call; `retry` when it is safe to repeat.
+  template <typename Response, typename Request, typename Stub>
+  absl::StatusOr<Response> Call(Stub* stub,
+                                grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
+                                                             Response*),
+                                const Request& request, bool retry) const;
+
+  ClientOptions options_;
+  std::shared_ptr<grpc::Channel> channel_;
+  std::shared_ptr<v1::HullService::Stub> hulls_;
+  std::unique_ptr<v1::CollisionService::Stub> collisions_;
+  std::unique_ptr<v1::StatusService::Stub> status_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_CLIENT_H_

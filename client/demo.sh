@@ -1,0 +1,216 @@
+#!/bin/bash
+# The textbook's collision scenes, end to end, as a new user meets them:
+#
+#   bash client/demo.sh
+#
+# On a bare Debian 12 it first installs what docker/packages.txt lists (as root) and builds hulld
+# and hullctl into build/demo. Then it starts a server, registers hulls, asks questions whose
+# answers are known, streams points into a live hull while querying it, and writes one picture.
+# It stops what it started, and fails when an answer is not the expected one.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export LC_ALL=C
+
+readonly build=$PWD/build/demo
+readonly work=$build/scenes
+readonly models=/usr/share/assimp/models/OBJ
+# About z, as a quaternion: (x, y, z) -> (-x, -y, z), exactly.
+readonly half_turn=0,0,0,1
+wrong=0
+server_pid=
+writer_pid=
+
+stop_everything() {
+  local pid
+  for pid in $writer_pid $server_pid; do
+    kill "$pid" 2>/dev/null || true
+    wait "$pid" 2>/dev/null || true
+  done
+  writer_pid=
+  server_pid=
+}
+trap stop_everything EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+heading() { printf '\n== %s\n' "$*"; }
+
+ctl() { "$build/client/hullctl" --server "$address" "$@"; }
+
+# field NAME: the value of a row of one of hullctl's tables, read from standard input.
+field() { awk -F '  +' -v name="$1" '$1 == name { print $2 }'; }
+
+# expect WANT GOT: notes a wrong answer.
+expect() {
+  [[ $1 == "$2" ]] && return 0
+  printf '  WRONG: expected %s, got %s\n' "$1" "$2"
+  wrong=$((wrong + 1))
+}
+
+install_and_build() {
+  heading "Installing packages and building (a few minutes the first time)"
+  bash docker/packages.sh install build demo >"$work/packages.log" 2>&1 ||
+    { cat "$work/packages.log"; exit 1; }
+  command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
+  { cmake --preset release -B "$build" -DHULLD_BUILD_TESTS=OFF &&
+    cmake --build "$build" --target hulld hullctl --parallel "$(nproc)"; } >"$work/build.log" 2>&1 ||
+    { tail -n 40 "$work/build.log"; echo "The build failed: see $work/build.log"; exit 1; }
+}
+
+start_server() {
+  local port=50551
+  # The default port, or the next one that nobody listens on.
+  while (exec 3<>"/dev/tcp/127.0.0.1/$port") 2>/dev/null; do port=$((port + 1)); done
+  address=127.0.0.1:$port
+  heading "Starting hulld on $address"
+  "$build/server/hulld" --listen "$address" >"$work/hulld.log" 2>&1 &
+  server_pid=$!
+  for _ in {1..100}; do
+    if ctl status >"$work/status" 2>&1; then
+      printf '  version %s, store %s\n' "$(field version <"$work/status")" "$(field store <"$work/status")"
+      return 0
+    fi
+    kill -0 "$server_pid" 2>/dev/null || break
+    sleep 0.1
+  done
+  echo "The server did not start:"
+  cat "$work/hulld.log"
+  exit 1
+}
+
+# register NAME FILE: appends the points of a file to a hull and shows what became of them.
+register() {
+  ctl append "$1" "$2" --create >/dev/null
+  ctl get "$1" --audit >"$work/hull"
+  expect ok "$(field audit <"$work/hull")"
+  printf '  %-8s %s\n           %s vertices, %s edges, %s facets; audit %s\n' "$1" \
+    "$(field points <"$work/hull")" "$(field vertices <"$work/hull")" \
+    "$(field edges <"$work/hull")" "$(field facets <"$work/hull")" "$(field audit <"$work/hull")"
+}
+
+# ask WANT QUESTION A B OPTION...: asks both methods.
+ask() {
+  local want=$1 question=$2 flag
+  shift 2
+  printf '\n  %s\n' "$question"
+  for flag in "" --textbook; do
+    ctl check "$@" --axis --report $flag >"$work/answer"
+    awk -F '  +' '{ value[$1] = $2 }
+      END { printf "    %-16s  %-11s  %8s  axes tested: %s", value["method"], value["relation"],
+                   value["time"], value["axes tested"]
+            if (value["found at"] != "nowhere") printf "; found at %s", value["found at"]
+            printf "\n" }' "$work/answer"
+    expect "$want" "$(field relation <"$work/answer")"
+  done
+}
+
+# turned_about NAME SHIFT: the pose that turns a copy of a hull by half a turn about the vertical
+# line through its vertex of largest x, moved by SHIFT of the way towards the middle of the hull.
+# With SHIFT 0 the two share exactly that vertex, and the plane of constant x through it separates
+# the rest; a little inwards the line runs through the inside of both; a little outwards a gap opens.
+# Doubling a coordinate and turning by half a turn round nothing, so the touching is exact.
+turned_about() {
+  ctl mesh "$1" | awk -v shift="$2" -v turn="$half_turn" '
+    $1 == "v" { n++; x += $2; y += $3; if (n == 1 || $2 > vx) { vx = $2; vy = $3 } }
+    END { printf "%s,%.17g,%.17g,0\n", turn, 2 * (vx + shift * (x / n - vx)),
+                                             2 * (vy + shift * (y / n - vy)) }'
+}
+
+mesh_scenes() {
+  heading "One mesh each: Spider and Wuson"
+  register spider "$models/spider.obj"
+  register wuson "$models/WusonOBJ.obj"
+
+  heading "Two copies of Spider"
+  ask SEPARATED "far apart?" spider spider --pose-b 1000,0,0
+  ask OVERLAPPING "overlapping plainly?" spider spider --pose-b 10,5,0
+  ask OVERLAPPING "overlapping barely, by a part in 10^12?" \
+    spider spider --pose-b "$(turned_about spider 1e-12)"
+  ask TOUCHING "exactly at the boundary, where they share one vertex?" \
+    spider spider --pose-b "$(turned_about spider 0)"
+  ask SEPARATED "apart by a part in 10^12?" spider spider --pose-b "$(turned_about spider -1e-12)"
+
+  heading "Two copies of Wuson"
+  ask TOUCHING "exactly at the boundary, where they share one vertex?" \
+    wuson wuson --pose-b "$(turned_about wuson 0)"
+  ask OVERLAPPING "the same place?" wuson wuson
+}
+
+generated_scenes() {
+  heading "Two cubes, from a lattice of 27 points"
+  ctl generate lattice 27 -o "$work/cube.xyz"
+  register cube "$work/cube.xyz"
+  ask TOUCHING "sharing a face?" cube cube --pose-b 2,0,0
+  ask TOUCHING "sharing an edge?" cube cube --pose-b 2,2,0
+  ask TOUCHING "sharing a corner?" cube cube --pose-b 2,2,2
+
+  heading "3000 and 100 random points in a ball of radius 1"
+  ctl generate ball 3000 --seed 1 -o "$work/ball3000.xyz"
+  ctl generate ball 100 --seed 2 -o "$work/ball100.xyz"
+  register ball3000 "$work/ball3000.xyz"
+  register ball100 "$work/ball100.xyz"
+
+  heading "The two random balls"
+  ask SEPARATED "centres 2.5 apart?" ball3000 ball100 --pose-b 2.5,0,0
+  ask OVERLAPPING "centres 1 apart?" ball3000 ball100 --pose-b 1,0,0
+}
+
+# A writer streams ever larger balls into one hull while a reader asks whether it reaches a second
+# one. Answers name the revision that they were computed from.
+streaming_scene() {
+  local radius revision last moves=0 points=$work/live.fifo
+  heading "A live hull grows while it is queried: does it reach the ball at distance 6?"
+  rm -f "$points"
+  mkfifo "$points"
+  ctl create live >/dev/null
+  last=$(ctl get live | field revision)
+  # Not through ctl: the process itself must be the one to stop.
+  "$build/client/hullctl" --server "$address" append live - --chunk-points 500 \
+    <"$points" >"$work/append" &
+  writer_pid=$!
+  exec 4>"$points"
+  for radius in 1 2 3 4 5 6; do
+    ctl generate ball 5000 --seed "$radius" --radius "$radius" >&4
+    # The writer works on its own; go on when the hull has changed since the last look.
+    for _ in {1..200}; do
+      revision=$(ctl get live | field revision)
+      ((revision > last)) && break
+      sleep 0.05
+    done
+    ((revision > last)) && moves=$((moves + 1))
+    last=$revision
+    ctl check live ball100 --pose-b 6,0,0 >"$work/answer"
+    printf '  points of radius <= %s on their way:  %-11s  at revision %s\n' "$radius" \
+      "$(field relation <"$work/answer")" "$revision"
+    ((radius > 2)) || expect SEPARATED "$(field relation <"$work/answer")"
+  done
+  exec 4>&-
+  wait "$writer_pid" || expect "a writer that succeeds" "exit code $?"
+  writer_pid=
+  expect "6 changes seen" "$moves changes seen"
+  ctl check live ball100 --pose-b 6,0,0 >"$work/answer"
+  expect OVERLAPPING "$(field relation <"$work/answer")"
+  printf '  all %s:  %s at revision %s\n' "$(field points <"$work/append")" \
+    "$(field relation <"$work/answer")" "$(field revision <"$work/append")"
+}
+
+draw_picture() {
+  heading "A picture: points, mesh and hull side by side"
+  ctl picture --points "$models/spider.obj" --mesh "$models/spider.obj" --hull spider \
+    -o "$build/scene.svg"
+  echo "  $build/scene.svg"
+}
+
+mkdir -p "$work"
+install_and_build
+start_server
+mesh_scenes
+generated_scenes
+streaming_scene
+draw_picture
+stop_everything
+if ((wrong > 0)); then
+  heading "$wrong answers were WRONG"
+  exit 1
+fi
+heading "All answers are as expected"

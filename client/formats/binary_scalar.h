@@ -1,0 +1,88 @@
+#ifndef HULLD_CLIENT_FORMATS_BINARY_SCALAR_H_
+#define HULLD_CLIENT_FORMATS_BINARY_SCALAR_H_
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace hulld {
+
+// The scalars of binary PLY and PCD files.
+enum class ScalarType {
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kInt64,
+  kUint64,
+  kFloat,
+  kDouble
+};
+
+inline constexpr size_t kMaxScalarBytes = 8;
+
+constexpr size_t SizeOf(ScalarType type) {
+  switch (type) {
+    case ScalarType::kInt8:
+    case ScalarType::kUint8:
+      return 1;
+    case ScalarType::kInt16:
+    case ScalarType::kUint16:
+      return 2;
+    case ScalarType::kInt32:
+    case ScalarType::kUint32:
+    case ScalarType::kFloat:
+      return 4;
+    case ScalarType::kInt64:
+    case ScalarType::kUint64:
+    case ScalarType::kDouble:
+      return 8;
+  }
+  return 0;
+}
+
+template <typename Scalar>
+double LoadAs(const unsigned char* little_endian) {
+  static_assert(std::endian::native == std::endian::little, "bytes are loaded as they lie");
+  Scalar scalar;
+  std::memcpy(&scalar, little_endian, sizeof(scalar));
+  return static_cast<double>(scalar);
+}
+
+// The value of SizeOf(type) bytes. Exact but for 64-bit integers beyond 2^53, which are rounded to
+// nearest.
+inline double LoadScalar(ScalarType type, const unsigned char* bytes, bool big_endian) {
+  unsigned char little[kMaxScalarBytes];
+  const size_t size = SizeOf(type);
+  for (size_t i = 0; i < size; ++i) little[i] = bytes[big_endian ? size - 1 - i : i];
+  switch (type) {
+    case ScalarType::kInt8:
+      return LoadAs<int8_t>(little);
+    case ScalarType::kUint8:
+      return LoadAs<uint8_t>(little);
+    case ScalarType::kInt16:
+      return LoadAs<int16_t>(little);
+    case ScalarType::kUint16:
+      return LoadAs<uint16_t>(little);
+    case ScalarType::kInt32:
+      return LoadAs<int32_t>(little);
+    case ScalarType::kUint32:
+      return LoadAs<uint32_t>(little);
+    case ScalarType::kInt64:
+      return LoadAs<int64_t>(little);
+    case ScalarType::kUint64:
+      return LoadAs<uint64_t>(little);
+    case ScalarType::kFloat:
+      return LoadAs<float>(little);
+    case ScalarType::kDouble:
+      return LoadAs<double>(little);
+  }
+  return 0;
+}
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_FORMATS_BINARY_SCALAR_H_

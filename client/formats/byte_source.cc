@@ -1,0 +1,157 @@
+#include "client/formats/byte_source.h"
+
+#include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+namespace hulld {
+namespace {
+
+constexpr size_t kBufferBytes = size_t{256} << 10;
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<ByteSource>> ByteSource::Open(const std::string& path) {
+  if (path == "-") return std::make_unique<ByteSource>(dup(STDIN_FILENO), "standard input");
+  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    const std::string message = absl::StrCat("cannot open ", path, ": ", strerror(errno));
+    if (errno == ENOENT) return absl::NotFoundError(message);
+    if (errno == EACCES) return absl::PermissionDeniedError(message);
+    return absl::InvalidArgumentError(message);
+  }
+  struct stat info;
+  if (fstat(descriptor, &info) == 0 && S_ISDIR(info.st_mode)) {
+    close(descriptor);
+    return absl::InvalidArgumentError(absl::StrCat(path, " is a directory; name a file"));
+  }
+  return std::make_unique<ByteSource>(descriptor, path);
+}
+
+ByteSource::ByteSource(int descriptor, std::string name)
+    : descriptor_(descriptor), name_(std::move(name)), buffer_(kBufferBytes) {}
+
+ByteSource::~ByteSource() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+bool ByteSource::Refill() {
+  if (at_end_) return false;
+  if (begin_ > 0) {
+    std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
+    base_ += begin_;
+    end_ -= begin_;
+    begin_ = 0;
+  }
+  if (end_ == buffer_.size()) buffer_.resize(2 * buffer_.size());
+  ssize_t count;
+  do {
+    count = read(descriptor_, buffer_.data() + end_, buffer_.size() - end_);
+  } while (count < 0 && errno == EINTR);
+  if (count <= 0) {
+    at_end_ = true;
+    if (count < 0) {
+      status_ =
+          absl::InvalidArgumentError(absl::StrCat("cannot read ", name_, ": ", strerror(errno)));
+    }
+    return false;
+  }
+  end_ += static_cast<size_t>(count);
+  if (progress_) progress_(base_ + end_);
+  return true;
+}
+
+void ByteSource::SkipByteOrderMark() {
+  at_start_ = false;
+  while (end_ - begin_ < 3 && Refill()) continue;
+  const std::string_view start(buffer_.data() + begin_, end_ - begin_);
+  if (start.substr(0, 3) == "\xEF\xBB\xBF") {
+    begin_ += 3;
+  } else if (start.substr(0, 2) == "\xFE\xFF" || start.substr(0, 2) == "\xFF\xFE") {
+    status_ = absl::InvalidArgumentError(
+        absl::StrCat(name_, " is UTF-16 text; convert it first: iconv -f UTF-16 -t UTF-8"));
+  }
+}
+
+bool ByteSource::FindLineEnd(size_t from, size_t* length) {
+  const std::string_view unread(buffer_.data() + begin_, end_ - begin_);
+  if (line_end_ == LineEnd::kUnknown) {
+    const size_t found = unread.find_first_of("\r\n", from);
+    // A CR that comes last may be half of a CR LF.
+    if (found == std::string_view::npos || (unread[found] == '\r' && found + 1 == unread.size())) {
+      return false;
+    }
+    const bool lone_cr = unread[found] == '\r' && unread[found + 1] != '\n';
+    line_end_ = lone_cr ? LineEnd::kCr : LineEnd::kLf;
+  }
+  *length = unread.find(line_end_ == LineEnd::kCr ? '\r' : '\n', from);
+  return *length != std::string_view::npos;
+}
+
+bool ByteSource::ReadLine(std::string_view* line) {
+  if (at_start_) SkipByteOrderMark();
+  if (!status_.ok()) return false;
+  size_t length = 0;
+  size_t searched = 0;
+  while (!FindLineEnd(searched, &length)) {
+    length = end_ - begin_;
+    if (length > kMaxLineBytes) {
+      ++line_;
+      status_ = ErrorAtLine("the line is longer than 16 MiB; is this a text file?");
+      return false;
+    }
+    searched = length > 0 ? length - 1 : 0;
+    if (Refill()) continue;
+    if (!status_.ok() || length == 0) return false;
+    break;
+  }
+  ++line_;
+  *line = std::string_view(buffer_.data() + begin_, length);
+  begin_ = std::min(begin_ + length + 1, end_);
+  while (!line->empty() && line->back() == '\r') line->remove_suffix(1);
+  return true;
+}
+
+bool ByteSource::Read(void* out, size_t size) {
+  char* to = static_cast<char*>(out);
+  for (;;) {
+    const size_t count = std::min(size, end_ - begin_);
+    std::memcpy(to, buffer_.data() + begin_, count);
+    begin_ += count;
+    to += count;
+    size -= count;
+    if (size == 0) return true;
+    if (!Refill()) return false;
+  }
+}
+
+bool ByteSource::Skip(uint64_t size) {
+  for (;;) {
+    const size_t count = static_cast<size_t>(std::min<uint64_t>(size, end_ - begin_));
+    begin_ += count;
+    size -= count;
+    if (size == 0) return true;
+    if (!Refill()) return false;
+  }
+}
+
+absl::Status ByteSource::ErrorAtLine(const std::string& message) const {
+  return absl::InvalidArgumentError(absl::StrCat(name_, ":", line_, ": ", message));
+}
+
+absl::Status ByteSource::ErrorAtByte(const std::string& message) const {
+  return absl::InvalidArgumentError(absl::StrCat(name_, ": byte ", offset(), ": ", message));
+}
+
+absl::Status ByteSource::Truncated(const std::string& what) const {
+  if (!status_.ok()) return status_;
+  return absl::InvalidArgumentError(
+      absl::StrCat(name_, ": ends at byte ", offset(), " ", what, "; is it complete?"));
+}
+
+}  // namespace hulld

@@ -1,0 +1,67 @@
+#include <absl/strings/str_cat.h>
+
+#include "client/formats/off_reader.h"
+#include "client/formats/point_file.h"
+#include "client/formats/text_number.h"
+
+namespace hulld {
+namespace {
+
+bool IsPositionFirst(std::string_view keyword) {
+  for (const std::string_view prefix : {"ST", "C", "N"}) {
+    if (keyword.substr(0, prefix.size()) == prefix) keyword.remove_prefix(prefix.size());
+  }
+  return keyword == "OFF";
+}
+
+}  // namespace
+
+bool OffReader::NextContent(std::string_view* content) {
+  std::string_view line;
+  while (source_->ReadLine(&line)) {
+    *content = Trim(line.substr(0, line.find('#')));
+    if (!content->empty()) return true;
+  }
+  return false;
+}
+
+absl::Status OffReader::ReadHeader() {
+  std::string_view rest;
+  if (!NextContent(&rest)) return source_->Truncated("before the keyword OFF");
+  const std::string_view keyword = NextToken(&rest);
+  if (!IsPositionFirst(keyword)) {
+    return source_->ErrorAtLine(absl::StrCat(
+        Quoted(keyword), " is not OFF, COFF, NOFF or STOFF; other kinds are not supported"));
+  }
+  if (Trim(rest) == "BINARY") {
+    return source_->ErrorAtLine("binary OFF is not supported; convert it to ascii OFF or to PLY");
+  }
+  // The counts may stand beside the keyword.
+  if (Trim(rest).empty() && !NextContent(&rest)) return source_->Truncated("before the counts");
+  for (uint64_t* const count : {&vertex_count_, &face_count_}) {
+    const std::string_view text = NextToken(&rest);
+    if (ParseUnsigned(text, count)) continue;
+    return source_->ErrorAtLine(
+        absl::StrCat(Quoted(text), " is not a number of vertices or faces"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status OffReader::NextVertex(uint64_t index, std::string_view* content) {
+  if (NextContent(content)) return absl::OkStatus();
+  return source_->Truncated(absl::StrCat("after ", index, " of ", vertex_count_, " vertices"));
+}
+
+absl::Status ReadOff(ByteSource* source, PointCollector* points) {
+  OffReader reader(source);
+  if (absl::Status status = reader.ReadHeader(); !status.ok()) return status;
+  std::string_view content;
+  for (uint64_t i = 0; i < reader.vertex_count(); ++i) {
+    absl::Status status = reader.NextVertex(i, &content);
+    if (status.ok()) status = AddTextPoint(*source, content, points);
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace hulld

@@ -1,0 +1,119 @@
+#include "client/formats/point_file.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <array>
+#include <utility>
+
+#include "client/formats/text_number.h"
+
+namespace hulld {
+namespace {
+
+struct FormatName {
+  const char* name;
+  PointFormat format;
+};
+
+// The first name of each format is the one that is listed.
+constexpr FormatName kFormatNames[] = {
+    {"obj", PointFormat::kObj}, {"off", PointFormat::kOff},   {"ply", PointFormat::kPly},
+    {"xyz", PointFormat::kXyz}, {"csv", PointFormat::kCsv},   {"pcd", PointFormat::kPcd},
+    {"stl", PointFormat::kStl}, {"gltf", PointFormat::kGltf}, {"glb", PointFormat::kGltf},
+    {"txt", PointFormat::kXyz}, {"asc", PointFormat::kXyz},   {"tsv", PointFormat::kCsv},
+};
+
+absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
+  absl::StatusOr<std::unique_ptr<ByteSource>> source = ByteSource::Open(request.path);
+  if (!source.ok()) return source.status();
+  (*source)->ReportProgress(request.progress);
+  switch (request.format) {
+    case PointFormat::kObj:
+      return ReadObj(source->get(), points);
+    case PointFormat::kOff:
+      return ReadOff(source->get(), points);
+    case PointFormat::kPly:
+      return ReadPly(source->get(), points);
+    case PointFormat::kXyz:
+      return ReadXyz(source->get(), points);
+    case PointFormat::kCsv:
+      return ReadCsv(source->get(), points);
+    case PointFormat::kPcd:
+      return ReadPcd(source->get(), points);
+    case PointFormat::kStl:
+    case PointFormat::kGltf:
+      break;
+  }
+  return absl::InternalError("not a format that is read as a stream");
+}
+
+absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
+  const bool needs_file =
+      request.format == PointFormat::kStl || request.format == PointFormat::kGltf;
+  if (!needs_file) return ReadText(request, points);
+  if (request.path == "-") {
+    return absl::InvalidArgumentError(
+        "stl and gltf cannot be read from standard input; save the data to a file and name it");
+  }
+  // Says plainly why a file cannot be opened.
+  if (auto source = ByteSource::Open(request.path); !source.ok()) return source.status();
+  return request.format == PointFormat::kStl ? ReadStl(request.path, points)
+                                             : ReadGltf(request.path, points);
+}
+
+}  // namespace
+
+const std::vector<std::string>& PointFormatNames() {
+  static const auto* const names = [] {
+    auto* all = new std::vector<std::string>;
+    for (const FormatName& entry : kFormatNames) all->push_back(entry.name);
+    return all;
+  }();
+  return *names;
+}
+
+absl::StatusOr<PointFormat> PointFormatFromName(const std::string& name) {
+  for (const FormatName& entry : kFormatNames) {
+    if (absl::AsciiStrToLower(name) == entry.name) return entry.format;
+  }
+  return absl::InvalidArgumentError(absl::StrCat("unknown format ", Quoted(name), "; known are ",
+                                                 absl::StrJoin(PointFormatNames(), ", ")));
+}
+
+absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
+  const size_t slash = path.find_last_of('/');
+  const std::string file = slash == std::string::npos ? path : path.substr(slash + 1);
+  const size_t dot = file.find_last_of('.');
+  if (dot != std::string::npos) {
+    if (auto format = PointFormatFromName(file.substr(dot + 1)); format.ok()) return format;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(path, ": no known format has this extension; say which with --format (",
+                   absl::StrJoin(PointFormatNames(), ", "), ")"));
+}
+
+absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {
+  PointCollector points(request.options, receive);
+  if (absl::Status status = ReadAny(request, &points); !status.ok()) return status;
+  if (absl::Status status = points.Flush(); !status.ok()) return status;
+  return points.counts();
+}
+
+absl::Status AddTextPoint(const ByteSource& source, std::string_view text, PointCollector* points) {
+  std::array<double, 3> xyz;
+  for (size_t i = 0; i < 3; ++i) {
+    const std::string_view token = NextToken(&text);
+    if (token.empty()) {
+      return source.ErrorAtLine(absl::StrCat("a point needs 3 coordinates, here are ", i));
+    }
+    if (const NumberText kind = ParseDouble(token, &xyz[i]); kind != NumberText::kNumber) {
+      return source.ErrorAtLine(NumberProblem(kind, token));
+    }
+  }
+  return points->Add(xyz[0], xyz[1], xyz[2],
+                     [&](const std::string& message) { return source.ErrorAtLine(message); });
+}
+
+}  // namespace hulld

@@ -1,0 +1,111 @@
+#include "client/formats/text_number.h"
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <system_error>
+
+namespace hulld {
+namespace {
+
+bool IsSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+// std::from_chars says "out of range" alike of 1e999 and of 1e-999. Tells them apart by the decimal
+// exponent of the first digit that is not 0; a valid number outside of the range of double has one
+// above 300 or below -300.
+bool IsHuge(std::string_view text) {
+  long long exponent = -1;
+  bool in_fraction = false;
+  bool leading = true;
+  size_t i = 0;
+  for (; i < text.size() && (IsDigit(text[i]) || text[i] == '.'); ++i) {
+    if (text[i] == '.') {
+      in_fraction = true;
+      continue;
+    }
+    if (leading && text[i] == '0') {
+      if (in_fraction) --exponent;
+      continue;
+    }
+    leading = false;
+    if (!in_fraction) ++exponent;
+  }
+  if (i + 1 >= text.size()) return exponent > 0;
+  const bool negative = text[i + 1] == '-';
+  const char* begin = text.data() + i + 1 + (text[i + 1] == '-' || text[i + 1] == '+');
+  long long written = 0;
+  const auto [end, error] = std::from_chars(begin, text.data() + text.size(), written);
+  if (error == std::errc::result_out_of_range) return !negative;
+  constexpr long long kBeyondAnyText = std::numeric_limits<long long>::max() / 2;
+  if (written > kBeyondAnyText) return !negative;
+  return exponent + (negative ? -written : written) > 0;
+}
+
+}  // namespace
+
+NumberText ParseDouble(std::string_view text, double* value) {
+  const bool negative = !text.empty() && text[0] == '-';
+  if (negative || (!text.empty() && text[0] == '+')) text.remove_prefix(1);
+  // from_chars would take a second '-'.
+  if (text.empty() || text[0] == '-') return NumberText::kNoNumber;
+  const char* const end = text.data() + text.size();
+  double magnitude = 0;
+  const auto [stop, error] = std::from_chars(text.data(), end, magnitude);
+  if (stop != end || error == std::errc::invalid_argument) return NumberText::kNoNumber;
+  if (error == std::errc::result_out_of_range) {
+    if (IsHuge(text)) return NumberText::kTooLarge;
+    magnitude = 0;
+  } else if (std::isinf(magnitude) && (IsDigit(text[0]) || text[0] == '.')) {
+    return NumberText::kTooLarge;
+  }
+  *value = negative ? -magnitude : magnitude;
+  return NumberText::kNumber;
+}
+
+bool ParseUnsigned(std::string_view text, uint64_t* value) {
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, *value);
+  return !text.empty() && stop == end && error == std::errc();
+}
+
+std::string ShortestText(double value) {
+  char buffer[32];
+  return std::string(buffer, std::to_chars(buffer, buffer + sizeof(buffer), value).ptr);
+}
+
+std::string_view NextToken(std::string_view* rest) {
+  size_t begin = 0;
+  while (begin < rest->size() && IsSpace((*rest)[begin])) ++begin;
+  size_t end = begin;
+  while (end < rest->size() && !IsSpace((*rest)[end])) ++end;
+  const std::string_view token = rest->substr(begin, end - begin);
+  rest->remove_prefix(end);
+  return token;
+}
+
+std::string_view Trim(std::string_view text) {
+  while (!text.empty() && IsSpace(text.front())) text.remove_prefix(1);
+  while (!text.empty() && IsSpace(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::string Quoted(std::string_view text) {
+  constexpr size_t kLongest = 40;
+  std::string quoted = "\"";
+  for (const char c : text.substr(0, kLongest)) quoted += c >= ' ' && c <= '~' ? c : '?';
+  if (text.size() > kLongest) quoted += "...";
+  return quoted + "\"";
+}
+
+std::string NumberProblem(NumberText kind, std::string_view text) {
+  if (kind == NumberText::kTooLarge) {
+    return Quoted(text) + " is beyond the largest double, about 1.8e308; rescale the points";
+  }
+  std::string problem = Quoted(text) + " is not a number";
+  if (text.find(',') != std::string_view::npos) problem += " (the decimal mark is a point)";
+  return problem;
+}
+
+}  // namespace hulld

@@ -1,0 +1,77 @@
+#include "client/hullctl/invocation.h"
+
+#include <absl/strings/str_cat.h>
+
+namespace hulld {
+namespace {
+
+bool Contains(const std::string& text, const char* part) {
+  return text.find(part) != std::string::npos;
+}
+
+// gRPC uses one code for "nobody there" and for a server that says so itself.
+bool IsConnectionFailure(const std::string& message) {
+  for (const char* part :
+       {"connect", "Connect", "resolution", "resolve", "Socket closed", "reset"}) {
+    if (Contains(message, part)) return true;
+  }
+  return false;
+}
+
+std::string WithHint(const std::string& message, const std::string& hint) {
+  return absl::StrCat(message, " (", hint, ")");
+}
+
+std::string Explain(const absl::Status& status, const std::string& server,
+                    std::chrono::milliseconds timeout) {
+  const std::string message(status.message().data(), status.message().size());
+  switch (status.code()) {
+    case absl::StatusCode::kUnavailable:
+      if (IsConnectionFailure(message)) {
+        return absl::StrCat("cannot reach hulld at ", server,
+                            ": start it with 'hulld', or name another with --server (", message,
+                            ")");
+      }
+      return absl::StrCat("hulld at ", server, " is not available: ", message, "; try again later");
+    case absl::StatusCode::kDeadlineExceeded:
+      return absl::StrCat("no answer from hulld at ", server, " within ", timeout.count(),
+                          " ms: raise --timeout, or see whether it is well with 'hullctl status' (",
+                          message, ")");
+    case absl::StatusCode::kNotFound:
+      return WithHint(message, "see 'hullctl list'");
+    case absl::StatusCode::kAlreadyExists:
+      return WithHint(message, "accept it with --if-absent, or see 'hullctl delete'");
+    case absl::StatusCode::kAborted:
+      return WithHint(message, "see its revision with 'hullctl get'");
+    case absl::StatusCode::kUnimplemented:
+      return absl::StrCat(server, " does not know this call; is it a hulld of this version? (",
+                          message, ")");
+    case absl::StatusCode::kInternal:
+    case absl::StatusCode::kUnknown:
+      return absl::StrCat("hulld at ", server, " failed: ", message, "; see its log");
+    default:
+      return message;
+  }
+}
+
+}  // namespace
+
+Client Invocation::MakeClient() const {
+  ClientOptions options;
+  options.server = server;
+  options.timeout = timeout;
+  return Client(std::move(options));
+}
+
+ExitCode Invocation::Fail(const absl::Status& status) const {
+  err << "hullctl: " << Explain(status, server, timeout) << "\n";
+  const bool unreachable = absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status);
+  return unreachable ? ExitCode::kUnreachable : ExitCode::kRequestFailed;
+}
+
+ExitCode Invocation::FailUsage(const absl::Status& status) const {
+  err << "hullctl: " << std::string(status.message().data(), status.message().size()) << "\n";
+  return ExitCode::kUsage;
+}
+
+}  // namespace hulld

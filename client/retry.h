@@ -1,0 +1,38 @@
+#ifndef HULLD_CLIENT_RETRY_H_
+#define HULLD_CLIENT_RETRY_H_
+
+#include <absl/status/status.h>
+
+#include <chrono>
+#include <functional>
+
+namespace hulld {
+
+using Deadline = std::chrono::system_clock::time_point;
+
+// When a call that is safe to repeat is repeated: after UNAVAILABLE alone, which says that the
+// server was not reached or is draining. Waits double from initial_backoff to max_backoff.
+struct RetryPolicy {
+  // Attempts in all; 1 turns retries off.
+  int max_attempts = 4;
+  std::chrono::milliseconds initial_backoff{100};
+  std::chrono::milliseconds max_backoff{2000};
+  // Replaces the wait, for tests. Empty: sleeps.
+  std::function<void(std::chrono::milliseconds)> wait;
+};
+
+// The wait after `failures` >= 1 failed attempts.
+std::chrono::milliseconds BackoffAfter(const RetryPolicy& policy, int failures);
+
+// Waits as the policy says after `failures` failed attempts. False, without waiting, when the
+// attempts are used up or the wait would pass the deadline.
+bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline);
+
+// Calls `attempt` until it returns something else than UNAVAILABLE, the attempts are used up, or
+// the deadline is near. Returns the last attempt's status. `attempt` must be safe to repeat.
+absl::Status CallWithRetries(const RetryPolicy& policy, Deadline deadline,
+                             const std::function<absl::Status()>& attempt);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_RETRY_H_

@@ -1,0 +1,86 @@
+#include "client/retry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace hulld {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// A policy that records its waits instead of waiting.
+RetryPolicy Recording(std::vector<milliseconds>* waits, int max_attempts) {
+  RetryPolicy policy;
+  policy.max_attempts = max_attempts;
+  policy.wait = [waits](milliseconds wait) { waits->push_back(wait); };
+  return policy;
+}
+
+Deadline Far() { return std::chrono::system_clock::now() + std::chrono::hours(1); }
+
+TEST(Retry, UnavailableIsTriedAgainWithDoublingWaitsUpToACap) {
+  std::vector<milliseconds> waits;
+  int attempts = 0;
+  const absl::Status status = CallWithRetries(Recording(&waits, 8), Far(), [&] {
+    ++attempts;
+    return absl::UnavailableError("down");
+  });
+  EXPECT_EQ(status, absl::UnavailableError("down"));
+  EXPECT_EQ(attempts, 8);
+  EXPECT_THAT(
+      waits, ElementsAre(milliseconds(100), milliseconds(200), milliseconds(400), milliseconds(800),
+                         milliseconds(1600), milliseconds(2000), milliseconds(2000)));
+}
+
+TEST(Retry, EndsWithTheFirstOtherAnswer) {
+  std::vector<milliseconds> waits;
+  int attempts = 0;
+  EXPECT_TRUE(CallWithRetries(Recording(&waits, 4), Far(), [&] {
+                return ++attempts < 3 ? absl::UnavailableError("") : absl::OkStatus();
+              }).ok());
+  EXPECT_EQ(attempts, 3);
+}
+
+TEST(Retry, OtherErrorsAreNotTriedAgain) {
+  for (const absl::StatusCode code :
+       {absl::StatusCode::kDeadlineExceeded, absl::StatusCode::kInternal,
+        absl::StatusCode::kResourceExhausted, absl::StatusCode::kNotFound,
+        absl::StatusCode::kAborted, absl::StatusCode::kCancelled, absl::StatusCode::kUnknown}) {
+    std::vector<milliseconds> waits;
+    int attempts = 0;
+    EXPECT_EQ(CallWithRetries(Recording(&waits, 4), Far(),
+                              [&] {
+                                ++attempts;
+                                return absl::Status(code, "x");
+                              })
+                  .code(),
+              code);
+    EXPECT_EQ(attempts, 1);
+    EXPECT_THAT(waits, IsEmpty());
+  }
+}
+
+TEST(Retry, AWaitThatWouldPassTheDeadlineIsNotBegun) {
+  std::vector<milliseconds> waits;
+  int attempts = 0;
+  const Deadline past = std::chrono::system_clock::now();
+  EXPECT_TRUE(absl::IsUnavailable(CallWithRetries(Recording(&waits, 4), past, [&] {
+    ++attempts;
+    return absl::UnavailableError("");
+  })));
+  EXPECT_EQ(attempts, 1);
+  EXPECT_THAT(waits, IsEmpty());
+}
+
+TEST(Retry, OneAttemptMeansNone) {
+  std::vector<milliseconds> waits;
+  EXPECT_FALSE(WaitBeforeRetry(Recording(&waits, 1), 1, Far()));
+  EXPECT_THAT(waits, IsEmpty());
+}
+
+}  // namespace
+}  // namespace hulld

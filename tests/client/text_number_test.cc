@@ -1,0 +1,109 @@
+#include "client/formats/text_number.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <random>
+
+namespace hulld {
+namespace {
+
+double Parsed(std::string_view text) {
+  double value = -12345;
+  EXPECT_EQ(ParseDouble(text, &value), NumberText::kNumber) << text;
+  return value;
+}
+
+NumberText KindOf(std::string_view text) {
+  double ignored;
+  return ParseDouble(text, &ignored);
+}
+
+TEST(TextNumber, IsTheNearestDouble) {
+  EXPECT_EQ(Parsed("0.1"), 0.1);
+  EXPECT_EQ(Parsed("-1e-310"), -1e-310);
+  EXPECT_EQ(Parsed("4.9406564584124654e-324"), 0x1p-1074);
+  EXPECT_EQ(Parsed("1.7976931348623157e308"), 0x1.fffffffffffffp1023);
+  EXPECT_EQ(Parsed("2.2250738585072011e-308"), 0x0.fffffffffffffp-1022);
+  // Half way between two doubles: ties go to even, and one digit far behind decides otherwise.
+  EXPECT_EQ(Parsed("9007199254740993"), 9007199254740992.0);
+  EXPECT_EQ(Parsed("9007199254740993.0000000000000000000000000000000000000001"),
+            9007199254740994.0);
+  EXPECT_EQ(Parsed("0." + std::string(400, '0') + "1e401"), 1.0);
+}
+
+TEST(TextNumber, TakesAPlusSignAndBareFractions) {
+  EXPECT_EQ(Parsed("+1.5"), 1.5);
+  EXPECT_EQ(Parsed("+.5"), 0.5);
+  EXPECT_EQ(Parsed("-2."), -2.0);
+  EXPECT_EQ(Parsed("1e+2"), 100.0);
+}
+
+TEST(TextNumber, KeepsTheSignOfZero) {
+  EXPECT_TRUE(std::signbit(Parsed("-0")));
+  EXPECT_FALSE(std::signbit(Parsed("+0")));
+}
+
+TEST(TextNumber, TooSmallForADoubleIsZero) {
+  EXPECT_EQ(Parsed("1e-400"), 0.0);
+  EXPECT_TRUE(std::signbit(Parsed("-1e-400")));
+  EXPECT_EQ(Parsed("0." + std::string(500, '0') + "1"), 0.0);
+  EXPECT_EQ(Parsed("1e-99999999999999999999999999"), 0.0);
+  EXPECT_EQ(Parsed("12345e-9223372036854775807"), 0.0);
+  // Half of the smallest denormal goes to even, that is 0; anything above it up.
+  EXPECT_EQ(Parsed("2.4703282292062327e-324"), 0.0);
+  EXPECT_EQ(Parsed("2.4703282292062328e-324"), 0x1p-1074);
+}
+
+TEST(TextNumber, TooLargeForADoubleIsSaid) {
+  for (const char* text : {"1e999", "-1e999", "+1e309", "1.8e308", "1e99999999999999999999999",
+                           "0.00001e9223372036854775807"}) {
+    EXPECT_EQ(KindOf(text), NumberText::kTooLarge) << text;
+  }
+  EXPECT_EQ(KindOf(std::string(400, '9')), NumberText::kTooLarge);
+  EXPECT_EQ(KindOf(std::string(400, '9') + ".5"), NumberText::kTooLarge);
+  EXPECT_EQ(NumberProblem(NumberText::kTooLarge, "1e999"),
+            "\"1e999\" is beyond the largest double, about 1.8e308; rescale the points");
+}
+
+TEST(TextNumber, ReadsNanAndInfinityAsSuch) {
+  EXPECT_TRUE(std::isnan(Parsed("nan")));
+  EXPECT_TRUE(std::isnan(Parsed("-NaN")));
+  EXPECT_EQ(Parsed("inf"), HUGE_VAL);
+  EXPECT_EQ(Parsed("-Infinity"), -HUGE_VAL);
+}
+
+TEST(TextNumber, RefusesWhatIsNoNumber) {
+  for (const char* text :
+       {"",   "-",    "+",   ".",  "abc", "1x",     "+-1",   "--1",  "-+1",   "++1",
+        "1e", "0x10", "1,5", "1 ", " 1",  "3.1+e2", "1e5.5", "nanx", "infin", "e5"}) {
+    EXPECT_EQ(KindOf(text), NumberText::kNoNumber) << text;
+  }
+}
+
+TEST(TextNumber, AgreesWithTheCLibraryOnRandomBits) {
+  std::mt19937_64 random(20240601);
+  int denormal = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const double value = std::bit_cast<double>(i % 10 == 0 ? random() >> 12 : random());
+    if (!std::isfinite(value)) continue;
+    if (std::abs(value) < 0x1p-1022) ++denormal;
+    char text[64];
+    std::snprintf(text, sizeof(text), "%.*g", 1 + i % 25, value);
+    const double expected = std::strtod(text, nullptr);
+    if (!std::isfinite(expected)) continue;
+    ASSERT_EQ(std::bit_cast<uint64_t>(Parsed(text)), std::bit_cast<uint64_t>(expected)) << text;
+    ASSERT_EQ(std::bit_cast<uint64_t>(Parsed(ShortestText(value))), std::bit_cast<uint64_t>(value));
+  }
+  EXPECT_GT(denormal, 5000);
+}
+
+TEST(TextNumber, QuotesForeignTextSafely) {
+  EXPECT_EQ(Quoted("a\x1b[31m\xff"), "\"a?[31m?\"");
+  EXPECT_EQ(Quoted(std::string(1000, 'a')), "\"" + std::string(40, 'a') + "...\"");
+}
+
+}  // namespace
+}  // namespace hulld
