@@ -90,8 +90,8 @@ TEST(HullBuilder, MatchesBruteForceOnNearlyDegenerateSets) {
   Random random(seed);
   for (int round = 0; round < kRounds / 6; ++round) {
     std::vector<Vector> points = DegeneratePoints(random);
-    const double scale = std::array{0.1, 1.0 / 3, 1e-160, 3e150, 0.7e-318}[round % 5];
-    const double offset = round % 5 < 2 ? random.Below(3) * 0.3 : 0;
+    const double scale = std::array{0.1, 1.0 / 3, 1e-160, 3e150, 0.7e-318, 1e-92, 1e99}[round % 7];
+    const double offset = round % 7 < 2 ? random.Below(3) * 0.3 : 0;
     for (Vector& p : points) {
       p = p * scale + Vector::Constant(offset);
       if (random.Below(4) == 0) {
@@ -104,6 +104,57 @@ TEST(HullBuilder, MatchesBruteForceOnNearlyDegenerateSets) {
         << "seed " << seed << " round " << round << " points "
         << testing::PrintToString(ToOracle(points));
     ASSERT_TRUE(AuditHull(hull).ok()) << "seed " << seed << " round " << round;
+  }
+}
+
+// The same in planes that doubles hold exactly: x = c, y = c, z = c, x = y or z = x.
+TEST(HullBuilder, MatchesBruteForceOnNearlyDegeneratePolygons) {
+  const uint64_t seed = TestSeed(112);
+  Random random(seed);
+  for (int round = 0; round < kRounds / 3; ++round) {
+    std::vector<Vector> points = RandomLatticePoints(random, random.Between(3, 14), 5);
+    const double scale = std::array{0.1, 1e-160, 1e153, 1e-318}[round % 4];
+    const int plane = random.Below(5);
+    for (Vector& p : points) {
+      p *= scale;
+      if (round % 4 == 0) p += Vector(0.3, 0.7, 0.1);
+      for (int k = 0; k < 3; ++k) {
+        if (random.Below(3) == 0) p[k] = std::nextafter(p[k], random.Below(2) ? 1e300 : -1e300);
+      }
+      if (plane < 3) p[plane] = scale;
+      if (plane == 3) p.y() = p.x();
+      if (plane == 4) p.z() = p.x();
+    }
+    const Hull hull = BuildHull(points);
+    ASSERT_LE(hull.dimension(), 2);
+    ASSERT_TRUE(SameHull(hull, oracle::BruteForceHull(ToOracle(points))))
+        << "seed " << seed << " round " << round << " points "
+        << testing::PrintToString(ToOracle(points));
+  }
+}
+
+// Convexity is invariant under translation: a lattice of units in the last place about 2^e is as
+// good as one of units, at every exponent, up to where an exact stage gives way to the next.
+TEST(HullBuilder, LatticesOfLastPlacesKeepTheFacets) {
+  const uint64_t seed = TestSeed(113);
+  Random random(seed);
+  std::vector<int> exponents = {-1022, -1021, -970, -500, -360, 0, 300, 500, 1000, 1022, 1023};
+  for (int e = -312; e <= -300; ++e) exponents.push_back(e);
+  for (int e = 326; e <= 334; ++e) exponents.push_back(e);
+  for (int round = 0; round < kRounds / 3; ++round) {
+    const std::vector<Vector> points = DegeneratePoints(random);
+    oracle::ConvexHull expected = ToOracle(BuildHull(points));
+    const int e = exponents[static_cast<size_t>(round) % exponents.size()];
+    // 2^e (1 + k 2^-52) for each coordinate k, which may be negative: 1.5 leaves room below.
+    const auto moved = [e](double k) { return std::ldexp(1.5 + k * 0x1p-52, e); };
+    std::vector<Vector> cluster;
+    for (const Vector& p : points) cluster.emplace_back(moved(p.x()), moved(p.y()), moved(p.z()));
+    for (oracle::Point& p : expected.vertices) {
+      for (double& x : p) x = moved(x);
+    }
+    ASSERT_TRUE(SameHull(BuildHull(cluster), expected))
+        << "seed " << seed << " round " << round << " exponent " << e << " points "
+        << testing::PrintToString(ToOracle(points));
   }
 }
 

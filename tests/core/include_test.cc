@@ -2,8 +2,9 @@
 
 #include <filesystem>
 #include <fstream>
-#include <regex>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 // Dependencies point one way. Reads the source tree.
@@ -17,20 +18,27 @@ struct Include {
   std::string header;  // what stands between the brackets or quotes
 };
 
+// The header of an #include line.
+std::optional<std::string> HeaderOf(std::string line) {
+  std::erase_if(line, [](char c) { return c == ' ' || c == '\t'; });
+  constexpr size_t kPrefix = std::string_view("#include").size();
+  if (!line.starts_with("#include") || line.size() <= kPrefix) return std::nullopt;
+  if (line[kPrefix] != '<' && line[kPrefix] != '"') return std::nullopt;
+  const size_t end = line.find_first_of(">\"", kPrefix + 1);
+  return line.substr(kPrefix + 1, end - kPrefix - 1);
+}
+
 std::vector<Include> IncludesUnder(const std::string& directory) {
   std::vector<Include> result;
   const fs::path root = HULLD_SOURCE_DIR;
-  const std::regex pattern(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / directory)) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".h" && extension != ".cc") continue;
     std::ifstream file(entry.path());
     std::string line;
-    std::smatch match;
     while (std::getline(file, line)) {
-      if (std::regex_search(line, match, pattern)) {
-        result.push_back({fs::relative(entry.path(), root).string(), match[1]});
-      }
+      const std::optional<std::string> header = HeaderOf(line);
+      if (header) result.push_back({fs::relative(entry.path(), root).string(), *header});
     }
   }
   return result;

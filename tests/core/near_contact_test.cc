@@ -103,6 +103,36 @@ TEST(NearContact, GenericPairsOnTheBrinkMatchTheOracle) {
   EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
 }
 
+// Hulls that are tiny beside their distance from the origin of their frames, down to a few units in
+// the last place: all that counts is lost in the rounding of a rotation. Under a common pose the
+// relation is that of the integer sets about the origin.
+TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
+  const uint64_t seed = TestSeed(903);
+  Random random(seed);
+  RelationCheck check;
+  for (int round = 0; round < 5 * kRounds; ++round) {
+    const std::vector<Vector> a = RandomLatticePoints(random, random.Between(1, 8), 4);
+    const std::vector<Vector> b =
+        Shifted(RandomLatticePoints(random, random.Between(1, 8), 4),
+                Vector(random.Between(-4, 4), random.Between(-3, 3), random.Between(-1, 1)));
+    const double unit = std::ldexp(1.0, -random.Between(20, 50));
+    const Vector origin(1.5, -1.25, 1.75);
+    Pose pose;
+    for (double& q : pose.q) q = random.Real(-1, 1);
+    pose.t = Vector(random.Real(-1, 1), random.Real(-1, 1), 1e6);
+    const Relation expected = OracleRelation(BuildHull(a), Pose(), BuildHull(b), Pose());
+    const Hull tiny_a = BuildHull(Shifted(Scaled(a, unit), origin));
+    const Hull tiny_b = BuildHull(Shifted(Scaled(b, unit), origin));
+    ASSERT_TRUE(check.Ask(tiny_a, pose, tiny_b, pose, expected))
+        << "seed " << seed << " round " << round;
+  }
+  for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
+    EXPECT_GT(check.count(relation), check.questions() / 40) << Name(relation);
+  }
+  EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions() / 10);
+  EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
+}
+
 // The solids of the cube's symmetry, whole and flat, in units of four.
 std::vector<Hull> SymmetricSolids() {
   std::vector<Vector> cube, octahedron, cuboctahedron, dodecahedron, truncated, square, segment;

@@ -1,0 +1,76 @@
+#!/bin/bash
+# Builds hulld and runs its tests, as continuous integration does: presets release and asan-ubsan.
+#
+#   bash tests/run.sh [--release-only] [--no-install]
+#
+# On a bare Debian 12 it first installs what docker/packages.txt lists (as root); with everything
+# there it asks apt for nothing. Builds into build/. Ends with a summary; fails when any part did.
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 2
+
+presets=(release asan-ubsan)
+install=yes
+for option in "$@"; do
+  case $option in
+    --release-only) presets=(release) ;;
+    --no-install) install=no ;;
+    --help)
+      sed -n '2,7s/^# \{0,1\}//p' tests/run.sh
+      exit 0
+      ;;
+    *)
+      echo "tests/run.sh: unknown option $option; see --help" >&2
+      exit 2
+      ;;
+  esac
+done
+
+failed=0
+summary=()
+
+# run_part NAME COMMAND...: runs one part under a heading and notes its outcome and its time.
+run_part() {
+  local name=$1 start=$SECONDS outcome=ok code=0
+  shift
+  printf '\n==== %s\n' "$name"
+  "$@" || { code=$?; outcome=FAILED; failed=1; }
+  summary+=("$(printf '%-24s %-6s %4d s' "$name" "$outcome" $((SECONDS - start)))")
+  return $code
+}
+
+check_format() {
+  # Another version would format otherwise.
+  if ! command -v clang-format-14 >/dev/null; then
+    echo "skipped: clang-format-14 is not installed"
+    return 0
+  fi
+  find core server client tests -name '*.cc' -print0 -o -name '*.h' -print0 |
+    xargs -0 -r clang-format-14 --dry-run -Werror ||
+    { echo "Please run clang-format-14 -i on the files above."; return 1; }
+}
+
+configure_and_build() {
+  cmake --preset "$1" && cmake --build --preset "$1" --parallel "$jobs"
+}
+
+# A compiler of this code may take 1.5 GiB, so memory bounds the number of jobs too.
+available_kib=$(awk '/^MemAvailable:/ { print $2 }' /proc/meminfo 2>/dev/null || true)
+jobs=$(nproc)
+by_memory=$((${available_kib:-1572864} / 1572864))
+((jobs > by_memory)) && jobs=$((by_memory > 0 ? by_memory : 1))
+
+if [[ $install == yes ]]; then
+  run_part "packages" bash docker/packages.sh install build test || exit 1
+fi
+command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
+
+run_part "format" check_format
+for preset in "${presets[@]}"; do
+  run_part "$preset: build" configure_and_build "$preset" &&
+    run_part "$preset: tests" ctest --preset "$preset" --parallel "$jobs"
+done
+
+printf '\n==== summary\n'
+printf '%s\n' "${summary[@]}"
+((failed == 0)) && echo "All parts passed." || echo "Some parts FAILED: see above."
+exit $failed
