@@ -15,6 +15,9 @@ namespace {
 // Rounds of aiming at the surface, each at a plane nearer than the last; more is not worth it.
 constexpr int kMostRounds = 64;
 
+// Corners of a map that one insertion measures: a map is done long before the surface has doubled.
+constexpr size_t kCornersPerInsertion = 8;
+
 // Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
 // many points than where it only tells where to start walking.
 int ResolutionFor(size_t triangles, bool rejects) {
@@ -65,6 +68,7 @@ void Surface::Insert(VertexTable& vertices, const Vector& point) {
     }
   }
   if (directions_) directions_->SetHint(cell, last_);
+  if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
   if (alive_ >= next_update_) Update(vertices);
 }
 
@@ -108,10 +112,7 @@ void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a
 }
 
 TriangleId Surface::NewId() {
-  if (free_.empty()) {
-    triangles_.emplace_back();
-    return static_cast<TriangleId>(triangles_.size() - 1);
-  }
+  if (free_.empty()) return static_cast<TriangleId>(triangles_.Extend());
   const TriangleId id = free_.back();
   free_.pop_back();
   return id;
@@ -201,8 +202,9 @@ void Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vecto
   }
 }
 
-// Looks for an interior point while none is known, and measures the surface for its present size.
-// Called when the surface has doubled, so the cost of O(F) is amortized.
+// Looks for an interior point while none is known, and starts to measure the surface for its
+// present size. Called when the surface has doubled, so the cost of O(F) for an interior point is
+// amortized.
 void Surface::Update(const VertexTable& vertices) {
   next_update_ = 2 * alive_;
   if (!directions_) {
@@ -215,7 +217,7 @@ void Surface::Update(const VertexTable& vertices) {
       }
     });
   }
-  MeasureDirections(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
+  if (!measuring_) StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
@@ -241,33 +243,42 @@ void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
   const int wanted = std::min(affordable, 2 * ResolutionFor(alive_, true));
   if (wanted < 4) return;
   if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
-    MeasureDirections(vertices, wanted);
+    StartMeasuring(wanted);
+    ContinueMeasuring(vertices, measuring_->reach.size());
   }
 }
 
-void Surface::MeasureDirections(const VertexTable& vertices, int resolution) {
+void Surface::StartMeasuring(int resolution) {
   measured_at_ = alive_;
   asked_ = 0;
   rejected_ = 0;
-  DirectionMap map(directions_->center(), resolution);
-  const int row = resolution + 1;
-  std::vector<double> reach(6 * static_cast<size_t>(row) * static_cast<size_t>(row));
-  TriangleId near = Alive(last_);
-  for (int face = 0; face < 6; ++face) {
-    for (int i = 0; i < row; ++i) {
-      for (int k = 0; k < row; ++k) {
-        // Back and forth, so that each walk starts next to where the last one ended.
-        const int j = i % 2 == 0 ? k : resolution - k;
-        reach[static_cast<size_t>((face * row + i) * row + j)] =
-            Reach(vertices, map.CornerDirection(face, i, j), near);
-        if (i < resolution && j < resolution) {
-          map.SetHint(static_cast<size_t>((face * resolution + i) * resolution + j), near);
-        }
-      }
+  const size_t row = static_cast<size_t>(resolution) + 1;
+  measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
+                           std::vector<double>(6 * row * row), 0, Alive(last_)};
+}
+
+void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
+  Measurement& m = *measuring_;
+  const int resolution = m.map.resolution();
+  const auto row = static_cast<size_t>(resolution) + 1;
+  const size_t end = std::min(m.done + corners, m.reach.size());
+  m.near = Alive(m.near);
+  for (; m.done < end; ++m.done) {
+    const int face = static_cast<int>(m.done / (row * row));
+    const int i = static_cast<int>(m.done / row % row);
+    const int k = static_cast<int>(m.done % row);
+    // Back and forth, so that each walk starts next to where the last one ended.
+    const int j = i % 2 == 0 ? k : resolution - k;
+    const auto corner = static_cast<size_t>((face * (resolution + 1) + i) * (resolution + 1) + j);
+    m.reach[corner] = Reach(vertices, m.map.CornerDirection(face, i, j), m.near);
+    if (i < resolution && j < resolution) {
+      m.map.SetHint(static_cast<size_t>((face * resolution + i) * resolution + j), m.near);
     }
   }
-  map.SetRadii(reach);
-  directions_ = std::move(map);
+  if (end < m.reach.size()) return;
+  m.map.SetRadii(m.reach);
+  directions_ = std::move(m.map);
+  measuring_.reset();
 }
 
 // A distance m, near the largest, such that the double nearest to center + m * direction is inside;
@@ -298,7 +309,7 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
 void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
                             double size) {
   if (++mark_ == 0) {
-    for (SurfaceTriangle& t : triangles_) t.mark = 0;
+    for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
     std::fill(vertex_mark_.begin(), vertex_mark_.end(), 0);
     mark_ = 1;
   }

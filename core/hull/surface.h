@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/hull/chunked_vector.h"
 #include "core/hull/direction_map.h"
 #include "core/hull/vertex_table.h"
 
@@ -91,6 +92,16 @@ class Surface {
     uint8_t edge;
     uint8_t left;
   };
+  // A map of directions in the making. Its corners are measured some at a time, so that no
+  // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
+  struct Measurement {
+    DirectionMap map;
+    // By corner, face by face, i major.
+    std::vector<double> reach;
+    // How many corners are done, and where the last one's direction left the surface.
+    size_t done = 0;
+    TriangleId near;
+  };
   enum class Side { kInside, kOutside };
   // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
   // (inside).
@@ -114,7 +125,8 @@ class Surface {
   void CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
   void Update(const VertexTable& vertices);
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
-  void MeasureDirections(const VertexTable& vertices, int resolution);
+  void StartMeasuring(int resolution);
+  void ContinueMeasuring(const VertexTable& vertices, size_t corners);
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
@@ -125,15 +137,16 @@ class Surface {
 
   static constexpr VertexId kDead = UINT32_MAX;
 
-  std::vector<SurfaceTriangle> triangles_;
+  ChunkedVector<SurfaceTriangle> triangles_;
   std::vector<TriangleId> free_;
   size_t alive_ = 0;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.
   std::optional<DirectionMap> directions_;
+  std::optional<Measurement> measuring_;
   // Largest distance, by components, of a vertex from that point.
   double extent_ = 0;
-  // The count of triangles at which the surface is measured anew.
+  // The count of triangles at which measuring the surface anew starts.
   size_t next_update_ = 0;
   // Of the points since the last measurement, how many were looked up in the map and rejected by
   // it.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/hull/chunked_vector.h"
 #include "core/hull/hull.h"
 
 namespace hulld {
@@ -77,8 +78,8 @@ class VertexTable {
     bool is_new;
   };
 
-  std::vector<Vector> points_;
-  std::vector<Counts> counts_;
+  ChunkedVector<Vector> points_;
+  ChunkedVector<Counts> counts_;
   std::vector<VertexId> free_;
   double max_abs_coordinate_ = 0;
   uint64_t block_ = 0;
