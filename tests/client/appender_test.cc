@@ -201,7 +201,7 @@ TEST_F(AppenderTest, AServerThatAcknowledgesNothingMeetsTheDeadline) {
   StreamScript script;
   script.hold_acks = true;
   fake_.ScriptStreams({script});
-  const auto appender = Open(std::chrono::milliseconds(100));
+  const auto appender = Open(std::chrono::milliseconds(500));
   ASSERT_TRUE(appender->Append(Block(1)).ok());
   const absl::Status status = appender->Finish();
   EXPECT_TRUE(absl::IsDeadlineExceeded(status)) << status;

@@ -77,7 +77,7 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
   const Ran missing = Ask({"get", "x"});
   EXPECT_EQ(missing.code, 1);
   EXPECT_EQ(missing.err, "hullctl: hull \"x\" not found (see 'hullctl list')\n");
-  const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1", "--timeout", "50ms"});
+  const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1", "--timeout", "10s"});
   EXPECT_EQ(unreachable.code, 3);
   EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1: start it "
                                           "with 'hulld', or name another with --server"));

@@ -1,7 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <span>
 #include <vector>
 
 #include "core/hull/audit.h"
@@ -14,8 +15,10 @@ namespace {
 
 #ifdef HULLD_SANITIZED
 constexpr int kLatticeSide = 16;
+constexpr int kLargeRounds = 4;
 #else
 constexpr int kLatticeSide = 50;
+constexpr int kLargeRounds = 60;
 #endif
 
 // A cube's 8 vertices, 12 edges and 6 squares.
@@ -239,6 +242,62 @@ TEST(DegenerateHull, PowersOfTwoKeepTheFacetsOfABall) {
       for (double& x : p) x *= scale;
     }
     EXPECT_TRUE(ToOracle(BuildHull(Scaled(ball, scale))) == expected) << "2^" << exponent;
+  }
+}
+
+// The same with another power of two on each axis, from needles to pancakes far beyond the range of
+// any rounding, for sets large enough for whatever a builder does to large sets.
+TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
+  const uint64_t seed = TestSeed(210);
+  Random random(seed);
+  for (int round = 0; round < kLargeRounds; ++round) {
+    std::vector<Vector> points;
+    if (round % 3 == 0) points = RandomLatticePoints(random, 6000, 12);
+    if (round % 3 == 1) points = RandomInBall(random, 6000, 1);
+    if (round % 3 == 2) points = RandomOnSphere(random, 2500, 1);
+    for (Vector& p : points) p = (p * 0x1p30).array().round() * 0x1p-30;
+    oracle::ConvexHull expected = ToOracle(BuildHull(points));
+    const int span = round % 2 ? 1000 : 60;
+    Vector scale;
+    for (double& s : scale) s = std::ldexp(1.0, random.Between(-span, span));
+    for (Vector& p : points) p = p.cwiseProduct(scale);
+    for (oracle::Point& p : expected.vertices) {
+      for (int k = 0; k < 3; ++k) p[k] *= scale[k];
+    }
+    ASSERT_TRUE(SameHull(BuildHull(points), expected))
+        << "seed " << seed << " round " << round << " scale " << scale.transpose();
+  }
+}
+
+// Streams whose first blocks say little about the last: clusters far apart, growing shells, flat
+// starts. Any split into blocks gives the hull of one block.
+TEST(DegenerateHull, StreamsOfUnlikeBlocksEqualOneBlock) {
+  const uint64_t seed = TestSeed(211);
+  Random random(seed);
+  for (int round = 0; round < kLargeRounds; ++round) {
+    std::vector<Vector> points = RandomInBall(random, 1500, 1e-6);
+    const Vector far(1e3, -2e3, 5e2);
+    points = Concatenated(points, Shifted(RandomOnSphere(random, 1500, 1e-3), far));
+    if (round % 2) points = Shifted(RandomFlatPoints(random, 1500, 2), far);
+    for (double radius : {1e-3, 1.0, 1e3}) {
+      points = Concatenated(points, RandomOnSphere(random, 700, radius));
+      points = Concatenated(points, Scaled(RandomLatticePoints(random, 700, 5), radius / 4));
+    }
+    points = Concatenated(points, Scaled(LatticeCubeSurface(12), 100));
+    const Hull expected = BuildHull(points);
+    HullBuilder builder;
+    std::span<const Vector> rest = points;
+    while (!rest.empty()) {
+      const size_t n = std::min(rest.size(), static_cast<size_t>(random.Between(1, 2500)));
+      ASSERT_TRUE(builder.Add(rest.subspan(0, n)).ok());
+      rest = rest.subspan(n);
+    }
+    ASSERT_TRUE(SameBits(builder.Snapshot(), expected)) << "seed " << seed << " round " << round;
+    Shuffle(random, points);
+    ASSERT_TRUE(SameBits(BuildHull(points), expected)) << "seed " << seed << " round " << round;
+    HullBuilder one_by_one;
+    for (const Vector& p : points) ASSERT_TRUE(one_by_one.Add(std::span(&p, 1)).ok());
+    ASSERT_TRUE(SameBits(one_by_one.Snapshot(), expected)) << "seed " << seed << " round " << round;
   }
 }
 

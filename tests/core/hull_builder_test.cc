@@ -133,6 +133,32 @@ TEST(HullBuilder, MatchesBruteForceOnNearlyDegeneratePolygons) {
   }
 }
 
+// Rounded multiples of one vector, in a plane that doubles hold: slivers whose corners are decided
+// by the rounding alone.
+TEST(HullBuilder, MatchesBruteForceOnRoundedLinesInAPlane) {
+  const uint64_t seed = TestSeed(114);
+  Random random(seed);
+  int spread = 0;
+  for (int round = 0; round < kRounds / 3; ++round) {
+    const Vector step(random.Unit(), random.Unit(), 0);
+    const Vector origin(random.Unit(), random.Unit(), 0);
+    const int plane = random.Below(4);
+    std::vector<Vector> points;
+    for (int i = random.Between(4, 16); i > 0; --i) {
+      Vector p = origin + random.Between(-20, 20) * step;
+      if (plane < 3) std::swap(p.z(), p[plane]);
+      if (plane == 3) p.z() = p.x();
+      points.push_back(p);
+    }
+    const oracle::ConvexHull expected = oracle::BruteForceHull(ToOracle(points));
+    spread += expected.vertices.size() > 3;
+    ASSERT_TRUE(SameHull(BuildHull(points), expected))
+        << "seed " << seed << " round " << round << " points "
+        << testing::PrintToString(ToOracle(points));
+  }
+  EXPECT_GT(spread, kRounds / 10);
+}
+
 // Convexity is invariant under translation: a lattice of units in the last place about 2^e is as
 // good as one of units, at every exponent, up to where an exact stage gives way to the next.
 TEST(HullBuilder, LatticesOfLastPlacesKeepTheFacets) {

@@ -79,6 +79,28 @@ TEST_F(LargeHull, NearlyFlatSetsMatchCgal) {
                      "a few ulps of room");
 }
 
+// Points just outside and just inside facets that many others hide.
+TEST_F(LargeHull, ShellsOneLastPlaceApartMatchCgal) {
+  const uint64_t seed = TestSeed(304);
+  Random random(seed);
+  for (double tilt : {0.0, 1.0}) {
+    std::vector<Vector> box = RandomInCube(random, 3000, 1);
+    for (const Vector& p : RandomInCube(random, 3000, 1)) {
+      Vector on_face = p;
+      int k = 0;
+      p.cwiseAbs().maxCoeff(&k);
+      on_face[k] = std::copysign(1 + random.Between(-2, 2) * 0x1p-52, p[k]);
+      box.push_back(on_face);
+    }
+    box = Concatenated(box, Shifted(LatticeCube(2, 2), Vector::Constant(-1)));
+    for (Vector& p : box) p = Vector(p.x(), p.y() + tilt * 0.3 * p.x(), p.z() - tilt * 0.7 * p.y());
+    ExpectSameVertices(box, "box");
+    ExpectSameVertices(Shifted(box, Vector(1e4, -3, 0.1)), "box far off");
+    Shuffle(random, box);
+    ExpectSameVertices(box, "shuffled box");
+  }
+}
+
 TEST_F(LargeHull, MeshesMatchCgal) {
   for (const char* name : {"stanford-bunny.obj", "rocker-arm.obj", "spot.obj"}) {
     const std::optional<std::vector<Vector>> mesh = MeshVertices(name);
