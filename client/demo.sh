@@ -49,7 +49,7 @@ expect() {
 
 install_and_build() {
   heading "Installing packages and building (a few minutes the first time)"
-  bash docker/packages.sh install build demo >"$work/packages.log" 2>&1 ||
+  bash docker/packages.sh install build models >"$work/packages.log" 2>&1 ||
     { cat "$work/packages.log"; exit 1; }
   command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
   { cmake --preset release -B "$build" -DHULLD_BUILD_TESTS=OFF &&

@@ -60,7 +60,7 @@ by_memory=$((${available_kib:-1572864} / 1572864))
 ((jobs > by_memory)) && jobs=$((by_memory > 0 ? by_memory : 1))
 
 if [[ $install == yes ]]; then
-  run_part "packages" bash docker/packages.sh install build test || exit 1
+  run_part "packages" bash docker/packages.sh install build test models || exit 1
 fi
 command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
 
