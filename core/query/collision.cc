@@ -67,9 +67,13 @@ IntegerVector ToIntegers(const Vector& n) {
   return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
 }
 
-void Describe(ExactPair& pair, const IntegerVector& n, Answer& answer) {
-  answer.axis = DescribeAxis(pair, n);
-  answer.analysis.stage = answer.axis->kind;
+bool MustDescribe(const QueryOptions& options) { return options.want_axis || options.want_stage; }
+
+void Describe(ExactPair& pair, const IntegerVector& n, const QueryOptions& options,
+              Answer& answer) {
+  SeparatingAxis axis = DescribeAxis(pair, n);
+  answer.analysis.stage = axis.kind;
+  if (options.want_axis) answer.axis = std::move(axis);
 }
 
 // The ladder: floating point with a proven bound, then exact arithmetic.
@@ -87,10 +91,9 @@ absl::StatusOr<Answer> CertifiedSearch(const Placed& a, const Placed& b,
     }
     if (found.portal.verdict == PortalVerdict::kSeparated) {
       answer.relation = Relation::kSeparated;
-      answer.analysis.stage = AxisKind::kGeneral;
-      if (options.want_axis) {
+      if (MustDescribe(options)) {
         ExactPair exact(a.hull, a.pose, b.hull, b.pose, filter);
-        Describe(exact, ToIntegers(*found.portal.axis), answer);
+        Describe(exact, ToIntegers(*found.portal.axis), options, answer);
       }
       return answer;
     }
@@ -101,13 +104,7 @@ absl::StatusOr<Answer> CertifiedSearch(const Placed& a, const Placed& b,
   answer.rung = Rung::kExact;
   answer.relation = found->relation;
   answer.analysis.axes_tested += found->directions_tried;
-  if (found->axis) {
-    if (options.want_axis) {
-      Describe(exact, *found->axis, answer);
-    } else {
-      answer.analysis.stage = AxisKind::kGeneral;
-    }
-  }
+  if (found->axis && MustDescribe(options)) Describe(exact, *found->axis, options, answer);
   return answer;
 }
 

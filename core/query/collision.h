@@ -58,14 +58,17 @@ struct Analysis {
       0;  // textbook: up to and including the reported one, as if serial; search: directions tried
   uint64_t axes_total =
       0;  // textbook: candidates in all, parallel edge pairs included; 0 otherwise
-  std::optional<AxisKind>
-      stage;  // where separation, or when touching the first zero gap, was found
+  // Where separation, or when touching the first zero gap, was found: the kind of the axis. Known
+  // to the textbook; to the search when an axis or the stage is wanted.
+  std::optional<AxisKind> stage;
   std::optional<uint64_t> axis_index;  // textbook: the index of that axis, from 0
 };
 
 struct QueryOptions {
   Method method = Method::kCertifiedSearch;
   bool want_axis = false;
+  // Whether Analysis::stage must be known; the rest of the analysis costs nothing.
+  bool want_stage = false;
   // Textbook only: more candidate axes than this are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
   // Polled inside long loops, possibly from several threads; true ends the query with CANCELLED.

@@ -86,6 +86,21 @@ TEST(Collision, NoAxisUnlessWanted) {
   }
 }
 
+TEST(Collision, StageIsTheKindOfTheAxisWhetherOrNotTheAxisIsWanted) {
+  const Hull cube = UnitCube();
+  for (const Pose& pose : {At(2, 0, 0), At(1, 0, 0), At(1, 1, 1), At(3, 2, 1)}) {
+    QueryOptions options;
+    EXPECT_FALSE(CheckCollision(cube, Pose(), cube, pose, options)->analysis.stage.has_value());
+    options.want_stage = true;
+    const Answer stage_only = CheckCollision(cube, Pose(), cube, pose, options).value();
+    EXPECT_FALSE(stage_only.axis.has_value());
+    options.want_axis = true;
+    const Answer both = CheckCollision(cube, Pose(), cube, pose, options).value();
+    ASSERT_TRUE(both.axis.has_value());
+    EXPECT_EQ(stage_only.analysis.stage, both.axis->kind);
+  }
+}
+
 // Vertex 4x + 2y + z: the cube's facet at x = 0 is the first, that at x = 1 the last. An axis is a
 // line, so the first normal separates, and A's feature on it is the last facet.
 TEST(Collision, TextbookNamesTheFacetThatSeparates) {
