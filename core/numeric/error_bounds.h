@@ -53,6 +53,13 @@ inline constexpr double kTripleProductMax = 0x1p300;
 // DirectionMap::SetRadii).
 inline constexpr double kDirectionMapMargin = 0x1p-20;
 
+// The distance |p - s e - t f| for differences p, e, f of doubles and s, t in [0, 1] with rounded
+// sum at most 1 (exact sum at most 1 + u): components err by at most (1 + 3 + 3 + 2) u (|p| + |e| +
+// |f|), the norm by sqrt(3) of that and 8 u of itself; a sum of s and t above 1 by u moves the
+// point by at most 2 u (|e| + |f|). 32 u covers it; kLeastPositive what underflow adds. Proven.
+inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
+inline constexpr double kLeastPositive = 0x1p-1060;
+
 // Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
 // largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
 // between these two, so that no quantity that matters overflows, and what underflow adds (below
