@@ -57,7 +57,7 @@ absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
 
 // Whoever draws or writes the mesh relies on it.
 absl::Status CheckConsistent(const HullMesh& mesh) {
-  if (mesh.xyz.size() != 3 * mesh.header.hull().vertex_count() ||
+  if (mesh.xyz.size() != 3 * mesh.header.vertex_count() ||
       mesh.facet_sizes.size() != mesh.header.facet_count()) {
     return absl::InternalError("the mesh stream ended early, or its header miscounts");
   }
@@ -150,6 +150,10 @@ absl::StatusOr<v1::GetHullResponse> Client::GetHull(const std::string& hull_id, 
 absl::StatusOr<HullMesh> Client::GetHullMesh(const std::string& hull_id) const {
   v1::GetHullMeshRequest request;
   request.set_hull_id(hull_id);
+  return GetHullMesh(request);
+}
+
+absl::StatusOr<HullMesh> Client::GetHullMesh(const v1::GetHullMeshRequest& request) const {
   const Deadline deadline = NextDeadline();
   HullMesh mesh;
   absl::Status status = CallWithRetries(options_.retry, deadline, [&] {

@@ -66,6 +66,8 @@ class Client {
 
   // INTERNAL when the stream contradicts itself.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
+  // The same with all that a request can ask for, such as a simplification.
+  absl::StatusOr<HullMesh> GetHullMesh(const v1::GetHullMeshRequest& request) const;
 
   // One page.
   absl::StatusOr<v1::ListHullsResponse> ListHulls(const v1::ListHullsRequest& request) const;

@@ -83,8 +83,9 @@ void AppendStream::OnCancel() {
 }
 
 void AppendStream::OnDone() {
+  const std::shared_ptr<AppendStream> last = std::move(self_);
+  const std::lock_guard lock(mutex_);
   if (session_.has_value()) registry_.CloseAppend(*session_);
-  self_.reset();
 }
 
 void AppendStream::HandleMessage() {

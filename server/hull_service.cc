@@ -54,7 +54,7 @@ grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* cont
 
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
     grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) {
-  return MeshStream::Start(*context, admission_, registry_, readers_, request->hull_id());
+  return MeshStream::Start(*context, admission_, registry_, readers_, *request);
 }
 
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/hull/simplify.h"
 #include "server/config.h"
 #include "server/encode.h"
 #include "server/hull_id.h"
@@ -21,29 +22,59 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* MeshStream::Start(
     const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, const std::string& hull_id) {
+    WorkerPool& readers, const v1::GetHullMeshRequest& request) {
   auto* stream = new MeshStream(context);
   absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
   if (ticket.ok()) {
     stream->ticket_ = *std::move(ticket);
-    readers.Submit([stream, &registry, hull_id] { stream->Open(registry, hull_id); });
+    // gRPC keeps the request until the call is done.
+    readers.Submit([stream, &registry, &request] { stream->Open(registry, request); });
   } else {
     stream->Finish(ToGrpc(ticket.status()));
   }
   return stream;
 }
 
-void MeshStream::Open(Registry& registry, const std::string& hull_id) {
-  if (absl::Status s = ValidateHullId(hull_id, "hull_id"); !s.ok()) return Finish(ToGrpc(s));
-  auto resolved = registry.Resolve(hull_id, [this] { return lifetime_.ShouldStop(); });
+void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request) {
+  absl::Status valid = ValidateHullId(request.hull_id(), "hull_id");
+  if (!valid.ok()) return Finish(ToGrpc(valid));
+  auto resolved = registry.Resolve(request.hull_id(), [this] { return lifetime_.ShouldStop(); });
   if (lifetime_.ShouldStop()) return Finish(ToGrpc(lifetime_.StopStatus()));
   if (!resolved.ok()) return Finish(ToGrpc(resolved.status()));
-  view_ = std::move(resolved->second);
+  mesh_ = std::move(resolved->second.hull);
   v1::MeshHeader* header = message_.mutable_header();
+  if (request.has_simplification()) {
+    const absl::Status simplified = Simplify(request.simplification(), header);
+    if (lifetime_.ShouldStop()) return Finish(ToGrpc(lifetime_.StopStatus()));
+    if (!simplified.ok()) return Finish(ToGrpc(Prefixed("simplification: ", simplified)));
+  }
   EncodeHeader(registry.store(), resolved->first, header->mutable_header());
-  EncodeRecord(view_.record, header->mutable_hull());
-  header->set_facet_count(view_.hull->facet_count());
+  EncodeRecord(resolved->second.record, header->mutable_hull());
+  header->set_facet_count(mesh_->facet_count());
+  header->set_vertex_count(mesh_->vertices().size());
   StartWrite(&message_);
+}
+
+absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
+                                  v1::MeshHeader* header) {
+  const SimplifyTarget target = {static_cast<size_t>(simplification.max_vertices()),
+                                 simplification.max_error(),
+                                 [this] { return lifetime_.ShouldStop(); }};
+  absl::StatusOr<SimplifiedHull> simplified;
+  switch (simplification.side()) {
+    case v1::SIMPLIFICATION_SIDE_INSIDE:
+      simplified = SimplifyInside(*mesh_, target);
+      break;
+    case v1::SIMPLIFICATION_SIDE_OUTSIDE:
+      simplified = SimplifyOutside(*mesh_, target);
+      break;
+    default:
+      return absl::InvalidArgumentError("side must be INSIDE or OUTSIDE");
+  }
+  if (!simplified.ok()) return simplified.status();
+  header->set_error(simplified->error);
+  mesh_ = std::make_shared<const Hull>(std::move(simplified->hull));
+  return absl::OkStatus();
 }
 
 void MeshStream::OnWriteDone(bool ok) {
@@ -55,11 +86,11 @@ void MeshStream::OnWriteDone(bool ok) {
 
 bool MeshStream::NextMessage() {
   message_.Clear();
-  if (next_vertex_ < view_.hull->vertices().size()) {
+  if (next_vertex_ < mesh_->vertices().size()) {
     FillVertices(message_.mutable_vertices());
     return true;
   }
-  if (next_facet_ < view_.hull->facet_count()) {
+  if (next_facet_ < mesh_->facet_count()) {
     FillFacets(message_.mutable_facets());
     return true;
   }
@@ -67,7 +98,7 @@ bool MeshStream::NextMessage() {
 }
 
 void MeshStream::FillVertices(v1::MeshVertices* message) {
-  const auto vertices = view_.hull->vertices();
+  const auto vertices = mesh_->vertices();
   const size_t end = std::min(vertices.size(), next_vertex_ + kVerticesPerMessage);
   message->mutable_xyz()->Reserve(static_cast<int>(3 * (end - next_vertex_)));
   for (; next_vertex_ < end; ++next_vertex_) {
@@ -77,8 +108,8 @@ void MeshStream::FillVertices(v1::MeshVertices* message) {
 
 // Whole facets only; one that is larger than a message makes a message of its own.
 void MeshStream::FillFacets(v1::MeshFacets* message) {
-  while (next_facet_ < view_.hull->facet_count()) {
-    const auto facet = view_.hull->facet(next_facet_);
+  while (next_facet_ < mesh_->facet_count()) {
+    const auto facet = mesh_->facet(next_facet_);
     const int after =
         message->sizes_size() + 1 + message->indices_size() + static_cast<int>(facet.size());
     if (message->sizes_size() > 0 && after > kIndicesPerMessage) return;

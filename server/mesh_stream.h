@@ -21,7 +21,7 @@ class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
  public:
   static grpc::ServerWriteReactor<v1::GetHullMeshResponse>* Start(
       const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, const std::string& hull_id);
+      WorkerPool& readers, const v1::GetHullMeshRequest& request);
 
  private:
   explicit MeshStream(const grpc::CallbackServerContext& context) : lifetime_(context.deadline()) {}
@@ -30,7 +30,8 @@ class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
   void OnCancel() override { lifetime_.Cancel(); }
   void OnDone() override { delete this; }
 
-  void Open(Registry& registry, const std::string& hull_id);
+  void Open(Registry& registry, const v1::GetHullMeshRequest& request);
+  absl::Status Simplify(const v1::Simplification& simplification, v1::MeshHeader* header);
   // Fills message_ with the next piece; false when all are sent.
   bool NextMessage();
   void FillVertices(v1::MeshVertices* message);
@@ -38,7 +39,8 @@ class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
 
   CallLifetime lifetime_;
   std::optional<Admission::Ticket> ticket_;
-  HullView view_;
+  // What is sent: the hull itself, or what stands for it.
+  std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;
   size_t next_facet_ = 0;
   v1::GetHullMeshResponse message_;

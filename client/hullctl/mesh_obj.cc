@@ -4,11 +4,17 @@
 
 namespace hulld {
 
+std::string ErrorText(const HullMesh& mesh) {
+  if (!mesh.header.has_error()) return "";
+  return ", simplified from " + std::to_string(mesh.header.hull().vertex_count()) +
+         " vertices within " + ShortestText(mesh.header.error());
+}
+
 void WriteObj(const HullMesh& mesh, std::ostream& out) {
   const v1::HullInfo& hull = mesh.header.hull();
   out << "# hull " << hull.hull_id() << " revision " << hull.revision() << ": dimension "
       << hull.dimension() << ", " << mesh.vertex_count() << " vertices, " << mesh.facet_sizes.size()
-      << " facets\n";
+      << " facets" << ErrorText(mesh) << "\n";
   for (size_t i = 0; i < mesh.xyz.size(); i += 3) {
     out << "v " << ShortestText(mesh.xyz[i]) << " " << ShortestText(mesh.xyz[i + 1]) << " "
         << ShortestText(mesh.xyz[i + 2]) << "\n";

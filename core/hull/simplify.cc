@@ -53,13 +53,16 @@ struct Choice {
   double error = 0;
 };
 
-Choice ChooseVertices(const Hull& hull, const SimplifyTarget& target) {
+absl::StatusOr<Choice> ChooseVertices(const Hull& hull, const SimplifyTarget& target) {
   VertexSubset subset(hull.vertices());
   const size_t most = target.max_vertices == 0
                           ? hull.vertices().size()
                           : std::min(target.max_vertices, hull.vertices().size());
   while (subset.chosen().size() < most) {
     if (target.max_error > 0 && subset.DistanceBound() <= target.max_error) break;
+    if (target.should_stop && target.should_stop()) {
+      return absl::CancelledError("stopped while simplifying");
+    }
     subset.ChooseNext();
   }
   Choice choice;
@@ -193,8 +196,9 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
   if (hull.vertices().size() <= std::max(least, target.max_vertices)) {
     return SimplifiedHull{hull, 0};
   }
-  const Choice choice = ChooseVertices(hull, target);
-  return SimplifiedHull{HullOf(choice.points), choice.error};
+  const absl::StatusOr<Choice> choice = ChooseVertices(hull, target);
+  if (!choice.ok()) return choice.status();
+  return SimplifiedHull{HullOf(choice->points), choice->error};
 }
 
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target) {
@@ -206,7 +210,8 @@ absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyT
   std::optional<SimplifiedHull> best;
   size_t inside_vertices = target.max_error > 0 ? InsideVerticesFor(kBoxVertices) : most_inside;
   while (hull.dimension() == 3) {
-    const absl::StatusOr<SimplifiedHull> inside = SimplifyInside(hull, {inside_vertices, 0});
+    const absl::StatusOr<SimplifiedHull> inside =
+        SimplifyInside(hull, {inside_vertices, 0, target.should_stop});
     if (!inside.ok()) return inside.status();
     std::optional<SimplifiedHull> outside = EncloseAlong(hull, inside->hull);
     if (outside && (!best || outside->error < best->error)) best = std::move(outside);

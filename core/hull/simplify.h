@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstddef>
+#include <functional>
 
 #include "core/hull/hull.h"
 
@@ -15,6 +16,8 @@ struct SimplifyTarget {
   size_t max_vertices = 0;
   // The caller's length unit. 0: any error.
   double max_error = 0;
+  // Polled often; true ends the simplification with CANCELLED. May be empty.
+  std::function<bool()> should_stop;
 };
 
 // A hull that stands for another, and what it is worth.

@@ -54,10 +54,11 @@ struct SeparatingAxis {
 // The textbook's report.
 struct Analysis {
   std::chrono::nanoseconds time{0};
-  uint64_t axes_tested =
-      0;  // textbook: up to and including the reported one, as if serial; search: directions tried
-  uint64_t axes_total =
-      0;  // textbook: candidates in all, parallel edge pairs included; 0 otherwise
+  // Textbook: up to and including the reported axis, counted as if serial, or all. Search:
+  // directions tried.
+  uint64_t axes_tested = 0;
+  // Textbook: candidates in all, parallel edge pairs included. Otherwise 0.
+  uint64_t axes_total = 0;
   // Where separation, or when touching the first zero gap, was found: the kind of the axis. Known
   // to the textbook; to the search when an axis or the stage is wanted.
   std::optional<AxisKind> stage;

@@ -113,6 +113,7 @@ TEST_F(ClientTest, DeletingPassesTheRevisionOn) {
 v1::GetHullMeshResponse Header(uint64_t vertices, uint64_t facets) {
   v1::GetHullMeshResponse part;
   part.mutable_header()->mutable_hull()->set_vertex_count(vertices);
+  part.mutable_header()->set_vertex_count(vertices);
   part.mutable_header()->set_facet_count(facets);
   return part;
 }

@@ -103,6 +103,7 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
   grpc::Status GetHullMesh(grpc::ServerContext*, const v1::GetHullMeshRequest* request,
                            grpc::ServerWriter<v1::GetHullMeshResponse>* writer) override {
     if (auto status = fake_.Enter("GetHullMesh"); !status.ok()) return status;
+    fake_.last_mesh_request = *request;
     if (fake_.mesh_parts.empty()) return NoSuchHull(request->hull_id());
     for (const v1::GetHullMeshResponse& part : fake_.mesh_parts) writer->Write(part);
     return grpc::Status::OK;

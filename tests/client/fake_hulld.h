@@ -68,6 +68,7 @@ class FakeHulld final {
 
   // Replaces the parts of every mesh; the relations of every batch.
   std::vector<v1::GetHullMeshResponse> mesh_parts;
+  v1::GetHullMeshRequest last_mesh_request;
   std::optional<std::vector<v1::BatchCheckCollisionsResponse>> batch_answers;
   v1::CheckCollisionResponse collision_answer;
   v1::CheckCollisionRequest last_collision_request();

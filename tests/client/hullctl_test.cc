@@ -316,6 +316,7 @@ std::vector<v1::GetHullMeshResponse> Tetrahedron() {
   v1::MeshHeader& header = *parts[0].mutable_header();
   header.mutable_hull()->set_hull_id("a");
   header.mutable_hull()->set_vertex_count(4);
+  header.set_vertex_count(4);
   header.mutable_hull()->set_dimension(3);
   header.set_facet_count(4);
   for (const double x : {0.1, 1e-310, 0.0, 1.0 / 3, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1e308}) {
@@ -339,9 +340,25 @@ TEST_F(HullctlTest, MeshWritesObjThatReadsBackExactly) {
   EXPECT_EQ(Ask({"mesh", "a", "-o", "/no/such/folder/a.obj"}).code, 2);
 }
 
+TEST_F(HullctlTest, SimplifiedMeshTellsItsError) {
+  fake_.mesh_parts = Tetrahedron();
+  v1::MeshHeader& header = *fake_.mesh_parts[0].mutable_header();
+  header.mutable_hull()->set_vertex_count(72);
+  header.set_error(0.25);
+  EXPECT_THAT(Ask({"mesh", "a", "--max-vertices", "8", "--outside"}).out,
+              HasSubstr("4 vertices, 4 facets, simplified from 72 vertices within 0.25\n"));
+  EXPECT_EQ(fake_.last_mesh_request.simplification().side(), v1::SIMPLIFICATION_SIDE_OUTSIDE);
+  EXPECT_EQ(fake_.last_mesh_request.simplification().max_vertices(), 8u);
+  const Ran unclear = Ask({"mesh", "a", "--outside"});
+  EXPECT_EQ(unclear.code, 2);
+  EXPECT_THAT(unclear.err, HasSubstr("--max-vertices"));
+  EXPECT_EQ(Ask({"mesh", "a", "--max-error", "-1"}).code, 2);
+}
+
 TEST_F(HullctlTest, MeshWritesSegmentsAndPoints) {
   v1::GetHullMeshResponse header;
   header.mutable_header()->mutable_hull()->set_vertex_count(2);
+  header.mutable_header()->set_vertex_count(2);
   v1::GetHullMeshResponse vertices;
   for (int i = 0; i < 6; ++i) vertices.mutable_vertices()->add_xyz(i);
   fake_.mesh_parts = {header, vertices};

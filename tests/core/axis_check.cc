@@ -85,10 +85,6 @@ bool Agrees(const IntegerVector& n, const Vector& direction) {
   return !oracle::IsZero(n) && (ToUnit(n) - direction).cwiseAbs().maxCoeff() <= kDirectionTolerance;
 }
 
-IntegerVector EdgeVector(const std::vector<IntegerVector>& world, const Edge& edge) {
-  return oracle::Subtract(world[edge.head], world[edge.tail]);
-}
-
 // The facet normals of a hull, each both ways: an axis is a line.
 std::vector<IntegerVector> FacetNormals(const Hull& hull, const std::vector<IntegerVector>& world) {
   std::vector<IntegerVector> result;
@@ -102,12 +98,25 @@ std::vector<IntegerVector> FacetNormals(const Hull& hull, const std::vector<Inte
   return result;
 }
 
-std::vector<IntegerVector> EdgeCrossProducts(const Scene& scene) {
+// The edges that the direction is perpendicular to within its rounding: others cannot be factors of
+// a cross product that agrees with it.
+std::vector<IntegerVector> EdgesAcross(const Hull& hull, const std::vector<IntegerVector>& world,
+                                       const Vector& direction) {
   std::vector<IntegerVector> result;
-  for (const Edge& edge_a : scene.a.edges()) {
-    for (const Edge& edge_b : scene.b.edges()) {
-      const IntegerVector n =
-          oracle::Cross(EdgeVector(scene.world.a, edge_a), EdgeVector(scene.world.b, edge_b));
+  for (const Edge& edge : hull.edges()) {
+    const IntegerVector vector = oracle::Subtract(world[edge.head], world[edge.tail]);
+    if (std::abs(ToUnit(vector).dot(direction)) <= 10 * kDirectionTolerance) {
+      result.push_back(vector);
+    }
+  }
+  return result;
+}
+
+std::vector<IntegerVector> EdgeCrossProducts(const Scene& scene, const Vector& direction) {
+  std::vector<IntegerVector> result;
+  for (const IntegerVector& edge_a : EdgesAcross(scene.a, scene.world.a, direction)) {
+    for (const IntegerVector& edge_b : EdgesAcross(scene.b, scene.world.b, direction)) {
+      const IntegerVector n = oracle::Cross(edge_a, edge_b);
       result.push_back(n);
       result.push_back(oracle::Negate(n));
     }
@@ -186,7 +195,7 @@ std::vector<IntegerVector> Candidates(const Scene& scene, const SeparatingAxis& 
     case AxisKind::kFacetB:
       return FacetNormals(scene.b, scene.world.b);
     case AxisKind::kEdgeEdge:
-      return EdgeCrossProducts(scene);
+      return EdgeCrossProducts(scene, axis.direction);
     case AxisKind::kFlat:
     case AxisKind::kGeneral:
       break;

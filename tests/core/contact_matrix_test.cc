@@ -14,9 +14,11 @@ namespace hulld {
 namespace {
 
 #ifdef HULLD_SANITIZED
-constexpr int kStride = 23;
+constexpr int kStride = 7;
+constexpr int kFlatRounds = 600;
 #else
 constexpr int kStride = 1;
+constexpr int kFlatRounds = 2400;
 #endif
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -277,7 +279,7 @@ TEST(ContactMatrix, FlatPairsInOnePlaneTouchOrSeparate) {
   const uint64_t seed = TestSeed(404);
   Random random(seed);
   RelationCheck check;
-  for (int i = 0; i < 2400 / kStride; ++i) {
+  for (int i = 0; i < kFlatRounds; ++i) {
     const int dimension = random.Below(3);
     const auto vector = [&] {
       return Vector(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
@@ -300,8 +302,8 @@ TEST(ContactMatrix, FlatPairsInOnePlaneTouchOrSeparate) {
     ASSERT_NE(expected, Relation::kOverlapping);
     ASSERT_TRUE(check.Ask(a, pose, b, pose, expected)) << "seed " << seed << " round " << i;
   }
-  EXPECT_GT(check.count(Relation::kTouching), check.questions() / 5);
-  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 5);
+  EXPECT_GT(check.count(Relation::kTouching), check.questions() / 8);
+  EXPECT_GT(check.count(Relation::kSeparated), check.questions() / 8);
 }
 
 }  // namespace

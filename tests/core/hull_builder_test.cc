@@ -22,7 +22,7 @@ namespace {
 using testing::HasSubstr;
 
 #ifdef HULLD_SANITIZED
-constexpr int kRounds = 200;
+constexpr int kRounds = 600;
 #else
 constexpr int kRounds = 3000;
 #endif

@@ -15,7 +15,7 @@ namespace hulld {
 namespace {
 
 #ifdef HULLD_SANITIZED
-constexpr int kRounds = 800;
+constexpr int kRounds = 2000;
 #else
 constexpr int kRounds = 20000;
 #endif

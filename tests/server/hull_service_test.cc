@@ -60,9 +60,13 @@ class HullCalls : public ServerTest {
   };
 
   Mesh GetMesh(const std::string& hull_id) {
-    grpc::ClientContext context;
     v1::GetHullMeshRequest request;
     request.set_hull_id(hull_id);
+    return GetMesh(request);
+  }
+
+  Mesh GetMesh(const v1::GetHullMeshRequest& request) {
+    grpc::ClientContext context;
     auto stream = hulls_->GetHullMesh(&context, request);
     Mesh mesh;
     v1::GetHullMeshResponse part;
@@ -187,6 +191,28 @@ TEST_F(HullCalls, MeshOfACubeIsItsCanonicalSnapshot) {
   EXPECT_EQ(mesh.xyz.size(), 24);
   EXPECT_THAT(mesh.sizes, ElementsAre(4, 4, 4, 4, 4, 4));
   EXPECT_THAT(std::vector(mesh.indices.begin(), mesh.indices.begin() + 4), ElementsAre(0, 1, 3, 2));
+}
+
+TEST_F(HullCalls, SimplifiedMeshesStandForTheHullWithinTheirError) {
+  Put("ball", Sphere(500));
+  v1::GetHullMeshRequest request;
+  request.set_hull_id("ball");
+  v1::Simplification& simplification = *request.mutable_simplification();
+  EXPECT_EQ(GetMesh(request).status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  for (const auto side : {v1::SIMPLIFICATION_SIDE_INSIDE, v1::SIMPLIFICATION_SIDE_OUTSIDE}) {
+    simplification.set_side(side);
+    simplification.set_max_vertices(20);
+    const Mesh mesh = GetMesh(request);
+    ASSERT_TRUE(mesh.status.ok()) << mesh.status.error_message();
+    EXPECT_EQ(mesh.header.hull().vertex_count(), 500);
+    EXPECT_LE(mesh.header.vertex_count(), 20);
+    EXPECT_EQ(mesh.xyz.size(), 3 * mesh.header.vertex_count());
+    EXPECT_EQ(mesh.sizes.size(), mesh.header.facet_count());
+    EXPECT_GT(mesh.header.error(), 0);
+    EXPECT_LT(mesh.header.error(), 1);
+  }
+  simplification.set_max_vertices(2);
+  EXPECT_THAT(GetMesh(request).status.error_message(), HasSubstr("needs at least 8"));
 }
 
 TEST_F(HullCalls, MeshOfAnEmptyHullIsItsHeader) {
