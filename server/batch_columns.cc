@@ -7,6 +7,12 @@
 #include "server/status_map.h"
 
 namespace hulld::server {
+namespace {
+
+// What an element of a repeated message field takes beside its own bytes: a tag and its length.
+constexpr size_t kElementOverhead = 5;
+
+}  // namespace
 
 BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                            uint64_t first_pair)
@@ -25,7 +31,7 @@ void BatchColumns::AddRow(v1::Relation relation, v1::Rung rung) {
   message.add_rungs(rung);
   if (wanted_.axis()) message.add_axes();
   if (wanted_.analysis()) message.add_analyses();
-  bytes_ += 2;
+  bytes_ += 2 + kElementOverhead * (size_t{wanted_.axis()} + size_t{wanted_.analysis()});
   ++next_pair_;
 }
 
@@ -37,7 +43,7 @@ void BatchColumns::AddProblem(const absl::Status& status) {
   problem->set_pair(next_pair_ - 1);
   problem->set_code(ToGrpc(status.code()));
   problem->set_message(std::string(status.message()));
-  bytes_ += problem->ByteSizeLong();
+  bytes_ += problem->ByteSizeLong() + kElementOverhead;
 }
 
 void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b) {
