@@ -15,6 +15,9 @@ namespace {
 // Rounds of aiming at the surface, each at a plane nearer than the last; more is not worth it.
 constexpr int kMostRounds = 64;
 
+// A smaller surface is walked across faster than it is measured.
+constexpr size_t kWorthMeasuring = 64;
+
 // Corners of a map that one insertion measures: a map is done long before the surface has doubled.
 constexpr size_t kCornersPerInsertion = 8;
 
@@ -217,7 +220,7 @@ void Surface::Update(const VertexTable& vertices) {
       }
     });
   }
-  if (!measuring_) StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
+  if (IsWorthMeasuring() && !measuring_) StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
@@ -236,8 +239,13 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
   return inside ? std::optional<Vector>(mean) : std::nullopt;
 }
 
+// At extreme scales every sign is decided by integers, and a map costs more than it saves.
+bool Surface::IsWorthMeasuring() const {
+  return alive_ >= kWorthMeasuring && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
+}
+
 void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
-  if (!directions_ || !IsMapWorthwhile()) return;
+  if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
   // A tenth as many walks as points, at most.
   const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
   const int wanted = std::min(affordable, 2 * ResolutionFor(alive_, true));

@@ -124,6 +124,7 @@ class Surface {
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
   void Update(const VertexTable& vertices);
+  bool IsWorthMeasuring() const;
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
   void StartMeasuring(int resolution);
   void ContinueMeasuring(const VertexTable& vertices, size_t corners);

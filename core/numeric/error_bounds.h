@@ -88,9 +88,10 @@ inline constexpr double kMinkowskiErrorFactor = 128 * kUnitRoundoff;
 // |n| per component (sqrt(3) * 16 * 3 u |n| M < 84 u |n| M more). Proven.
 inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 
-// det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most d =
-// 128 u S each, W <= 4 S: first order 3 * 6 * W^2 d = 18 W^2 d, higher orders below W^2 d / 100,
-// rounding at most 6 * 5 u W^3 <= W^2 d. Times W^2 d. Proven.
+// det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most
+// d = 128 u S each, W <= 4 S. A 3x3 determinant is at most 4 W^3, so a value above 24 W^2 d needs
+// W > 6 d; there the exact change by errors, 18 W^2 d + 18 W d^2 + 6 d^3, is at most 21.2 W^2 d,
+// and rounding, 6 * 5 u W^3 with u W <= d / 73, less than W^2 d. Times W^2 d. Proven.
 inline constexpr double kTetrahedronErrorFactor = 24;
 
 // The cross product of two computed edges with components at most e and f, whose ends err by at

@@ -44,6 +44,9 @@ struct Feature {
 
 // World frame, from A towards B: max n.A <= min n.B over the reals for the n that was found, of
 // which `direction` is the rounding to unit length.
+//
+// FACET_A and FACET_B name the line: the direction may be minus the facet's outward normal, as in
+// the textbook, which tests each line once. The features are those of the direction.
 struct SeparatingAxis {
   Vector direction;
   AxisKind kind;

@@ -244,23 +244,23 @@ struct Scan {
   }
 };
 
-uint64_t CountAxes(const Hull& a, const Hull& b) {
-  // Flat differences add at most 3 + E_A + E_B, far below any limit's grain; they are counted where
-  // they occur.
-  return a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
+absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
+  if (count <= options.max_textbook_axes) return absl::OkStatus();
+  return absl::ResourceExhaustedError(absl::StrCat(
+      "textbook SAT would test ", count, " axes; the limit is ", options.max_textbook_axes));
 }
 
 }  // namespace
 
 absl::StatusOr<Answer> TextbookSat(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                    const QueryOptions& options) {
-  if (const uint64_t count = CountAxes(a, b); count > options.max_textbook_axes) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "textbook SAT would test ", count, " axes; the limit is ", options.max_textbook_axes));
-  }
+  // Before anything is computed, and again with the axes of a flat difference.
+  const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
+  if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;
   const FloatPair filter(a, X_WA, b, X_WB);
   ExactPair exact(a, X_WA, b, X_WB, filter);
   AxisTable axes(exact, filter);
+  if (absl::Status status = CheckCount(axes.size(), options); !status.ok()) return status;
   Scan scan;
   scan.Run(axes, options);
   if (scan.stopped) return absl::CancelledError("stopped in textbook SAT");

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/hull/hull_builder.h"
 #include "core/query/collision.h"
 #include "tests/core/oracle_bridge.h"
 #include "tests/core/point_sets.h"
@@ -84,6 +85,20 @@ TEST(Collision, NoAxisUnlessWanted) {
     EXPECT_TRUE(CheckCollision(cube, Pose(), cube, At(2, 0, 0), options)->axis.has_value());
     EXPECT_FALSE(CheckCollision(cube, Pose(), cube, At(0.5, 0, 0), options)->axis.has_value());
   }
+}
+
+TEST(Collision, AxesOfAFlatDifferenceCountAgainstTheLimit) {
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(std::vector<Vector>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}).ok());
+  const Hull triangle = builder.Snapshot();
+  QueryOptions options;
+  options.method = Method::kTextbookSat;
+  // 1 + 1 normals, 3 x 3 cross products; the plane's normal and 3 + 3 in-plane normals.
+  options.max_textbook_axes = 18;
+  EXPECT_EQ(CheckCollision(triangle, Pose(), triangle, Pose(), options)->analysis.axes_total, 18u);
+  options.max_textbook_axes = 17;
+  EXPECT_TRUE(absl::IsResourceExhausted(
+      CheckCollision(triangle, Pose(), triangle, Pose(), options).status()));
 }
 
 TEST(Collision, StageIsTheKindOfTheAxisWhetherOrNotTheAxisIsWanted) {
