@@ -33,8 +33,13 @@ uint32_t Scramble(uint32_t x) {
   return x ^ (x >> 16);
 }
 
-// Where to insert a point, for sorting: cell, then farthest first, then the point's index.
+// Where to insert a point, for sorting: the place of its direction in the upper half, the point's
+// index in the lower.
 using SortKey = uint64_t;
+// Cells a side, as a power of two, of the grid that tells the place; and the bits of a place: three
+// for the face of the cube.
+constexpr int kGridBits = 10;
+constexpr int kPlaceBits = 3 + 2 * kGridBits;
 
 void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch) {
   constexpr size_t kWorthRadix = 2048;
@@ -42,9 +47,9 @@ void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch) 
     std::sort(keys.begin(), keys.end());
     return;
   }
-  constexpr int kDigit = 11;
+  constexpr int kDigit = 12;
   scratch.resize(keys.size());
-  for (int shift = 32; shift < 64; shift += kDigit) {
+  for (int shift = 32; shift < 32 + kPlaceBits; shift += kDigit) {
     std::array<uint32_t, 1 << kDigit> starts{};
     constexpr uint64_t kMask = (1 << kDigit) - 1;
     for (const SortKey key : keys) ++starts[(key >> shift) & kMask];
@@ -59,12 +64,22 @@ void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch) 
   }
 }
 
+// The bits of a number below 2^16, each followed by a zero.
+uint32_t Spread(uint32_t x) {
+  x = (x | (x << 8)) & 0x00FF00FF;
+  x = (x | (x << 4)) & 0x0F0F0F0F;
+  x = (x | (x << 2)) & 0x33333333;
+  return (x | (x << 1)) & 0x55555555;
+}
+
+// Directions in Morton order on a fine grid, face by face.
 SortKey KeyOf(const DirectionMap& directions, const Vector& point, uint32_t index) {
-  constexpr int kRatioBits = 12;
-  const DirectionMap::Place place = directions.PlaceOf(point);
-  const double scale = (1 << kRatioBits) - 1;
-  const auto nearness = static_cast<uint64_t>(directions.Nearness(place) * scale);
-  return (static_cast<uint64_t>(place.cell) << (32 + kRatioBits)) | (nearness << 32) | index;
+  const auto cell =
+      static_cast<uint32_t>(DirectionMap::PlaceIn(directions.center(), 1 << kGridBits, point).cell);
+  constexpr uint32_t kMask = (1u << kGridBits) - 1;
+  const uint32_t face = cell >> (2 * kGridBits);
+  const uint32_t order = Spread((cell >> kGridBits) & kMask) << 1 | Spread(cell & kMask);
+  return static_cast<uint64_t>(face << (2 * kGridBits) | order) << 32 | index;
 }
 
 // One call of InsertBlock.

@@ -36,7 +36,7 @@ class InsertionRounds {
 
 // Adds a block of points to a surface, in an order that is fast for any input: rounds of growing
 // size, each reduced to the points that the map of directions cannot reject and sorted along the
-// surface, farthest first. Stops and returns false when should_stop, which may be empty, says so.
+// surface. Stops and returns false when should_stop, which may be empty, says so.
 bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
                  const std::function<bool()>& should_stop);
 

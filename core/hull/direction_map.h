@@ -37,8 +37,10 @@ class DirectionMap {
 
   // NaN-free for every finite point. The cell may be a neighbour of the true one by rounding; the
   // radii allow for that.
-  Place PlaceOf(const Vector& point) const {
-    const Vector v = point - center_;
+  Place PlaceOf(const Vector& point) const { return PlaceIn(center_, n_, point); }
+  // The same for a map of any resolution.
+  static Place PlaceIn(const Vector& center, int resolution, const Vector& point) {
+    const Vector v = point - center;
     const double x = std::abs(v.x());
     const double y = std::abs(v.y());
     const double z = std::abs(v.z());
@@ -46,17 +48,14 @@ class DirectionMap {
     const double m = axis == 0 ? x : axis == 1 ? y : z;
     if (m == 0) return {0, 0};
     if (!(m >= kLeastDistance && m <= kLargestDistance)) return {0, INFINITY};
-    const double scale = half_ / m;
-    const int i = std::min(n_ - 1, static_cast<int>(v[kNext[axis]] * scale + half_));
-    const int j = std::min(n_ - 1, static_cast<int>(v[kNext[axis + 1]] * scale + half_));
+    const double half = 0.5 * resolution;
+    const double scale = half / m;
+    const int i = std::min(resolution - 1, static_cast<int>(v[kNext[axis]] * scale + half));
+    const int j = std::min(resolution - 1, static_cast<int>(v[kNext[axis + 1]] * scale + half));
     const int face = 2 * axis + (v[axis] < 0 ? 1 : 0);
-    return {static_cast<size_t>((face * n_ + i) * n_ + j), m};
+    return {static_cast<size_t>((face * resolution + i) * resolution + j), m};
   }
   bool IsCertainlyInside(const Place& place) const { return place.distance < radii_[place.cell]; }
-  // From 1, at the radius below which points are certainly inside, to 0, infinitely far.
-  double Nearness(const Place& place) const {
-    return place.distance > 0 ? std::min(1.0, radii_[place.cell] / place.distance) : 0.0;
-  }
 
   uint32_t hint(size_t cell) const { return hints_[cell]; }
   void SetHint(size_t cell, uint32_t hint) { hints_[cell] = hint; }
