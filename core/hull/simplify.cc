@@ -23,7 +23,8 @@ constexpr size_t kBoxVertices = 8;
 constexpr double kFirstInflation = 0x1p-46;
 constexpr int kMostInflations = 16;
 
-// Measuring against the full hull is tighter, against the inside one cheaper.
+// Distances from a corner to a triangle, some 30 ns each, that one error may cost: measuring
+// against the full hull is tighter, against the inside one cheaper.
 constexpr size_t kMostDistances = 2'000'000;
 
 absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {

@@ -62,9 +62,10 @@ inline constexpr double kLeastPositive = 0x1p-1060;
 
 // Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
 // largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
-// between these two, so that no quantity that matters overflows, and what underflow adds (below
-// 2^-1074 times 2^400 times small counts) is far below 2^-53 of the slack in the factors that
-// follow. Proven.
+// between these two. Directions are scaled to a largest component in [1/2, 1). Then nothing
+// overflows: the largest quantity is a cube of 8 S, 2^909. Nor does underflow matter: the least
+// bound is 24 W^2 d with W > 6 d and d = 128 u S (see kTetrahedronErrorFactor), at least 2^-1029,
+// and a product that underflows errs by 2^-1075, far below the W^2 d of slack. Proven.
 inline constexpr double kFilterMinSize = 0x1p-300;
 inline constexpr double kFilterMaxSize = 0x1p300;
 

@@ -2,7 +2,6 @@
 #define HULLD_CORE_QUERY_EXACT_PAIR_H_
 
 #include <cstdint>
-#include <functional>
 #include <unordered_map>
 #include <vector>
 

@@ -2,7 +2,6 @@
 #define HULLD_CORE_QUERY_FLOAT_PAIR_H_
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "core/hull/hull.h"
