@@ -30,6 +30,13 @@ constexpr size_t kLeastSlicePairsPerThread = 16;
 // slice of its own, parallel over its axes.
 constexpr double kSliceProjections = 3e7;
 
+// Stands in for the hull of placements that cannot be answered.
+const QueryHull& NoHull() {
+  static const Hull empty;
+  static const QueryHull no_hull(empty);
+  return no_hull;
+}
+
 double TextbookProjections(const Hull& a, const Hull& b) {
   const double axes = static_cast<double>(a.edges().size()) * static_cast<double>(b.edges().size());
   return axes * static_cast<double>(a.vertices().size() + b.vertices().size());
@@ -85,7 +92,7 @@ absl::Status BatchStream::ResolvePlacements() {
   std::vector<size_t> hull_of(count);
   std::vector<std::string> ids;
   std::unordered_map<std::string, size_t> index_of;
-  placements_.resize(count, {&no_hull_, Pose()});
+  std::vector<Pose> poses(count);
   for (int i = 0; i < count; ++i) {
     const v1::Placement& placement = request_.placements(i);
     const std::string field = absl::StrCat("placements[", i, "]");
@@ -94,7 +101,7 @@ absl::Status BatchStream::ResolvePlacements() {
     const absl::StatusOr<Pose> pose = DecodePose(placement.pose(), field + ".pose");
     problems[i] = pose.status();
     if (!problems[i].ok()) continue;
-    placements_[i].X_WH = *pose;
+    poses[i] = *pose;
     const auto [known, is_new] = index_of.emplace(placement.hull_id(), ids.size());
     if (is_new) ids.push_back(placement.hull_id());
     hull_of[i] = known->second;
@@ -103,9 +110,9 @@ absl::Status BatchStream::ResolvePlacements() {
   const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, options_.should_stop);
   if (!resolved.ok()) return resolved.status();
   EncodeHeader(registry_.store(), resolved->store_revision, head_.mutable_header());
-  hulls_.resize(ids.size());
+  snapshots_.resize(ids.size());
   for (size_t i = 0; i < ids.size(); ++i) {
-    if (resolved->hulls[i].ok()) hulls_[i] = resolved->hulls[i]->hull;
+    if (resolved->hulls[i].ok()) snapshots_[i] = resolved->hulls[i]->snapshot;
   }
   answerable_.resize(count);
   for (int i = 0; i < count; ++i) {
@@ -113,10 +120,11 @@ absl::Status BatchStream::ResolvePlacements() {
     if (problems[i].ok()) problems[i] = resolved->hulls[hull_of[i]].status();
     if (problems[i].ok()) {
       answerable_[i] = true;
-      placements_[i].hull = hulls_[hull_of[i]].get();
+      placements_.push_back(*PlacedHull::Make(snapshots_[hull_of[i]]->query_hull(), poses[i]));
       EncodeVersion(resolved->hulls[hull_of[i]]->record, version);
       continue;
     }
+    placements_.push_back(*PlacedHull::Make(NoHull(), Pose()));
     v1::PlacementProblem* problem = head_.add_placement_problems();
     problem->set_placement(i);
     problem->set_code(ToGrpc(problems[i].code()));
@@ -156,7 +164,7 @@ size_t BatchStream::SliceEnd() const {
   double projections = 0;
   for (size_t i = next_pair_; i < most; ++i) {
     const PlacedPair pair = PairAt(i);
-    projections += TextbookProjections(*placements_[pair.a].hull, *placements_[pair.b].hull);
+    projections += TextbookProjections(placements_[pair.a].hull(), placements_[pair.b].hull());
     if (projections > kSliceProjections) return std::max(i, next_pair_ + 1);
   }
   return most;
@@ -167,12 +175,10 @@ std::vector<absl::StatusOr<Answer>> BatchStream::AnswerPairs(
   if (pairs.size() != 1) {
     return CheckCollisions(placements_, pairs, options_, executor_.threads());
   }
-  const PlacedHull& a = placements_[pairs[0].a];
-  const PlacedHull& b = placements_[pairs[0].b];
   QueryOptions options = options_;
   options.threads = executor_.threads();
   std::vector<absl::StatusOr<Answer>> answers;
-  answers.push_back(CheckCollision(*a.hull, a.X_WH, *b.hull, b.X_WH, options));
+  answers.push_back(CheckCollision(placements_[pairs[0].a], placements_[pairs[0].b], options));
   return answers;
 }
 
@@ -199,8 +205,8 @@ absl::Status BatchStream::ComputeSlice() {
       continue;
     }
     const absl::StatusOr<Answer>& answer = answers[answered++];
-    const Hull& a = *placements_[pair.a].hull;
-    const Hull& b = *placements_[pair.b].hull;
+    const Hull& a = placements_[pair.a].hull();
+    const Hull& b = placements_[pair.b].hull();
     if (answer.ok()) {
       columns.Add(answer, a, b);
     } else {

@@ -70,9 +70,7 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
 
   // Owned by the one task that runs for this call, if any.
   QueryOptions options_;
-  std::vector<std::shared_ptr<const Hull>> hulls_;
-  // Stands in for the hull of placements that cannot be answered.
-  const Hull no_hull_;
+  std::vector<std::shared_ptr<const Snapshot>> snapshots_;
   std::vector<PlacedHull> placements_;
   std::vector<char> answerable_;  // by placement
   v1::BatchCheckCollisionsResponse head_;

@@ -67,9 +67,13 @@ absl::StatusOr<PairQuery> Prepare(Registry& registry, const CallLifetime& lifeti
 
 absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
                     v1::CheckCollisionResponse* response) {
-  const Hull& a = *query.a.hull;
-  const Hull& b = *query.b.hull;
-  const auto answer = hulld::CheckCollision(a, query.X_WA, b, query.X_WB, query.options);
+  const auto placed_a = PlacedHull::Make(query.a.snapshot->query_hull(), query.X_WA);
+  if (!placed_a.ok()) return placed_a.status();
+  const auto placed_b = PlacedHull::Make(query.b.snapshot->query_hull(), query.X_WB);
+  if (!placed_b.ok()) return placed_b.status();
+  const Hull& a = placed_a->hull();
+  const Hull& b = placed_b->hull();
+  const auto answer = hulld::CheckCollision(*placed_a, *placed_b, query.options);
   if (!answer.ok()) return NameQueryLimit(answer.status());
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));

@@ -76,12 +76,18 @@ v1::Relation EncodeRelation(Relation relation) {
       return v1::RELATION_TOUCHING;
     case Relation::kOverlapping:
       return v1::RELATION_OVERLAPPING;
+    case Relation::kWithinTolerance:
+      return v1::RELATION_WITHIN_TOLERANCE;
   }
   return v1::RELATION_UNSPECIFIED;
 }
 
 v1::Rung EncodeRung(Rung rung) {
   switch (rung) {
+    case Rung::kBounds:
+      return v1::RUNG_BOUNDS;
+    case Rung::kCached:
+      return v1::RUNG_CACHED;
     case Rung::kFloatingPoint:
       return v1::RUNG_FLOATING_POINT;
     case Rung::kExact:

@@ -91,11 +91,11 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const CallLifet
   const auto& [revision, view] = *resolved;
   EncodeHeader(registry_.store(), revision, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
-  response->set_edge_count(view.hull->edges().size());
-  response->set_facet_count(view.hull->facet_count());
-  EncodeBox(*view.hull, response);
+  response->set_edge_count(view.snapshot->hull().edges().size());
+  response->set_facet_count(view.snapshot->hull().facet_count());
+  EncodeBox(view.snapshot->hull(), response);
   if (request.audit()) {
-    const absl::Status finding = AuditHull(*view.hull);
+    const absl::Status finding = AuditHull(view.snapshot->hull());
     response->mutable_audit()->set_ok(finding.ok());
     if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
   }

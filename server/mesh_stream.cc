@@ -41,7 +41,8 @@ void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request)
   auto resolved = registry.Resolve(request.hull_id(), [this] { return lifetime_.ShouldStop(); });
   if (lifetime_.ShouldStop()) return Finish(ToGrpc(lifetime_.StopStatus()));
   if (!resolved.ok()) return Finish(ToGrpc(resolved.status()));
-  mesh_ = std::move(resolved->second.hull);
+  mesh_ =
+      std::shared_ptr<const Hull>(resolved->second.snapshot, &resolved->second.snapshot->hull());
   v1::MeshHeader* header = message_.mutable_header();
   if (request.has_simplification()) {
     const absl::Status simplified = Simplify(request.simplification(), header);

@@ -13,7 +13,7 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   QueryOptions options;
   options.method = *decoded;
   options.want_axis = wanted.axis();
-  options.want_stage = wanted.analysis();
+  options.want_analysis = wanted.analysis();
   options.max_textbook_axes = limits.max_textbook_axes;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
   return options;

@@ -23,7 +23,7 @@ struct Registry::PendingChunk {
 struct RegisteredHull {
   HullRecord record;
   // Of record.revision; null when nobody has asked since the last change.
-  std::shared_ptr<const Hull> snapshot;
+  std::shared_ptr<const Snapshot> snapshot;
   bool deleted = false;
   // Not OK once a change that the builder holds could not be stored.
   absl::Status failure;
@@ -104,7 +104,7 @@ absl::StatusOr<Registry::HullPointer> Registry::CreateLocked(const std::string& 
   auto hull = std::make_shared<RegisteredHull>();
   hull->record.hull_id = id;
   hull->record.create_revision = hull->record.revision = revision;
-  hull->snapshot = empty_hull_;
+  hull->snapshot = empty_snapshot_;
   hulls_.emplace(id, hull);
   return hull;
 }
@@ -183,7 +183,7 @@ void Registry::MakeSnapshot(Lock& lock, RegisteredHull& hull,
   if (hull.busy || hull.deleted || hull.snapshot != nullptr) return;
   hull.busy = true;
   lock.unlock();
-  auto snapshot = std::make_shared<const Hull>(hull.builder.Snapshot());
+  auto snapshot = std::make_shared<const Snapshot>(hull.builder.Snapshot());
   lock.lock();
   hull.snapshot = std::move(snapshot);
   hull.busy = false;
@@ -292,7 +292,7 @@ void Registry::StartNextChunk(const HullPointer& hull) {
 }
 
 void Registry::RunNextChunk(const HullPointer& hull) {
-  std::shared_ptr<const Hull> stale;  // goes after the lock
+  std::shared_ptr<const Snapshot> stale;  // goes after the lock
   Lock lock(mutex_);
   const PendingChunk pending = std::move(hull->pending.front());
   hull->pending.pop_front();
@@ -307,7 +307,7 @@ void Registry::RunNextChunk(const HullPointer& hull) {
 // Entered and left with the lock held; requires that the builder is owned.
 absl::StatusOr<ChunkResult> Registry::Apply(Lock& lock, RegisteredHull& hull,
                                             const PendingChunk& pending,
-                                            std::shared_ptr<const Hull>* stale) {
+                                            std::shared_ptr<const Snapshot>* stale) {
   const Chunk& chunk = pending.chunk;
   const std::string name = absl::StrCat("chunk ", chunk.sequence, ": ");
   if (hull.deleted) return Prefixed(name, Deleted(hull.record));
@@ -347,7 +347,8 @@ absl::StatusOr<ChunkResult> Registry::Apply(Lock& lock, RegisteredHull& hull,
 }
 
 absl::Status Registry::CommitChunk(RegisteredHull& hull, const PendingChunk& pending,
-                                   const PointCounts& counts, std::shared_ptr<const Hull>* stale) {
+                                   const PointCounts& counts,
+                                   std::shared_ptr<const Snapshot>* stale) {
   HullRecord& record = hull.record;
   const Chunk& chunk = pending.chunk;
   const bool changed = counts.outside > 0;

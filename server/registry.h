@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "core/hull/hull.h"
 #include "core/hull/hull_builder.h"
 #include "server/config.h"
+#include "server/snapshot.h"
 #include "server/store.h"
 #include "server/worker_pool.h"
 
@@ -38,7 +38,7 @@ struct HullRecord {
 // A hull as one reader sees it: the snapshot belongs to the record's revision.
 struct HullView {
   HullRecord record;
-  std::shared_ptr<const Hull> hull;
+  std::shared_ptr<const Snapshot> snapshot;
 };
 
 // Hulls that all were current at one revision of the store.
@@ -168,14 +168,14 @@ class Registry {
   void StartNextChunk(const HullPointer& hull);
   void RunNextChunk(const HullPointer& hull);
   absl::StatusOr<ChunkResult> Apply(Lock& lock, RegisteredHull& hull, const PendingChunk& pending,
-                                    std::shared_ptr<const Hull>* stale);
+                                    std::shared_ptr<const Snapshot>* stale);
   absl::Status CommitChunk(RegisteredHull& hull, const PendingChunk& pending,
-                           const PointCounts& counts, std::shared_ptr<const Hull>* stale);
+                           const PointCounts& counts, std::shared_ptr<const Snapshot>* stale);
 
   Store& store_;
   const Limits limits_;
   WorkerPool& writers_;
-  const std::shared_ptr<const Hull> empty_hull_ = std::make_shared<const Hull>();
+  const std::shared_ptr<const Snapshot> empty_snapshot_ = std::make_shared<const Snapshot>(Hull());
 
   mutable std::mutex mutex_;
   // The rest, and all of a RegisteredHull but its builder, is guarded by mutex_.

@@ -62,12 +62,15 @@ inline constexpr double kLeastPositive = 0x1p-1060;
 
 // Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
 // largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
-// between these two. Directions are scaled to a largest component in [1/2, 1). Then nothing
-// overflows: the largest quantity is a cube of 8 S, 2^909. Nor does underflow matter: the least
-// bound is 24 W^2 d with W > 6 d and d = 128 u S (see kTetrahedronErrorFactor), at least 2^-1029,
-// and a product that underflows errs by 2^-1075, far below the W^2 d of slack. Proven.
+// between these two, with directions whose largest component is between the second two. Then nothing
+// overflows: the largest quantities are a cube of 8 S, 2^909, and a direction times 8 S, 2^703. Nor
+// does underflow matter: the least bounds are 24 W^2 d with W > 6 d and d = 128 u S (see
+// kTetrahedronErrorFactor), at least 2^-1029, and 512 u |n| S, at least 2^-744; a product that
+// underflows errs by 2^-1075, far below their slack. Proven.
 inline constexpr double kFilterMinSize = 0x1p-300;
 inline constexpr double kFilterMaxSize = 0x1p300;
+inline constexpr double kDirectionMin = 0x1p-400;
+inline constexpr double kDirectionMax = 0x1p400;
 
 // Entries of the rotation matrix R(q)/|q|^2, computed from q scaled by a power of two to a largest
 // component in [1/2, 1): each numerator is a sum of at most 4 products (error at most 7 u |q|^2),
@@ -105,6 +108,21 @@ inline constexpr double kNormalErrorFactor = 5;
 // S <= |n| d / 2. As kGapNormalFactor h S + kGapPositionFactor |n| d. Proven.
 inline constexpr double kGapNormalFactor = 12.5;
 inline constexpr double kGapPositionFactor = 4;
+
+// A value n . v in a hull's own frame, n with components at most sqrt(3) |n_W|: products and sums err
+// by at most 3 u * 3 sqrt(3) |n_W| M < 16 u |n_W| M. Twice that, as the blur of a support map; times
+// |n_W| M. Proven.
+inline constexpr double kSupportBlurFactor = 32 * kUnitRoundoff;
+
+// The distance of a vertex from the hull's centre: the difference errs by u of itself, the norm by
+// at most 8 u. Proven.
+inline constexpr double kRadiusRoundUp = 1 + 16 * kUnitRoundoff;
+
+// Spheres round the hulls: the distance of their centres errs by sqrt(3) * 128 u S, the sum of the
+// radii (at most 4 S in all) by 4 u S; squares by 4 u of themselves each. As kSphereErrorFactor S
+// and a factor kSphereSquareRoundUp. Proven.
+inline constexpr double kSphereErrorFactor = 256 * kUnitRoundoff;
+inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 
 // Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
 // u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). Proven.

@@ -53,6 +53,9 @@ inline IntegerVector AnyPerpendicular(const IntegerVector& d) {
   return {0, 0, d.x};
 }
 
+// Above the exponent of any double's lowest bit.
+inline constexpr int kAboveAllExponents = 1024;
+
 // The exponent e of the lowest set bit of x: x is an odd multiple of 2^e. Requires x finite and not
 // 0. Exact, subnormals included.
 int LowestBitExponent(double x);

@@ -19,9 +19,7 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
 #pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
   for (int64_t i = 0; i < count; ++i) {
     if (each.should_stop && each.should_stop()) continue;
-    const PlacedHull& a = placements[pairs[i].a];
-    const PlacedHull& b = placements[pairs[i].b];
-    answers[i] = CheckCollision(*a.hull, a.X_WH, *b.hull, b.X_WH, each);
+    answers[i] = CheckCollision(placements[pairs[i].a], placements[pairs[i].b], each);
   }
   return answers;
 }

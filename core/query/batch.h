@@ -11,12 +11,6 @@
 
 namespace hulld {
 
-// A hull at a pose; the hull must outlive the call.
-struct PlacedHull {
-  const Hull* hull;
-  Pose X_WH;
-};
-
 // Indices of a pair into a table of placements.
 struct PlacedPair {
   uint32_t a;

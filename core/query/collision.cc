@@ -5,42 +5,42 @@
 #include <algorithm>
 #include <chrono>
 #include <compare>
+#include <span>
 #include <utility>
 
 #include "core/query/axis_description.h"
 #include "core/query/exact_pair.h"
-#include "core/query/exact_search.h"
 #include "core/query/float_pair.h"
-#include "core/query/float_search.h"
+#include "core/query/ladder.h"
 #include "core/query/textbook_sat.h"
 
 namespace hulld {
 namespace {
 
-// One hull at one pose.
-struct Placed {
-  const Hull& hull;
-  const Pose& pose;
-};
+std::weak_ordering Compare(std::span<const double> a, std::span<const double> b) {
+  return std::lexicographical_compare_three_way(a.begin(), a.end(), b.begin(), b.end(),
+                                                [](double x, double y) {
+                                                  return x < y   ? std::weak_ordering::less
+                                                         : y < x ? std::weak_ordering::greater
+                                                                 : std::weak_ordering::equivalent;
+                                                });
+}
+
+std::span<const double> Coordinates(const Vector& v) { return {v.data(), 3}; }
 
 // A total order of placed hulls by their content, so that a pair is answered the same way whichever
 // of the two comes first.
-std::weak_ordering Compare(const Placed& a, const Placed& b) {
-  const auto compare = [](const auto& x, const auto& y) {
-    return std::lexicographical_compare_three_way(x.begin(), x.end(), y.begin(), y.end(),
-                                                  [](double p, double q) {
-                                                    return p < q   ? std::weak_ordering::less
-                                                           : q < p ? std::weak_ordering::greater
-                                                                   : std::weak_ordering::equivalent;
-                                                  });
-  };
-  if (const auto order = compare(a.pose.t, b.pose.t); order != 0) return order;
-  if (const auto order = compare(a.pose.q, b.pose.q); order != 0) return order;
-  const auto va = a.hull.vertices();
-  const auto vb = b.hull.vertices();
+std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
+  if (const auto order = Compare(Coordinates(a.X_WH().t), Coordinates(b.X_WH().t)); order != 0) {
+    return order;
+  }
+  if (const auto order = Compare(a.X_WH().q, b.X_WH().q); order != 0) return order;
+  const auto va = a.hull().vertices();
+  const auto vb = b.hull().vertices();
   if (const auto order = va.size() <=> vb.size(); order != 0) return order;
   for (size_t i = 0; i < va.size(); ++i) {
-    if (const auto order = compare(va[i], vb[i]); order != 0) return order;
+    const auto order = Compare(Coordinates(va[i]), Coordinates(vb[i]));
+    if (order != 0) return order;
   }
   return std::weak_ordering::equivalent;
 }
@@ -63,74 +63,88 @@ Answer Mirrored(Answer answer) {
 }
 
 IntegerVector ToIntegers(const Vector& n) {
-  constexpr int kAboveAllExponents = 1024;
   return ToInteger(n, LowestBitExponent(n, kAboveAllExponents));
 }
 
-bool MustDescribe(const QueryOptions& options) { return options.want_axis || options.want_stage; }
-
-void Describe(ExactPair& pair, const IntegerVector& n, const QueryOptions& options,
-              Answer& answer) {
-  SeparatingAxis axis = DescribeAxis(pair, n);
-  answer.analysis.stage = axis.kind;
-  if (options.want_axis) answer.axis = std::move(axis);
+std::optional<IntegerVector> ExactAxis(const Decision& decision) {
+  if (const Vector* n = std::get_if<Vector>(&decision.axis)) return ToIntegers(*n);
+  if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) return *n;
+  return std::nullopt;
 }
 
-// The ladder: floating point with a proven bound, then exact arithmetic.
-absl::StatusOr<Answer> CertifiedSearch(const Placed& a, const Placed& b,
-                                       const QueryOptions& options) {
-  const FloatPair filter(a.hull, a.pose, b.hull, b.pose);
+// A and B in the order of their content.
+absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
+                                       const QueryOptions& options, PairCache* cache) {
+  const FloatPair pair(a, b);
+  const absl::StatusOr<Decision> decision =
+      Decide(pair, options.tolerance, cache, options.should_stop);
+  if (!decision.ok()) return decision.status();
   Answer answer;
-  if (filter.usable()) {
-    const FloatSearchResult found = SearchInFloatingPoint(filter);
-    answer.analysis.axes_tested = found.directions_tried;
-    answer.rung = Rung::kFloatingPoint;
-    if (found.portal.verdict == PortalVerdict::kOverlapping) {
-      answer.relation = Relation::kOverlapping;
-      return answer;
-    }
-    if (found.portal.verdict == PortalVerdict::kSeparated) {
-      answer.relation = Relation::kSeparated;
-      if (MustDescribe(options)) {
-        ExactPair exact(a.hull, a.pose, b.hull, b.pose, filter);
-        Describe(exact, ToIntegers(*found.portal.axis), options, answer);
-      }
-      return answer;
+  answer.relation = decision->relation;
+  answer.rung = decision->rung;
+  answer.analysis.axes_tested = decision->directions_tried;
+  if (options.want_axis || options.want_analysis) {
+    if (const std::optional<IntegerVector> n = ExactAxis(*decision)) {
+      ExactPair exact(pair);
+      SeparatingAxis axis = DescribeAxis(exact, *n);
+      answer.analysis.stage = axis.kind;
+      if (options.want_axis) answer.axis = std::move(axis);
     }
   }
-  ExactPair exact(a.hull, a.pose, b.hull, b.pose, filter);
-  absl::StatusOr<ExactSearchResult> found = SearchExactly(exact, options.should_stop);
-  if (!found.ok()) return found.status();
-  answer.rung = Rung::kExact;
-  answer.relation = found->relation;
-  answer.analysis.axes_tested += found->directions_tried;
-  if (found->axis && MustDescribe(options)) Describe(exact, *found->axis, options, answer);
   return answer;
 }
 
-absl::StatusOr<Answer> CertifiedSearchOfEither(const Placed& a, const Placed& b,
-                                               const QueryOptions& options) {
-  if (Compare(a, b) <= 0) return CertifiedSearch(a, b, options);
-  absl::StatusOr<Answer> answer = CertifiedSearch(b, a, options);
+PairCache Mirrored(PairCache cache) {
+  if (cache.axis) cache.axis = -*cache.axis;
+  for (VertexPair& pair : cache.pairs) std::swap(pair.a, pair.b);
+  return cache;
+}
+
+absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const PlacedHull& b,
+                                               const QueryOptions& options, PairCache* cache) {
+  if (Compare(a, b) <= 0) return CertifiedSearch(a, b, options, cache);
+  if (cache != nullptr) *cache = Mirrored(*cache);
+  absl::StatusOr<Answer> answer = CertifiedSearch(b, a, options, cache);
+  if (cache != nullptr) *cache = Mirrored(*cache);
   if (!answer.ok()) return answer;
   return Mirrored(*std::move(answer));
 }
 
 }  // namespace
 
+absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
+                                      const QueryOptions& options, PairCache* cache) {
+  std::optional<std::chrono::steady_clock::time_point> start;
+  if (options.want_analysis) start = std::chrono::steady_clock::now();
+  absl::StatusOr<Answer> answer = Answer{};
+  if (!a.hull().empty() && !b.hull().empty()) {
+    answer = options.method == Method::kTextbookSat ? TextbookSat(a, b, options)
+                                                    : CertifiedSearchOfEither(a, b, options, cache);
+  }
+  if (answer.ok() && start) answer->analysis.time = std::chrono::steady_clock::now() - *start;
+  return answer;
+}
+
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,
                                       const Pose& X_WB, const QueryOptions& options) {
-  const auto start = std::chrono::steady_clock::now();
-  if (absl::Status status = ValidatePose(X_WA); !status.ok()) return status;
-  if (absl::Status status = ValidatePose(X_WB); !status.ok()) return status;
-  absl::StatusOr<Answer> answer = Answer{};
-  if (!a.empty() && !b.empty()) {
-    answer = options.method == Method::kTextbookSat
-                 ? TextbookSat(a, X_WA, b, X_WB, options)
-                 : CertifiedSearchOfEither({a, X_WA}, {b, X_WB}, options);
-  }
-  if (answer.ok()) answer->analysis.time = std::chrono::steady_clock::now() - start;
-  return answer;
+  const QueryHull query_a(a);
+  const QueryHull query_b(b);
+  const absl::StatusOr<PlacedHull> placed_a = PlacedHull::Make(query_a, X_WA);
+  if (!placed_a.ok()) return placed_a.status();
+  const absl::StatusOr<PlacedHull> placed_b = PlacedHull::Make(query_b, X_WB);
+  if (!placed_b.ok()) return placed_b.status();
+  return CheckCollision(*placed_a, *placed_b, options);
+}
+
+RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache) {
+  if (a.hull().empty() || b.hull().empty()) return {Relation::kSeparated, Rung::kBounds};
+  const bool swapped = Compare(a, b) > 0;
+  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  const FloatPair pair = swapped ? FloatPair(b, a) : FloatPair(a, b);
+  const absl::StatusOr<Decision> decision = Decide(pair, 0, cache, {});
+  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  // Nothing stops the search.
+  return {decision->relation, decision->rung};
 }
 
 }  // namespace hulld

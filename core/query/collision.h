@@ -11,16 +11,23 @@
 #include <vector>
 
 #include "core/hull/hull.h"
+#include "core/query/certificate.h"
+#include "core/query/placed_hull.h"
 #include "core/query/pose.h"
 
 namespace hulld {
 
+// QueryOptions::max_error by default, relative to the largest absolute coordinates of the two
+// hulls, each about its centre, and the separation.
+inline constexpr double kDefaultRelativeMaxError = 1e-12;
+
 // The relation of two closed convex sets A and B, over the reals. An empty hull is separated from
 // all.
 enum class Relation {
-  kSeparated,    // no common point
-  kTouching,     // 0 is on the boundary of A - B
-  kOverlapping,  // 0 is interior to A - B
+  kSeparated,        // no common point
+  kTouching,         // 0 is on the boundary of A - B
+  kOverlapping,      // 0 is interior to A - B
+  kWithinTolerance,  // |separation| <= QueryOptions::tolerance; neither colliding nor not
 };
 
 enum class AxisKind {
@@ -34,7 +41,12 @@ enum class AxisKind {
 enum class Method { kCertifiedSearch, kTextbookSat };
 
 // What decided an answer.
-enum class Rung { kFloatingPoint, kExact };
+enum class Rung {
+  kBounds,         // spheres round the hulls
+  kCached,         // the axis or the vertex pairs of the previous query of the pair
+  kFloatingPoint,  // the hulls, in floating point with a proven error bound
+  kExact,          // exact arithmetic
+};
 
 // The vertices of one hull that lie farthest along an axis.
 struct Feature {
@@ -68,11 +80,44 @@ struct Analysis {
   std::optional<uint64_t> axis_index;  // textbook: the index of that axis, from 0
 };
 
+// The signed separation: the distance when positive; minus the penetration depth, the distance from
+// 0 to the boundary of A - B, when negative; 0 exactly when touching. |value - true value| <=
+// bound, and the sign agrees with the relation. Where a double cannot hold the value it saturates
+// and the bound is infinite.
+struct Separation {
+  double value = 0;
+  double bound = 0;
+};
+
+// Points of A and B, world frame, that attain the separation: at the distance of each other when
+// separated, a common point when touching, and when overlapping those that coincide after the
+// shortest translation that ends the overlap. `error`: how far each may be from a point of its hull
+// and from attaining the separation. Where several are equally good, one of them.
+struct Witness {
+  Vector p_WA;
+  Vector p_WB;
+  double error = 0;
+};
+
 struct QueryOptions {
   Method method = Method::kCertifiedSearch;
   bool want_axis = false;
-  // Whether Analysis::stage must be known; the rest of the analysis costs nothing.
-  bool want_stage = false;
+  // Whether Analysis::time and Analysis::stage must be known; the rest of the analysis costs
+  // nothing.
+  bool want_analysis = false;
+  bool want_certificate = false;
+  bool want_separation = false;
+  bool want_witness = false;
+  // The largest bound of a wanted separation that will do, in the caller's length unit; absent:
+  // kDefaultRelativeMaxError times the sizes of the hulls and the separation. Where a double cannot
+  // hold the value so well, the bound is that of its rounding.
+  std::optional<double> max_error;
+  // Whether Answer::within_clearance must be known: whether separation <= this, decided exactly.
+  std::optional<double> clearance;
+  // tau >= 0, length. 0: the relation is exact, always. Positive: it may be kWithinTolerance where
+  // |separation| <= tau. Not with a wanted separation, witness, clearance or certificate, nor the
+  // textbook: these need the relation, and INVALID_ARGUMENT says so.
+  double tolerance = 0;
   // Textbook only: more candidate axes than this are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
   // Polled inside long loops, possibly from several threads; true ends the query with CANCELLED.
@@ -88,13 +133,47 @@ struct Answer {
   // When wanted, the relation is SEPARATED or TOUCHING, and neither hull is empty.
   std::optional<SeparatingAxis> axis;
   Analysis analysis;
+  // When wanted and neither hull is empty.
+  std::optional<Certificate> certificate;
+  // When wanted; infinite when a hull is empty.
+  std::optional<Separation> separation;
+  // When wanted and neither hull is empty.
+  std::optional<Witness> witness;
+  // When wanted: whether separation <= QueryOptions::clearance. False when a hull is empty.
+  std::optional<bool> within_clearance;
 };
 
-// The exact relation of hull A at pose X_WA and hull B at pose X_WB, for every finite input.
-// Requires valid poses (ValidatePose); otherwise INVALID_ARGUMENT. RESOURCE_EXHAUSTED: the textbook
-// method would test more axes than allowed. CANCELLED: should_stop said so.
+// What a query of one pair leaves for the next one of the same hulls at other poses: an axis that
+// separated them, or vertex pairs whose differences surrounded the origin. Never an answer: what it
+// suggests is proven anew or dropped. Belongs to one caller at a time.
+struct PairCache {
+  // World frame, from A towards B.
+  std::optional<Vector> axis;
+  // 0 or 4.
+  uint32_t pair_count = 0;
+  VertexPair pairs[4];
+};
+
+// The relation of hull A and hull B at their poses, exact for every finite input, and what else the
+// options ask for. `cache` may be null; with it the relation, the separation and its bound are
+// those without it. Swapping A and B mirrors the answer.
+// INVALID_ARGUMENT: options that exclude each other, a negative or NaN tolerance, max_error or
+// clearance. RESOURCE_EXHAUSTED: the textbook method would test more axes than allowed. CANCELLED:
+// should_stop said so.
+absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
+                                      const QueryOptions& options = {}, PairCache* cache = nullptr);
+
+// The same for hulls that are asked about once: makes what queries need of them, in O(V), and drops
+// it. INVALID_ARGUMENT also for poses that are not valid (ValidatePose).
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,
                                       const Pose& X_WB, const QueryOptions& options = {});
+
+// The relation alone, as CheckCollision with default options finds it: the fastest way to ask.
+struct RelationAnswer {
+  Relation relation;
+  Rung rung;
+};
+RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache = nullptr);
 
 }  // namespace hulld
 

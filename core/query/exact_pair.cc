@@ -7,9 +7,6 @@
 namespace hulld {
 namespace {
 
-// Above the exponent of any double's lowest bit.
-constexpr int kAboveAllExponents = 1024;
-
 // A quaternion as integers without common power of two, its homogeneous matrix and squared norm.
 struct IntegerRotation {
   IntegerVector rows[3];
@@ -41,27 +38,23 @@ IntegerRotation RotationOf(const std::array<double, 4>& q) {
           ww + xx + yy + zz};
 }
 
-int ExponentOf(const Hull& hull) {
-  int exponent = kAboveAllExponents;
-  for (const Vector& v : hull.vertices()) exponent = LowestBitExponent(v, exponent);
-  return exponent;
-}
-
 }  // namespace
 
-ExactPair::ExactPair(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-                     const FloatPair& filter)
-    : filter_(&filter) {
+ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
+  const Pose& X_WA = filter.a().X_WH();
+  const Pose& X_WB = filter.b().X_WH();
   const IntegerRotation R_A = RotationOf(X_WA.q);
   const IntegerRotation R_B = RotationOf(X_WB.q);
-  a_ = {&a, ExponentOf(a), {}, {}, {}};
-  b_ = {&b, ExponentOf(b), {}, {}, {}};
+  a_ = {&filter.a().query_hull(), {}, {}, {}};
+  b_ = {&filter.b().query_hull(), {}, {}, {}};
+  const int exponent_a = a_.hull->exponent();
+  const int exponent_b = b_.hull->exponent();
   const int shift_exponent =
       LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents));
-  const int common = std::min({a_.exponent, b_.exponent, shift_exponent});
+  const int common = std::min({exponent_a, exponent_b, shift_exponent});
   for (int i = 0; i < 3; ++i) {
-    a_.rows[i] = (R_B.norm_squared << (a_.exponent - common)) * R_A.rows[i];
-    b_.rows[i] = (R_A.norm_squared << (b_.exponent - common)) * R_B.rows[i];
+    a_.rows[i] = (R_B.norm_squared << (exponent_a - common)) * R_A.rows[i];
+    b_.rows[i] = (R_A.norm_squared << (exponent_b - common)) * R_B.rows[i];
   }
   a_.shift = {0, 0, 0};
   b_.shift =
@@ -74,7 +67,7 @@ IntegerVector ExactPair::ToWorld(const Side& side, const IntegerVector& own) {
 
 const IntegerVector& ExactPair::Vertex(Side& side, uint32_t i) {
   if (const auto found = side.vertices.find(i); found != side.vertices.end()) return found->second;
-  const IntegerVector own = ToInteger(side.hull->vertices()[i], side.exponent);
+  const IntegerVector own = ToInteger(side.hull->hull().vertices()[i], side.hull->exponent());
   return side.vertices.emplace(i, ToWorld(side, own) + side.shift).first->second;
 }
 
@@ -84,7 +77,7 @@ void ExactPair::CacheAllVertices() {
 }
 
 std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
-  std::vector<uint32_t> all(side.hull->vertices().size());
+  std::vector<uint32_t> all(side.hull->hull().vertices().size());
   std::iota(all.begin(), all.end(), 0u);
   return all;
 }
@@ -119,15 +112,18 @@ uint32_t ExactPair::FarthestA(const IntegerVector& n) { return FeatureA(n).front
 
 uint32_t ExactPair::FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
 
-IntegerVector ExactPair::SumOfVertices(const Side& side) {
+IntegerVector ExactPair::SumOfInnerVertices(const Side& side) {
+  const auto vertices = side.hull->hull().vertices();
   IntegerVector own = {0, 0, 0};
-  for (const Vector& v : side.hull->vertices()) own = own + ToInteger(v, side.exponent);
-  return ToWorld(side, own) + Integer(side.hull->vertices().size()) * side.shift;
+  for (const uint32_t i : side.hull->inner_vertices()) {
+    own = own + ToInteger(vertices[i], side.hull->exponent());
+  }
+  return ToWorld(side, own) + Integer(side.hull->inner_vertices().size()) * side.shift;
 }
 
 IntegerVector ExactPair::CenterDifference() const {
-  return Integer(b().vertices().size()) * SumOfVertices(a_) -
-         Integer(a().vertices().size()) * SumOfVertices(b_);
+  return Integer(b_.hull->inner_vertices().size()) * SumOfInnerVertices(a_) -
+         Integer(a_.hull->inner_vertices().size()) * SumOfInnerVertices(b_);
 }
 
 }  // namespace hulld

@@ -21,13 +21,11 @@ namespace hulld {
 // only these are multiplied out.
 class ExactPair {
  public:
-  // `filter` must outlive the pair and describe the same hulls and poses. Requires both hulls not
-  // empty.
-  ExactPair(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
-            const FloatPair& filter);
+  // Of the hulls and poses of `filter`, which must outlive the pair.
+  explicit ExactPair(const FloatPair& filter);
 
-  const Hull& a() const { return *a_.hull; }
-  const Hull& b() const { return *b_.hull; }
+  const Hull& a() const { return a_.hull->hull(); }
+  const Hull& b() const { return b_.hull->hull(); }
 
   const IntegerVector& VertexA(uint32_t i) { return Vertex(a_, i); }
   const IntegerVector& VertexB(uint32_t i) { return Vertex(b_, i); }
@@ -44,14 +42,12 @@ class ExactPair {
   uint32_t FarthestB(const IntegerVector& n);
 
   // A positive multiple of a point in the relative interior of A - B: the difference of the means
-  // of the vertices.
+  // of the hulls' inner vertices.
   IntegerVector CenterDifference() const;
 
  private:
   struct Side {
-    const Hull* hull;
-    // Exponent of the integers that stand for the hull's own coordinates.
-    int exponent;
+    const QueryHull* hull;
     // world = matrix * own + shift.
     IntegerVector rows[3];
     IntegerVector shift;
@@ -60,7 +56,7 @@ class ExactPair {
 
   static IntegerVector ToWorld(const Side& side, const IntegerVector& own);
   static const IntegerVector& Vertex(Side& side, uint32_t i);
-  static IntegerVector SumOfVertices(const Side& side);
+  static IntegerVector SumOfInnerVertices(const Side& side);
   static std::vector<uint32_t> Farthest(Side& side, const std::vector<uint32_t>& candidates,
                                         const IntegerVector& n);
   std::vector<uint32_t> AllOf(const Side& side) const;

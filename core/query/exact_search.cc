@@ -13,11 +13,10 @@ namespace {
 // A - B, thickened along one coordinate axis by +-half where `axis` is set.
 class ExactSpace {
  public:
-  using Direction = IntegerVector;
   struct Point {
     IntegerVector w;
+    VertexPair pair;
   };
-  static constexpr bool kExact = true;
 
   ExactSpace(ExactPair& pair, const std::function<bool()>& should_stop)
       : pair_(pair), should_stop_(should_stop) {}
@@ -30,22 +29,13 @@ class ExactSpace {
   uint64_t directions_tried() const { return directions_tried_; }
   bool MayContinue() const { return !should_stop_ || !should_stop_(); }
   IntegerVector Center() const { return pair_.CenterDifference(); }
-  const IntegerVector& Scaled(const IntegerVector& n) const { return n; }
 
   Point Farthest(const IntegerVector& n) {
     ++directions_tried_;
-    IntegerVector w = pair_.VertexA(pair_.FarthestA(n)) - pair_.VertexB(pair_.FarthestB(n));
+    const VertexPair farthest = {pair_.FarthestA(n), pair_.FarthestB(n)};
+    IntegerVector w = pair_.VertexA(farthest.a) - pair_.VertexB(farthest.b);
     if (axis_ >= 0) w[axis_] += n[axis_] < 0 ? Integer(-half_) : half_;
-    return {std::move(w)};
-  }
-
-  bool IsBelowOrigin(const IntegerVector& n, const Point& farthest) const {
-    return Sign(Dot(n, farthest.w)) < 0;
-  }
-
-  // The ray meets the portal beyond the origin, and starts strictly inside.
-  bool HoldsOrigin(const IntegerVector&, const Point&, const Point&, const Point&) const {
-    return true;
+    return {std::move(w), farthest};
   }
 
  private:
@@ -57,8 +47,12 @@ class ExactSpace {
 };
 
 absl::StatusOr<ExactSearchResult> SearchPortal(ExactSpace& space) {
-  PortalResult<IntegerVector> found = PortalSearch<ExactSpace>(space).Run();
-  ExactSearchResult result{Relation::kOverlapping, std::move(found.axis), space.directions_tried()};
+  auto found = PortalSearch<ExactSpace>(space).Run();
+  ExactSearchResult result{
+      Relation::kOverlapping, std::move(found.axis), space.directions_tried(), {}};
+  if (found.portal) {
+    for (const ExactSpace::Point& point : *found.portal) result.pairs.push_back(point.pair);
+  }
   switch (found.verdict) {
     case PortalVerdict::kSeparated:
       result.relation = Relation::kSeparated;
@@ -68,7 +62,7 @@ absl::StatusOr<ExactSearchResult> SearchPortal(ExactSpace& space) {
       break;
     case PortalVerdict::kOverlapping:
       break;
-    case PortalVerdict::kUndecided:
+    case PortalVerdict::kStopped:
       return absl::CancelledError("stopped in an exact query");
   }
   return result;
@@ -105,13 +99,13 @@ absl::StatusOr<ExactSearchResult> SearchInPlane(ExactPair& pair, const IntegerVe
 // A and B on parallel lines along u, or points; w is a point of C.
 ExactSearchResult SearchOnLine(ExactPair& pair, const IntegerVector& u, const IntegerVector& w) {
   const IntegerVector across = Cross(u, w);
-  if (!IsZero(across)) return {Relation::kSeparated, Cross(u, across), 1};
+  if (!IsZero(across)) return {Relation::kSeparated, Cross(u, across), 1, {}};
   for (const IntegerVector& n : {u, -u}) {
     const IntegerVector farthest =
         pair.VertexA(pair.FarthestA(n)) - pair.VertexB(pair.FarthestB(n));
-    if (Sign(Dot(n, farthest)) < 0) return {Relation::kSeparated, n, 2};
+    if (Sign(Dot(n, farthest)) < 0) return {Relation::kSeparated, n, 2, {}};
   }
-  return {Relation::kTouching, AnyPerpendicular(u), 3};
+  return {Relation::kTouching, AnyPerpendicular(u), 3, {}};
 }
 
 }  // namespace
@@ -145,14 +139,14 @@ absl::StatusOr<ExactSearchResult> SearchExactly(ExactPair& pair,
   }
   const IntegerVector w = pair.VertexA(0) - pair.VertexB(0);
   if (span.dimension == 0) {
-    if (IsZero(w)) return ExactSearchResult{Relation::kTouching, IntegerVector{1, 0, 0}, 1};
-    return ExactSearchResult{Relation::kSeparated, -w, 1};
+    if (IsZero(w)) return ExactSearchResult{Relation::kTouching, IntegerVector{1, 0, 0}, 1, {}};
+    return ExactSearchResult{Relation::kSeparated, -w, 1, {}};
   }
   if (span.dimension == 1) return SearchOnLine(pair, span.direction, w);
   const int side = Sign(Dot(span.direction, w));
   if (side == 0) return SearchInPlane(pair, span.direction, should_stop);
   const IntegerVector axis = side < 0 ? span.direction : -span.direction;
-  return ExactSearchResult{Relation::kSeparated, axis, 1};
+  return ExactSearchResult{Relation::kSeparated, axis, 1, {}};
 }
 
 }  // namespace hulld

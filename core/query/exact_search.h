@@ -18,6 +18,8 @@ struct ExactSearchResult {
   // Separated and touching: n, world frame, n.(a - b) <= 0 for all a and b, < 0 when separated.
   std::optional<IntegerVector> axis;
   uint64_t directions_tried = 0;
+  // Where touching and known: pairs whose differences hold 0 in their hull, with repetitions.
+  std::vector<VertexPair> pairs;
 };
 
 // Decides the relation of two hulls that are not empty, exactly. CANCELLED when should_stop said so

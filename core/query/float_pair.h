@@ -4,51 +4,74 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/hull/hull.h"
-#include "core/query/pose.h"
+#include "core/numeric/error_bounds.h"
+#include "core/query/certificate.h"
+#include "core/query/placed_hull.h"
 
 namespace hulld {
 
-// A pair of posed hulls in floating point, with proven error bounds (core/numeric/error_bounds.h).
+// A pair of placed hulls in floating point, with proven error bounds (core/numeric/error_bounds.h).
 // Everything is relative to the world shifted by -t_A: A is rotated only, B is rotated and moved by
 // t_B - t_A, so a common offset costs no accuracy.
 class FloatPair {
  public:
-  FloatPair(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB);
+  // The hulls must outlive the pair. Requires both not empty.
+  FloatPair(const PlacedHull& a, const PlacedHull& b)
+      : a_(&a),
+        b_(&b),
+        offset_(b.X_WH().t - a.X_WH().t),
+        size_(a.hull().max_abs_coordinate() + b.hull().max_abs_coordinate() +
+              offset_.cwiseAbs().maxCoeff()),
+        usable_(size_ >= kFilterMinSize && size_ <= kFilterMaxSize) {}
 
+  const PlacedHull& a() const { return *a_; }
+  const PlacedHull& b() const { return *b_; }
   // Whether the bounds below hold: false when the pair's size is beyond [kFilterMinSize,
   // kFilterMaxSize].
   bool usable() const { return usable_; }
   // The size S of the pair that the bounds are relative to.
   double size() const { return size_; }
 
-  // The vertex of A farthest along n_W, and of B farthest against it; the lowest index among
-  // equals.
-  uint32_t FarthestA(const Vector& n_W) const;
-  uint32_t FarthestB(const Vector& n_W) const;
-  // All vertices of A that may be farthest along n_W when each component of n_W errs by up to 64 u
-  // of the largest.
+  // A vertex of A - B far along a direction.
+  struct Support {
+    VertexPair pair;
+    // n . (a - b): where certain, within SupportError of the largest over A - B.
+    double value;
+    bool certain;
+  };
+  // A vertex of A far along n_W, and of B far against it.
+  Support Farthest(const Vector& n_W) const;
+  // The farthest.
+  Support CertainFarthest(const Vector& n_W) const;
+  // How far a certain value may be from the true maximum. Requires the largest component of n_W
+  // between kDirectionMin and kDirectionMax.
+  double SupportError(const Vector& n_W) const {
+    return kSupportErrorFactor * n_W.cwiseAbs().maxCoeff() * size_;
+  }
+
+  // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
+  // up to 64 u of the largest.
   std::vector<uint32_t> CandidatesA(const Vector& n_W) const;
   // All vertices of B that may be farthest against n_W.
   std::vector<uint32_t> CandidatesB(const Vector& n_W) const;
 
   // Positions, each component within kMinkowskiErrorFactor * size().
-  Vector PositionA(uint32_t i) const { return R_WA_ * a_->vertices()[i]; }
-  Vector PositionB(uint32_t i) const { return R_WB_ * b_->vertices()[i] + offset_; }
+  Vector PositionA(uint32_t i) const { return a_->R_WH() * a_->hull().vertices()[i]; }
+  Vector PositionB(uint32_t i) const { return b_->R_WH() * b_->hull().vertices()[i] + offset_; }
+  // The vertex a - b of A - B, within the same bound.
+  Vector Difference(VertexPair pair) const { return PositionA(pair.a) - PositionB(pair.b); }
   // A point of A - B, within the same bound.
   Vector CenterDifference() const {
-    return R_WA_ * a_->center() - (R_WB_ * b_->center() + offset_);
+    return a_->rotated_center() - (b_->rotated_center() + offset_);
   }
-  // n . w for the Minkowski vertex of a and b.
-  double Value(const Vector& n_W, uint32_t a, uint32_t b) const;
-  // How far Value, at its maximum over all vertices, may be from the true maximum.
-  double SupportError(const Vector& n_W) const;
 
  private:
-  const Hull* a_;
-  const Hull* b_;
-  Eigen::Matrix3d R_WA_;
-  Eigen::Matrix3d R_WB_;
+  // n_W in a hull's own frame.
+  Vector InA(const Vector& n_W) const { return a_->R_WH().transpose() * n_W; }
+  Vector InB(const Vector& n_W) const { return b_->R_WH().transpose() * n_W; }
+
+  const PlacedHull* a_;
+  const PlacedHull* b_;
   Vector offset_;
   double size_;
   bool usable_;

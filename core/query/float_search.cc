@@ -12,67 +12,258 @@ namespace {
 // Observed: random pairs of up to 10000 vertices, 1 % apart, need fewer than 30.
 constexpr uint64_t kMaxDirections = 64;
 
-class FloatSpace {
+struct Corner {
+  Vector w;
+  VertexPair pair;
+};
+
+// The corners of the part of A - B that is nearest to the origin so far: a vertex, an edge, a
+// triangle or a tetrahedron. The newest comes last.
+class Simplex {
  public:
-  using Direction = Vector;
-  struct Point {
-    Vector w;
-    // The support value along the direction it was found for.
-    double value = 0;
-  };
-  static constexpr bool kExact = false;
+  uint32_t count() const { return count_; }
+  const Corner& corner(uint32_t i) const { return corners_[i]; }
 
-  explicit FloatSpace(const FloatPair& pair) : pair_(pair) {}
-
-  uint64_t directions_tried() const { return directions_tried_; }
-  bool MayContinue() const { return directions_tried_ < kMaxDirections; }
-  Vector Center() const { return pair_.CenterDifference(); }
-
-  // To a largest component in [1/2, 1), by a power of two.
-  Vector Scaled(const Vector& n) const {
-    int exponent = 0;
-    std::frexp(n.cwiseAbs().maxCoeff(), &exponent);
-    return n.unaryExpr([exponent](double component) { return std::ldexp(component, -exponent); });
-  }
-
-  Point Farthest(const Vector& n) {
-    ++directions_tried_;
-    const uint32_t a = pair_.FarthestA(n);
-    const uint32_t b = pair_.FarthestB(n);
-    return {pair_.PositionA(a) - pair_.PositionB(b), pair_.Value(n, a, b)};
-  }
-
-  bool IsBelowOrigin(const Vector& n, const Point& farthest) const {
-    return farthest.value < -pair_.SupportError(n);
-  }
-
-  bool HoldsOrigin(const Vector& center, const Point& p, const Point& q, const Point& r) const {
-    double largest = center.cwiseAbs().maxCoeff();
-    for (const Point* point : {&p, &q, &r}) {
-      largest = std::max(largest, point->w.cwiseAbs().maxCoeff());
+  bool Contains(VertexPair pair) const {
+    for (uint32_t i = 0; i < count_; ++i) {
+      if (corners_[i].pair == pair) return true;
     }
-    const double position_error = kMinkowskiErrorFactor * pair_.size();
-    const double bound = kTetrahedronErrorFactor * largest * largest * position_error;
-    const auto volume = [](const Vector& u, const Vector& v, const Vector& w) {
-      return u.dot(v.cross(w));
-    };
-    // The origin's barycentric coordinates in the tetrahedron, up to a common factor.
-    return volume(p.w, q.w, r.w) > bound && volume(center, r.w, q.w) > bound &&
-           volume(center, p.w, r.w) > bound && volume(center, q.w, p.w) > bound;
+    return false;
+  }
+
+  void Add(const Corner& corner) { corners_[count_++] = corner; }
+
+  // Reduces to the corners of the face nearest to the origin, up to rounding, and gives a direction
+  // from that face towards the origin. False when the origin is in the tetrahedron.
+  bool Reduce(Vector& n) {
+    switch (count_) {
+      case 1:
+        n = -corners_[0].w;
+        return true;
+      case 2:
+        ReduceEdge(n);
+        return true;
+      case 3:
+        ReduceTriangle(n);
+        return true;
+      default:
+        return ReduceTetrahedron(n);
+    }
   }
 
  private:
+  void Keep(const Corner& p) {
+    corners_[0] = p;
+    count_ = 1;
+  }
+  void Keep(const Corner& q, const Corner& p) {
+    const Corner kept[2] = {q, p};
+    std::copy(kept, kept + 2, corners_.begin());
+    count_ = 2;
+  }
+  void Keep(const Corner& r, const Corner& q, const Corner& p) {
+    const Corner kept[3] = {r, q, p};
+    std::copy(kept, kept + 3, corners_.begin());
+    count_ = 3;
+  }
+
+  // From the edge's line towards the origin.
+  static Vector AcrossEdge(const Vector& p, const Vector& e) {
+    return e * (e.dot(p) / e.squaredNorm()) - p;
+  }
+
+  void ReduceEdge(Vector& n) {
+    const Corner& p = corners_[1];
+    const Vector e = corners_[0].w - p.w;
+    if (e.dot(p.w) < 0) {
+      n = AcrossEdge(p.w, e);
+    } else {
+      n = -p.w;
+      Keep(p);
+    }
+  }
+
+  // Which part of the triangle of the newest corner p and of q and r is nearest; the edge q r and
+  // its ends are not, as p was farther towards the origin than these.
+  enum class Part { kCorner, kEdgeToQ, kEdgeToR, kInside };
+  static Part NearestPart(const Vector& p, const Vector& q, const Vector& r, Vector& n) {
+    const Vector e = q - p;
+    const Vector f = r - p;
+    const double along_e = -e.dot(p);
+    const double along_f = -f.dot(p);
+    if (along_e <= 0 && along_f <= 0) {
+      n = -p;
+      return Part::kCorner;
+    }
+    const Vector normal = e.cross(f);
+    if (along_e > 0 && e.cross(normal).dot(p) < 0) {
+      n = AcrossEdge(p, e);
+      return Part::kEdgeToQ;
+    }
+    if (along_f > 0 && normal.cross(f).dot(p) < 0) {
+      n = AcrossEdge(p, f);
+      return Part::kEdgeToR;
+    }
+    n = normal.dot(p) > 0 ? Vector(-normal) : normal;
+    return Part::kInside;
+  }
+
+  void KeepPart(Part part, const Corner& p, const Corner& q, const Corner& r) {
+    switch (part) {
+      case Part::kCorner:
+        return Keep(p);
+      case Part::kEdgeToQ:
+        return Keep(q, p);
+      case Part::kEdgeToR:
+        return Keep(r, p);
+      case Part::kInside:
+        return Keep(r, q, p);
+    }
+  }
+
+  void ReduceTriangle(Vector& n) {
+    const Corner p = corners_[2];
+    KeepPart(NearestPart(p.w, corners_[1].w, corners_[0].w, n), p, Corner(corners_[1]),
+             Corner(corners_[0]));
+  }
+
+  // Squared distance from the origin along n, which leads there from the part that holds p.
+  static double SquaredDistance(const Vector& n, const Vector& p) {
+    const double along = n.dot(p);
+    return along * along / n.squaredNorm();
+  }
+
+  bool ReduceTetrahedron(Vector& n) {
+    const Corner p = corners_[3];
+    const Corner others[3] = {corners_[2], corners_[1], corners_[0]};
+    const Vector edges[3] = {others[0].w - p.w, others[1].w - p.w, others[2].w - p.w};
+    const Vector normals[3] = {edges[0].cross(edges[1]), edges[1].cross(edges[2]),
+                               edges[2].cross(edges[0])};
+    const double turn = normals[0].dot(edges[2]) > 0 ? -1 : 1;
+    double nearest = INFINITY;
+    int face = -1;
+    Part part = Part::kInside;
+    for (int i = 0; i < 3; ++i) {
+      // The origin is beyond the face.
+      if (!(turn * normals[i].dot(p.w) < 0)) continue;
+      Vector towards;
+      const Part candidate = NearestPart(p.w, others[i].w, others[(i + 1) % 3].w, towards);
+      const double distance = SquaredDistance(towards, p.w);
+      if (!(distance < nearest)) continue;
+      nearest = distance;
+      face = i;
+      part = candidate;
+      n = towards;
+    }
+    if (face < 0) return false;
+    KeepPart(part, p, others[face], others[(face + 1) % 3]);
+    return true;
+  }
+
+  std::array<Corner, 4> corners_;
+  uint32_t count_ = 0;
+};
+
+double Volume(const Vector& u, const Vector& v, const Vector& w) { return u.dot(v.cross(w)); }
+
+// Whether the origin is certain to be strictly inside a tetrahedron of computed Minkowski vertices.
+bool HoldsOrigin(const FloatPair& pair, const Vector& p, const Vector& q, const Vector& r,
+                 const Vector& s) {
+  const double largest =
+      p.cwiseAbs().cwiseMax(q.cwiseAbs()).cwiseMax(r.cwiseAbs()).cwiseMax(s.cwiseAbs()).maxCoeff();
+  const double position_error = kMinkowskiErrorFactor * pair.size();
+  const double bound = kTetrahedronErrorFactor * largest * largest * position_error;
+  // The origin's barycentric coordinates, up to a common factor whose sign is that of the first.
+  const double first = Volume(p, q, r);
+  const double turn = first > 0 ? 1 : -1;
+  return turn * first > bound && turn * Volume(s, r, q) > bound && turn * Volume(s, p, r) > bound &&
+         turn * Volume(s, q, p) > bound;
+}
+
+class FloatSearch {
+ public:
+  FloatSearch(const FloatPair& pair, double tolerance) : pair_(pair), tolerance_(tolerance) {}
+
+  FloatSearchResult Run() {
+    Vector n = -pair_.CenterDifference();
+    if (IsZero(n)) n = Vector::UnitX();
+    while (result_.directions_tried < kMaxDirections && Explore(n)) {
+    }
+    if (result_.verdict != FloatVerdict::kSeparated) {
+      result_.pair_count = simplex_.count();
+      for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.corner(i).pair;
+    }
+    return result_;
+  }
+
+ private:
+  // Explores along n and gives the next direction; false when the search is over.
+  bool Explore(Vector& n) {
+    double largest = n.cwiseAbs().maxCoeff();
+    if (!(largest >= kDirectionMin && largest <= kDirectionMax)) {
+      if (!(largest > 0)) return false;
+      n /= std::ldexp(1.0, std::ilogb(largest));
+      largest = n.cwiseAbs().maxCoeff();
+    }
+    ++result_.directions_tried;
+    FloatPair::Support farthest = pair_.Farthest(n);
+    const double error = kSupportErrorFactor * largest * pair_.size();
+    if (farthest.value < -error) {
+      if (!farthest.certain) farthest = pair_.CertainFarthest(n);
+      if (farthest.value < -error) return EndSeparated(n);
+    }
+    // Nothing farther towards the origin.
+    if (simplex_.Contains(farthest.pair)) return false;
+    simplex_.Add({pair_.Difference(farthest.pair), farthest.pair});
+    if (tolerance_ > 0 && IsWithinTolerance(n, farthest)) return false;
+    if (simplex_.Reduce(n)) return true;
+    if (HoldsOrigin(pair_, simplex_.corner(0).w, simplex_.corner(1).w, simplex_.corner(2).w,
+                    simplex_.corner(3).w)) {
+      result_.verdict = FloatVerdict::kOverlapping;
+    }
+    return false;
+  }
+
+  bool EndSeparated(const Vector& n) {
+    result_.verdict = FloatVerdict::kSeparated;
+    result_.axis = n;
+    return false;
+  }
+
+  bool IsWithinTolerance(const Vector&, const FloatPair::Support&) { return false; }
+
   const FloatPair& pair_;
-  uint64_t directions_tried_ = 0;
+  const double tolerance_;
+  Simplex simplex_;
+  FloatSearchResult result_;
 };
 
 }  // namespace
 
-FloatSearchResult SearchInFloatingPoint(const FloatPair& pair) {
-  FloatSpace space(pair);
+FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance) {
+  return FloatSearch(pair, tolerance).Run();
+}
+
+FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
   FloatSearchResult result;
-  result.portal = PortalSearch<FloatSpace>(space).Run();
-  result.directions_tried = space.directions_tried();
+  if (cache.axis.has_value()) {
+    const Vector& n = *cache.axis;
+    ++result.directions_tried;
+    const double error = pair.SupportError(n);
+    FloatPair::Support farthest = pair.Farthest(n);
+    if (farthest.value < -error && !farthest.certain) farthest = pair.CertainFarthest(n);
+    if (farthest.value < -error) {
+      result.verdict = FloatVerdict::kSeparated;
+      result.axis = n;
+    }
+  } else if (cache.pair_count == 4) {
+    const auto difference = [&](int i) { return pair.Difference(cache.pairs[i]); };
+    if (HoldsOrigin(pair, difference(0), difference(1), difference(2), difference(3))) {
+      result.verdict = FloatVerdict::kOverlapping;
+      result.pair_count = 4;
+      std::copy(cache.pairs, cache.pairs + 4, result.pairs.begin());
+    }
+  }
   return result;
 }
 

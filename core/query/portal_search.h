@@ -1,6 +1,7 @@
 #ifndef HULLD_CORE_QUERY_PORTAL_SEARCH_H_
 #define HULLD_CORE_QUERY_PORTAL_SEARCH_H_
 
+#include <array>
 #include <optional>
 
 #include "core/numeric/integer.h"
@@ -23,51 +24,43 @@ namespace hulld {
 // refinement moves the crossing strictly outwards, so that with exact signs the search ends for
 // every input. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals;
 // Edelsbrunner and Mücke 1990 (simulation of simplicity) for the ties.
-enum class PortalVerdict { kSeparated, kTouching, kOverlapping, kUndecided };
+enum class PortalVerdict { kSeparated, kTouching, kOverlapping, kStopped };
 
-template <typename Direction>
-struct PortalResult {
-  PortalVerdict verdict = PortalVerdict::kUndecided;
-  // Separated and touching: from A towards B, n.(a - b) <= 0 throughout.
-  std::optional<Direction> axis;
-};
-
-// A Space offers, for its vector type Direction with -, Dot, Cross and Sign:
-//   Direction Center()                     a positive multiple of a point strictly inside C (where
-//   exact) Point Farthest(n)                      a vertex of C farthest along n; Point has a
-//   member w, its position Direction Scaled(n)                    n times any positive number bool
-//   IsBelowOrigin(n, point)           whether n.w < 0 for all w in C is certain, `point` being
-//   farthest along n bool HoldsOrigin(center, p, q, r)      whether the origin, below the plane of
-//   the portal, is certain to be interior bool MayContinue()                     false ends the
-//   search undecided static constexpr bool kExact           whether all signs are exact
+// Space stands for C. It offers
+//
+//   struct Point { IntegerVector w; ... };    a vertex of C
+//   IntegerVector Center();                   a positive multiple of a point strictly inside C
+//   Point Farthest(const IntegerVector& n);   a vertex farthest along n
+//   bool MayContinue();                       false stops the search
 template <typename Space>
 class PortalSearch {
  public:
-  using Direction = typename Space::Direction;
   using Point = typename Space::Point;
-  using Result = PortalResult<Direction>;
+
+  struct Result {
+    PortalVerdict verdict = PortalVerdict::kStopped;
+    // Separated and touching: from A towards B, n.(a - b) <= 0 throughout.
+    std::optional<IntegerVector> axis;
+    // Touching: a triangle, possibly degenerate, that holds the origin.
+    std::optional<std::array<Point, 3>> portal;
+  };
 
   explicit PortalSearch(Space& space) : space_(space) {}
 
   Result Run() {
     center_ = space_.Center();
     ray_ = -center_;
-    if (IsZero(ray_)) {
-      return {Space::kExact ? PortalVerdict::kOverlapping : PortalVerdict::kUndecided, {}};
-    }
+    if (IsZero(ray_)) return {PortalVerdict::kOverlapping, {}, {}};
     if (std::optional<Result> early = FindPortal()) return *early;
     return RefinePortal();
   }
 
  private:
   // Explores along n; a result when that settles it.
-  std::optional<Result> Explore(const Direction& n, Point* farthest) {
-    if (IsZero(n) || !space_.MayContinue()) return Result{};
-    const Direction scaled = space_.Scaled(n);
-    *farthest = space_.Farthest(scaled);
-    if (space_.IsBelowOrigin(scaled, *farthest)) {
-      return Result{PortalVerdict::kSeparated, scaled};
-    }
+  std::optional<Result> Explore(const IntegerVector& n, Point* farthest) {
+    if (!space_.MayContinue()) return Result{};
+    *farthest = space_.Farthest(n);
+    if (Sign(Dot(n, farthest->w)) < 0) return Result{PortalVerdict::kSeparated, n, {}};
     return std::nullopt;
   }
 
@@ -75,7 +68,7 @@ class PortalSearch {
   // comment above: the derivative by c is (p - q) x d. Zero only when p - q is parallel to the ray.
   int Turn(const Point& p, const Point& q) const {
     if (const int sign = Sign(Dot(ray_, Cross(p.w, q.w)))) return sign;
-    const Direction slope = Cross(p.w - q.w, ray_);
+    const IntegerVector slope = Cross(p.w - q.w, ray_);
     for (int i = 0; i < 3; ++i) {
       if (const int sign = Sign(slope[i])) return sign;
     }
@@ -88,7 +81,7 @@ class PortalSearch {
   std::optional<Result> FindPortal() {
     auto& [p, left, right] = portal_;
     if (auto result = Explore(ray_, &p)) return result;
-    Direction n = Cross(ray_, p.w);
+    IntegerVector n = Cross(ray_, p.w);
     if (IsZero(n)) {
       // p is on the ray's line; a vertex farthest along a direction across the ray is not.
       if (auto result = Explore(AnyPerpendicular(ray_), &p)) return result;
@@ -107,15 +100,12 @@ class PortalSearch {
   Result RefinePortal() {
     auto& [p, q, r] = portal_;
     for (;;) {
-      const Direction n = Cross(q.w - p.w, r.w - p.w);
-      if (Sign(Dot(n, p.w)) > 0 && space_.HoldsOrigin(center_, p, q, r)) {
-        return {PortalVerdict::kOverlapping, {}};
-      }
+      const IntegerVector n = Cross(q.w - p.w, r.w - p.w);
+      if (Sign(Dot(n, p.w)) > 0) return {PortalVerdict::kOverlapping, {}, {}};
       Point w;
       if (auto result = Explore(n, &w)) return *result;
       if (Sign(Dot(n, w.w - p.w)) <= 0) {
-        if constexpr (Space::kExact) return {PortalVerdict::kTouching, n};
-        return {};
+        return {PortalVerdict::kTouching, n, portal_};
       }
       Replace(w);
     }
@@ -142,9 +132,9 @@ class PortalSearch {
   }
 
   Space& space_;
-  Direction center_;
-  Direction ray_;
-  Point portal_[3];
+  IntegerVector center_;
+  IntegerVector ray_;
+  std::array<Point, 3> portal_;
 };
 
 }  // namespace hulld

@@ -252,13 +252,15 @@ absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
 
 }  // namespace
 
-absl::StatusOr<Answer> TextbookSat(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull& placed_b,
                                    const QueryOptions& options) {
+  const Hull& a = placed_a.hull();
+  const Hull& b = placed_b.hull();
   // Before anything is computed, and again with the axes of a flat difference.
   const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
   if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;
-  const FloatPair filter(a, X_WA, b, X_WB);
-  ExactPair exact(a, X_WA, b, X_WB, filter);
+  const FloatPair filter(placed_a, placed_b);
+  ExactPair exact(filter);
   AxisTable axes(exact, filter);
   if (absl::Status status = CheckCount(axes.size(), options); !status.ok()) return status;
   Scan scan;

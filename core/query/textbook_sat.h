@@ -21,7 +21,7 @@ namespace hulld {
 //
 // Requires both hulls not empty. RESOURCE_EXHAUSTED: more axes than options.max_textbook_axes.
 // CANCELLED: should_stop.
-absl::StatusOr<Answer> TextbookSat(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+absl::StatusOr<Answer> TextbookSat(const PlacedHull& a, const PlacedHull& b,
                                    const QueryOptions& options);
 
 }  // namespace hulld

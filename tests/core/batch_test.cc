@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <deque>
 #include <vector>
 
 #include "tests/core/oracle_bridge.h"
@@ -14,7 +15,8 @@ namespace {
 
 // A crowd of hulls of all dimensions, some of them in exact contact.
 struct Crowd {
-  std::vector<Hull> hulls;
+  std::deque<Hull> hulls;
+  std::deque<QueryHull> query_hulls;
   std::vector<PlacedHull> placements;
   std::vector<PlacedPair> pairs;
 };
@@ -27,6 +29,7 @@ Crowd MakeCrowd(uint64_t seed) {
     crowd.hulls.push_back(BuildHull(RandomLatticePoints(random, random.Between(1, 12), 3)));
     crowd.hulls.push_back(BuildHull(RandomInBall(random, 40, 2)));
   }
+  for (const Hull& hull : crowd.hulls) crowd.query_hulls.emplace_back(hull);
   for (int i = 0; i < 40; ++i) {
     Pose pose;
     // Mostly on a lattice, where hulls touch.
@@ -34,7 +37,8 @@ Crowd MakeCrowd(uint64_t seed) {
     if (i % 4 == 1) pose.q = {1, 1, 0, 0};
     pose.t = Vector(random.Between(-1, 1), random.Between(-1, 1), random.Between(-1, 1)) * 2;
     const int hull = random.Below(static_cast<int>(crowd.hulls.size()));
-    crowd.placements.push_back({&crowd.hulls[static_cast<size_t>(hull)], pose});
+    crowd.placements.push_back(
+        *PlacedHull::Make(crowd.query_hulls[static_cast<size_t>(hull)], pose));
   }
   for (uint32_t a = 0; a < 40; ++a) {
     for (uint32_t b = 0; b < 40; ++b) crowd.pairs.push_back({a, b});
@@ -73,7 +77,7 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
     for (const PlacedPair& pair : pairs) {
       const PlacedHull& a = crowd.placements[pair.a];
       const PlacedHull& b = crowd.placements[pair.b];
-      expected.push_back(CheckCollision(*a.hull, a.X_WH, *b.hull, b.X_WH, options).value());
+      expected.push_back(CheckCollision(a, b, options).value());
       ++seen[static_cast<size_t>(expected.back().relation)];
     }
     for (int threads : {1, 2, 8}) {
@@ -114,7 +118,7 @@ TEST(Batch, CancellationCancelsTheRestAndNothingElse) {
       }
       const PlacedHull& a = crowd.placements[crowd.pairs[i].a];
       const PlacedHull& b = crowd.placements[crowd.pairs[i].b];
-      EXPECT_EQ(answers[i]->relation, CheckCollision(*a.hull, a.X_WH, *b.hull, b.X_WH)->relation);
+      EXPECT_EQ(answers[i]->relation, CheckCollision(a, b)->relation);
     }
     EXPECT_GT(cancelled, 0u);
   }
@@ -123,7 +127,10 @@ TEST(Batch, CancellationCancelsTheRestAndNothingElse) {
 TEST(Batch, OnePairTooLargeForTheTextbookFailsAlone) {
   const Hull cube = BuildHull(LatticeCube(2, 1));
   const Hull ball = BuildHull(FibonacciSphere(60));
-  const std::vector<PlacedHull> placements = {{&cube, {}}, {&ball, {}}};
+  const QueryHull query_cube(cube);
+  const QueryHull query_ball(ball);
+  const std::vector<PlacedHull> placements = {*PlacedHull::Make(query_cube, {}),
+                                              *PlacedHull::Make(query_ball, {})};
   const std::vector<PlacedPair> pairs = {{0, 0}, {1, 1}, {0, 0}};
   QueryOptions options;
   options.method = Method::kTextbookSat;

@@ -106,7 +106,7 @@ TEST(Collision, StageIsTheKindOfTheAxisWhetherOrNotTheAxisIsWanted) {
   for (const Pose& pose : {At(2, 0, 0), At(1, 0, 0), At(1, 1, 1), At(3, 2, 1)}) {
     QueryOptions options;
     EXPECT_FALSE(CheckCollision(cube, Pose(), cube, pose, options)->analysis.stage.has_value());
-    options.want_stage = true;
+    options.want_analysis = true;
     const Answer stage_only = CheckCollision(cube, Pose(), cube, pose, options).value();
     EXPECT_FALSE(stage_only.axis.has_value());
     options.want_axis = true;

@@ -121,9 +121,11 @@ const char* Name(Relation relation) {
     case Relation::kTouching:
       return "TOUCHING";
     case Relation::kOverlapping:
+      return "OVERLAPPING";
+    case Relation::kWithinTolerance:
       break;
   }
-  return "OVERLAPPING";
+  return "WITHIN_TOLERANCE";
 }
 
 const char* Name(AxisKind kind) {

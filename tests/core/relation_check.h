@@ -37,8 +37,8 @@ class RelationCheck {
                                    Relation expected, Method method);
 
   int questions_ = 0;
-  std::array<int, 3> relations_ = {};
-  std::array<int, 2> rungs_ = {};
+  std::array<int, 4> relations_ = {};
+  std::array<int, 4> rungs_ = {};
   std::array<int, 5> kinds_ = {};
   std::array<int, 5> textbook_kinds_ = {};
 };

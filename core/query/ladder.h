@@ -1,0 +1,39 @@
+#ifndef HULLD_CORE_QUERY_LADDER_H_
+#define HULLD_CORE_QUERY_LADDER_H_
+
+#include <absl/status/statusor.h>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <variant>
+
+#include "core/query/certificate.h"
+#include "core/query/collision.h"
+#include "core/query/float_pair.h"
+
+namespace hulld {
+
+// A relation and what showed it.
+struct Decision {
+  Relation relation = Relation::kSeparated;
+  Rung rung = Rung::kBounds;
+  // Separated: n.(a - b) < 0 throughout; touching: <= 0; exactly, as it stands.
+  std::variant<std::monostate, Vector, IntegerVector> axis;
+  // Overlapping: none, or four pairs whose differences hold 0 strictly inside their hull. Touching:
+  // none, or three whose differences hold 0 in their hull, repetitions included.
+  uint32_t pair_count = 0;
+  std::array<VertexPair, 4> pairs = {};
+  uint64_t directions_tried = 0;
+};
+
+// The ladder: each rung answers only what its own error bound proves. Spheres round the hulls; what
+// the cache suggests; the hulls in floating point; exact arithmetic. Requires hulls not empty.
+// Updates the cache, which may be null. CANCELLED when should_stop said so (it may be empty); only
+// the exact rung asks it.
+absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
+                                const std::function<bool()>& should_stop);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_LADDER_H_
