@@ -62,9 +62,9 @@ inline constexpr double kLeastPositive = 0x1p-1060;
 
 // Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
 // largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
-// between these two, with directions whose largest component is between the second two. Then nothing
-// overflows: the largest quantities are a cube of 8 S, 2^909, and a direction times 8 S, 2^703. Nor
-// does underflow matter: the least bounds are 24 W^2 d with W > 6 d and d = 128 u S (see
+// between these two, with directions whose largest component is between the second two. Then
+// nothing overflows: the largest quantities are a cube of 8 S, 2^909, and a direction times 8 S,
+// 2^703. Nor does underflow matter: the least bounds are 24 W^2 d with W > 6 d and d = 128 u S (see
 // kTetrahedronErrorFactor), at least 2^-1029, and 512 u |n| S, at least 2^-744; a product that
 // underflows errs by 2^-1075, far below their slack. Proven.
 inline constexpr double kFilterMinSize = 0x1p-300;
@@ -109,9 +109,9 @@ inline constexpr double kNormalErrorFactor = 5;
 inline constexpr double kGapNormalFactor = 12.5;
 inline constexpr double kGapPositionFactor = 4;
 
-// A value n . v in a hull's own frame, n with components at most sqrt(3) |n_W|: products and sums err
-// by at most 3 u * 3 sqrt(3) |n_W| M < 16 u |n_W| M. Twice that, as the blur of a support map; times
-// |n_W| M. Proven.
+// A value n . v in a hull's own frame, n with components at most sqrt(3) |n_W|: products and sums
+// err by at most 3 u * 3 sqrt(3) |n_W| M < 16 u |n_W| M. Twice that, as the blur of a support map;
+// times |n_W| M. Proven.
 inline constexpr double kSupportBlurFactor = 32 * kUnitRoundoff;
 
 // The distance of a vertex from the hull's centre: the difference errs by u of itself, the norm by
@@ -123,6 +123,12 @@ inline constexpr double kRadiusRoundUp = 1 + 16 * kUnitRoundoff;
 // and a factor kSphereSquareRoundUp. Proven.
 inline constexpr double kSphereErrorFactor = 256 * kUnitRoundoff;
 inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
+
+// A point p + s (q - p) + t (r - p) of a triangle of computed Minkowski vertices, with weights in
+// [0, 1] whose rounded sum is at most 1: the vertices err by d = 128 u S per component, weights
+// whose exact sum exceeds 1 by 2 u move it by 2 u * 8 S, rounding by at most 8 u * 8 S; times
+// sqrt(3) for the norm, at most 2.1 (128 + 80) u S. Times S. Proven.
+inline constexpr double kNearPointErrorFactor = 512 * kUnitRoundoff;
 
 // Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
 // u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). Proven.

@@ -5,9 +5,8 @@ namespace hulld {
 // The values are those that the support maps found in the hulls' own frames, so that the bound on
 // the maximum holds for them.
 FloatPair::Support FloatPair::Farthest(const Vector& n_W) const {
-  const double blur = kSupportBlurFactor * n_W.cwiseAbs().maxCoeff() * size_;
-  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W), blur);
-  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W), blur);
+  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W));
+  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W));
   return {{a.vertex, b.vertex}, a.value + b.value - n_W.dot(offset_), a.certain && b.certain};
 }
 

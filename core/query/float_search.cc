@@ -51,7 +51,28 @@ class Simplex {
     }
   }
 
+  // A point of the simplex near to the origin: the nearest but for rounding once it is reduced.
+  // Whatever the rounding, weights are in [0, 1] and it is in the simplex, but for the rounding of
+  // the weighted sum.
+  Vector NearPoint() const {
+    const Vector& p = corners_[count_ - 1].w;
+    if (count_ == 1) return p;
+    const Vector& q = corners_[count_ - 2].w;
+    if (count_ == 2) return p + Weight(-(q - p).dot(p), (q - p).squaredNorm()) * (q - p);
+    const Vector& r = corners_[count_ - 3].w;
+    const Vector normal = (q - p).cross(r - p);
+    // The origin's coordinates in the triangle, by areas; for a tetrahedron that of its last face.
+    const double area = normal.squaredNorm();
+    const double along_q = Weight(-(r - p).cross(normal).dot(p), area);
+    const double along_r = Weight(-normal.cross(q - p).dot(p), area);
+    const double sum = std::max(1.0, along_q + along_r);
+    return p + (along_q / sum) * (q - p) + (along_r / sum) * (r - p);
+  }
+
  private:
+  static double Weight(double part, double whole) {
+    return whole > 0 ? std::clamp(part / whole, 0.0, 1.0) : 0;
+  }
   void Keep(const Corner& p) {
     corners_[0] = p;
     count_ = 1;
@@ -212,11 +233,19 @@ class FloatSearch {
       if (!farthest.certain) farthest = pair_.CertainFarthest(n);
       if (farthest.value < -error) return EndSeparated(n);
     }
-    // Nothing farther towards the origin.
-    if (simplex_.Contains(farthest.pair)) return false;
-    simplex_.Add({pair_.Difference(farthest.pair), farthest.pair});
-    if (tolerance_ > 0 && IsWithinTolerance(n, farthest)) return false;
-    if (simplex_.Reduce(n)) return true;
+    const Vector along = n;
+    // Else nothing is farther towards the origin.
+    const bool progress = !simplex_.Contains(farthest.pair);
+    bool outside = true;
+    if (progress) {
+      simplex_.Add({pair_.Difference(farthest.pair), farthest.pair});
+      outside = simplex_.Reduce(n);
+    }
+    if (tolerance_ > 0 && IsWithinTolerance(along, farthest, error)) {
+      result_.verdict = FloatVerdict::kWithinTolerance;
+      return false;
+    }
+    if (outside) return progress;
     if (HoldsOrigin(pair_, simplex_.corner(0).w, simplex_.corner(1).w, simplex_.corner(2).w,
                     simplex_.corner(3).w)) {
       result_.verdict = FloatVerdict::kOverlapping;
@@ -230,7 +259,16 @@ class FloatSearch {
     return false;
   }
 
-  bool IsWithinTolerance(const Vector&, const FloatPair::Support&) { return false; }
+  // Whether |separation| <= tolerance is certain: A - B has a point so near to the origin, and
+  // along some direction does not reach farther than that beyond it. `farthest` is that along n.
+  bool IsWithinTolerance(const Vector& n, FloatPair::Support farthest, double error) {
+    const double length = n.norm();
+    if (farthest.value > tolerance_ * length) return false;
+    if (!farthest.certain) farthest = pair_.CertainFarthest(n);
+    const double reach = std::max(0.0, farthest.value + error) / length;
+    const double nearest = simplex_.NearPoint().norm() + kNearPointErrorFactor * pair_.size();
+    return std::max(reach, nearest) * kSphereSquareRoundUp <= tolerance_;
+  }
 
   const FloatPair& pair_;
   const double tolerance_;

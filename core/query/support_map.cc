@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
+#include <numeric>
+#include <utility>
 
 #if defined(__x86_64__)
 #define HULLD_HAS_AVX2_PATH
@@ -13,12 +14,17 @@
 namespace hulld {
 namespace {
 
-// Up to this many vertices a scan beats a climb. Observed: tests/bench/query_benchmark.
-constexpr size_t kMostScanned = 48;
+// Up to this many vertices a scan beats the cube map. Observed: tests/bench/query_benchmark.
+constexpr size_t kMostScanned = 40;
 // Cells of the cube map per vertex. Observed: more of them save less than their cache misses cost.
-constexpr double kCellsPerVertex = 3;
+constexpr double kCellsPerVertex = 2;
+// A cell with more vertices than this lists one of them, to climb from.
+constexpr size_t kMostListed = 24;
 // A plateau larger than this is not flooded; every vertex is looked at instead.
 constexpr size_t kMostFlooded = 64;
+// How far, in cells, arcs are drawn beyond where they pass: far more than rounding, far less than a
+// cell.
+constexpr double kArcMargin = 1e-7;
 
 bool HasAvx2() {
 #ifdef HULLD_HAS_AVX2_PATH
@@ -86,143 +92,245 @@ template <typename Block, typename Support>
   support.certain = true;
 }
 
-template <typename NeighborBlock, typename Support>
-[[gnu::always_inline]] inline void ClimbBlocks(const NeighborBlock* neighbors,
-                                               const uint32_t* starts, const Vector& n, double blur,
-                                               Support& support) {
-  Lanes x, y, z, values;
-  Broadcast(n.x(), x);
-  Broadcast(n.y(), y);
-  Broadcast(n.z(), z);
-  for (;;) {
-    const NeighborBlock* block = neighbors + starts[support.vertex];
-    const NeighborBlock* const end = neighbors + starts[support.vertex + 1];
-    Lanes best;
-    Evaluate(block->positions, x, y, z, best);
-    LaneIds best_ids = {block->ids[0], block->ids[1], block->ids[2], block->ids[3]};
-    for (++block; block != end; ++block) {
-      Evaluate(block->positions, x, y, z, values);
-      const LaneIds ids = {block->ids[0], block->ids[1], block->ids[2], block->ids[3]};
-      const LaneIds better = values > best;
-      best = better ? values : best;
-      best_ids = better ? ids : best_ids;
-    }
-    const int lane = LargestLane(best, best_ids);
-    if (!(best[lane] > support.value)) {
-      support.certain = best[lane] < support.value - blur;
-      return;
-    }
-    support.vertex = static_cast<uint32_t>(best_ids[lane]);
-    support.value = best[lane];
+// The area vector of a facet, from the outside.
+Vector NormalOf(std::span<const uint32_t> facet, std::span<const Vector> vertices) {
+  const Vector& origin = vertices[facet[0]];
+  Vector normal = Vector::Zero();
+  for (size_t i = 2; i < facet.size(); ++i) {
+    normal += (vertices[facet[i - 1]] - origin).cross(vertices[facet[i]] - origin);
   }
+  return normal;
+}
+
+// The size of the vertices' bounding box, relative to its longest side; at least a thousandth of
+// it.
+Vector ExtentsOf(std::span<const Vector> vertices) {
+  Vector low = vertices[0];
+  Vector high = vertices[0];
+  for (const Vector& vertex : vertices) {
+    low = low.cwiseMin(vertex);
+    high = high.cwiseMax(vertex);
+  }
+  // Halved first, so that it does not overflow.
+  const Vector extents = 0.5 * high - 0.5 * low;
+  constexpr double kLeastExtent = 1e-3;
+  return (extents / extents.maxCoeff()).cwiseMax(kLeastExtent);
 }
 
 }  // namespace
 
-SupportMap::SupportMap(const Hull& hull) : vertices_(hull.vertices()) {
-  // Below dimension 3 a polygon's or a segment's edges lead to the farthest vertex too.
-  if (vertices_.size() <= kMostScanned) {
-    for (size_t i = 0; i < vertices_.size(); i += 4) {
-      Fill(blocks_.emplace_back(), vertices_.subspan(i));
+// Draws the arcs of the Gauss map into cells.
+class SupportMap::ArcDrawing {
+ public:
+  explicit ArcDrawing(uint32_t side) : side_(side) {}
+
+  // The arc between directions m and n, where the cones of two vertices meet.
+  void Draw(const Vector& m, const Vector& n, uint32_t first, uint32_t second) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double sign : {1.0, -1.0}) {
+        double from = 0;
+        double to = 1;
+        // The part of m + t (n - m) on this face: the face's component is positive and at least as
+        // large as each of the others, but for rounding.
+        for (const int other : {kAfter[axis], kAfter[axis + 1]}) {
+          for (const double side : {1.0, -1.0}) {
+            Clip(sign * m[axis] + side * m[other], sign * n[axis] + side * n[other], &from, &to);
+          }
+        }
+        if (!(from <= to)) continue;
+        DrawOnFace(axis, sign, m + from * (n - m), m + to * (n - m), first, second);
+      }
     }
+  }
+
+  std::vector<CellVertex> Take() { return std::move(entries_); }
+
+ private:
+  // Keeps those t in [from, to] where the linear function that is a at 0 and b at 1 is not
+  // negative.
+  static void Clip(double a, double b, double* from, double* to) {
+    constexpr double kSlack = 1e-9;
+    a += kSlack;
+    b += kSlack;
+    if (a >= 0 && b >= 0) return;
+    if (a < 0 && b < 0) {
+      *from = 2;
+      return;
+    }
+    const double zero = a / (a - b);
+    if (a < 0) {
+      *from = std::max(*from, zero);
+    } else {
+      *to = std::min(*to, zero);
+    }
+  }
+
+  double Place(double component, double along) const {
+    return (component / along + 1) * 0.5 * side_;
+  }
+  uint32_t Index(double place) const {
+    return static_cast<uint32_t>(std::clamp(place, 0.0, side_ - 1.0));
+  }
+
+  void DrawOnFace(int axis, double sign, const Vector& m, const Vector& n, uint32_t first,
+                  uint32_t second) {
+    const double m_along = sign * m[axis];
+    const double n_along = sign * n[axis];
+    if (!(m_along > 0 && n_along > 0)) return;
+    double x0 = Place(m[kAfter[axis]], m_along);
+    double y0 = Place(m[kAfter[axis + 1]], m_along);
+    double x1 = Place(n[kAfter[axis]], n_along);
+    double y1 = Place(n[kAfter[axis + 1]], n_along);
+    if (x0 > x1) {
+      std::swap(x0, x1);
+      std::swap(y0, y1);
+    }
+    const uint32_t face = 2 * axis + (sign < 0 ? 1 : 0);
+    const double slope = x1 > x0 ? (y1 - y0) / (x1 - x0) : 0;
+    for (uint32_t i = Index(x0 - kArcMargin); i <= Index(x1 + kArcMargin); ++i) {
+      double low = y0;
+      double high = y1;
+      if (x1 - x0 > kArcMargin) {
+        low = y0 + slope * (std::clamp<double>(i, x0, x1) - x0);
+        high = y0 + slope * (std::clamp<double>(i + 1.0, x0, x1) - x0);
+      }
+      if (low > high) std::swap(low, high);
+      for (uint32_t j = Index(low - kArcMargin); j <= Index(high + kArcMargin); ++j) {
+        const uint32_t cell = (face * side_ + i) * side_ + j;
+        entries_.push_back({cell, first});
+        entries_.push_back({cell, second});
+      }
+    }
+  }
+
+  const uint32_t side_;
+  std::vector<CellVertex> entries_;
+};
+
+SupportMap::SupportMap(const Hull& hull) : vertices_(hull.vertices()) {
+  // A flat hull's Gauss map has arcs of half a circle; as large flat hulls are rare, it is scanned.
+  if (vertices_.size() <= kMostScanned || hull.dimension() < 3) {
+    BuildBlocks();
     return;
   }
   BuildNeighbors(hull);
-  BuildStarts();
+  BuildCells(hull);
 }
 
-void SupportMap::Fill(Block& block, std::span<const Vector> positions) {
-  for (size_t lane = 0; lane < 4; ++lane) {
-    const Vector& position = positions[std::min(lane, positions.size() - 1)];
-    block.x[lane] = position.x();
-    block.y[lane] = position.y();
-    block.z[lane] = position.z();
+void SupportMap::BuildBlocks() {
+  blocks_.resize((vertices_.size() + 3) / 4);
+  for (size_t i = 0; i < 4 * blocks_.size(); ++i) {
+    const Vector& vertex = vertices_[std::min(i, vertices_.size() - 1)];
+    blocks_[i / 4].x[i % 4] = vertex.x();
+    blocks_[i / 4].y[i % 4] = vertex.y();
+    blocks_[i / 4].z[i % 4] = vertex.z();
   }
 }
 
 void SupportMap::BuildNeighbors(const Hull& hull) {
-  const size_t count = vertices_.size();
-  std::vector<uint32_t> degrees(count);
+  neighbor_starts_.resize(vertices_.size() + 1);
   for (const Edge& edge : hull.edges()) {
-    ++degrees[edge.tail];
-    ++degrees[edge.head];
+    ++neighbor_starts_[edge.tail + 1];
+    ++neighbor_starts_[edge.head + 1];
   }
-  neighbor_starts_.resize(count + 1);
-  for (size_t i = 0; i < count; ++i) {
-    neighbor_starts_[i + 1] = neighbor_starts_[i] + (degrees[i] + 3) / 4;
-  }
-  neighbors_.resize(neighbor_starts_[count]);
-  std::vector<uint32_t> filled(count);
-  const auto add = [&](uint32_t vertex, uint32_t neighbor) {
-    const uint32_t place = filled[vertex]++;
-    // The lanes from this one on: repeated until another neighbour takes them.
-    NeighborBlock& block = neighbors_[neighbor_starts_[vertex] + place / 4];
-    const Vector& position = vertices_[neighbor];
-    for (uint32_t lane = place % 4; lane < 4; ++lane) {
-      block.positions.x[lane] = position.x();
-      block.positions.y[lane] = position.y();
-      block.positions.z[lane] = position.z();
-      block.ids[lane] = neighbor;
-    }
-  };
+  std::partial_sum(neighbor_starts_.begin(), neighbor_starts_.end(), neighbor_starts_.begin());
+  neighbors_.resize(neighbor_starts_.back());
+  std::vector<uint32_t> next(neighbor_starts_.begin(), neighbor_starts_.end() - 1);
   for (const Edge& edge : hull.edges()) {
-    add(edge.tail, edge.head);
-    add(edge.head, edge.tail);
+    neighbors_[next[edge.tail]++] = edge.head;
+    neighbors_[next[edge.head]++] = edge.tail;
   }
 }
 
-void SupportMap::BuildStarts() {
+void SupportMap::BuildCells(const Hull& hull) {
   const double cells = kCellsPerVertex * static_cast<double>(vertices_.size());
-  side_ = std::max(2u, static_cast<uint32_t>(std::sqrt(cells / 6)));
-  starts_.resize(size_t{6} * side_ * side_);
-  size_t cell = 0;
-  uint32_t last = 0;
-  for (int face = 0; face < 6; ++face) {
-    for (uint32_t i = 0; i < side_; ++i) {
-      for (uint32_t j = 0; j < side_; ++j, ++cell) {
-        Vector n;
-        n[face / 2] = face % 2 == 0 ? 1 : -1;
-        n[(face / 2 + 1) % 3] = (2 * i + 1.0) / side_ - 1;
-        n[(face / 2 + 2) % 3] = (2 * j + 1.0) / side_ - 1;
-        last = Climb(last, n, 0).vertex;
-        starts_[cell] = last;
-      }
+  side_ = std::max(2u, static_cast<uint32_t>(std::lround(std::sqrt(cells / 6))));
+  scale_ = ExtentsOf(vertices_);
+
+  // Of each edge the normals on its two sides, in the map's directions, of unit length.
+  std::vector<std::array<Vector, 2>> sides(hull.edges().size());
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    const std::span<const uint32_t> facet = hull.facet(f);
+    const Vector normal = NormalOf(facet, vertices_).cwiseProduct(scale_).stableNormalized();
+    for (size_t i = 0; i < facet.size(); ++i) {
+      const uint32_t tail = facet[i];
+      const uint32_t head = facet[i + 1 < facet.size() ? i + 1 : 0];
+      const Edge edge{std::min(tail, head), std::max(tail, head)};
+      const auto found = std::lower_bound(hull.edges().begin(), hull.edges().end(), edge);
+      sides[found - hull.edges().begin()][tail < head] = normal;
     }
   }
+  ArcDrawing drawing(side_);
+  for (size_t e = 0; e < sides.size(); ++e) {
+    drawing.Draw(sides[e][0], sides[e][1], hull.edges()[e].tail, hull.edges()[e].head);
+  }
+  FillCells(drawing.Take());
 }
 
-uint32_t SupportMap::StartOf(const Vector& n) const {
-  const double x = std::abs(n.x());
-  const double y = std::abs(n.y());
-  const double z = std::abs(n.z());
-  const int axis = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
-  const double largest = axis == 0 ? x : axis == 1 ? y : z;
-  // Also for n = 0 and for infinite quotients: some cell.
-  const double scale = 0.5 * side_ / largest;
-  const auto index = [&](double component) {
-    const double place = component * scale + 0.5 * side_;
-    return place > 0 ? std::min(static_cast<uint32_t>(std::min(place, 65536.0)), side_ - 1) : 0u;
-  };
-  const uint32_t face = 2 * axis + (n[axis] < 0 ? 1 : 0);
-  const uint32_t i = index(n[(axis + 1) % 3]);
-  const uint32_t j = index(n[(axis + 2) % 3]);
-  return starts_[(face * side_ + i) * side_ + j];
+// Sorts the entries by cell. A cell without any lies within the cone of one vertex.
+void SupportMap::FillCells(std::vector<CellVertex> entries) {
+  std::sort(entries.begin(), entries.end());
+  entries.erase(std::unique(entries.begin(), entries.end()), entries.end());
+  cells_.resize(size_t{6} * side_ * side_);
+  std::vector<uint32_t> listed;
+  uint32_t last = 0;
+  auto entry = entries.begin();
+  for (uint32_t c = 0; c < cells_.size(); ++c) {
+    listed.clear();
+    for (; entry != entries.end() && entry->cell == c; ++entry) listed.push_back(entry->vertex);
+    const bool too_many = listed.size() > kMostListed;
+    if (listed.empty() || too_many) {
+      listed.assign(1, Climb({last, -INFINITY, false}, CenterOf(c)).vertex);
+    }
+    last = listed.back();
+    Cell& cell = cells_[c];
+    for (size_t i = 0; i < 4; ++i) cell.ids[i] = listed[std::min(i, listed.size() - 1)];
+    if (listed.size() <= 4 && !too_many) continue;
+    cell.ids[3] = kLong + static_cast<uint32_t>(lists_.size());
+    lists_.push_back(static_cast<uint32_t>(listed.size()));
+    lists_.insert(lists_.end(), listed.begin(), listed.end());
+  }
+  lists_.shrink_to_fit();
 }
 
-double SupportMap::ValueOf(uint32_t vertex, const Vector& n) const {
-  const Vector& v = vertices_[vertex];
-  return (n.x() * v.x() + n.y() * v.y()) + n.z() * v.z();
+// A direction of the hull's frame in the middle of a cell.
+Vector SupportMap::CenterOf(uint32_t cell) const {
+  const uint32_t face = cell / (side_ * side_);
+  const int axis = static_cast<int>(face / 2);
+  Vector n;
+  n[axis] = face % 2 == 0 ? 1 : -1;
+  n[kAfter[axis]] = (2.0 * (cell / side_ % side_) + 1) / side_ - 1;
+  n[kAfter[axis + 1]] = (2.0 * (cell % side_) + 1) / side_ - 1;
+  return n.cwiseQuotient(scale_);
+}
+
+SupportMap::Support SupportMap::LookUpLong(const Cell& cell, const Vector& n) const {
+  const uint32_t* const list = lists_.data() + (cell.ids[3] - kLong);
+  Support best{list[1], ValueOf(list[1], n), false};
+  // A single one stands for many.
+  if (list[0] == 1) return Climb(best, n);
+  for (uint32_t i = 2; i <= list[0]; ++i) {
+    const double value = ValueOf(list[i], n);
+    if (value > best.value) best = {list[i], value, false};
+  }
+  return best;
+}
+
+SupportMap::Support SupportMap::Climb(Support from, const Vector& n) const {
+  for (;;) {
+    Support best = from;
+    for (const uint32_t id : NeighborsOf(from.vertex)) {
+      const double value = ValueOf(id, n);
+      if (value > best.value) best = {id, value, false};
+    }
+    if (best.vertex == from.vertex) return from;
+    from = best;
+  }
 }
 
 SupportMap::Support SupportMap::ScanPortably(const Vector& n) const {
   Support support;
   ScanBlocks(blocks_, vertices_.size(), n, support);
-  return support;
-}
-
-SupportMap::Support SupportMap::ClimbPortably(uint32_t start, const Vector& n, double blur) const {
-  Support support{start, ValueOf(start, n), false};
-  ClimbBlocks(neighbors_.data(), neighbor_starts_.data(), n, blur, support);
   return support;
 }
 
@@ -232,32 +340,12 @@ __attribute__((target("avx2"))) SupportMap::Support SupportMap::ScanAvx2(const V
   ScanBlocks(blocks_, vertices_.size(), n, support);
   return support;
 }
-
-__attribute__((target("avx2"))) SupportMap::Support SupportMap::ClimbAvx2(uint32_t start,
-                                                                          const Vector& n,
-                                                                          double blur) const {
-  Support support{start, ValueOf(start, n), false};
-  ClimbBlocks(neighbors_.data(), neighbor_starts_.data(), n, blur, support);
-  return support;
-}
 #else
 SupportMap::Support SupportMap::ScanAvx2(const Vector& n) const { return ScanPortably(n); }
-SupportMap::Support SupportMap::ClimbAvx2(uint32_t start, const Vector& n, double blur) const {
-  return ClimbPortably(start, n, blur);
-}
 #endif
 
 SupportMap::Support SupportMap::Scan(const Vector& n) const {
   return HasAvx2() ? ScanAvx2(n) : ScanPortably(n);
-}
-
-SupportMap::Support SupportMap::Climb(uint32_t start, const Vector& n, double blur) const {
-  return HasAvx2() ? ClimbAvx2(start, n, blur) : ClimbPortably(start, n, blur);
-}
-
-SupportMap::Support SupportMap::Farthest(const Vector& n, double blur) const {
-  if (!blocks_.empty()) return Scan(n);
-  return Climb(StartOf(n), n, blur);
 }
 
 // Calls visit(vertex, value) for all vertices with a value of at least from.value - slack, or says
@@ -271,31 +359,30 @@ bool SupportMap::VisitPlateau(const Support& from, const Vector& n, double slack
   found[0] = from.vertex;
   visit(from.vertex, from.value);
   for (size_t next = 0; next < count; ++next) {
-    const uint32_t vertex = found[next];
-    for (uint32_t b = neighbor_starts_[vertex]; b < neighbor_starts_[vertex + 1]; ++b) {
-      for (const uint32_t id : neighbors_[b].ids) {
-        const double value = ValueOf(id, n);
-        if (!(value >= least)) continue;
-        if (std::find(found.begin(), found.begin() + count, id) != found.begin() + count) continue;
-        if (count == kMostFlooded) return false;
-        found[count++] = id;
-        visit(id, value);
-      }
+    for (const uint32_t id : NeighborsOf(found[next])) {
+      const double value = ValueOf(id, n);
+      if (!(value >= least)) continue;
+      if (std::find(found.begin(), found.begin() + count, id) != found.begin() + count) continue;
+      if (count == kMostFlooded) return false;
+      found[count++] = id;
+      visit(id, value);
     }
   }
   return true;
 }
 
-SupportMap::Support SupportMap::CertainFarthest(const Vector& n, double blur) const {
-  Support support = Farthest(n, blur);
-  if (support.certain) return support;
-  Support best = support;
+SupportMap::Support SupportMap::MakeCertain(Support from, const Vector& n, double blur) const {
+  double nearest = -INFINITY;
+  for (const uint32_t id : NeighborsOf(from.vertex)) nearest = std::max(nearest, ValueOf(id, n));
+  if (nearest < from.value - blur) return {from.vertex, from.value, true};
+  from = Climb(from, n);
+  Support best = from;
   const auto consider = [&](uint32_t vertex, double value) {
     if (value > best.value || (value == best.value && vertex < best.vertex)) {
       best = {vertex, value, true};
     }
   };
-  if (!VisitPlateau(support, n, blur, consider)) {
+  if (!VisitPlateau(from, n, blur, consider)) {
     for (uint32_t i = 0; i < vertices_.size(); ++i) consider(i, ValueOf(i, n));
   }
   best.certain = true;
@@ -318,8 +405,9 @@ std::vector<uint32_t> SupportMap::Plateau(const Vector& n, double slack) const {
 }
 
 size_t SupportMap::MemoryBytes() const {
-  return blocks_.capacity() * sizeof(Block) + neighbors_.capacity() * sizeof(NeighborBlock) +
-         neighbor_starts_.capacity() * sizeof(uint32_t) + starts_.capacity() * sizeof(uint32_t);
+  return blocks_.capacity() * sizeof(Block) + cells_.capacity() * sizeof(Cell) +
+         (neighbor_starts_.capacity() + neighbors_.capacity() + lists_.capacity()) *
+             sizeof(uint32_t);
 }
 
 }  // namespace hulld

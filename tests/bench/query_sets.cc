@@ -1,0 +1,178 @@
+#include "tests/bench/query_sets.h"
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "core/hull/hull_builder.h"
+#include "core/query/collision.h"
+
+namespace hulld::bench {
+namespace {
+
+constexpr size_t kHullsPerSet = 32;
+
+class Random {
+ public:
+  explicit Random(uint64_t seed) : engine_(seed) {}
+  double Between(double low, double high) {
+    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
+  }
+  size_t Below(size_t n) { return engine_() % n; }
+  // By Marsaglia's rejection.
+  Vector UnitVector() {
+    for (;;) {
+      const Vector v(Between(-1, 1), Between(-1, 1), Between(-1, 1));
+      const double squared = v.squaredNorm();
+      if (squared > 0.01 && squared <= 1) return v / std::sqrt(squared);
+    }
+  }
+  std::array<double, 4> Rotation() {
+    for (;;) {
+      std::array<double, 4> q;
+      double squared = 0;
+      for (double& component : q) {
+        component = Between(-1, 1);
+        squared += component * component;
+      }
+      if (squared < 0.01 || squared > 1) continue;
+      for (double& component : q) component /= std::sqrt(squared);
+      return q;
+    }
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+Hull BuildHull(const std::vector<Vector>& points) {
+  HullBuilder builder;
+  if (!builder.Add(points).ok()) std::abort();
+  return builder.Snapshot();
+}
+
+std::vector<Vector> OnEllipsoid(Random& random, size_t count) {
+  const Vector axes(random.Between(0.5, 1.5), random.Between(0.5, 1.5), random.Between(0.5, 1.5));
+  std::vector<Vector> points;
+  for (size_t i = 0; i < count; ++i) points.push_back(random.UnitVector().cwiseProduct(axes));
+  return points;
+}
+
+// The corners of the triangles of a binary STL file.
+std::vector<Vector> ReadStl(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  std::vector<Vector> points;
+  constexpr size_t kHeader = 84;
+  constexpr size_t kTriangle = 50;
+  for (size_t at = kHeader; at + kTriangle <= bytes.size(); at += kTriangle) {
+    float corners[9];
+    std::memcpy(corners, bytes.data() + at + 12, sizeof corners);
+    for (int i = 0; i < 9; i += 3) points.emplace_back(corners[i], corners[i + 1], corners[i + 2]);
+  }
+  return points;
+}
+
+void AddHulls(const std::string& name, Random& random, QuerySet& set) {
+  if (name == "ur5") {
+    const char* data = std::getenv("HULLD_DATA");
+    const std::filesystem::path folder =
+        data != nullptr ? std::filesystem::path(data)
+                        : std::filesystem::path(HULLD_SOURCE_DIR) / "../shared/data";
+    for (const char* link :
+         {"base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3"}) {
+      const std::vector<Vector> points = ReadStl(folder / "ur5" / (std::string(link) + ".stl"));
+      if (!points.empty()) set.hulls.push_back(BuildHull(points));
+    }
+    return;
+  }
+  const size_t count = std::stoul(name.substr(name.find(':') + 1));
+  for (size_t i = 0; i < kHullsPerSet; ++i)
+    set.hulls.push_back(BuildHull(OnEllipsoid(random, count)));
+}
+
+// B moved from A's centre along `direction` so far that the pair is in the regime.
+Pose Place(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pose X_WB,
+           const Vector& direction, Regime regime, Random& random) {
+  const PlacedHull placed_a = *PlacedHull::Make(a, X_WA);
+  const Vector center_b = PlacedHull::Make(b, X_WB)->rotated_center();
+  const Vector start = placed_a.rotated_center() + X_WA.t - center_b;
+  const double reach = a.radius() + b.radius();
+  const auto at = [&](double distance) {
+    Pose X = X_WB;
+    X.t = start + distance * direction;
+    return X;
+  };
+  if (regime == Regime::kFar) return at(reach * random.Between(1.5, 3));
+  double colliding = 0;
+  double separated = 1.01 * reach;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (colliding + separated);
+    const bool apart =
+        FindRelation(placed_a, *PlacedHull::Make(b, at(middle))).relation == Relation::kSeparated;
+    (apart ? separated : colliding) = middle;
+  }
+  switch (regime) {
+    case Regime::kClose:
+      return at(separated + reach * random.Between(0.01, 0.05));
+    case Regime::kGap:
+      return at(separated + 1e-6 * reach);
+    case Regime::kGraze:
+      return at(separated - 1e-6 * reach);
+    case Regime::kDeep:
+      return at(0.5 * separated);
+    default:
+      return at(separated);
+  }
+}
+
+}  // namespace
+
+const char* Name(Regime regime) {
+  switch (regime) {
+    case Regime::kFar:
+      return "far";
+    case Regime::kClose:
+      return "close";
+    case Regime::kGap:
+      return "gap";
+    case Regime::kTouch:
+      return "touch";
+    case Regime::kGraze:
+      return "graze";
+    case Regime::kDeep:
+      break;
+  }
+  return "deep";
+}
+
+QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count) {
+  QuerySet set;
+  set.name = name + "/" + Name(regime);
+  Random random(20261121 + static_cast<uint64_t>(regime));
+  AddHulls(name, random, set);
+  if (set.hulls.empty()) return set;
+  for (const Hull& hull : set.hulls) set.query_hulls.emplace_back(hull);
+  for (size_t i = 0; i < count; ++i) {
+    const size_t hull_a = random.Below(set.hulls.size());
+    const size_t hull_b = random.Below(set.hulls.size());
+    Pose X_WA;
+    X_WA.q = random.Rotation();
+    X_WA.t = random.UnitVector() * random.Between(0, 2);
+    Pose X_WB;
+    X_WB.q = random.Rotation();
+    X_WB = Place(set.query_hulls[hull_a], X_WA, set.query_hulls[hull_b], X_WB, random.UnitVector(),
+                 regime, random);
+    set.queries.push_back({hull_a, hull_b, X_WA, X_WB});
+    set.a.push_back(*PlacedHull::Make(set.query_hulls[hull_a], X_WA));
+    set.b.push_back(*PlacedHull::Make(set.query_hulls[hull_b], X_WB));
+  }
+  return set;
+}
+
+}  // namespace hulld::bench
