@@ -236,7 +236,7 @@ std::vector<Extreme> MakeExtremes() {
   const auto add = [&](const char* name, Arithmetic needs, std::function<Points(int)> make) {
     all.push_back({name, std::move(make), needs});
   };
-  add("scale_5e_324", kExact, SubnormalLattice);
+  add("scale_5e_324", kAny, SubnormalLattice);
   add("scale_1e_310", kAny, [](int n) { return Ball(n, 1e-310); });
   add("scale_1e_300", kAny, [](int n) { return Ball(n, 1e-300); });
   add("scale_1e_200", kAny, [](int n) { return Ball(n, 1e-200); });
@@ -248,7 +248,7 @@ std::vector<Extreme> MakeExtremes() {
   add("scale_1e300", kAny, [](int n) { return Ball(n, 1e300); });
   add("scale_1e300_sphere", kAny, [](int n) { return Sphere(n, 1e300); });
   add("scale_1e_300_sphere", kAny, [](int n) { return Sphere(n, 1e-300); });
-  add("scale_largest", kExact, LargestCube);
+  add("scale_largest", kAny, LargestCube);
   add("offset_1e15", kAny, [](int n) { return Shifted(Ball(n, 100), Vector::Constant(1e15)); });
   add("offset_1e15_one_axis", kAny, [](int n) { return Shifted(Ball(n, 1), Vector(1e15, 0, 0)); });
   add("offset_1e15_few_ulps", kExact,
