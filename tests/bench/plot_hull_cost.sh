@@ -24,7 +24,7 @@ series() {
   awk -F, -v shape="$1:" -v library="$2" '
     NR == 1 { for (i = 1; i <= NF; ++i) column[$i] = i; next }
     index($1, shape) == 1 && $2 == library { print $column["points"], $column["milliseconds"] }
-  ' "$rows"
+  ' "$rows" | sort -n
 }
 
 panel() {
@@ -51,7 +51,7 @@ set output '${rows%.csv}.$format'
 set multiplot layout 1,2
 set logscale xy
 set xrange [70:1.5e6]
-set yrange [0.005:5e4]
+set yrange [0.01:2e6]
 set format x '10^{%T}'
 set format y '10^{%T}'
 set xlabel 'points'

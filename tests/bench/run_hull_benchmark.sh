@@ -27,6 +27,8 @@ for suite in "${suites[@]}"; do
     build | stream | cost)
       "$programs/hull_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
         --benchmark_enable_random_interleaving=true
+      { head -1 "$out" && tail -n +2 "$out" | sort -t, -k1,1V -k2,2; } >"$out.sorted"
+      mv "$out.sorted" "$out"
       ;;
     extremes) "$programs/extreme_benchmark" --benchmark_out="$out" ;;
     *)
@@ -35,4 +37,6 @@ for suite in "${suites[@]}"; do
       ;;
   esac
 done
-[[ -f $results/hull_cost_$machine.csv ]] && bash tests/bench/plot_hull_cost.sh "$machine"
+if [[ -f $results/hull_cost_$machine.csv ]]; then bash tests/bench/plot_hull_cost.sh "$machine"; fi
+# For the README.
+if [[ -f $results/hull_extremes_$machine.csv ]]; then bash tests/bench/extremes_table.sh "$machine"; fi
