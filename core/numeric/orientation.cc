@@ -1,6 +1,7 @@
 #include "core/numeric/orientation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <optional>
@@ -49,6 +50,29 @@ bool InExpansionRange(std::initializer_list<double> coordinates) {
 }
 
 bool InExpansionRange(const Vector& v) { return InExpansionRange({v.x(), v.y(), v.z()}); }
+
+using FourPoints = std::array<Vector, 4>;
+
+// The points times the power of two that brings their largest coordinate next below kExpansionMax,
+// which changes no sign; empty where some other coordinate stays below kExpansionMin, so that the
+// product might be rounded. Requires a coordinate that is not zero.
+std::optional<FourPoints> ScaledToExpansionRange(const FourPoints& points) {
+  double largest = 0;
+  for (const Vector& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  const int exponent = std::ilogb(kExpansionMax) - 1 - std::ilogb(largest);
+  // Two factors, as one may exceed the range of doubles.
+  const double first = std::ldexp(1.0, exponent / 2);
+  const double second = std::ldexp(1.0, exponent - exponent / 2);
+  FourPoints scaled;
+  for (size_t i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      scaled[i][k] = points[i][k] * first * second;
+      const bool is_exact = points[i][k] == 0 || std::abs(scaled[i][k]) >= kExpansionMin;
+      if (!is_exact) return std::nullopt;
+    }
+  }
+  return scaled;
+}
 
 using Difference = Expansion<2>;
 
@@ -107,9 +131,17 @@ int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d)
     ++counts.filter;
     return *sign;
   }
+  // Duplicates ask for the corners of triangles themselves.
+  if (d == a || d == b || d == c) {
+    ++counts.filter;
+    return 0;
+  }
   if (InExpansionRange(a) && InExpansionRange(b) && InExpansionRange(c) && InExpansionRange(d)) {
     ++counts.expansion;
     return ExpansionOrient3d(a, b, c, d);
+  }
+  if (const std::optional<FourPoints> scaled = ScaledToExpansionRange({a, b, c, d})) {
+    return Orient3d((*scaled)[0], (*scaled)[1], (*scaled)[2], (*scaled)[3]);
   }
   ++counts.integer;
   return IntegerOrient3d(a, b, c, d);
