@@ -5,6 +5,8 @@
 #include <bit>
 #include <numeric>
 
+#include "core/hull/conflict_lists.h"
+
 namespace hulld {
 namespace {
 
@@ -82,11 +84,12 @@ SortKey KeyOf(const DirectionMap& directions, const Vector& point, uint32_t inde
   return static_cast<uint64_t>(face << (2 * kGridBits) | order) << 32 | index;
 }
 
-// One call of InsertBlock.
-class BlockInsertion {
+// Adds points in rounds of growing size, each reduced to those that the map of directions cannot
+// reject and sorted along the surface.
+class RoundsInsertion {
  public:
-  BlockInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
-                 const std::function<bool()>& should_stop)
+  RoundsInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                  const std::function<bool()>& should_stop)
       : surface_(surface),
         vertices_(vertices),
         points_(points),
@@ -158,6 +161,156 @@ class BlockInsertion {
   std::vector<Vector> chosen_;
 };
 
+// The smaller a surface, the cheaper it is to test a point against all its triangles.
+constexpr size_t kMostTrianglesToTest = 64;
+// A block of at most this many points is not worth a map of directions for rejecting most of them.
+constexpr size_t kSmallBlock = 65536;
+// Points of the first of the samples of a larger block, at most.
+constexpr size_t kLargestFirstSample = 16384;
+// Each sample, and then the block, is this many times the sample before.
+constexpr size_t kSampleRatio = 16;
+// Samples are made of runs of consecutive points, for the sake of memory.
+constexpr size_t kRun = 64;
+
+// One call of InsertBlock.
+//
+// Idea: of most clouds most points are inside. Samples of growing size shape the surface; then the
+// map of directions rejects most of what follows, read once and in order, and what remains goes
+// into conflict lists. A block most of which is outside is inserted in rounds instead.
+class BlockInsertion {
+ public:
+  BlockInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                 std::span<const uint32_t> done, const std::function<bool()>& should_stop)
+      : surface_(surface),
+        vertices_(vertices),
+        points_(points),
+        done_(done.begin(), done.end()),
+        should_stop_(should_stop) {}
+
+  bool Run() {
+    // A triangle's list takes memory whether it is used or not.
+    if (!surface_.IsMeasurable() || 64 * points_.size() < surface_.triangle_count()) {
+      return InsertRounds(0);
+    }
+    for (size_t stride = FirstStride(); stride > 0; stride /= kSampleRatio) {
+      const ConflictLists::Outcome outcome = InsertSample(stride);
+      if (outcome == ConflictLists::Outcome::kStopped) return false;
+      if (outcome == ConflictLists::Outcome::kGaveUp) return InsertRounds(stride);
+      stride_before_ = stride;
+    }
+    return true;
+  }
+
+ private:
+  // Calls visit(first, count) for the runs of each stride-th run of the block, without what earlier
+  // samples had.
+  template <typename Visitor>
+  void ForEachRun(size_t stride, Visitor&& visit) const {
+    for (size_t first = 0; first < points_.size(); first += kRun * stride) {
+      if (stride_before_ > 0 && first / kRun % stride_before_ == 0) continue;
+      visit(first, std::min(kRun, points_.size() - first));
+    }
+  }
+
+  // A power of kSampleRatio, or 1 for all points at once.
+  size_t FirstStride() const {
+    if (points_.size() <= kSmallBlock) return 1;
+    size_t stride = 1;
+    while (points_.size() / stride > kLargestFirstSample) stride *= kSampleRatio;
+    return stride;
+  }
+
+  ConflictLists::Outcome InsertSample(size_t stride) {
+    ConflictLists lists(surface_, vertices_);
+    if (surface_.triangle_count() <= kMostTrianglesToTest) {
+      lists.Take(Sample(stride));
+    } else {
+      TakeByDirection(stride, lists);
+    }
+    const ConflictLists::Outcome outcome = lists.InsertAll(should_stop_);
+    if (outcome == ConflictLists::Outcome::kStopped) return outcome;
+    if (outcome == ConflictLists::Outcome::kGaveUp) rest_ = lists.TakeRest();
+    for (const Vector& p : astray_) surface_.Insert(vertices_, p);
+    astray_.clear();
+    surface_.FinishInsertions(vertices_);
+    return outcome;
+  }
+
+  bool IsDone(size_t i) const {
+    return std::find(done_.begin(), done_.end(), static_cast<uint32_t>(i)) != done_.end();
+  }
+
+  std::vector<Vector> Sample(size_t stride) const {
+    std::vector<Vector> sample;
+    sample.reserve(points_.size() / stride + kRun);
+    ForEachRun(stride, [&](size_t first, size_t count) {
+      for (size_t i = first; i < first + count; ++i) {
+        if (!IsDone(i)) sample.push_back(points_[i]);
+      }
+    });
+    return sample;
+  }
+
+  void TakeByDirection(size_t stride, ConflictLists& lists) {
+    surface_.MeasureBefore(vertices_, points_.size() / stride);
+    const DirectionMap& directions = *surface_.directions();
+    std::vector<Vector> survivors;
+    std::vector<uint32_t> of_run;
+    size_t asked = 0;
+    ForEachRun(stride, [&](size_t first, size_t count) {
+      of_run.clear();
+      directions.AppendSurvivors(points_.subspan(first, count), of_run);
+      // Gathered while they are in the cache.
+      for (const uint32_t i : of_run) {
+        if (!IsDone(first + i)) survivors.push_back(points_[first + i]);
+      }
+      asked += count;
+    });
+    surface_.CountRejected(asked, asked - survivors.size());
+    std::vector<Vector> outside;
+    std::vector<TriangleId> seen;
+    for (const Vector& p : survivors) {
+      const std::optional<Surface::Location> location =
+          surface_.Locate(vertices_, p, directions.hint(directions.PlaceOf(p).cell));
+      if (!location) {
+        astray_.push_back(p);
+      } else if (location->side == Surface::Side::kInside) {
+        surface_.CountIfDuplicate(vertices_, location->triangle, p);
+      } else {
+        outside.push_back(p);
+        seen.push_back(location->triangle);
+      }
+    }
+    lists.Take(outside, seen);
+  }
+
+  // Inserts in rounds what conflict lists gave up and what no sample up to this stride had; all,
+  // for stride 0.
+  bool InsertRounds(size_t stride) {
+    for (size_t first = 0; first < points_.size(); first += kRun) {
+      if (stride > 0 && first / kRun % stride == 0) continue;
+      const size_t end = std::min(first + kRun, points_.size());
+      for (size_t i = first; i < end; ++i) {
+        if (!IsDone(i)) rest_.push_back(points_[i]);
+      }
+    }
+    return RoundsInsertion(surface_, vertices_, rest_, should_stop_).Run();
+  }
+
+  Surface& surface_;
+  VertexTable& vertices_;
+  std::span<const Vector> points_;
+  // Indices of points that are not to be inserted, few.
+  std::vector<uint32_t> done_;
+  const std::function<bool()>& should_stop_;
+  // The stride of the sample before; 0 when there is none.
+  size_t stride_before_ = 0;
+  // Points that are to be inserted one by one: the walk to them was too long.
+  std::vector<Vector> astray_;
+  // Points that are to be inserted in rounds.
+  std::vector<Vector> rest_;
+};
+
 }  // namespace
 
 InsertionRounds::InsertionRounds(size_t n) : n_(static_cast<uint32_t>(n)), count_(1) {
@@ -183,8 +336,8 @@ void InsertionRounds::AppendRound(int round, std::vector<uint32_t>& members) con
 }
 
 bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
-                 const std::function<bool()>& should_stop) {
-  return BlockInsertion(surface, vertices, points, should_stop).Run();
+                 std::span<const uint32_t> done, const std::function<bool()>& should_stop) {
+  return BlockInsertion(surface, vertices, points, done, should_stop).Run();
 }
 
 }  // namespace hulld

@@ -25,6 +25,8 @@ namespace {
 constexpr size_t kUninterruptedPoints = 1024;
 // Points between two polls of should_stop.
 constexpr size_t kPointsPerPoll = 256;
+// Points looked at for some that are extreme along the axes, at most twice.
+constexpr size_t kExtremesSample = 4096;
 // From this many points on, the order of insertion is worth choosing.
 constexpr size_t kWorthOrdering = 128;
 
@@ -38,6 +40,23 @@ absl::Status CheckFinite(std::span<const Vector> points) {
     }
   }
   return absl::OkStatus();
+}
+
+// Where the lowest and the highest coordinates are, along each axis, among some points spread over
+// all; each index once. Points to start a hull from.
+std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
+  const size_t stride = points.size() / kExtremesSample + 1;
+  std::array<uint32_t, 6> extremes{};
+  for (size_t i = 0; i < points.size(); i += stride) {
+    for (size_t k = 0; k < 3; ++k) {
+      if (points[i][k] < points[extremes[k]][k]) extremes[k] = static_cast<uint32_t>(i);
+      if (points[i][k] > points[extremes[k + 3]][k]) extremes[k + 3] = static_cast<uint32_t>(i);
+    }
+  }
+  std::vector<uint32_t> distinct(extremes.begin(), extremes.end());
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  return distinct;
 }
 
 bool LexicographicallyLess(const Vector& a, const Vector& b) {
@@ -68,10 +87,16 @@ class HullBuilder::State {
 
   // Inserts all points; false when should_stop, which may be empty, said so.
   bool InsertAll(std::span<const Vector> points, const std::function<bool()>& should_stop) {
+    std::vector<uint32_t> done;
+    if (dimension() < 0 && points.size() >= kWorthOrdering) done = AxisExtremes(points);
+    for (const uint32_t i : done) Insert(points[i]);
     for (size_t i = 0; i < points.size(); ++i) {
       if (surface_ && points.size() - i >= kWorthOrdering) {
-        return InsertBlock(*surface_, vertices_, points.subspan(i), should_stop);
+        std::erase_if(done, [i](uint32_t index) { return index < i; });
+        for (uint32_t& index : done) index -= static_cast<uint32_t>(i);
+        return InsertBlock(*surface_, vertices_, points.subspan(i), done, should_stop);
       }
+      if (std::find(done.begin(), done.end(), i) != done.end()) continue;
       if (i % kPointsPerPoll == 0 && should_stop && should_stop()) return false;
       Insert(points[i]);
     }

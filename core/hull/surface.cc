@@ -63,15 +63,30 @@ void Surface::Insert(VertexTable& vertices, const Vector& point) {
   if (location->side == Side::kInside) {
     CountIfDuplicate(vertices, location->triangle, point);
   } else {
-    CollectRegion(vertices, location->triangle, point, size);
-    RemoveVertices(vertices);
-    JoinHorizon(vertices, vertices.Add(point));
-    if (directions_) {
-      extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
-    }
+    RemoveVisible(vertices, point, location->triangle);
+    JoinToBoundary(vertices, point);
   }
   if (directions_) directions_->SetHint(cell, last_);
   if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
+  if (alive_ >= next_update_) Update(vertices);
+}
+
+std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const Vector& point,
+                                                   TriangleId seen) {
+  CollectRegion(vertices, seen, point, SizeWith(vertices, point));
+  RemoveVertices(vertices);
+  return region_;
+}
+
+std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
+  JoinHorizon(vertices, vertices.Add(point));
+  if (directions_) {
+    extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
+  }
+  return std::span(region_).first(horizon_.size());
+}
+
+void Surface::FinishInsertions(const VertexTable& vertices) {
   if (alive_ >= next_update_) Update(vertices);
 }
 
@@ -82,20 +97,13 @@ TriangleId Surface::Alive(TriangleId id) const {
   return id;
 }
 
-// What a plane's slope is relative to; infinite where the bound would not hold.
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
   const double size = vertices.max_abs_coordinate() + point.cwiseAbs().maxCoeff();
   return size <= kPlaneMaxCoordinate ? size : INFINITY;
 }
 
-// +1 when the point sees the triangle from outside, 0 when it lies in its plane.
-int Surface::SideOf(const VertexTable& vertices, TriangleId id, const Vector& point,
-                    double size) const {
-  const SurfaceTriangle& t = triangles_[id];
-  const double value = t.normal.dot(point) - t.offset;
-  const double bound = static_cast<double>(t.slope) * size;
-  if (value > bound) return 1;
-  if (value < -bound) return -1;
+int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
+                         const Vector& point) const {
   const auto& [a, b, c] = t.corners;
   return Orient3d(vertices[a], vertices[b], vertices[c], point);
 }
@@ -155,14 +163,15 @@ int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
 // with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
 // walk is longer than the surface warrants.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
-                                               double size, TriangleId start) {
+                                               double size, TriangleId start) const {
   TriangleId at = start;
+  uint32_t random = 1;
   TriangleId from = kDead;
   const size_t longest = 4 * alive_ + 64;
   for (size_t steps = 0; steps < longest; ++steps) {
     if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
-    random_ = random_ * 1664525u + 1013904223u;
-    const uint32_t first = (random_ >> 16) % 3;
+    random = random * 1664525u + 1013904223u;
+    const uint32_t first = (random >> 16) % 3;
     const SurfaceTriangle& t = triangles_[at];
     TriangleId next = kDead;
     for (uint32_t k = 0; k < 3 && next == kDead; ++k) {
@@ -196,13 +205,14 @@ Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point
 }
 
 // A point equal to a vertex lies in the cones of that vertex's triangles alone.
-void Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const {
+bool Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const {
   for (const VertexId v : triangles_[id].corners) {
     if (vertices[v] == point) {
       vertices.CountDuplicate(v);
-      return;
+      return true;
     }
   }
+  return false;
 }
 
 // Looks for an interior point while none is known, and starts to measure the surface for its
@@ -210,17 +220,24 @@ void Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vecto
 // amortized.
 void Surface::Update(const VertexTable& vertices) {
   next_update_ = 2 * alive_;
-  if (!directions_) {
-    const std::optional<Vector> interior = FindInterior(vertices);
-    if (!interior) return;
-    directions_.emplace(*interior, 1);
-    ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-      for (const VertexId v : t.corners) {
-        extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
-      }
-    });
-  }
-  if (IsWorthMeasuring() && !measuring_) StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
+  if (!directions_) SetCenter(vertices);
+  if (IsWorthMeasuring() && !measuring_) {
+    StartMeasuring(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
+  };
+}
+
+// Puts the center strictly inside and forgets what was measured; does nothing where no double is
+// inside.
+void Surface::SetCenter(const VertexTable& vertices) {
+  const std::optional<Vector> interior = FindInterior(vertices);
+  if (!interior) return;
+  directions_.emplace(*interior, 1);
+  extent_ = 0;
+  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
+    for (const VertexId v : t.corners) {
+      extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
+    }
+  });
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
@@ -240,23 +257,23 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
 }
 
 // At extreme scales every sign is decided by integers, and a map costs more than it saves.
-bool Surface::IsWorthMeasuring() const {
-  return alive_ >= kWorthMeasuring && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
-}
+bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
   if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
   // A tenth as many walks as points, at most.
   const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
-  const int wanted = std::min(affordable, 2 * ResolutionFor(alive_, true));
+  const int wanted = std::min(affordable, 4 * ResolutionFor(alive_, true));
   if (wanted < 4) return;
   if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
-    StartMeasuring(wanted);
+    StartMeasuring(vertices, wanted);
     ContinueMeasuring(vertices, measuring_->reach.size());
   }
 }
 
-void Surface::StartMeasuring(int resolution) {
+void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
+  // The first surface, from which the center comes, may have been a corner of what it is now.
+  if (directions_->resolution() == 1) SetCenter(vertices);
   measured_at_ = alive_;
   asked_ = 0;
   rejected_ = 0;
@@ -295,13 +312,14 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
 double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
   const Vector center = directions_->center();
   double m = extent_;
-  // A walk to a point outside ends at any triangle that it sees, hence the rounds.
+  // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
+  // nearly coplanar, their rounded planes tell little, hence the growing steps.
   for (int round = 0; round < kMostRounds; ++round) {
     const SurfaceTriangle& t = triangles_[near];
     const double climb = t.normal.dot(direction);
     const double height = t.offset - t.normal.dot(center);
     if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
-    m *= 1 - 0x1p-30;
+    m *= 1 - std::ldexp(0x1p-30, round / 2);
     const Vector point = center + m * direction;
     const std::optional<Location> location = Walk(vertices, point, SizeWith(vertices, point), near);
     if (!location) return 0;

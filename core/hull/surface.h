@@ -10,6 +10,7 @@
 #include "core/hull/chunked_vector.h"
 #include "core/hull/direction_map.h"
 #include "core/hull/vertex_table.h"
+#include "core/numeric/error_bounds.h"
 
 namespace hulld {
 
@@ -54,9 +55,42 @@ class Surface {
   // of all triangles where no double lies strictly inside the polytope.
   void Insert(VertexTable& vertices, const Vector& point);
 
+  // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
+  // (inside).
+  enum class Side { kInside, kOutside };
+  struct Location {
+    Side side;
+    TriangleId triangle;
+  };
+  // Finds where a point lies and changes nothing. `start`: where to start walking. Requires that an
+  // interior point is known; empty when the walk is longer than the surface warrants.
+  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
+                                 TriangleId start) const {
+    return Walk(vertices, point, SizeWith(vertices, point), Alive(start));
+  }
+  // True when the point lies strictly outside the triangle's plane, exactly.
+  bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
+    return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
+  }
+  // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
+  // returns the triangles that go, for the caller to move what it keeps by triangle; the second
+  // joins the point to their boundary and returns the triangles that come, which take over IDs.
+  // The spans hold until the next insertion.
+  std::span<const TriangleId> RemoveVisible(VertexTable& vertices, const Vector& point,
+                                            TriangleId seen);
+  std::span<const TriangleId> JoinToBoundary(VertexTable& vertices, const Vector& point);
+  // Counts the point when it equals a corner of the triangle, and says so.
+  bool CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
+  // Does what insertions in two steps leave undone: housekeeping for what comes.
+  void FinishInsertions(const VertexTable& vertices);
+
   // The map of directions, for choosing what to insert and in which order; null where no interior
   // point is known.
   const DirectionMap* directions() const { return directions_ ? &*directions_ : nullptr; }
+  // True when an interior point is known and no scale is extreme.
+  bool IsMeasurable() const {
+    return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
+  }
   // Measures the surface anew when that pays for so many points to be inserted. Does nothing where
   // no interior point is known. Cost: at most some walks per ten points.
   void MeasureBefore(const VertexTable& vertices, size_t points);
@@ -76,6 +110,8 @@ class Surface {
   const SurfaceTriangle& triangle(TriangleId id) const { return triangles_[id]; }
   // IDs of triangles lie below this.
   size_t id_bound() const { return triangles_.size(); }
+  // What a plane's slope is relative to; infinite where the bound would not hold.
+  double SizeWith(const VertexTable& vertices, const Vector& point) const;
   size_t triangle_count() const { return alive_; }
 
  private:
@@ -102,31 +138,32 @@ class Surface {
     size_t done = 0;
     TriangleId near;
   };
-  enum class Side { kInside, kOutside };
-  // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
-  // (inside).
-  struct Location {
-    Side side;
-    TriangleId triangle;
-  };
 
   bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
   TriangleId Alive(TriangleId id) const;
-  double SizeWith(const VertexTable& vertices, const Vector& point) const;
-  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const;
+  // +1 when the point sees the triangle from outside, 0 when it lies in its plane.
+  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const {
+    const SurfaceTriangle& t = triangles_[id];
+    const double value = t.normal.dot(point) - t.offset;
+    const double bound = static_cast<double>(t.slope) * size;
+    if (value > bound) return 1;
+    if (value < -bound) return -1;
+    return ExactSideOf(vertices, t, point);
+  }
+  int ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point) const;
   void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
   TriangleId NewId();
   void LinkAll();
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
-                               TriangleId start);
+                               TriangleId start) const;
   int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
-  void CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
   void Update(const VertexTable& vertices);
   bool IsWorthMeasuring() const;
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
-  void StartMeasuring(int resolution);
+  void SetCenter(const VertexTable& vertices);
+  void StartMeasuring(const VertexTable& vertices, int resolution);
   void ContinueMeasuring(const VertexTable& vertices, size_t corners);
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
@@ -156,7 +193,6 @@ class Surface {
   // The count of triangles when it was last measured.
   size_t measured_at_ = 0;
   TriangleId last_ = 0;
-  uint32_t random_ = 1;
 
   // Scratch of one insertion.
   std::vector<TriangleId> region_;
