@@ -36,15 +36,20 @@ void ConflictLists::Take(std::span<const Vector> points) {
 void ConflictLists::Take(std::span<const Vector> points, std::span<const TriangleId> seen) {
   CountTaken(points);
   is_trial_ = false;
-  std::vector<TriangleId> targets(seen.begin(), seen.end());
-  std::sort(targets.begin(), targets.end());
-  targets.erase(std::unique(targets.begin(), targets.end()), targets.end());
+  std::vector<TriangleId> targets;
+  // By triangle: its place among the targets, from 1.
+  std::vector<uint32_t> place(surface_.id_bound(), 0);
+  counts_.assign(1, 0);
+  for (const TriangleId id : seen) {
+    if (place[id] == 0) {
+      targets.push_back(id);
+      place[id] = static_cast<uint32_t>(targets.size());
+      counts_.push_back(0);
+    }
+    ++counts_[place[id]];
+  }
   sources_.clear();
   Reserve(BlocksFor(points.size()) + targets.size() + 1);
-  std::vector<uint32_t> place(surface_.id_bound());
-  for (size_t k = 0; k < targets.size(); ++k) place[targets[k]] = static_cast<uint32_t>(k + 1);
-  counts_.assign(targets.size() + 1, 0);
-  for (const TriangleId id : seen) ++counts_[place[id]];
   AllocateLists(targets);
   for (size_t i = 0; i < points.size(); ++i) {
     const size_t at = cursors_[place[seen[i]]]++;

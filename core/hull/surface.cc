@@ -90,13 +90,6 @@ void Surface::FinishInsertions(const VertexTable& vertices) {
   if (alive_ >= next_update_) Update(vertices);
 }
 
-// A dead triangle's first neighbour is one that came in its place.
-TriangleId Surface::Alive(TriangleId id) const {
-  if (id >= triangles_.size()) return last_;
-  while (!IsAlive(id)) id = triangles_[id].neighbours[0];
-  return id;
-}
-
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
   const double size = vertices.max_abs_coordinate() + point.cwiseAbs().maxCoeff();
   return size <= kPlaneMaxCoordinate ? size : INFINITY;

@@ -140,7 +140,12 @@ class Surface {
   };
 
   bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
-  TriangleId Alive(TriangleId id) const;
+  // A dead triangle's first neighbour is one that came in its place.
+  TriangleId Alive(TriangleId id) const {
+    if (id >= triangles_.size()) return last_;
+    while (!IsAlive(id)) id = triangles_[id].neighbours[0];
+    return id;
+  }
   // +1 when the point sees the triangle from outside, 0 when it lies in its plane.
   int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
