@@ -171,6 +171,8 @@ constexpr size_t kLargestFirstSample = 16384;
 constexpr size_t kSampleRatio = 16;
 // Samples are made of runs of consecutive points, for the sake of memory.
 constexpr size_t kRun = 64;
+// From this many runs on, threads save more than they cost.
+constexpr size_t kWorthThreads = 512;
 
 // One call of InsertBlock.
 //
@@ -180,11 +182,13 @@ constexpr size_t kRun = 64;
 class BlockInsertion {
  public:
   BlockInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
-                 std::span<const uint32_t> done, const std::function<bool()>& should_stop)
+                 std::span<const uint32_t> done, int threads,
+                 const std::function<bool()>& should_stop)
       : surface_(surface),
         vertices_(vertices),
         points_(points),
         done_(done.begin(), done.end()),
+        threads_(std::max(threads, 1)),
         should_stop_(should_stop) {}
 
   bool Run() {
@@ -202,15 +206,16 @@ class BlockInsertion {
   }
 
  private:
-  // Calls visit(first, count) for the runs of each stride-th run of the block, without what earlier
-  // samples had.
-  template <typename Visitor>
-  void ForEachRun(size_t stride, Visitor&& visit) const {
+  // Where the runs of a sample begin: each stride-th of the block, without those of earlier
+  // samples.
+  std::vector<size_t> RunsOf(size_t stride) const {
+    std::vector<size_t> runs;
     for (size_t first = 0; first < points_.size(); first += kRun * stride) {
-      if (stride_before_ > 0 && first / kRun % stride_before_ == 0) continue;
-      visit(first, std::min(kRun, points_.size() - first));
+      if (stride_before_ == 0 || first / kRun % stride_before_ != 0) runs.push_back(first);
     }
+    return runs;
   }
+  size_t RunSize(size_t first) const { return std::min(kRun, points_.size() - first); }
 
   // A power of kSampleRatio, or 1 for all points at once.
   size_t FirstStride() const {
@@ -243,45 +248,85 @@ class BlockInsertion {
   std::vector<Vector> Sample(size_t stride) const {
     std::vector<Vector> sample;
     sample.reserve(points_.size() / stride + kRun);
-    ForEachRun(stride, [&](size_t first, size_t count) {
-      for (size_t i = first; i < first + count; ++i) {
+    for (const size_t first : RunsOf(stride)) {
+      for (size_t i = first; i < first + RunSize(first); ++i) {
         if (!IsDone(i)) sample.push_back(points_[i]);
       }
-    });
+    }
     return sample;
   }
 
-  void TakeByDirection(size_t stride, ConflictLists& lists) {
-    surface_.MeasureBefore(vertices_, points_.size() / stride);
-    const DirectionMap& directions = *surface_.directions();
-    std::vector<Vector> survivors;
-    std::vector<uint32_t> of_run;
-    size_t asked = 0;
-    ForEachRun(stride, [&](size_t first, size_t count) {
-      of_run.clear();
-      directions.AppendSurvivors(points_.subspan(first, count), of_run);
-      // Gathered while they are in the cache.
-      for (const uint32_t i : of_run) {
-        if (!IsDone(first + i)) survivors.push_back(points_[first + i]);
-      }
-      asked += count;
-    });
-    surface_.CountRejected(asked, asked - survivors.size());
+  // What a part of a sample comes to that the surface does not change under.
+  struct Part {
+    // Points that see a triangle, and these.
     std::vector<Vector> outside;
     std::vector<TriangleId> seen;
-    for (const Vector& p : survivors) {
-      const std::optional<Surface::Location> location =
-          surface_.Locate(vertices_, p, directions.hint(directions.PlaceOf(p).cell));
-      if (!location) {
-        astray_.push_back(p);
-      } else if (location->side == Surface::Side::kInside) {
-        surface_.CountIfDuplicate(vertices_, location->triangle, p);
-      } else {
-        outside.push_back(p);
-        seen.push_back(location->triangle);
-      }
+    std::vector<VertexId> duplicates;
+    std::vector<Vector> astray;
+    size_t asked = 0;
+    size_t rejected = 0;
+  };
+
+  // The runs are dealt out to threads in order, so that the result is the same on any number.
+  void TakeByDirection(size_t stride, ConflictLists& lists) {
+    surface_.MeasureBefore(vertices_, points_.size() / stride);
+    const std::vector<size_t> runs = RunsOf(stride);
+    const size_t part_count = runs.size() < kWorthThreads ? 1 : static_cast<size_t>(threads_);
+    std::vector<Part> parts(part_count);
+#pragma omp parallel for num_threads(part_count) schedule(static, 1) if (part_count > 1)
+    for (size_t k = 0; k < parts.size(); ++k) {
+      const size_t first = runs.size() * k / parts.size();
+      const size_t end = runs.size() * (k + 1) / parts.size();
+      parts[k] = Locate(std::span(runs).subspan(first, end - first));
     }
-    lists.Take(outside, seen);
+    for (size_t k = 1; k < parts.size(); ++k) {
+      Append(parts[k].outside, parts[0].outside);
+      Append(parts[k].seen, parts[0].seen);
+    }
+    for (const Part& part : parts) {
+      for (const VertexId v : part.duplicates) vertices_.CountDuplicate(v);
+      Append(part.astray, astray_);
+      surface_.CountRejected(part.asked, part.rejected);
+    }
+    lists.Take(parts[0].outside, parts[0].seen);
+  }
+
+  template <typename T>
+  static void Append(const std::vector<T>& what, std::vector<T>& to) {
+    to.insert(to.end(), what.begin(), what.end());
+  }
+
+  Part Locate(std::span<const size_t> runs) const {
+    const DirectionMap& directions = *surface_.directions();
+    Part part;
+    std::vector<Vector> survivors;
+    std::vector<uint32_t> of_run;
+    for (const size_t first : runs) {
+      const std::span<const Vector> run = points_.subspan(first, RunSize(first));
+      of_run.clear();
+      directions.AppendSurvivors(run, of_run);
+      // Gathered while they are in the cache.
+      for (const uint32_t i : of_run) {
+        if (!IsDone(first + i)) survivors.push_back(run[i]);
+      }
+      part.asked += run.size();
+    }
+    part.rejected = part.asked - survivors.size();
+    for (const Vector& p : survivors) LocateSurvivor(directions, p, part);
+    return part;
+  }
+
+  void LocateSurvivor(const DirectionMap& directions, const Vector& p, Part& part) const {
+    const std::optional<Surface::Location> location =
+        surface_.Locate(vertices_, p, directions.hint(directions.PlaceOf(p).cell));
+    if (!location) {
+      part.astray.push_back(p);
+    } else if (location->side == Surface::Side::kOutside) {
+      part.outside.push_back(p);
+      part.seen.push_back(location->triangle);
+    } else if (const auto corner = surface_.CornerAt(vertices_, location->triangle, p)) {
+      part.duplicates.push_back(*corner);
+    }
   }
 
   // Inserts in rounds what conflict lists gave up and what no sample up to this stride had; all,
@@ -302,6 +347,7 @@ class BlockInsertion {
   std::span<const Vector> points_;
   // Indices of points that are not to be inserted, few.
   std::vector<uint32_t> done_;
+  int threads_;
   const std::function<bool()>& should_stop_;
   // The stride of the sample before; 0 when there is none.
   size_t stride_before_ = 0;
@@ -336,8 +382,9 @@ void InsertionRounds::AppendRound(int round, std::vector<uint32_t>& members) con
 }
 
 bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
-                 std::span<const uint32_t> done, const std::function<bool()>& should_stop) {
-  return BlockInsertion(surface, vertices, points, done, should_stop).Run();
+                 std::span<const uint32_t> done, int threads,
+                 const std::function<bool()>& should_stop) {
+  return BlockInsertion(surface, vertices, points, done, threads, should_stop).Run();
 }
 
 }  // namespace hulld

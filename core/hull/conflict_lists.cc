@@ -182,7 +182,10 @@ void ConflictLists::Scatter() {
 int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const TriangleId> targets) {
   for (size_t k = 0; k < targets.size(); ++k) {
     if (IsCertainlyBelow(planes_[k], point)) continue;
-    if (surface_.CountIfDuplicate(vertices_, targets[k], point)) return kBelowAll;
+    if (const auto corner = surface_.CornerAt(vertices_, targets[k], point)) {
+      vertices_.CountDuplicate(*corner);
+      return kBelowAll;
+    }
     if (surface_.IsSeenFrom(vertices_, targets[k], point)) return static_cast<int64_t>(k);
   }
   return kBelowAll;

@@ -41,6 +41,7 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
   for (size_t i = 0; i < n; ++i) SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
   alive_ = triangles_.size();
   LinkAll();
+  while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   Update(vertices);
 }
 
@@ -56,12 +57,17 @@ void Surface::Insert(VertexTable& vertices, const Vector& point) {
       return;
     }
     cell = place.cell;
-    location = Walk(vertices, point, size, Alive(directions_->hint(cell)));
+    location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
   }
-  if (!location) location = Scan(vertices, point, size);
+  if (!location) {
+    location = Scan(vertices, point, size);
+    work_ += triangles_.size();
+  }
   last_ = location->triangle;
   if (location->side == Side::kInside) {
-    CountIfDuplicate(vertices, location->triangle, point);
+    // A point equal to a vertex lies in the cones of that vertex's triangles alone.
+    const std::optional<VertexId> corner = CornerAt(vertices, location->triangle, point);
+    if (corner) vertices.CountDuplicate(*corner);
   } else {
     RemoveVisible(vertices, point, location->triangle);
     JoinToBoundary(vertices, point);
@@ -80,13 +86,28 @@ std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const 
 
 std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
   JoinHorizon(vertices, vertices.Add(point));
+  // Here rather than when they are needed, so that no insertion does it for many.
+  while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   if (directions_) {
     extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
   }
   return std::span(region_).first(horizon_.size());
 }
 
+size_t Surface::MemoryBytes() const {
+  size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + vertex_mark_.MemoryBytes();
+  if (directions_) bytes += directions_->MemoryBytes();
+  if (measuring_) {
+    bytes += measuring_->map.MemoryBytes() + measuring_->reach.capacity() * sizeof(double) +
+             measuring_->hint.capacity() * sizeof(TriangleId);
+  }
+  return bytes + region_.capacity() * sizeof(TriangleId) +
+         horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit);
+}
+
 void Surface::FinishInsertions(const VertexTable& vertices) {
+  // A map that was made fine for a large block takes more memory than it saves time from here on.
+  if (directions_ && directions_->cell_count() > 4 * alive_) directions_->Coarsen();
   if (alive_ >= next_update_) Update(vertices);
 }
 
@@ -156,12 +177,14 @@ int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
 // with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
 // walk is longer than the surface warrants.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
-                                               double size, TriangleId start) const {
+                                               double size, TriangleId start,
+                                               uint64_t& steps) const {
   TriangleId at = start;
   uint32_t random = 1;
   TriangleId from = kDead;
   const size_t longest = 4 * alive_ + 64;
-  for (size_t steps = 0; steps < longest; ++steps) {
+  for (size_t step = 0; step < longest; ++step) {
+    ++steps;
     if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
     random = random * 1664525u + 1013904223u;
     const uint32_t first = (random >> 16) % 3;
@@ -197,15 +220,12 @@ Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point
   return location;
 }
 
-// A point equal to a vertex lies in the cones of that vertex's triangles alone.
-bool Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const {
+std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleId id,
+                                          const Vector& point) const {
   for (const VertexId v : triangles_[id].corners) {
-    if (vertices[v] == point) {
-      vertices.CountDuplicate(v);
-      return true;
-    }
+    if (vertices[v] == point) return v;
   }
-  return false;
+  return std::nullopt;
 }
 
 // Looks for an interior point while none is known, and starts to measure the surface for its
@@ -222,9 +242,10 @@ void Surface::Update(const VertexTable& vertices) {
 // Puts the center strictly inside and forgets what was measured; does nothing where no double is
 // inside.
 void Surface::SetCenter(const VertexTable& vertices) {
+  work_ += 2 * triangles_.size();
   const std::optional<Vector> interior = FindInterior(vertices);
   if (!interior) return;
-  directions_.emplace(*interior, 1);
+  directions_.emplace(*interior);
   extent_ = 0;
   ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
     for (const VertexId v : t.corners) {
@@ -256,11 +277,11 @@ void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
   if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
   // A tenth as many walks as points, at most.
   const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
-  const int wanted = std::min(affordable, 4 * ResolutionFor(alive_, true));
+  const int wanted = std::min(affordable, 4 * ResolutionFor(alive_, true)) & ~1;
   if (wanted < 4) return;
   if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
     StartMeasuring(vertices, wanted);
-    ContinueMeasuring(vertices, measuring_->reach.size());
+    ContinueMeasuring(vertices, SIZE_MAX);
   }
 }
 
@@ -271,32 +292,45 @@ void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
   asked_ = 0;
   rejected_ = 0;
   const size_t row = static_cast<size_t>(resolution) + 1;
+  work_ += row;
   measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
-                           std::vector<double>(6 * row * row), 0, Alive(last_)};
+                           std::vector<double>(row), std::vector<TriangleId>(row, Alive(last_))};
 }
 
 void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
-  Measurement& m = *measuring_;
-  const int resolution = m.map.resolution();
-  const auto row = static_cast<size_t>(resolution) + 1;
-  const size_t end = std::min(m.done + corners, m.reach.size());
-  m.near = Alive(m.near);
-  for (; m.done < end; ++m.done) {
-    const int face = static_cast<int>(m.done / (row * row));
-    const int i = static_cast<int>(m.done / row % row);
-    const int k = static_cast<int>(m.done % row);
-    // Back and forth, so that each walk starts next to where the last one ended.
-    const int j = i % 2 == 0 ? k : resolution - k;
-    const auto corner = static_cast<size_t>((face * (resolution + 1) + i) * (resolution + 1) + j);
-    m.reach[corner] = Reach(vertices, m.map.CornerDirection(face, i, j), m.near);
-    if (i < resolution && j < resolution) {
-      m.map.SetHint(static_cast<size_t>((face * resolution + i) * resolution + j), m.near);
-    }
-  }
-  if (end < m.reach.size()) return;
-  m.map.SetRadii(m.reach);
-  directions_ = std::move(m.map);
+  for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
+  if (measuring_->face < 6) return;
+  measuring_->map.Finish(measuring_->least, measuring_->largest);
+  directions_ = std::move(measuring_->map);
   measuring_.reset();
+}
+
+// Measures one corner, and makes the cell whose last corner it is.
+void Surface::MeasureCorner(const VertexTable& vertices) {
+  Measurement& m = *measuring_;
+  const auto j = static_cast<size_t>(m.j);
+  const double reach_above = m.reach[j];
+  const TriangleId hint_above = m.hint[j];
+  // From the corner to the left, or from the one above.
+  TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
+  const double reach = Reach(vertices, m.map.CornerDirection(m.face, m.i, m.j), near);
+  m.reach[j] = reach;
+  m.hint[j] = near;
+  m.least = std::min(m.least, reach);
+  m.largest = std::max(m.largest, reach);
+  if (m.i > 0 && m.j > 0) {
+    m.map.AppendCell(
+        std::min(std::min(m.reach_before, reach_above), std::min(m.reach[j - 1], reach)),
+        m.hint_before);
+  }
+  m.reach_before = reach_above;
+  m.hint_before = hint_above;
+  ++work_;
+  if (++m.j <= m.map.resolution()) return;
+  m.j = 0;
+  if (++m.i <= m.map.resolution()) return;
+  m.i = 0;
+  ++m.face;
 }
 
 // A distance m, near the largest, such that the double nearest to center + m * direction is inside;
@@ -314,7 +348,8 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
     if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
     m *= 1 - std::ldexp(0x1p-30, round / 2);
     const Vector point = center + m * direction;
-    const std::optional<Location> location = Walk(vertices, point, SizeWith(vertices, point), near);
+    const std::optional<Location> location =
+        Walk(vertices, point, SizeWith(vertices, point), near, work_);
     if (!location) return 0;
     near = location->triangle;
     if (location->side == Side::kInside) return m;
@@ -329,7 +364,7 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
                             double size) {
   if (++mark_ == 0) {
     for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
-    std::fill(vertex_mark_.begin(), vertex_mark_.end(), 0);
+    for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_[id] = 0;
     mark_ = 1;
   }
   region_.assign(1, first);
@@ -365,7 +400,6 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
 void Surface::RemoveVertices(VertexTable& vertices) {
   if (region_.size() + 2 == horizon_.size()) return;
-  vertex_mark_.resize(vertices.id_bound(), 0);
   for (const HorizonEdge& edge : horizon_) vertex_mark_[edge.tail] = mark_;
   for (const TriangleId id : region_) {
     for (const VertexId v : triangles_[id].corners) {

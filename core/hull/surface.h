@@ -2,6 +2,7 @@
 #define HULLD_CORE_HULL_SURFACE_H_
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -66,7 +67,8 @@ class Surface {
   // interior point is known; empty when the walk is longer than the surface warrants.
   std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
                                  TriangleId start) const {
-    return Walk(vertices, point, SizeWith(vertices, point), Alive(start));
+    uint64_t steps = 0;
+    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), steps);
   }
   // True when the point lies strictly outside the triangle's plane, exactly.
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
@@ -79,8 +81,9 @@ class Surface {
   std::span<const TriangleId> RemoveVisible(VertexTable& vertices, const Vector& point,
                                             TriangleId seen);
   std::span<const TriangleId> JoinToBoundary(VertexTable& vertices, const Vector& point);
-  // Counts the point when it equals a corner of the triangle, and says so.
-  bool CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
+  // The corner of the triangle that the point equals.
+  std::optional<VertexId> CornerAt(const VertexTable& vertices, TriangleId id,
+                                   const Vector& point) const;
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
 
@@ -99,6 +102,12 @@ class Surface {
     asked_ += asked;
     rejected_ += rejected;
   }
+
+  // Steps of all walks and scans, corners measured, and cells made, since this surface began: the
+  // work of insertions beyond the triangles that they remove and create.
+  uint64_t work() const { return work_; }
+  // What it holds in memory. Cost: O(1).
+  size_t MemoryBytes() const;
 
   // Calls visit(id, triangle) for every triangle.
   template <typename Visitor>
@@ -132,11 +141,19 @@ class Surface {
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
   struct Measurement {
     DirectionMap map;
-    // By corner, face by face, i major.
+    // Of the corners of the last row up to the one to measure, and of the row before from there on:
+    // how far the surface is, and where the direction leaves it.
     std::vector<double> reach;
-    // How many corners are done, and where the last one's direction left the surface.
-    size_t done = 0;
-    TriangleId near;
+    std::vector<TriangleId> hint;
+    // Both of the corner that stood before in the last one's place.
+    double reach_before = 0;
+    TriangleId hint_before = 0;
+    // The corner to measure: its face, row and column.
+    int face = 0;
+    int i = 0;
+    int j = 0;
+    double least = INFINITY;
+    double largest = 0;
   };
 
   bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
@@ -161,7 +178,7 @@ class Surface {
   void LinkAll();
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
-                               TriangleId start) const;
+                               TriangleId start, uint64_t& steps) const;
   int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Update(const VertexTable& vertices);
@@ -170,6 +187,7 @@ class Surface {
   void SetCenter(const VertexTable& vertices);
   void StartMeasuring(const VertexTable& vertices, int resolution);
   void ContinueMeasuring(const VertexTable& vertices, size_t corners);
+  void MeasureCorner(const VertexTable& vertices);
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
@@ -181,8 +199,10 @@ class Surface {
   static constexpr VertexId kDead = UINT32_MAX;
 
   ChunkedVector<SurfaceTriangle> triangles_;
-  std::vector<TriangleId> free_;
+  ChunkedVector<TriangleId> free_;
   size_t alive_ = 0;
+  // By vertex: the last insertion whose region it was in.
+  ChunkedVector<uint32_t> vertex_mark_;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.
   std::optional<DirectionMap> directions_;
@@ -198,12 +218,12 @@ class Surface {
   // The count of triangles when it was last measured.
   size_t measured_at_ = 0;
   TriangleId last_ = 0;
+  uint64_t work_ = 0;
 
   // Scratch of one insertion.
   std::vector<TriangleId> region_;
   std::vector<HorizonEdge> horizon_;
   std::vector<Visit> visits_;
-  std::vector<uint32_t> vertex_mark_;
   uint32_t mark_ = 0;
 };
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <vector>
 
 #include "core/hull/chunked_vector.h"
 #include "core/hull/hull.h"
@@ -67,6 +66,9 @@ class VertexTable {
   size_t size() const { return points_.size() - free_.size(); }
   // IDs lie below this.
   size_t id_bound() const { return points_.size(); }
+  size_t MemoryBytes() const {
+    return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes();
+  }
   // Largest absolute coordinate of all vertices that ever lived.
   double max_abs_coordinate() const { return max_abs_coordinate_; }
 
@@ -80,7 +82,7 @@ class VertexTable {
 
   ChunkedVector<Vector> points_;
   ChunkedVector<Counts> counts_;
-  std::vector<VertexId> free_;
+  ChunkedVector<VertexId> free_;
   double max_abs_coordinate_ = 0;
   uint64_t block_ = 0;
   uint64_t outside_ = 0;
