@@ -54,15 +54,18 @@ class DirectionMap {
     const double x = std::abs(v.x());
     const double y = std::abs(v.y());
     const double z = std::abs(v.z());
-    const int axis = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
-    const double m = axis == 0 ? x : axis == 1 ? y : z;
+    // No branches that depend on the direction.
+    const double larger = std::max(x, y);
+    const double m = std::max(larger, z);
+    const int of_two = y > x ? 1 : 0;
+    const int axis = z > larger ? 2 : of_two;
     if (m == 0) return {0, 0};
     if (!(m >= kLeastDistance && m <= kLargestDistance)) return {0, INFINITY};
     const double half = 0.5 * resolution;
     const double scale = half / m;
     const int i = std::min(resolution - 1, static_cast<int>(v[kNext[axis]] * scale + half));
     const int j = std::min(resolution - 1, static_cast<int>(v[kNext[axis + 1]] * scale + half));
-    const int face = 2 * axis + (v[axis] < 0 ? 1 : 0);
+    const int face = 2 * axis + static_cast<int>(v[axis] < 0);
     return {static_cast<size_t>((face * resolution + i) * resolution + j), m};
   }
   bool IsCertainlyInside(const Place& place) const {

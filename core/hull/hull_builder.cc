@@ -99,6 +99,7 @@ class HullBuilder::State {
  public:
   void BeginBlock() { vertices_.BeginBlock(); }
   void Insert(const Vector& point) {
+    if (surface_) return surface_->Insert(vertices_, point);
     switch (dimension()) {
       case -1:
         return GrowToPoint(point);
@@ -106,21 +107,23 @@ class HullBuilder::State {
         return GrowToSegment(point);
       case 1:
         return InsertIntoSegment(point);
-      case 2:
-        return InsertIntoPolygon(point);
       default:
-        return surface_->Insert(vertices_, point);
+        return InsertIntoPolygon(point);
     }
   }
 
   // Inserts all points; false when should_stop, which may be empty, said so.
   bool InsertAll(std::span<const Vector> points, int threads,
                  const std::function<bool()>& should_stop) {
+    if (points.size() < kWorthOrdering) {
+      for (const Vector& point : points) Insert(point);
+      return true;
+    }
     std::vector<uint32_t> done;
-    if (dimension() < 0 && points.size() >= kWorthOrdering) done = AxisExtremes(points);
+    if (dimension() < 0) done = AxisExtremes(points);
     for (const uint32_t i : done) Insert(points[i]);
     for (size_t i = 0; i < points.size(); ++i) {
-      if (surface_ && points.size() - i >= kWorthOrdering) {
+      if (surface_) {
         std::erase_if(done, [i](uint32_t index) { return index < i; });
         for (uint32_t& index : done) index -= static_cast<uint32_t>(i);
         return InsertBlock(*surface_, vertices_, points.subspan(i), done, threads, should_stop);
@@ -220,7 +223,8 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
   if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
 
   state_->BeginBlock();
-  if (!state_->InsertAll(points, limits.threads, may_stop ? limits.should_stop : nullptr)) {
+  static const std::function<bool()> kNeverStop;
+  if (!state_->InsertAll(points, limits.threads, may_stop ? limits.should_stop : kNeverStop)) {
     state_ = std::move(before);
     return absl::CancelledError("stopped while adding points; the hull is as before");
   }

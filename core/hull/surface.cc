@@ -24,7 +24,7 @@ constexpr size_t kCornersPerInsertion = 8;
 // Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
 // many points than where it only tells where to start walking.
 int ResolutionFor(size_t triangles, bool rejects) {
-  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 12 : 96));
+  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 6 : 96));
   return std::clamp(static_cast<int>(cells_a_side), 2, 256);
 }
 
@@ -45,18 +45,10 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
   Update(vertices);
 }
 
-void Surface::Insert(VertexTable& vertices, const Vector& point) {
+void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell) {
   const double size = SizeWith(vertices, point);
   std::optional<Location> location;
-  size_t cell = 0;
   if (directions_) {
-    const DirectionMap::Place place = directions_->PlaceOf(point);
-    ++asked_;
-    if (directions_->IsCertainlyInside(place)) {
-      ++rejected_;
-      return;
-    }
-    cell = place.cell;
     location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
   }
   if (!location) {
@@ -277,7 +269,7 @@ void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
   if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
   // A tenth as many walks as points, at most.
   const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
-  const int wanted = std::min(affordable, 4 * ResolutionFor(alive_, true)) & ~1;
+  const int wanted = std::min(affordable, 3 * ResolutionFor(alive_, true)) & ~1;
   if (wanted < 4) return;
   if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
     StartMeasuring(vertices, wanted);

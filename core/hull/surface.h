@@ -54,7 +54,19 @@ class Surface {
 
   // Adds a point. Cost: the triangles removed and created, and a walk of a few exact signs; a scan
   // of all triangles where no double lies strictly inside the polytope.
-  void Insert(VertexTable& vertices, const Vector& point);
+  void Insert(VertexTable& vertices, const Vector& point) {
+    size_t cell = 0;
+    if (directions_) {
+      const DirectionMap::Place place = directions_->PlaceOf(point);
+      ++asked_;
+      if (directions_->IsCertainlyInside(place)) {
+        ++rejected_;
+        return;
+      }
+      cell = place.cell;
+    }
+    InsertSurvivor(vertices, point, cell);
+  }
 
   // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
   // (inside).
@@ -193,6 +205,7 @@ class Surface {
 
   void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
                      double size);
+  void InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell);
   void RemoveVertices(VertexTable& vertices);
   void JoinHorizon(const VertexTable& vertices, VertexId apex);
 
