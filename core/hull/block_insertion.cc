@@ -10,6 +10,8 @@
 namespace hulld {
 namespace {
 
+// From so many points and triangles on, zones for threads are worth making.
+constexpr size_t kWorthZones = 1024;
 // Points of the first round, about.
 constexpr size_t kFirstRound = 64;
 // Insertions between two polls of should_stop.
@@ -89,10 +91,11 @@ SortKey KeyOf(const DirectionMap& directions, const Vector& point, uint32_t inde
 class RoundsInsertion {
  public:
   RoundsInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
-                  const std::function<bool()>& should_stop)
+                  int threads, const std::function<bool()>& should_stop)
       : surface_(surface),
         vertices_(vertices),
         points_(points),
+        threads_(threads),
         should_stop_(should_stop),
         rounds_(points.size()) {}
 
@@ -143,6 +146,13 @@ class RoundsInsertion {
   }
 
   bool InsertChosen() {
+    if (threads_ > 1 && surface_.directions() != nullptr && chosen_.size() >= kWorthZones &&
+        surface_.triangle_count() >= kWorthZones) {
+      std::optional<std::vector<Vector>> put_off =
+          surface_.InsertInZones(vertices_, chosen_, threads_ < 4 ? 2 : 4, should_stop_);
+      if (!put_off) return false;
+      chosen_ = std::move(*put_off);
+    }
     for (size_t k = 0; k < chosen_.size(); ++k) {
       if (k % kPointsPerPoll == 0 && should_stop_ && should_stop_()) return false;
       surface_.Insert(vertices_, chosen_[k]);
@@ -153,6 +163,7 @@ class RoundsInsertion {
   Surface& surface_;
   VertexTable& vertices_;
   std::span<const Vector> points_;
+  int threads_;
   const std::function<bool()>& should_stop_;
   InsertionRounds rounds_;
   std::vector<uint32_t> members_;
@@ -339,7 +350,7 @@ class BlockInsertion {
         if (!IsDone(i)) rest_.push_back(points_[i]);
       }
     }
-    return RoundsInsertion(surface_, vertices_, rest_, should_stop_).Run();
+    return RoundsInsertion(surface_, vertices_, rest_, threads_, should_stop_).Run();
   }
 
   Surface& surface_;

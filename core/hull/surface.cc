@@ -37,8 +37,10 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
     std::reverse(loop.begin(), loop.end());
   }
   const size_t n = loop.size();
-  for (size_t i = 1; i + 1 < n; ++i) SetTriangle(vertices, NewId(), loop[0], loop[i], loop[i + 1]);
-  for (size_t i = 0; i < n; ++i) SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
+  for (size_t i = 1; i + 1 < n; ++i)
+    SetTriangle(vertices, NewId(editor_), loop[0], loop[i], loop[i + 1]);
+  for (size_t i = 0; i < n; ++i)
+    SetTriangle(vertices, NewId(editor_), loop[(i + 1) % n], loop[i], apex);
   alive_ = triangles_.size();
   LinkAll();
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
@@ -49,13 +51,13 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
   const double size = SizeWith(vertices, point);
   std::optional<Location> location;
   if (directions_) {
-    location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
+    location = Walk(vertices, point, size, Alive(directions_->hint(cell)), 0, work_);
   }
   if (!location) {
     location = Scan(vertices, point, size);
     work_ += triangles_.size();
   }
-  last_ = location->triangle;
+  editor_.last = location->triangle;
   if (location->side == Side::kInside) {
     // A point equal to a vertex lies in the cones of that vertex's triangles alone.
     const std::optional<VertexId> corner = CornerAt(vertices, location->triangle, point);
@@ -64,26 +66,26 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
     RemoveVisible(vertices, point, location->triangle);
     JoinToBoundary(vertices, point);
   }
-  if (directions_) directions_->SetHint(cell, last_);
+  if (directions_) directions_->SetHint(cell, editor_.last);
   if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
   if (alive_ >= next_update_) Update(vertices);
 }
 
 std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const Vector& point,
                                                    TriangleId seen) {
-  CollectRegion(vertices, seen, point, SizeWith(vertices, point));
-  RemoveVertices(vertices);
-  return region_;
+  CollectRegion(vertices, seen, point, SizeWith(vertices, point), editor_);
+  RemoveVertices(vertices, editor_);
+  return editor_.region;
 }
 
 std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
-  JoinHorizon(vertices, vertices.Add(point));
+  JoinHorizon(vertices, vertices.Add(point), editor_);
   // Here rather than when they are needed, so that no insertion does it for many.
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   if (directions_) {
     extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
   }
-  return std::span(region_).first(horizon_.size());
+  return std::span(editor_.region).first(editor_.horizon.size());
 }
 
 size_t Surface::MemoryBytes() const {
@@ -93,8 +95,9 @@ size_t Surface::MemoryBytes() const {
     bytes += measuring_->map.MemoryBytes() + measuring_->reach.capacity() * sizeof(double) +
              measuring_->hint.capacity() * sizeof(TriangleId);
   }
-  return bytes + region_.capacity() * sizeof(TriangleId) +
-         horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit);
+  return bytes + editor_.region.capacity() * sizeof(TriangleId) +
+         editor_.horizon.capacity() * sizeof(HorizonEdge) +
+         editor_.visits.capacity() * sizeof(Visit);
 }
 
 void Surface::FinishInsertions(const VertexTable& vertices) {
@@ -128,11 +131,25 @@ void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a
   t.mark = 0;
 }
 
-TriangleId Surface::NewId() {
+TriangleId Surface::NewId(Editor& editor) {
+  if (editor.zone != 0) {
+    if (editor.free.empty()) return editor.next++;
+    const TriangleId id = editor.free.back();
+    editor.free.pop_back();
+    return id;
+  }
   if (free_.empty()) return static_cast<TriangleId>(triangles_.Extend());
   const TriangleId id = free_.back();
   free_.pop_back();
   return id;
+}
+
+void Surface::FreeId(Editor& editor, TriangleId id) {
+  if (editor.zone != 0) {
+    editor.free.push_back(id);
+  } else {
+    free_.push_back(id);
+  }
 }
 
 // Links neighbours by their common edges, for a surface whose triangles are all new.
@@ -167,9 +184,9 @@ int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
 
 // Crosses any edge whose plane through the interior point has the point on its far side, starting
 // with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
-// walk is longer than the surface warrants.
+// walk is longer than the surface warrants, or leaves the zone, where one is given.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
-                                               double size, TriangleId start,
+                                               double size, TriangleId start, uint32_t zone,
                                                uint64_t& steps) const {
   TriangleId at = start;
   uint32_t random = 1;
@@ -177,6 +194,7 @@ std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, cons
   const size_t longest = 4 * alive_ + 64;
   for (size_t step = 0; step < longest; ++step) {
     ++steps;
+    if (zone != 0 && (triangles_[at].mark & kZoneMask) != zone) return std::nullopt;
     if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
     random = random * 1664525u + 1013904223u;
     const uint32_t first = (random >> 16) % 3;
@@ -197,7 +215,7 @@ std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, cons
 
 Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point,
                                 double size) const {
-  Location location{Side::kInside, Alive(last_)};
+  Location location{Side::kInside, Alive(editor_.last)};
   for (TriangleId id = 0; id < triangles_.size(); ++id) {
     if (!IsAlive(id)) continue;
     const int side = SideOf(vertices, id, point, size);
@@ -285,8 +303,9 @@ void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
   rejected_ = 0;
   const size_t row = static_cast<size_t>(resolution) + 1;
   work_ += row;
-  measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
-                           std::vector<double>(row), std::vector<TriangleId>(row, Alive(last_))};
+  measuring_ =
+      Measurement{DirectionMap(directions_->center(), resolution), std::vector<double>(row),
+                  std::vector<TriangleId>(row, Alive(editor_.last))};
 }
 
 void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
@@ -341,7 +360,7 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
     m *= 1 - std::ldexp(0x1p-30, round / 2);
     const Vector point = center + m * direction;
     const std::optional<Location> location =
-        Walk(vertices, point, SizeWith(vertices, point), near, work_);
+        Walk(vertices, point, SizeWith(vertices, point), near, 0, work_);
     if (!location) return 0;
     near = location->triangle;
     if (location->side == Side::kInside) return m;
@@ -349,24 +368,27 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
   return 0;
 }
 
-// Fills region_ with the connected triangles that the point sees or whose planes hold it, and
-// horizon_ with their boundary, in order round it: depth first, the edges of each triangle
-// counter-clockwise from the one it was entered by.
-void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                            double size) {
-  if (++mark_ == 0) {
-    for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
-    for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_[id] = 0;
-    mark_ = 1;
-  }
-  region_.assign(1, first);
-  horizon_.clear();
-  triangles_[first].mark = mark_;
-  visits_.assign(1, {first, 0, 3});
-  while (!visits_.empty()) {
-    Visit& visit = visits_.back();
+void Surface::ResetMarks() {
+  for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
+  for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_[id] = 0;
+  editor_.mark = 0;
+}
+
+// Fills the editor's region with the connected triangles that the point sees or whose planes hold
+// it, and the horizon with their boundary, in order round it: depth first, the edges of each
+// triangle counter-clockwise from the one it was entered by. False when that leaves the zone.
+bool Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                            double size, Editor& editor) {
+  if (editor.mark > UINT32_MAX - 2 * (kZoneMask + 1)) ResetMarks();
+  const uint32_t mark = editor.mark += kZoneMask + 1;
+  editor.region.assign(1, first);
+  editor.horizon.clear();
+  triangles_[first].mark = mark;
+  editor.visits.assign(1, {first, 0, 3});
+  while (!editor.visits.empty()) {
+    Visit& visit = editor.visits.back();
     if (visit.left == 0) {
-      visits_.pop_back();
+      editor.visits.pop_back();
       continue;
     }
     const SurfaceTriangle& t = triangles_[visit.triangle];
@@ -376,52 +398,61 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
     --visit.left;
     const TriangleId next = t.neighbours[i];
     SurfaceTriangle& other = triangles_[next];
-    if (other.mark == mark_) continue;
+    if (other.mark == mark) continue;
+    if (editor.zone != 0 && (other.mark & kZoneMask) != editor.zone) return false;
     const uint32_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
     if (SideOf(vertices, next, point, size) >= 0) {
-      other.mark = mark_;
-      region_.push_back(next);
-      visits_.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
+      other.mark = mark;
+      editor.region.push_back(next);
+      editor.visits.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
     } else {
-      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
+      editor.horizon.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
     }
   }
+  return true;
 }
 
-// Removes the vertices that only triangles of region_ have: those not on the horizon. By Euler's
+// Removes the vertices that only triangles of the region have: those not on the horizon. By Euler's
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
-void Surface::RemoveVertices(VertexTable& vertices) {
-  if (region_.size() + 2 == horizon_.size()) return;
-  for (const HorizonEdge& edge : horizon_) vertex_mark_[edge.tail] = mark_;
-  for (const TriangleId id : region_) {
+void Surface::RemoveVertices(VertexTable& vertices, Editor& editor) {
+  if (editor.region.size() + 2 == editor.horizon.size()) return;
+  for (const HorizonEdge& edge : editor.horizon) vertex_mark_[edge.tail] = editor.mark;
+  for (const TriangleId id : editor.region) {
     for (const VertexId v : triangles_[id].corners) {
-      if (vertex_mark_[v] == mark_) continue;
-      vertex_mark_[v] = mark_;
-      vertices.Remove(v);
+      if (vertex_mark_[v] == editor.mark) continue;
+      vertex_mark_[v] = editor.mark;
+      if (editor.zone != 0) {
+        vertices.Remove(v, editor.vertices);
+      } else {
+        vertices.Remove(v);
+      }
     }
   }
 }
 
 // Joins the apex to the horizon; the new triangles take the places of the region's first.
-void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
-  const size_t old_count = region_.size();
-  const size_t new_count = horizon_.size();
-  while (region_.size() < new_count) region_.push_back(NewId());
+void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor) {
+  std::vector<TriangleId>& region = editor.region;
+  const size_t old_count = region.size();
+  const size_t new_count = editor.horizon.size();
+  while (region.size() < new_count) region.push_back(NewId(editor));
   for (size_t k = 0; k < new_count; ++k) {
-    const HorizonEdge& edge = horizon_[k];
-    const TriangleId id = region_[k];
+    const HorizonEdge& edge = editor.horizon[k];
+    const TriangleId id = region[k];
     SetTriangle(vertices, id, edge.tail, edge.head, apex);
-    triangles_[id].neighbours = {edge.beyond, region_[k + 1 == new_count ? 0 : k + 1],
-                                 region_[k == 0 ? new_count - 1 : k - 1]};
+    triangles_[id].mark = editor.zone;
+    triangles_[id].neighbours = {edge.beyond, region[k + 1 == new_count ? 0 : k + 1],
+                                 region[k == 0 ? new_count - 1 : k - 1]};
     triangles_[edge.beyond].neighbours[edge.edge_beyond] = id;
   }
   for (size_t k = new_count; k < old_count; ++k) {
-    triangles_[region_[k]].corners[0] = kDead;
-    triangles_[region_[k]].neighbours[0] = region_[0];
-    free_.push_back(region_[k]);
+    triangles_[region[k]].corners[0] = kDead;
+    triangles_[region[k]].neighbours[0] = region[0];
+    FreeId(editor, region[k]);
   }
-  alive_ = alive_ - old_count + new_count;
-  last_ = region_[0];
+  if (editor.zone == 0) alive_ = alive_ - old_count + new_count;
+  editor.alive += static_cast<int64_t>(new_count) - static_cast<int64_t>(old_count);
+  editor.last = region[0];
 }
 
 }  // namespace hulld

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -80,7 +81,7 @@ class Surface {
   std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
                                  TriangleId start) const {
     uint64_t steps = 0;
-    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), steps);
+    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), 0, steps);
   }
   // True when the point lies strictly outside the triangle's plane, exactly.
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
@@ -98,6 +99,14 @@ class Surface {
                                    const Vector& point) const;
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
+
+  // Adds points, in the order given, by threads that each have a zone of the surface: the triangles
+  // with all corners in one part of space. Returns those that would change anything else, few,
+  // which are not added. zones: 2 or 4. Requires that an interior point is known.
+  // Empty when should_stop, which may be empty, said so: then the surface is of no use any more.
+  std::optional<std::vector<Vector>> InsertInZones(VertexTable& vertices,
+                                                   std::span<const Vector> points, uint32_t zones,
+                                                   const std::function<bool()>& should_stop);
 
   // The map of directions, for choosing what to insert and in which order; null where no interior
   // point is known.
@@ -149,6 +158,25 @@ class Surface {
     uint8_t edge;
     uint8_t left;
   };
+  // What one insertion works with. Marks hold a count of insertions and, in the lowest bits, a
+  // zone.
+  struct Editor {
+    std::vector<TriangleId> region;
+    std::vector<HorizonEdge> horizon;
+    std::vector<Visit> visits;
+    uint32_t mark = 0;
+    // Where the last insertion was.
+    TriangleId last = 0;
+    // 0 for the whole surface. Otherwise only triangles marked with this zone may be changed, and
+    // new IDs come from `free`, then from `next` on, up to `end`.
+    uint32_t zone = 0;
+    std::vector<TriangleId> free;
+    TriangleId next = 0;
+    TriangleId end = 0;
+    int64_t alive = 0;
+    VertexTable::Zone vertices;
+    uint64_t work = 0;
+  };
   // A map of directions in the making. Its corners are measured some at a time, so that no
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
   struct Measurement {
@@ -171,7 +199,7 @@ class Surface {
   bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
   // A dead triangle's first neighbour is one that came in its place.
   TriangleId Alive(TriangleId id) const {
-    if (id >= triangles_.size()) return last_;
+    if (id >= triangles_.size()) return editor_.last;
     while (!IsAlive(id)) id = triangles_[id].neighbours[0];
     return id;
   }
@@ -186,11 +214,12 @@ class Surface {
   }
   int ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point) const;
   void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
-  TriangleId NewId();
+  TriangleId NewId(Editor& editor);
+  void FreeId(Editor& editor, TriangleId id);
   void LinkAll();
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
-                               TriangleId start, uint64_t& steps) const;
+                               TriangleId start, uint32_t zone, uint64_t& steps) const;
   int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Update(const VertexTable& vertices);
@@ -203,13 +232,19 @@ class Surface {
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
-  void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                     double size);
+  bool CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                     double size, Editor& editor);
   void InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell);
-  void RemoveVertices(VertexTable& vertices);
-  void JoinHorizon(const VertexTable& vertices, VertexId apex);
+  void RemoveVertices(VertexTable& vertices, Editor& editor);
+  void JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor);
+  void ResetMarks();
+
+  void MarkZones(const VertexTable& vertices, std::span<Editor> zones);
+  bool InsertInZone(VertexTable& vertices, const Vector& point, double size, Editor& zone);
+  void LeaveZones(VertexTable& vertices, std::span<Editor> zones);
 
   static constexpr VertexId kDead = UINT32_MAX;
+  static constexpr uint32_t kZoneMask = 7;
 
   ChunkedVector<SurfaceTriangle> triangles_;
   ChunkedVector<TriangleId> free_;
@@ -230,14 +265,9 @@ class Surface {
   size_t rejected_ = 0;
   // The count of triangles when it was last measured.
   size_t measured_at_ = 0;
-  TriangleId last_ = 0;
   uint64_t work_ = 0;
 
-  // Scratch of one insertion.
-  std::vector<TriangleId> region_;
-  std::vector<HorizonEdge> horizon_;
-  std::vector<Visit> visits_;
-  uint32_t mark_ = 0;
+  Editor editor_;
 };
 
 }  // namespace hulld

@@ -86,6 +86,28 @@ TEST(HullCost, ThreadsLeaveNoTrace) {
   }
 }
 
+TEST(HullCost, CancellationOnThreadsChangesNothing) {
+  const uint64_t seed = TestSeed(504);
+  Random random(seed);
+  const std::vector<Vector> first = RandomInBall(random, 500, 1);
+  const std::vector<Vector> block = RandomOnSphere(random, 30000, 2);
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(first).ok());
+  const Hull before = builder.Snapshot();
+  int cancelled = 0;
+  // The last of the polls are those of the threads.
+  for (const int allowed : {0, 10, 40, 60, 80}) {
+    int polls = 0;
+    AddLimits limits;
+    limits.threads = 2;
+    limits.should_stop = [&] { return ++polls > allowed; };
+    if (builder.Add(block, limits).ok()) break;
+    ++cancelled;
+    ASSERT_TRUE(SameBits(builder.Snapshot(), before)) << "after " << allowed << " polls";
+  }
+  EXPECT_GE(cancelled, 4);
+}
+
 // Inside points are not kept, and what is kept is small.
 TEST(HullCost, MemoryIsBoundedByTheVertices) {
   const uint64_t seed = TestSeed(503);
