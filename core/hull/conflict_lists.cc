@@ -9,10 +9,10 @@ namespace {
 // Insertions between two polls of should_stop.
 constexpr size_t kInsertionsPerPoll = 64;
 // Insertions after which it is clear whether most points are inside.
-constexpr size_t kTrialInsertions = 64;
-// Moves of a point, on average, from which on another order of insertion is better. Observed: below
-// 16 for clouds most of which is inside.
-constexpr size_t kMostMoves = 64;
+constexpr size_t kTrialInsertions = 24;
+// Moves of a point, on average, from which on another order of insertion is better. Observed: at
+// most 8 for clouds and meshes most of which is inside.
+constexpr size_t kMostMoves = 32;
 
 }  // namespace
 
@@ -81,7 +81,7 @@ ConflictLists::Outcome ConflictLists::InsertAll(const std::function<bool()>& sho
 // After some insertions, all of them far out, most of a cloud is inside or will never be.
 bool ConflictLists::IsMostlyOutside(size_t insertions) {
   if (insertions != kTrialInsertions || !is_trial_) return false;
-  return 4 * (waiting_ + insertions) > 3 * taken_;
+  return 8 * (waiting_ + insertions) > 7 * taken_;
 }
 
 std::vector<Vector> ConflictLists::TakeRest() {

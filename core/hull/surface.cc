@@ -21,6 +21,11 @@ constexpr size_t kWorthMeasuring = 64;
 // Corners of a map that one insertion measures: a map is done long before the surface has doubled.
 constexpr size_t kCornersPerInsertion = 8;
 
+// Simpler than Eigen's for three components, and as exact.
+double LargestComponent(const Vector& v) {
+  return std::max(std::abs(v.x()), std::max(std::abs(v.y()), std::abs(v.z())));
+}
+
 // Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
 // many points than where it only tells where to start walking.
 int ResolutionFor(size_t triangles, bool rejects) {
@@ -83,7 +88,7 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
   // Here rather than when they are needed, so that no insertion does it for many.
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   if (directions_) {
-    extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
+    extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
   }
   return std::span(editor_.region).first(editor_.horizon.size());
 }
@@ -107,7 +112,7 @@ void Surface::FinishInsertions(const VertexTable& vertices) {
 }
 
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
-  const double size = vertices.max_abs_coordinate() + point.cwiseAbs().maxCoeff();
+  const double size = vertices.max_abs_coordinate() + LargestComponent(point);
   return size <= kPlaneMaxCoordinate ? size : INFINITY;
 }
 
@@ -125,7 +130,7 @@ void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a
   t.corners = {a, b, c};
   t.normal = Cross(e, f);
   t.offset = t.normal.dot(vertices[a]);
-  const double slope = kPlaneErrorFactor * e.cwiseAbs().maxCoeff() * f.cwiseAbs().maxCoeff();
+  const double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
   const bool in_range = slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope;
   t.slope = in_range ? static_cast<float>(slope * (1 + 0x1p-20)) : INFINITY;
   t.mark = 0;
@@ -166,19 +171,21 @@ void Surface::LinkAll() {
   }
 }
 
+Surface::Ray Surface::RayTo(const Vector& point) const {
+  const Vector y = point - directions_->center();
+  const double d = std::max(extent_, LargestComponent(y));
+  const bool in_range = d >= kTripleProductMin && d <= kTripleProductMax;
+  return {y, in_range ? kTripleProductErrorFactor * d * d * d : INFINITY};
+}
+
 // Which side of the plane through the interior point and the edge a, b the point lies on: +1 on the
 // side of a triangle to the left of the edge.
-int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
-                    const Vector& point) const {
+int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
+                    const Ray& ray) const {
   const Vector& center = directions_->center();
-  const Vector y = point - center;
-  const double value = Dot(y, Cross(vertices[a] - center, vertices[b] - center));
-  const double d = std::max(extent_, y.cwiseAbs().maxCoeff());
-  if (d >= kTripleProductMin && d <= kTripleProductMax) {
-    const double bound = kTripleProductErrorFactor * d * d * d;
-    if (value > bound) return 1;
-    if (value < -bound) return -1;
-  }
+  const double value = Dot(ray.y, Cross(vertices[a] - center, vertices[b] - center));
+  if (value > ray.bound) return 1;
+  if (value < -ray.bound) return -1;
   return Orient3d(center, vertices[a], vertices[b], point);
 }
 
@@ -188,6 +195,7 @@ int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
                                                double size, TriangleId start, uint32_t zone,
                                                uint64_t& steps) const {
+  const Ray ray = RayTo(point);
   TriangleId at = start;
   uint32_t random = 1;
   TriangleId from = kDead;
@@ -204,7 +212,9 @@ std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, cons
       const uint32_t i = (first + k) % 3;
       // The edge just crossed has the point on this side, as the sign was exact.
       if (t.neighbours[i] == from) continue;
-      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point) < 0) next = t.neighbours[i];
+      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point, ray) < 0) {
+        next = t.neighbours[i];
+      }
     }
     if (next == kDead) return Location{Side::kInside, at};
     from = at;

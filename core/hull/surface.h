@@ -152,6 +152,12 @@ class Surface {
     TriangleId beyond;
     uint32_t edge_beyond;
   };
+  // What the steps of a walk share: the point from the center, and what a triple product of it and
+  // two vertices from the center errs by.
+  struct Ray {
+    Vector y;
+    double bound;
+  };
   // A triangle of the region under traversal, the edge to cross next, and how many are left.
   struct Visit {
     TriangleId triangle;
@@ -220,7 +226,9 @@ class Surface {
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
                                TriangleId start, uint32_t zone, uint64_t& steps) const;
-  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point) const;
+  Ray RayTo(const Vector& point) const;
+  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
+             const Ray& ray) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Update(const VertexTable& vertices);
   bool IsWorthMeasuring() const;
