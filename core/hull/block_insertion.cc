@@ -343,6 +343,7 @@ class BlockInsertion {
   // Inserts in rounds what conflict lists gave up and what no sample up to this stride had; all,
   // for stride 0.
   bool InsertRounds(size_t stride) {
+    rest_.reserve(points_.size());
     for (size_t first = 0; first < points_.size(); first += kRun) {
       if (stride > 0 && first / kRun % stride == 0) continue;
       const size_t end = std::min(first + kRun, points_.size());
