@@ -50,7 +50,7 @@ inline constexpr double kTripleProductMin = 0x1p-300;
 inline constexpr double kTripleProductMax = 0x1p300;
 
 // What a direction map takes off its radii; its rounding errors are below half of this (see
-// DirectionMap::SetRadii).
+// DirectionMap::Finish).
 inline constexpr double kDirectionMapMargin = 0x1p-20;
 
 // The distance |p - s e - t f| for differences p, e, f of doubles and s, t in [0, 1] with rounded

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <optional>
 
@@ -40,6 +42,64 @@ std::optional<int> FilteredOrient3d(const Vector& r, const Vector& s, const Vect
                       std::abs(s.y()) + std::abs(s.z()) + std::abs(t.x()) + std::abs(t.y()) +
                       std::abs(t.z());
   return CertainSign(det, kOrient3dErrorFactor * permanent + (size + 1) * kUnderflowError);
+}
+
+__extension__ using Int128 = __int128;
+
+// Four points as integers below 2^60 in magnitude, on one scale.
+struct FixedPoints {
+  std::array<std::array<int64_t, 3>, 4> points;
+};
+
+// A power of two for each factor of a scale that brings `largest` to [2^59, 2^60); two factors, as
+// one may exceed the range of doubles.
+std::array<double, 2> FixedPointScale(double largest) {
+  const int exponent = 1082 - static_cast<int>(std::bit_cast<uint64_t>(largest) >> 52);
+  const auto power = [](int e) {
+    return std::bit_cast<double>(static_cast<uint64_t>(1023 + e) << 52);
+  };
+  return {power(exponent / 2), power(exponent - exponent / 2)};
+}
+
+// Empty unless all coordinates are integers on the scale of the largest: those of a lattice, a
+// drawing or a scan mostly are.
+std::optional<FixedPoints> ToFixedPoints(const std::array<const Vector*, 4>& points) {
+  double largest = 0;
+  for (const Vector* p : points) largest = std::max(largest, p->cwiseAbs().maxCoeff());
+  const std::array<double, 2> scale = FixedPointScale(largest);
+  FixedPoints fixed;
+  bool is_exact = true;
+  for (size_t i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const double x = (*points[i])[k];
+      // Scaling rounds only what becomes smaller than one, which no integer equals but zero.
+      const double scaled = x * scale[0] * scale[1];
+      const auto integer = static_cast<int64_t>(scaled);
+      is_exact &= static_cast<double>(integer) == scaled && (integer == 0) == (x == 0);
+      fixed.points[i][k] = integer;
+    }
+  }
+  return is_exact ? std::optional(fixed) : std::nullopt;
+}
+
+// Differences are below 2^61, minors below 2^123; the sum of their products is gathered in two
+// halves, the lower one below 3 * 2^125.
+int FixedPointOrient3d(const FixedPoints& fixed) {
+  const auto& [a, b, c, d] = fixed.points;
+  Int128 low = 0;
+  Int128 high = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int i = k == 2 ? 0 : k + 1;
+    const int j = k == 0 ? 2 : k - 1;
+    const Int128 minor = static_cast<Int128>(c[i] - a[i]) * (d[j] - a[j]) -
+                         static_cast<Int128>(c[j] - a[j]) * (d[i] - a[i]);
+    const int64_t r = b[k] - a[k];
+    low += static_cast<Int128>(r) * static_cast<uint64_t>(minor);
+    high += static_cast<Int128>(r) * static_cast<int64_t>(minor >> 64);
+  }
+  high += low >> 64;
+  if (high != 0) return high > 0 ? 1 : -1;
+  return static_cast<uint64_t>(low) != 0 ? 1 : 0;
 }
 
 bool InExpansionRange(std::initializer_list<double> coordinates) {
@@ -135,6 +195,10 @@ int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d)
   if (d == a || d == b || d == c) {
     ++counts.filter;
     return 0;
+  }
+  if (const std::optional<FixedPoints> fixed = ToFixedPoints({&a, &b, &c, &d})) {
+    ++counts.fixed_point;
+    return FixedPointOrient3d(*fixed);
   }
   if (InExpansionRange(a) && InExpansionRange(b) && InExpansionRange(c) && InExpansionRange(d)) {
     ++counts.expansion;

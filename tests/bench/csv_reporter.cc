@@ -9,10 +9,19 @@ namespace hulld::bench {
 namespace {
 
 // Every counter there is, in the order of the columns.
-constexpr const char* kCounters[] = {"points",       "vertices",        "vertices_missing_or_extra",
-                                     "p50_us",       "p99_us",          "p999_us",
-                                     "max_us",       "times_generic",   "ns_per_facet",
-                                     "filter_signs", "expansion_signs", "integer_signs"};
+constexpr const char* kCounters[] = {"points",
+                                     "vertices",
+                                     "vertices_missing_or_extra",
+                                     "p50_us",
+                                     "p99_us",
+                                     "p999_us",
+                                     "max_us",
+                                     "times_generic",
+                                     "ns_per_facet",
+                                     "filter_signs",
+                                     "fixed_point_signs",
+                                     "expansion_signs",
+                                     "integer_signs"};
 
 std::string CpuName() {
   std::ifstream in("/proc/cpuinfo");
