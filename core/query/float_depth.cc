@@ -158,6 +158,11 @@ class Expansion {
     return std::min(bounds_.high, distance - kTriangleDistanceErrorFactor * pair_.size());
   }
 
+  bool Contains(VertexPair pair) const {
+    return std::any_of(corners_.begin(), corners_.end(),
+                       [&](const Corner& corner) { return corner.pair == pair; });
+  }
+
   bool IsAbove(uint32_t facet, VertexPair pair) const {
     const Vector w = pair_.Difference(pair) * per_unit_;
     return planes_[facet].n.dot(w) > planes_[facet].distance + kRelativeVisibility;
@@ -175,7 +180,8 @@ class Expansion {
       farthest = pair_.CertainFarthest(n);
       bounds_.high = std::min(bounds_.high, HighOf(farthest));
     }
-    if (!IsAbove(*nearest, farthest.pair)) return false;
+    // One of its own vertices: the surface is not convex up to rounding.
+    if (!IsAbove(*nearest, farthest.pair) || Contains(farthest.pair)) return false;
     AddCorner(farthest.pair);
     const Vector w = corners_.back().w;
     const auto apex = static_cast<uint32_t>(corners_.size() - 1);

@@ -145,7 +145,7 @@ TEST(Separation, NeedlesPlatesAndOffsetsMatchBruteForce) {
   const uint64_t seed = TestSeed(712);
   Random random(seed);
   SeparationCheck check;
-  for (int round = 0; round < kRounds / 10; ++round) {
+  for (int round = 0; round < kRounds / 2; ++round) {
     const double local = std::array{0.0, 0.0, 1e6, 1e15}[random.Below(4)];
     const auto points = [&] {
       std::vector<Vector> set = RandomInCube(random, random.Between(2, 6), 1);
