@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <compare>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -15,6 +16,7 @@
 #include "core/query/exact_pair.h"
 #include "core/query/float_pair.h"
 #include "core/query/ladder.h"
+#include "core/query/separation.h"
 #include "core/query/textbook_sat.h"
 
 namespace hulld {
@@ -62,6 +64,7 @@ Answer Mirrored(Answer answer) {
     answer.axis->kind = Mirrored(answer.axis->kind);
     std::swap(answer.axis->feature_a, answer.axis->feature_b);
   }
+  if (answer.witness) std::swap(answer.witness->p_WA, answer.witness->p_WB);
   if (answer.certificate) {
     auto& direction = answer.certificate->direction;
     if (Vector* n = std::get_if<Vector>(&direction)) *n = -*n;
@@ -82,10 +85,13 @@ std::optional<IntegerVector> ExactAxis(const Decision& decision) {
 }
 
 // Whether the answer needs more than the relation.
-bool NeedsMore(const QueryOptions& options) { return options.want_certificate; }
+bool NeedsMore(const QueryOptions& options) {
+  return options.want_certificate || options.want_separation || options.want_witness ||
+         options.clearance.has_value();
+}
 
 // What the options ask for beyond the relation, the axis and the analysis.
-absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision,
+absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bool cold,
                              const QueryOptions& options, Answer& answer) {
   if (options.want_certificate) {
     ExactPair exact(pair);
@@ -93,6 +99,19 @@ absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision,
     if (!certificate.ok()) return certificate.status();
     answer.certificate = *std::move(certificate);
   }
+  if (!options.want_separation && !options.want_witness && !options.clearance) {
+    return absl::OkStatus();
+  }
+  const SeparationRequest request = {options.want_separation, options.want_witness,
+                                     options.max_error, options.clearance};
+  SeparationAnswer found;
+  if (absl::Status s = FindSeparation(pair, decision, cold, request, options.should_stop, found);
+      !s.ok()) {
+    return s;
+  }
+  answer.separation = found.separation;
+  answer.witness = found.witness;
+  answer.within_clearance = found.within_clearance;
   return absl::OkStatus();
 }
 
@@ -119,7 +138,8 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
   answer.analysis.axes_tested = decision->directions_tried;
   if (options.want_axis || options.want_analysis) AddAxis(pair, *decision, options, answer);
   if (NeedsMore(options)) {
-    if (absl::Status s = AddWhatIsWanted(pair, *decision, options, answer); !s.ok()) return s;
+    absl::Status s = AddWhatIsWanted(pair, *decision, cache == nullptr, options, answer);
+    if (!s.ok()) return s;
   }
   return answer;
 }
@@ -156,6 +176,15 @@ absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
   return more;
 }
 
+Answer AnswerOfEmpty(const QueryOptions& options) {
+  Answer answer;
+  if (options.want_separation) {
+    answer.separation = Separation{std::numeric_limits<double>::infinity(), 0};
+  }
+  if (options.clearance) answer.within_clearance = false;
+  return answer;
+}
+
 absl::Status CheckLength(const char* name, double length) {
   if (length >= 0) return absl::OkStatus();
   return absl::InvalidArgumentError(
@@ -187,8 +216,10 @@ absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
   if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
   std::optional<std::chrono::steady_clock::time_point> start;
   if (options.want_analysis) start = std::chrono::steady_clock::now();
-  absl::StatusOr<Answer> answer = Answer{};
-  if (!a.hull().empty() && !b.hull().empty()) {
+  absl::StatusOr<Answer> answer;
+  if (a.hull().empty() || b.hull().empty()) {
+    answer = AnswerOfEmpty(options);
+  } else {
     answer = options.method == Method::kTextbookSat ? Textbook(a, b, options)
                                                     : CertifiedSearchOfEither(a, b, options, cache);
   }
