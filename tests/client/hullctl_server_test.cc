@@ -7,6 +7,7 @@
 #include <random>
 #include <sstream>
 
+#include "client/client.h"
 #include "client/hullctl/hullctl.h"
 #include "client/hullctl/json.h"
 #include "client/verify/certificate_check.h"
@@ -219,6 +220,12 @@ TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
   ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok()) << ran.out;
   EXPECT_EQ(json.fields().at("collisions").list_value().values_size(), 1);
   EXPECT_TRUE(json.fields().at("complete").bool_value());
+  const TempFile clear("clear.json", placements + R"(,"wanted":{"clearance":0.25}})");
+  ran = Ask({"scene", clear.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out,
+            "0:cube\t1:cube\tTOUCHING\twithin\n1:cube\t2:cube\tSEPARATED\twithin\n"
+            "# touching 1 overlapping 0 separated 1 failed 0\n");
   const TempFile typo("typo.json", R"({"placement":[]})");
   ran = Ask({"scene", typo.path()});
   EXPECT_EQ(ran.code, 2);

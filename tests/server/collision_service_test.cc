@@ -149,6 +149,43 @@ TEST_F(CheckCollisionCall, WishesThatAreMalformedOrExcludeEachOtherAreRefused) {
   exclude([](auto* r) { r->mutable_wanted()->set_clearance(1); }, "wanted.clearance");
 }
 
+TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
+  Put("cube", Cube());
+  Create("empty");
+  const auto check = [&](const v1::Placement& b, double clearance) {
+    v1::CheckCollisionRequest request = Pair(PlacementOf("cube"), b);
+    request.mutable_wanted()->set_certificate(true);
+    request.mutable_wanted()->set_separation(true);
+    request.mutable_wanted()->set_witness(true);
+    request.mutable_wanted()->set_clearance(clearance);
+    return Check(request);
+  };
+  const v1::CheckCollisionResponse apart = check(PlacementOf("cube", 3), 2);
+  EXPECT_LE(std::abs(apart.separation().value() - 2), apart.separation().bound());
+  EXPECT_LE(apart.separation().bound(), 1e-11);
+  EXPECT_TRUE(apart.within_clearance());
+  EXPECT_NEAR(apart.witness().point_a().x(), 1, apart.witness().error());
+  EXPECT_NEAR(apart.witness().point_b().x(), 3, apart.witness().error());
+  EXPECT_LE(apart.witness().error(), 1e-11);
+  EXPECT_TRUE(apart.certificate().has_direction());
+  EXPECT_FALSE(check(PlacementOf("cube", 3), std::nextafter(2, 0)).within_clearance());
+  const v1::CheckCollisionResponse touching = check(PlacementOf("cube", 1), 0);
+  EXPECT_EQ(touching.separation().value(), 0);
+  EXPECT_TRUE(touching.within_clearance());
+  EXPECT_GT(touching.certificate().pairs_size(), 0);
+  const v1::CheckCollisionResponse deep = check(PlacementOf("cube", 0.5), 0);
+  EXPECT_LE(std::abs(deep.separation().value() + 0.5), deep.separation().bound());
+  EXPECT_TRUE(deep.within_clearance());
+  const v1::CheckCollisionResponse nothing = check(PlacementOf("empty"), 5);
+  EXPECT_EQ(nothing.separation().value(), std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(nothing.has_within_clearance());
+  EXPECT_FALSE(nothing.within_clearance());
+  EXPECT_FALSE(nothing.has_witness() || nothing.has_certificate());
+  const v1::CheckCollisionResponse bare = Check(Pair(PlacementOf("cube"), PlacementOf("cube", 3)));
+  EXPECT_FALSE(bare.has_separation() || bare.has_witness() || bare.has_certificate() ||
+               bare.has_within_clearance());
+}
+
 TEST_F(CheckCollisionCall, ATolerancePermitsNotToLookCloser) {
   Put("cube", Cube());
   const auto relation = [&](double x, double tolerance) {

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
+#include <initializer_list>
 #include <limits>
 #include <map>
 #include <random>
@@ -18,6 +20,10 @@ using ::testing::IsEmpty;
 using ::testing::Pair;
 
 using IndexPair = std::pair<uint32_t, uint32_t>;
+
+void Fill(google::protobuf::RepeatedField<uint32_t>* field, std::initializer_list<uint32_t> list) {
+  field->Assign(list.begin(), list.end());
+}
 
 class FindCollisionsCall : public ServerTest {
  protected:
@@ -101,11 +107,11 @@ TEST_F(FindCollisionsCall, AnEmptySceneHasItsTotals) {
   EXPECT_EQ(scene.totals.pairs(), 0);
 }
 
-TEST_F(FindCollisionsCall, GroupsAndTheFirstSetLeavePairsOut) {
+TEST_F(FindCollisionsCall, GroupsAndMoversLeavePairsOut) {
   Put("cube", Cube());
   const auto found = [&](const std::function<void(v1::FindCollisionsRequest*)>& change) {
     auto request = Row({0, 0, 0, 0});
-    request.mutable_groups()->Assign({5, 5, 6, 7});
+    Fill(request.mutable_groups(), {5, 5, 6, 7});
     change(&request);
     const Scene scene = Find(request);
     EXPECT_TRUE(scene.status.ok()) << scene.status.error_message();
@@ -117,18 +123,18 @@ TEST_F(FindCollisionsCall, GroupsAndTheFirstSetLeavePairsOut) {
   EXPECT_THAT(found([](auto* r) { r->set_ignore_same_group(true); }),
               ElementsAre(Pair(0, 2), Pair(0, 3), Pair(1, 2), Pair(1, 3), Pair(2, 3)));
   EXPECT_THAT(found([](auto* r) {
-                r->mutable_ignored_group_pairs()->Assign({7, 5, 6, 6});
+                Fill(r->mutable_ignored_group_pairs(), {7, 5, 6, 6});
               }),
               ElementsAre(Pair(0, 1), Pair(0, 2), Pair(1, 2), Pair(2, 3)));
   EXPECT_THAT(found([](auto* r) {
-                r->mutable_ignored_group_pairs()->Assign({5, 5, 5, 6, 5, 7});
+                Fill(r->mutable_ignored_group_pairs(), {5, 5, 5, 6, 5, 7});
               }),
               ElementsAre(Pair(2, 3)));
   EXPECT_THAT(found([](auto* r) { r->set_movers(1); }),
               ElementsAre(Pair(0, 1), Pair(0, 2), Pair(0, 3)));
   EXPECT_THAT(found([](auto* r) {
                 r->set_movers(2);
-                r->mutable_ignored_group_pairs()->Assign({5, 6});
+                Fill(r->mutable_ignored_group_pairs(), {5, 6});
               }),
               ElementsAre(Pair(0, 1), Pair(0, 3), Pair(1, 3)));
   EXPECT_THAT(found([](auto* r) { r->set_movers(0); }), IsEmpty());
