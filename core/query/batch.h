@@ -15,6 +15,7 @@ namespace hulld {
 struct PlacedPair {
   uint32_t a;
   uint32_t b;
+  friend bool operator==(const PlacedPair&, const PlacedPair&) = default;
 };
 
 // Answers every pair, in parallel on `threads` OpenMP threads; results[i] belongs to pairs[i] and

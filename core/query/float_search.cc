@@ -51,6 +51,27 @@ class Simplex {
     }
   }
 
+  // Reduces a tetrahedron that holds the origin to the nearest of its faces, up to rounding; gives
+  // the face's normal, outwards.
+  Vector ReduceToNearestFace() {
+    double nearest = INFINITY;
+    uint32_t off_face = 3;
+    Vector outwards = Vector::UnitX();
+    for (uint32_t i = 0; i < 4; ++i) {
+      const Vector& p = corners_[(i + 1) % 4].w;
+      Vector n = (corners_[(i + 2) % 4].w - p).cross(corners_[(i + 3) % 4].w - p);
+      if (n.dot(corners_[i].w - p) > 0) n = -n;
+      const double distance = n.dot(p) / n.norm();
+      if (!(distance < nearest)) continue;
+      nearest = distance;
+      off_face = i;
+      outwards = n;
+    }
+    std::swap(corners_[off_face], corners_[3]);
+    count_ = 3;
+    return outwards;
+  }
+
   // A point of the simplex near to the origin: the nearest but for rounding once it is reduced.
   // Whatever the rounding, weights are in [0, 1] and it is in the simplex, but for the rounding of
   // the weighted sum.
@@ -249,8 +270,12 @@ class FloatSearch {
     if (HoldsOrigin(pair_, simplex_.corner(0).w, simplex_.corner(1).w, simplex_.corner(2).w,
                     simplex_.corner(3).w)) {
       result_.verdict = FloatVerdict::kOverlapping;
+      return false;
     }
-    return false;
+    if (tolerance_ == 0) return false;
+    // Near the boundary of A - B: on through the nearest face, to see how far it reaches there.
+    n = simplex_.ReduceToNearestFace();
+    return true;
   }
 
   bool EndSeparated(const Vector& n) {
@@ -263,16 +288,22 @@ class FloatSearch {
   // along some direction does not reach farther than that beyond it. `farthest` is that along n.
   bool IsWithinTolerance(const Vector& n, FloatPair::Support farthest, double error) {
     const double length = n.norm();
-    if (farthest.value > tolerance_ * length) return false;
-    if (!farthest.certain) farthest = pair_.CertainFarthest(n);
-    const double reach = std::max(0.0, farthest.value + error) / length;
-    const double nearest = simplex_.NearPoint().norm() + kNearPointErrorFactor * pair_.size();
-    return std::max(reach, nearest) * kSphereSquareRoundUp <= tolerance_;
+    if (farthest.value < tolerance_ * length) {
+      if (!farthest.certain) farthest = pair_.CertainFarthest(n);
+      reach_ = std::min(reach_, std::max(0.0, farthest.value + error) / length);
+    }
+    nearest_ = std::min(nearest_, simplex_.NearPoint().norm());
+    const double distance = nearest_ + kNearPointErrorFactor * pair_.size();
+    return std::max(reach_, distance) * kSphereSquareRoundUp <= tolerance_;
   }
 
   const FloatPair& pair_;
   const double tolerance_;
   Simplex simplex_;
+  // With a tolerance: the least reach of A - B beyond the origin along some direction, and the
+  // least distance of some point of it, so far.
+  double reach_ = INFINITY;
+  double nearest_ = INFINITY;
   FloatSearchResult result_;
 };
 

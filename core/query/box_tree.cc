@@ -1,0 +1,104 @@
+#include "core/query/box_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/numeric/error_bounds.h"
+
+namespace hulld {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Boxes in a leaf. Observed: 4 to 16 make no difference.
+constexpr uint32_t kLeafBoxes = 8;
+
+}  // namespace
+
+Box BoundingBox(const PlacedHull& placed) {
+  if (placed.hull().empty()) {
+    return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};
+  }
+  const Vector& t = placed.X_WH().t;
+  const double size = placed.hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
+  if (!(size >= kFilterMinSize && size <= kFilterMaxSize)) {
+    return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
+  }
+  const SupportMap& support = placed.query_hull().support();
+  const double blur = kSupportBlurFactor * size;
+  const double error = kSupportErrorFactor * size;
+  Box box;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector n = placed.R_WH().row(axis).transpose();
+    box.high[axis] = t[axis] + support.CertainFarthest(n, blur).value + error;
+    box.low[axis] = t[axis] - support.CertainFarthest(-n, blur).value - error;
+  }
+  return box;
+}
+
+BoxTree::BoxTree(std::span<const Box> boxes) : indices_(boxes.size()) {
+  std::iota(indices_.begin(), indices_.end(), 0u);
+  if (boxes.empty()) return;
+  nodes_.reserve(2 * (boxes.size() / (kLeafBoxes / 2) + 1));
+  Build(boxes, 0, static_cast<uint32_t>(boxes.size()));
+  boxes_.reserve(boxes.size());
+  for (const uint32_t index : indices_) boxes_.push_back(boxes[index]);
+}
+
+// By halves along the axis in which the boxes' centres spread widest.
+uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end) {
+  const auto node = static_cast<uint32_t>(nodes_.size());
+  Box bounds = {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};
+  Box centers = bounds;
+  // Twice the centre; 0 for a box that is all of space.
+  const auto center = [&](uint32_t index) {
+    const Vector sum = boxes[index].low + boxes[index].high;
+    return sum.array().isFinite().all() ? sum : Vector(Vector::Zero());
+  };
+  uint32_t largest_index = 0;
+  for (uint32_t i = begin; i < end; ++i) {
+    const Box& box = boxes[indices_[i]];
+    bounds = {bounds.low.cwiseMin(box.low), bounds.high.cwiseMax(box.high)};
+    const Vector c = center(indices_[i]);
+    centers = {centers.low.cwiseMin(c), centers.high.cwiseMax(c)};
+    largest_index = std::max(largest_index, indices_[i]);
+  }
+  nodes_.push_back({bounds, largest_index, 0, begin, end});
+  if (end - begin <= kLeafBoxes) return node;
+  int axis = 0;
+  (centers.high - centers.low).maxCoeff(&axis);
+  const uint32_t middle = begin + (end - begin) / 2;
+  std::nth_element(indices_.begin() + begin, indices_.begin() + middle, indices_.begin() + end,
+                   [&](uint32_t i, uint32_t j) {
+                     const double x = center(i)[axis];
+                     const double y = center(j)[axis];
+                     return x < y || (x == y && i < j);
+                   });
+  Build(boxes, begin, middle);
+  nodes_[node].second = Build(boxes, middle, end);
+  return node;
+}
+
+void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const {
+  if (nodes_.empty()) return;
+  // Halves leave at most 32 levels.
+  uint32_t stack[40];
+  int height = 0;
+  stack[height++] = 0;
+  while (height > 0) {
+    const uint32_t index = stack[--height];
+    const Node& node = nodes_[index];
+    if (node.largest_index < first || !node.box.Meets(box)) continue;
+    if (node.second != 0) {
+      stack[height++] = node.second;
+      stack[height++] = index + 1;
+      continue;
+    }
+    for (uint32_t i = node.begin; i < node.end; ++i) {
+      if (indices_[i] >= first && boxes_[i].Meets(box)) found.push_back(indices_[i]);
+    }
+  }
+}
+
+}  // namespace hulld

@@ -1,0 +1,58 @@
+#ifndef HULLD_CORE_QUERY_BOX_TREE_H_
+#define HULLD_CORE_QUERY_BOX_TREE_H_
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/numeric/vector.h"
+#include "core/query/placed_hull.h"
+
+namespace hulld {
+
+// A closed axis-aligned box; empty when low exceeds high.
+struct Box {
+  Vector low;
+  Vector high;
+
+  bool Meets(const Box& other) const {
+    return (low.array() <= other.high.array()).all() && (other.low.array() <= high.array()).all();
+  }
+};
+
+// A box, world frame, that is certain to hold the hull: all of space where doubles do not reach.
+// Empty for an empty hull.
+Box BoundingBox(const PlacedHull& placed);
+
+// A hierarchy of boxes, for finding those that meet a given one. Immutable once built.
+class BoxTree {
+ public:
+  // Cost: O(n log n).
+  explicit BoxTree(std::span<const Box> boxes);
+
+  // Appends the indices, of at least `first`, of all boxes that meet `box`; in no particular order.
+  // Cost: O(log n) beyond what it finds, where boxes overlap little.
+  void AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const;
+
+ private:
+  // An inner node's children are the node after it and `second`; a leaf's boxes are those from
+  // `begin` to `end`.
+  struct Node {
+    Box box;
+    uint32_t largest_index;
+    uint32_t second;
+    uint32_t begin;
+    uint32_t end;
+  };
+
+  uint32_t Build(std::span<const Box> boxes, uint32_t begin, uint32_t end);
+
+  std::vector<Node> nodes_;
+  // In the order of the leaves.
+  std::vector<uint32_t> indices_;
+  std::vector<Box> boxes_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_BOX_TREE_H_
