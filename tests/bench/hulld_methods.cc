@@ -76,11 +76,11 @@ struct HulldSimplified {
   };
   using Placed = PlacedHull;
 
-  double relative_error;
+  double max_error;
   Hulld hulld;
 
   std::unique_ptr<Shape> MakeShape(const Hull& hull) {
-    return std::make_unique<Shape>(hull, relative_error * QueryHull(hull).radius());
+    return std::make_unique<Shape>(hull, max_error);
   }
   Placed Place(const Shape& shape, const Pose& X_WA) { return hulld.Place(shape.query_hull, X_WA); }
   Verdict Ask(const Placed& a, const Placed& b) { return hulld.Ask(a, b); }
@@ -88,22 +88,17 @@ struct HulldSimplified {
   std::optional<double> Distance(const Placed& a, const Placed& b) { return hulld.Distance(a, b); }
 };
 
-std::string Short(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.0e", value);
-  return text;
-}
-
 }  // namespace
 
-std::unique_ptr<QueryMethod> MakeHulld(double tolerance) {
-  std::string name = tolerance == 0 ? "hulld" : "hulld tau " + Short(tolerance);
+std::unique_ptr<QueryMethod> MakeHulld() { return MakeHulldWithin(0, "hulld"); }
+
+std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name) {
   return std::make_unique<MethodOf<Hulld>>(std::move(name), Hulld{tolerance});
 }
 
-std::unique_ptr<QueryMethod> MakeHulldSimplified(double relative_error) {
-  return std::make_unique<MethodOf<HulldSimplified>>("simplified " + Short(relative_error),
-                                                     HulldSimplified{relative_error, {0}});
+std::unique_ptr<QueryMethod> MakeHulldSimplified(double max_error, std::string name) {
+  return std::make_unique<MethodOf<HulldSimplified>>(std::move(name),
+                                                     HulldSimplified{max_error, {0}});
 }
 
 }  // namespace hulld::bench

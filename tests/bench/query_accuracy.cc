@@ -41,7 +41,7 @@ int Main() {
   for (const std::unique_ptr<QueryMethod>& method : methods) {
     std::vector<Verdict> verdicts(truth.size(), Verdict::kOpen);
     method->Prepare(suite.hulls, suite.queries);
-    method->Answer(verdicts);
+    method->Answer(0, verdicts);
     size_t open = 0;
     size_t missed = 0;
     size_t invented = 0;

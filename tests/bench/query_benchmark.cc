@@ -109,7 +109,7 @@ void FindRelations(benchmark::State& state, Subject& subject) {
   if (!subject.Prepare(state)) return;
   std::vector<Verdict> verdicts(subject.workload->questions().queries.size());
   for (auto _ : state) {
-    subject.method->Answer(verdicts);
+    subject.method->Answer(0, verdicts);
     benchmark::DoNotOptimize(verdicts.data());
     benchmark::ClobberMemory();
   }
@@ -121,7 +121,7 @@ void FindRelationsFromPoses(benchmark::State& state, Subject& subject) {
   if (!subject.Prepare(state)) return;
   std::vector<Verdict> verdicts(subject.workload->questions().queries.size());
   for (auto _ : state) {
-    subject.method->AnswerFromPoses(verdicts);
+    subject.method->AnswerFromPoses(0, verdicts);
     benchmark::DoNotOptimize(verdicts.data());
     benchmark::ClobberMemory();
   }
@@ -151,7 +151,7 @@ void MeasureContacts(benchmark::State& state, Subject& subject) {
   if (!subject.Prepare(state)) return;
   std::vector<std::optional<double>> values(subject.workload->questions().queries.size());
   for (auto _ : state) {
-    subject.method->MeasureDepths(values);
+    subject.method->MeasureDepths(0, values);
     benchmark::DoNotOptimize(values.data());
     benchmark::ClobberMemory();
   }
@@ -159,7 +159,7 @@ void MeasureContacts(benchmark::State& state, Subject& subject) {
   const QuerySet& set = subject.workload->questions();
   exact->Prepare(set.hulls, set.queries);
   std::vector<std::optional<double>> truth(values.size());
-  exact->MeasureDepths(truth);
+  exact->MeasureDepths(0, truth);
   ReportValues(state, values, truth);
 }
 
@@ -167,7 +167,7 @@ void MeasureDistances(benchmark::State& state, Subject& subject) {
   if (!subject.Prepare(state)) return;
   std::vector<std::optional<double>> values(subject.workload->questions().queries.size());
   for (auto _ : state) {
-    subject.method->MeasureDistances(values);
+    subject.method->MeasureDistances(0, values);
     benchmark::DoNotOptimize(values.data());
     benchmark::ClobberMemory();
   }
@@ -175,7 +175,7 @@ void MeasureDistances(benchmark::State& state, Subject& subject) {
   const QuerySet& set = subject.workload->questions();
   exact->Prepare(set.hulls, set.queries);
   std::vector<std::optional<double>> truth(values.size());
-  exact->MeasureDistances(truth);
+  exact->MeasureDistances(0, truth);
   ReportValues(state, values, truth);
 }
 

@@ -32,19 +32,20 @@ class QueryMethod {
   // Sets the questions and converts them. Both must outlive their use.
   virtual void Prepare(const std::deque<Hull>& hulls,
                        const std::vector<QuerySet::Query>& queries) = 0;
-  // Answers all questions, one verdict each. From placed hulls.
-  virtual void Answer(std::span<Verdict> verdicts) = 0;
+  // Answers as many questions as there are verdicts, beginning with question `first`, from placed
+  // hulls.
+  virtual void Answer(size_t first, std::span<Verdict> verdicts) = 0;
   // The same from poses, whose conversion is part of the work.
-  virtual void AnswerFromPoses(std::span<Verdict> verdicts) = 0;
+  virtual void AnswerFromPoses(size_t first, std::span<Verdict> verdicts) = 0;
   // Whether MeasureDepths can be asked.
   virtual bool knows_depth() const = 0;
   // The penetration depth for each question, without a value where the method finds none (as where
   // it finds the hulls apart), together with what the method's usual contact query finds: normal
   // and witness points.
-  virtual void MeasureDepths(std::span<std::optional<double>> depths) = 0;
+  virtual void MeasureDepths(size_t first, std::span<std::optional<double>> depths) = 0;
   virtual bool knows_distance() const = 0;
   // The same for the distance of hulls apart.
-  virtual void MeasureDistances(std::span<std::optional<double>> distances) = 0;
+  virtual void MeasureDistances(size_t first, std::span<std::optional<double>> distances) = 0;
 };
 
 // A method from a library with
@@ -73,13 +74,15 @@ class MethodOf final : public QueryMethod {
     }
   }
 
-  void Answer(std::span<Verdict> verdicts) override {
-    for (size_t i = 0; i < a_.size(); ++i) verdicts[i] = library_.Ask(a_[i], b_[i]);
+  void Answer(size_t first, std::span<Verdict> verdicts) override {
+    for (size_t i = 0; i < verdicts.size(); ++i) {
+      verdicts[i] = library_.Ask(a_[first + i], b_[first + i]);
+    }
   }
 
-  void AnswerFromPoses(std::span<Verdict> verdicts) override {
-    for (size_t i = 0; i < a_.size(); ++i) {
-      const QuerySet::Query& query = (*queries_)[i];
+  void AnswerFromPoses(size_t first, std::span<Verdict> verdicts) override {
+    for (size_t i = 0; i < verdicts.size(); ++i) {
+      const QuerySet::Query& query = (*queries_)[first + i];
       verdicts[i] = library_.Ask(library_.Place(*shapes_[query.hull_a], query.X_WA),
                                  library_.Place(*shapes_[query.hull_b], query.X_WB));
     }
@@ -88,18 +91,22 @@ class MethodOf final : public QueryMethod {
   bool knows_depth() const override {
     return requires(Library l, Placed p) { l.Depth(p, p); };
   }
-  void MeasureDepths(std::span<std::optional<double>> depths) override {
+  void MeasureDepths(size_t first, std::span<std::optional<double>> depths) override {
     if constexpr (requires(Library l, Placed p) { l.Depth(p, p); }) {
-      for (size_t i = 0; i < a_.size(); ++i) depths[i] = library_.Depth(a_[i], b_[i]);
+      for (size_t i = 0; i < depths.size(); ++i) {
+        depths[i] = library_.Depth(a_[first + i], b_[first + i]);
+      }
     }
   }
 
   bool knows_distance() const override {
     return requires(Library l, Placed p) { l.Distance(p, p); };
   }
-  void MeasureDistances(std::span<std::optional<double>> distances) override {
+  void MeasureDistances(size_t first, std::span<std::optional<double>> distances) override {
     if constexpr (requires(Library l, Placed p) { l.Distance(p, p); }) {
-      for (size_t i = 0; i < a_.size(); ++i) distances[i] = library_.Distance(a_[i], b_[i]);
+      for (size_t i = 0; i < distances.size(); ++i) {
+        distances[i] = library_.Distance(a_[first + i], b_[first + i]);
+      }
     }
   }
 
@@ -115,11 +122,13 @@ class MethodOf final : public QueryMethod {
   std::vector<Placed> b_;
 };
 
-// hulld itself. tolerance as in QueryOptions: 0 asks FindRelation.
-std::unique_ptr<QueryMethod> MakeHulld(double tolerance = 0);
-// hulld, exactly, on hulls simplified from inside until they are within relative_error of their
-// radius: never finds a collision too many.
-std::unique_ptr<QueryMethod> MakeHulldSimplified(double relative_error);
+// hulld itself.
+std::unique_ptr<QueryMethod> MakeHulld();
+// The same with QueryOptions::tolerance.
+std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name);
+// hulld, exactly, on hulls simplified from inside to within max_error: never finds a collision too
+// many.
+std::unique_ptr<QueryMethod> MakeHulldSimplified(double max_error, std::string name);
 
 // The separating axis test as coursework has it: all points into the world, then facet normals and
 // cross products of edges, every point projected on each, early exit, no certificate.
