@@ -98,6 +98,17 @@ inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 // and rounding, 6 * 5 u W^3 with u W <= d / 73, less than W^2 d. Times W^2 d. Proven.
 inline constexpr double kTetrahedronErrorFactor = 24;
 
+// det[u, v, w] where each is a computed Minkowski vertex, the difference of two, or the ray, with
+// components at most W <= 8 S and errors at most 2.1 d: a value above 64 W^2 d needs W > 16 d;
+// there the change by errors, 18 W^2 (2.1 d) + 18 W (2.1 d)^2 + 6 (2.1 d)^3, is at most 43 W^2 d,
+// and rounding, 30 u W^3 with u W <= d / 16, at most 2 W^2 d. Times W^2 d. Proven.
+inline constexpr double kDifferencesErrorFactor = 64;
+
+// The ray's direction times a computed Minkowski vertex, both with components at most W <= 4 S and
+// errors at most d: 6 W d + 3 d^2 and rounding of 9 u W^2 <= W d / 3; a value above 8 W d needs W >
+// 2 d. Times W d. Proven.
+inline constexpr double kRayErrorFactor = 8;
+
 // The cross product of two computed edges with components at most e and f, whose ends err by at
 // most d each as above: |error| <= 2 (2.1 d (e + f) + (2.1 d)^2) + 6 u e f, and u f <= 4 u S <= d
 // / 32. Times d (e + f + 3 d). Proven.
@@ -124,6 +135,11 @@ inline constexpr double kRadiusRoundUp = 1 + 16 * kUnitRoundoff;
 inline constexpr double kSphereErrorFactor = 256 * kUnitRoundoff;
 inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 
+// A direction whose components err by h: a value n . v in a hull's own frame by at most sqrt(3) h *
+// sqrt(3) M, so that two of them may change their order when they differ by less than 6 h M. Times
+// h S. Proven.
+inline constexpr double kDirectionErrorFactor = 8;
+
 // A point p + s (q - p) + t (r - p) of a triangle of computed Minkowski vertices, with weights in
 // [0, 1] whose rounded sum is at most 1: the vertices err by d = 128 u S per component, weights
 // whose exact sum exceeds 1 by 2 u move it by 2 u * 8 S, rounding by at most 8 u * 8 S; times
@@ -131,7 +147,8 @@ inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 inline constexpr double kNearPointErrorFactor = 512 * kUnitRoundoff;
 
 // Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
-// u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). Proven.
+// u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). So is the mean of
+// up to ten inner vertices: nine sums of values up to 10 M, 90 u M / 10, and a division. Proven.
 
 }  // namespace hulld
 

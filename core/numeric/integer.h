@@ -72,6 +72,7 @@ IntegerVector ToInteger(const Vector& v, int exponent);
 // component of the result errs by less than 2^-52 times the largest component, relative to the
 // exact quotient. Requires v not zero.
 Vector ToScaledDoubles(const IntegerVector& v);
+inline constexpr double kScaledDoublesError = 0x1p-52;
 
 }  // namespace hulld
 

@@ -15,10 +15,6 @@ inline double Dot(const Vector& a, const Vector& b) { return a.dot(b); }
 inline Vector Cross(const Vector& a, const Vector& b) { return a.cross(b); }
 inline bool IsZero(const Vector& a) { return a.x() == 0 && a.y() == 0 && a.z() == 0; }
 inline int Sign(double a) { return (a > 0) - (a < 0); }
-inline Vector AnyPerpendicular(const Vector& d) {
-  if (d.y() != 0 || d.z() != 0) return {0, d.z(), -d.y()};
-  return {0, 0, d.x()};
-}
 
 }  // namespace hulld
 

@@ -84,6 +84,7 @@ std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
 
 std::vector<uint32_t> ExactPair::Farthest(Side& side, const std::vector<uint32_t>& candidates,
                                           const IntegerVector& n) {
+  if (candidates.size() == 1) return candidates;
   std::vector<uint32_t> farthest;
   Integer best;
   for (const uint32_t i : candidates) {
@@ -100,17 +101,17 @@ std::vector<uint32_t> ExactPair::Farthest(Side& side, const std::vector<uint32_t
 
 std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n) {
   if (!filter_->usable() || IsZero(n)) return Farthest(a_, AllOf(a_), n);
-  return Farthest(a_, filter_->CandidatesA(ToScaledDoubles(n)), n);
+  const Vector n_W = ToScaledDoubles(n);
+  return Farthest(a_, filter_->CandidatesA(n_W, kScaledDoublesError * n_W.cwiseAbs().maxCoeff()),
+                  n);
 }
 
 std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n) {
   if (!filter_->usable() || IsZero(n)) return Farthest(b_, AllOf(b_), -n);
-  return Farthest(b_, filter_->CandidatesB(ToScaledDoubles(n)), -n);
+  const Vector n_W = ToScaledDoubles(n);
+  return Farthest(b_, filter_->CandidatesB(n_W, kScaledDoublesError * n_W.cwiseAbs().maxCoeff()),
+                  -n);
 }
-
-uint32_t ExactPair::FarthestA(const IntegerVector& n) { return FeatureA(n).front(); }
-
-uint32_t ExactPair::FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
 
 IntegerVector ExactPair::SumOfInnerVertices(const Side& side) {
   const auto vertices = side.hull->hull().vertices();

@@ -24,6 +24,7 @@ class ExactPair {
   // Of the hulls and poses of `filter`, which must outlive the pair.
   explicit ExactPair(const FloatPair& filter);
 
+  const FloatPair& filter() const { return *filter_; }
   const Hull& a() const { return a_.hull->hull(); }
   const Hull& b() const { return b_.hull->hull(); }
 
@@ -38,8 +39,15 @@ class ExactPair {
   // The vertices of B farthest against n, ascending.
   std::vector<uint32_t> FeatureB(const IntegerVector& n);
   // The lowest of them.
-  uint32_t FarthestA(const IntegerVector& n);
-  uint32_t FarthestB(const IntegerVector& n);
+  uint32_t FarthestA(const IntegerVector& n) { return FeatureA(n).front(); }
+  uint32_t FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
+  // The same when it is known to be among `candidates`, ascending.
+  uint32_t FarthestA(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
+    return Farthest(a_, candidates, n).front();
+  }
+  uint32_t FarthestB(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
+    return Farthest(b_, candidates, -n).front();
+  }
 
   // A positive multiple of a point in the relative interior of A - B: the difference of the means
   // of the hulls' inner vertices.

@@ -10,59 +10,21 @@
 namespace hulld {
 namespace {
 
-// A - B, thickened along one coordinate axis by +-half where `axis` is set.
-class ExactSpace {
- public:
-  struct Point {
-    IntegerVector w;
-    VertexPair pair;
-  };
-
-  ExactSpace(ExactPair& pair, const std::function<bool()>& should_stop)
-      : pair_(pair), should_stop_(should_stop) {}
-
-  void Thicken(int axis, Integer half) {
-    axis_ = axis;
-    half_ = std::move(half);
-  }
-
-  uint64_t directions_tried() const { return directions_tried_; }
-  bool MayContinue() const { return !should_stop_ || !should_stop_(); }
-  IntegerVector Center() const { return pair_.CenterDifference(); }
-
-  Point Farthest(const IntegerVector& n) {
-    ++directions_tried_;
-    const VertexPair farthest = {pair_.FarthestA(n), pair_.FarthestB(n)};
-    IntegerVector w = pair_.VertexA(farthest.a) - pair_.VertexB(farthest.b);
-    if (axis_ >= 0) w[axis_] += n[axis_] < 0 ? Integer(-half_) : half_;
-    return {std::move(w), farthest};
-  }
-
- private:
-  ExactPair& pair_;
-  const std::function<bool()>& should_stop_;
-  int axis_ = -1;
-  Integer half_;
-  uint64_t directions_tried_ = 0;
-};
-
-absl::StatusOr<ExactSearchResult> SearchPortal(ExactSpace& space) {
-  auto found = PortalSearch<ExactSpace>(space).Run();
+absl::StatusOr<ExactSearchResult> SearchPortal(PortalSearch& search) {
+  PortalSearch::Result found = search.Run();
   ExactSearchResult result{
-      Relation::kOverlapping, std::move(found.axis), space.directions_tried(), {}};
-  if (found.portal) {
-    for (const ExactSpace::Point& point : *found.portal) result.pairs.push_back(point.pair);
-  }
+      Relation::kOverlapping, std::move(found.axis), search.directions_tried(), {}};
+  if (found.portal) result.pairs.assign(found.portal->begin(), found.portal->end());
   switch (found.verdict) {
-    case PortalVerdict::kSeparated:
+    case PortalSearch::Verdict::kSeparated:
       result.relation = Relation::kSeparated;
       break;
-    case PortalVerdict::kTouching:
+    case PortalSearch::Verdict::kTouching:
       result.relation = Relation::kTouching;
       break;
-    case PortalVerdict::kOverlapping:
+    case PortalSearch::Verdict::kOverlapping:
       break;
-    case PortalVerdict::kStopped:
+    case PortalSearch::Verdict::kStopped:
       return absl::CancelledError("stopped in an exact query");
   }
   return result;
@@ -84,11 +46,11 @@ absl::StatusOr<ExactSearchResult> SearchInPlane(ExactPair& pair, const IntegerVe
                                                 const std::function<bool()>& should_stop) {
   int axis = 0;
   while (normal[axis].is_zero()) ++axis;
-  ExactSpace space(pair, should_stop);
+  PortalSearch search(pair, should_stop);
   // Any thickness will do; one of the size of the hulls keeps the search well shaped.
   const IntegerVector width = pair.VertexA(pair.FarthestA({1, 1, 1})) - pair.VertexB(0);
-  space.Thicken(axis, 1 + abs(width.x) + abs(width.y) + abs(width.z));
-  absl::StatusOr<ExactSearchResult> result = SearchPortal(space);
+  search.Thicken(axis, 1 + abs(width.x) + abs(width.y) + abs(width.z));
+  absl::StatusOr<ExactSearchResult> result = SearchPortal(search);
   if (result.ok() && result->relation == Relation::kOverlapping) {
     result->relation = Relation::kTouching;
     result->axis = normal;
@@ -134,8 +96,8 @@ absl::StatusOr<ExactSearchResult> SearchExactly(ExactPair& pair,
                                                 const std::function<bool()>& should_stop) {
   const MinkowskiSpan span = SpanOf(pair);
   if (span.dimension == 3) {
-    ExactSpace space(pair, should_stop);
-    return SearchPortal(space);
+    PortalSearch search(pair, should_stop);
+    return SearchPortal(search);
   }
   const IntegerVector w = pair.VertexA(0) - pair.VertexB(0);
   if (span.dimension == 0) {

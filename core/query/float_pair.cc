@@ -17,12 +17,19 @@ FloatPair::Support FloatPair::CertainFarthest(const Vector& n_W) const {
   return {{a.vertex, b.vertex}, a.value + b.value - n_W.dot(offset_), true};
 }
 
-std::vector<uint32_t> FloatPair::CandidatesA(const Vector& n_W) const {
-  return a_->query_hull().support().Plateau(InA(n_W), 2 * SupportError(n_W));
+std::vector<uint32_t> FloatPair::CandidatesA(const Vector& n_W, double error) const {
+  return a_->query_hull().support().Plateau(InA(n_W), Slack(n_W, error));
 }
 
-std::vector<uint32_t> FloatPair::CandidatesB(const Vector& n_W) const {
-  return b_->query_hull().support().Plateau(-InB(n_W), 2 * SupportError(n_W));
+std::vector<uint32_t> FloatPair::CandidatesB(const Vector& n_W, double error) const {
+  return b_->query_hull().support().Plateau(-InB(n_W), Slack(n_W, error));
+}
+
+Vector FloatPair::InnerPoint(const PlacedHull& placed) {
+  const auto inner = placed.query_hull().inner_vertices();
+  Vector sum = Vector::Zero();
+  for (const uint32_t i : inner) sum += placed.hull().vertices()[i];
+  return placed.R_WH() * (sum / static_cast<double>(inner.size()));
 }
 
 }  // namespace hulld

@@ -50,10 +50,10 @@ class FloatPair {
   }
 
   // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
-  // up to 64 u of the largest.
-  std::vector<uint32_t> CandidatesA(const Vector& n_W) const;
+  // up to `error`.
+  std::vector<uint32_t> CandidatesA(const Vector& n_W, double error) const;
   // All vertices of B that may be farthest against n_W.
-  std::vector<uint32_t> CandidatesB(const Vector& n_W) const;
+  std::vector<uint32_t> CandidatesB(const Vector& n_W, double error) const;
 
   // Positions, each component within kMinkowskiErrorFactor * size().
   Vector PositionA(uint32_t i) const { return a_->R_WH() * a_->hull().vertices()[i]; }
@@ -64,8 +64,14 @@ class FloatPair {
   Vector CenterDifference() const {
     return a_->rotated_center() - (b_->rotated_center() + offset_);
   }
+  // The difference of the means of the hulls' inner vertices, within the same bound.
+  Vector InnerDifference() const { return InnerPoint(*a_) - (InnerPoint(*b_) + offset_); }
 
  private:
+  static Vector InnerPoint(const PlacedHull& placed);
+  double Slack(const Vector& n_W, double error) const {
+    return 2 * SupportError(n_W) + kDirectionErrorFactor * error * size_;
+  }
   // n_W in a hull's own frame.
   Vector InA(const Vector& n_W) const { return a_->R_WH().transpose() * n_W; }
   Vector InB(const Vector& n_W) const { return b_->R_WH().transpose() * n_W; }

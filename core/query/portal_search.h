@@ -2,15 +2,18 @@
 #define HULLD_CORE_QUERY_PORTAL_SEARCH_H_
 
 #include <array>
+#include <cstdint>
+#include <functional>
 #include <optional>
 
-#include "core/numeric/integer.h"
-#include "core/numeric/vector.h"
+#include "core/query/certificate.h"
+#include "core/query/exact_pair.h"
 
 namespace hulld {
 
-// Where the origin lies relative to a convex set C = A - B, by shooting a ray from a point inside C
-// through the origin and looking for the facet of C through which it leaves.
+// Where the origin lies relative to a convex set C of dimension 3, by shooting a ray from a point
+// inside C through the origin and looking for the facet of C through which it leaves. C is A - B,
+// or A - B thickened along a coordinate axis.
 //
 // A portal is a triangle of vertices of C that the ray crosses. Its plane's far side is explored by
 // the support vertex w along its normal n, pointing away from the centre: if n.w < 0, all of C is
@@ -22,119 +25,77 @@ namespace hulld {
 // Ties: the centre c is taken to be c + (e, e^2, e^3) for an infinitesimal e, the ray's direction d
 // = -c being kept. Then the ray crosses no edge, unless the edge is parallel to it; every
 // refinement moves the crossing strictly outwards, so that with exact signs the search ends for
-// every input. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals;
-// Edelsbrunner and Mücke 1990 (simulation of simplicity) for the ties.
-enum class PortalVerdict { kSeparated, kTouching, kOverlapping, kStopped };
-
-// Space stands for C. It offers
-//
-//   struct Point { IntegerVector w; ... };    a vertex of C
-//   IntegerVector Center();                   a positive multiple of a point strictly inside C
-//   Point Farthest(const IntegerVector& n);   a vertex farthest along n
-//   bool MayContinue();                       false stops the search
-template <typename Space>
+// every input. All signs are exact: floating point with a proven bound decides most, integers the
+// rest. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals; Edelsbrunner
+// and Mücke 1990 (simulation of simplicity) for the ties.
 class PortalSearch {
  public:
-  using Point = typename Space::Point;
+  // `pair` and `should_stop`, which may be empty, must outlive the search. Requires C to have
+  // dimension 3.
+  PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop);
 
+  // Thickens C: by +-half along a coordinate axis.
+  void Thicken(int axis, Integer half);
+
+  enum class Verdict { kSeparated, kTouching, kOverlapping, kStopped };
   struct Result {
-    PortalVerdict verdict = PortalVerdict::kStopped;
-    // Separated and touching: from A towards B, n.(a - b) <= 0 throughout.
+    Verdict verdict = Verdict::kStopped;
+    // Separated and touching: from A towards B, n.w <= 0 for all w in C.
     std::optional<IntegerVector> axis;
-    // Touching: a triangle, possibly degenerate, that holds the origin.
-    std::optional<std::array<Point, 3>> portal;
+    // Touching: pairs whose vertices of C are a triangle, possibly degenerate, that holds the
+    // origin.
+    std::optional<std::array<VertexPair, 3>> portal;
   };
+  Result Run();
 
-  explicit PortalSearch(Space& space) : space_(space) {}
-
-  Result Run() {
-    center_ = space_.Center();
-    ray_ = -center_;
-    if (IsZero(ray_)) return {PortalVerdict::kOverlapping, {}, {}};
-    if (std::optional<Result> early = FindPortal()) return *early;
-    return RefinePortal();
-  }
+  uint64_t directions_tried() const { return directions_tried_; }
 
  private:
-  // Explores along n; a result when that settles it.
-  std::optional<Result> Explore(const IntegerVector& n, Point* farthest) {
-    if (!space_.MayContinue()) return Result{};
-    *farthest = space_.Farthest(n);
-    if (Sign(Dot(n, farthest->w)) < 0) return Result{PortalVerdict::kSeparated, n, {}};
-    return std::nullopt;
-  }
+  // A vertex of C, or the centre; in floating point within kMinkowskiErrorFactor of the pair's size
+  // where there is a filter.
+  struct Point {
+    VertexPair pair = {};
+    // The end of C's thickness, -1 or 1; 0 when C is not thickened.
+    int side = 0;
+    Vector w = Vector::Zero();
+  };
+  // What a direction is made of.
+  enum class Kind {
+    kRay,            // the ray's
+    kAcrossPoint,    // ray x p
+    kAcrossSegment,  // ray x (p - q)
+    kNormal,         // (q - p) x (r - p)
+    kOther,          // given
+  };
+  class Direction;
 
-  // Sign of det[d, p - c, q - c]: +1 when q is to the left of p seen along the ray. Ties as in the
-  // comment above: the derivative by c is (p - q) x d. Zero only when p - q is parallel to the ray.
-  int Turn(const Point& p, const Point& q) const {
-    if (const int sign = Sign(Dot(ray_, Cross(p.w, q.w)))) return sign;
-    const IntegerVector slope = Cross(p.w - q.w, ray_);
-    for (int i = 0; i < 3; ++i) {
-      if (const int sign = Sign(slope[i])) return sign;
-    }
-    return 0;
-  }
+  IntegerVector Exact(const Point& point) const;
+  const IntegerVector& ExactRay() const;
+  int Sign3(const Point& p, const Point& q, const Point& r) const;
+  int TurnOf(const Point& p, const Point& q) const;
+  bool IsOnRay(const Point& p) const;
+  int SignAlong(Direction& n, const Point& w) const;
+  int SignOfAdvance(Direction& n, const Point& p, const Point& q, const Point& r,
+                    const Point& w) const;
+  Point Farthest(Direction& n);
+  std::optional<Result> Explore(Direction& n, Point* farthest);
+  std::optional<Result> FindPortal();
+  Result RefinePortal();
+  void Replace(const Point& w);
 
-  // Fills portal_ with a triangle that the ray's line crosses: a vertex p, one to the left and one
-  // to the right of the plane through p and the ray, moved until their segment passes on the far
-  // side of the ray from p.
-  std::optional<Result> FindPortal() {
-    auto& [p, left, right] = portal_;
-    if (auto result = Explore(ray_, &p)) return result;
-    IntegerVector n = Cross(ray_, p.w);
-    if (IsZero(n)) {
-      // p is on the ray's line; a vertex farthest along a direction across the ray is not.
-      if (auto result = Explore(AnyPerpendicular(ray_), &p)) return result;
-      n = Cross(ray_, p.w);
-    }
-    if (auto result = Explore(n, &left)) return result;
-    if (auto result = Explore(-n, &right)) return result;
-    while (Turn(left, right) < 0) {
-      Point w;
-      if (auto result = Explore(Cross(ray_, left.w - right.w), &w)) return result;
-      (Turn(p, w) > 0 ? left : right) = w;
-    }
-    return std::nullopt;
-  }
-
-  Result RefinePortal() {
-    auto& [p, q, r] = portal_;
-    for (;;) {
-      const IntegerVector n = Cross(q.w - p.w, r.w - p.w);
-      if (Sign(Dot(n, p.w)) > 0) return {PortalVerdict::kOverlapping, {}, {}};
-      Point w;
-      if (auto result = Explore(n, &w)) return *result;
-      if (Sign(Dot(n, w.w - p.w)) <= 0) {
-        return {PortalVerdict::kTouching, n, portal_};
-      }
-      Replace(w);
-    }
-  }
-
-  // Puts w in place of the corner that leaves the ray crossing the portal. Corners turn left in
-  // order; exactly one consecutive pair has w to the right of the first and to the left of the
-  // second, unless w is in line with a corner.
-  void Replace(const Point& w) {
-    int turn[3];
-    for (int i = 0; i < 3; ++i) {
-      turn[i] = Turn(portal_[i], w);
-      if (turn[i] == 0) {
-        portal_[i] = w;
-        return;
-      }
-    }
-    for (int i = 0; i < 3; ++i) {
-      if (turn[i] < 0 && turn[(i + 1) % 3] > 0) {
-        portal_[(i + 2) % 3] = w;
-        return;
-      }
-    }
-  }
-
-  Space& space_;
-  IntegerVector center_;
-  IntegerVector ray_;
+  ExactPair& pair_;
+  const std::function<bool()>& should_stop_;
+  // Whether floating point may decide.
+  bool filtered_;
+  // Bound of the error of a point's components, where filtered.
+  double position_error_;
+  int axis_ = -1;
+  Integer half_;
+  // From the centre through the origin; exactly once it is asked for.
+  mutable std::optional<IntegerVector> exact_ray_;
+  Vector ray_ = Vector::Zero();
   std::array<Point, 3> portal_;
+  uint64_t directions_tried_ = 0;
 };
 
 }  // namespace hulld
