@@ -1,7 +1,7 @@
-#include <fcl/geometry/shape/convex.h>
 #include <fcl/narrowphase/detail/gjk_solver_indep.h>
 #include <fcl/narrowphase/detail/gjk_solver_libccd.h>
 
+#include "tests/bench/fcl_shape.h"
 #include "tests/bench/peers.h"
 
 namespace hulld::bench {
@@ -10,40 +10,18 @@ namespace {
 // Solver is asked directly: that spares the dispatch of fcl::collide and its bounding boxes.
 template <typename Solver>
 struct Fcl {
-  using Shape = fcl::Convexd;
+  using Shape = std::shared_ptr<fcl::Convexd>;
   struct Placed {
-    const Shape* shape;
+    const fcl::Convexd* shape;
     fcl::Transform3d X;
   };
 
   Solver solver;
 
   std::unique_ptr<Shape> MakeShape(const Hull& hull) {
-    auto vertices = std::make_shared<std::vector<fcl::Vector3d>>(hull.vertices().begin(),
-                                                                 hull.vertices().end());
-    auto faces = std::make_shared<std::vector<int>>();
-    int count = 0;
-    for (size_t i = 0; i < hull.facet_count(); ++i) {
-      const auto facet = hull.facet(i);
-      faces->push_back(static_cast<int>(facet.size()));
-      faces->insert(faces->end(), facet.begin(), facet.end());
-      ++count;
-      if (hull.dimension() < 3) {
-        // The other side, so that the surface is closed.
-        faces->push_back(static_cast<int>(facet.size()));
-        faces->insert(faces->end(), facet.rbegin(), facet.rend());
-        ++count;
-      }
-    }
-    return std::make_unique<Shape>(std::move(vertices), count, std::move(faces));
+    return std::make_unique<Shape>(ToFcl(hull));
   }
-
-  Placed Place(const Shape& shape, const Pose& X_WA) {
-    fcl::Transform3d X = fcl::Transform3d::Identity();
-    X.linear() = RotationOf(X_WA);
-    X.translation() = X_WA.t;
-    return {&shape, X};
-  }
+  Placed Place(const Shape& shape, const Pose& X_WA) { return {shape.get(), ToFcl(X_WA)}; }
 
   Verdict Ask(const Placed& a, const Placed& b) {
     return solver.shapeIntersect(*a.shape, a.X, *b.shape, b.X, nullptr) ? Verdict::kColliding

@@ -16,6 +16,7 @@
 //   SET/REGIME/distance/METHOD    distance and witness points of hulls apart
 //   SET/REGIME/warm/METHOD        the same pairs again and again, moved a little each time
 //   SET/REGIME/batch:T/METHOD     all questions at once on T threads; real time
+//   SET/scene:N/collisions/METHOD N hulls, each moved: all pairs that collide (scene_benchmark.h)
 
 #include <benchmark/benchmark.h>
 
@@ -31,6 +32,7 @@
 #include "tests/bench/query_method.h"
 #include "tests/bench/query_report.h"
 #include "tests/bench/query_sets.h"
+#include "tests/bench/scene_benchmark.h"
 
 namespace hulld::bench {
 namespace {
@@ -325,6 +327,7 @@ void Register() {
       RegisterSequences(set, regime, workload);
     }
   }
+  RegisterScenes();
 }
 
 }  // namespace
