@@ -5,9 +5,13 @@
 #include <bit>
 #include <numeric>
 
+#include "core/hull/conflict_lists.h"
+
 namespace hulld {
 namespace {
 
+// From so many points and triangles on, zones for threads are worth making.
+constexpr size_t kWorthZones = 1024;
 // Points of the first round, about.
 constexpr size_t kFirstRound = 64;
 // Insertions between two polls of should_stop.
@@ -82,14 +86,16 @@ SortKey KeyOf(const DirectionMap& directions, const Vector& point, uint32_t inde
   return static_cast<uint64_t>(face << (2 * kGridBits) | order) << 32 | index;
 }
 
-// One call of InsertBlock.
-class BlockInsertion {
+// Adds points in rounds of growing size, each reduced to those that the map of directions cannot
+// reject and sorted along the surface.
+class RoundsInsertion {
  public:
-  BlockInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
-                 const std::function<bool()>& should_stop)
+  RoundsInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                  int threads, const std::function<bool()>& should_stop)
       : surface_(surface),
         vertices_(vertices),
         points_(points),
+        threads_(threads),
         should_stop_(should_stop),
         rounds_(points.size()) {}
 
@@ -140,6 +146,13 @@ class BlockInsertion {
   }
 
   bool InsertChosen() {
+    if (threads_ > 1 && surface_.directions() != nullptr && chosen_.size() >= kWorthZones &&
+        surface_.triangle_count() >= kWorthZones) {
+      std::optional<std::vector<Vector>> put_off =
+          surface_.InsertInZones(vertices_, chosen_, threads_ < 4 ? 2 : 4, should_stop_);
+      if (!put_off) return false;
+      chosen_ = std::move(*put_off);
+    }
     for (size_t k = 0; k < chosen_.size(); ++k) {
       if (k % kPointsPerPoll == 0 && should_stop_ && should_stop_()) return false;
       surface_.Insert(vertices_, chosen_[k]);
@@ -150,12 +163,210 @@ class BlockInsertion {
   Surface& surface_;
   VertexTable& vertices_;
   std::span<const Vector> points_;
+  int threads_;
   const std::function<bool()>& should_stop_;
   InsertionRounds rounds_;
   std::vector<uint32_t> members_;
   std::vector<SortKey> keys_;
   std::vector<SortKey> scratch_;
   std::vector<Vector> chosen_;
+};
+
+// The smaller a surface, the cheaper it is to test a point against all its triangles.
+constexpr size_t kMostTrianglesToTest = 64;
+// A block of at most this many points is not worth a map of directions for rejecting most of them.
+constexpr size_t kSmallBlock = 65536;
+// Points of the first of the samples of a larger block, at most.
+constexpr size_t kLargestFirstSample = 16384;
+// Each sample, and then the block, is this many times the sample before.
+constexpr size_t kSampleRatio = 16;
+// Samples are made of runs of consecutive points, for the sake of memory.
+constexpr size_t kRun = 64;
+// From this many runs on, threads save more than they cost.
+constexpr size_t kWorthThreads = 512;
+
+// One call of InsertBlock.
+//
+// Idea: of most clouds most points are inside. Samples of growing size shape the surface; then the
+// map of directions rejects most of what follows, read once and in order, and what remains goes
+// into conflict lists. A block most of which is outside is inserted in rounds instead.
+class BlockInsertion {
+ public:
+  BlockInsertion(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                 std::span<const uint32_t> done, int threads,
+                 const std::function<bool()>& should_stop)
+      : surface_(surface),
+        vertices_(vertices),
+        points_(points),
+        done_(done.begin(), done.end()),
+        threads_(std::max(threads, 1)),
+        should_stop_(should_stop) {}
+
+  bool Run() {
+    // A triangle's list takes memory whether it is used or not.
+    if (!surface_.IsMeasurable() || 64 * points_.size() < surface_.triangle_count()) {
+      return InsertRounds(0);
+    }
+    for (size_t stride = FirstStride(); stride > 0; stride /= kSampleRatio) {
+      const ConflictLists::Outcome outcome = InsertSample(stride);
+      if (outcome == ConflictLists::Outcome::kStopped) return false;
+      if (outcome == ConflictLists::Outcome::kGaveUp) return InsertRounds(stride);
+      stride_before_ = stride;
+    }
+    return true;
+  }
+
+ private:
+  // Where the runs of a sample begin: each stride-th of the block, without those of earlier
+  // samples.
+  std::vector<size_t> RunsOf(size_t stride) const {
+    std::vector<size_t> runs;
+    for (size_t first = 0; first < points_.size(); first += kRun * stride) {
+      if (stride_before_ == 0 || first / kRun % stride_before_ != 0) runs.push_back(first);
+    }
+    return runs;
+  }
+  size_t RunSize(size_t first) const { return std::min(kRun, points_.size() - first); }
+
+  // A power of kSampleRatio, or 1 for all points at once.
+  size_t FirstStride() const {
+    if (points_.size() <= kSmallBlock) return 1;
+    size_t stride = 1;
+    while (points_.size() / stride > kLargestFirstSample) stride *= kSampleRatio;
+    return stride;
+  }
+
+  ConflictLists::Outcome InsertSample(size_t stride) {
+    ConflictLists lists(surface_, vertices_);
+    if (surface_.triangle_count() <= kMostTrianglesToTest) {
+      lists.Take(Sample(stride));
+    } else {
+      TakeByDirection(stride, lists);
+    }
+    const ConflictLists::Outcome outcome = lists.InsertAll(should_stop_);
+    if (outcome == ConflictLists::Outcome::kStopped) return outcome;
+    if (outcome == ConflictLists::Outcome::kGaveUp) rest_ = lists.TakeRest();
+    for (const Vector& p : astray_) surface_.Insert(vertices_, p);
+    astray_.clear();
+    surface_.FinishInsertions(vertices_);
+    return outcome;
+  }
+
+  bool IsDone(size_t i) const {
+    return std::find(done_.begin(), done_.end(), static_cast<uint32_t>(i)) != done_.end();
+  }
+
+  std::vector<Vector> Sample(size_t stride) const {
+    std::vector<Vector> sample;
+    sample.reserve(points_.size() / stride + kRun);
+    for (const size_t first : RunsOf(stride)) {
+      for (size_t i = first; i < first + RunSize(first); ++i) {
+        if (!IsDone(i)) sample.push_back(points_[i]);
+      }
+    }
+    return sample;
+  }
+
+  // What a part of a sample comes to that the surface does not change under.
+  struct Part {
+    // Points that see a triangle, and these.
+    std::vector<Vector> outside;
+    std::vector<TriangleId> seen;
+    std::vector<VertexId> duplicates;
+    std::vector<Vector> astray;
+    size_t asked = 0;
+    size_t rejected = 0;
+  };
+
+  // The runs are dealt out to threads in order, so that the result is the same on any number.
+  void TakeByDirection(size_t stride, ConflictLists& lists) {
+    surface_.MeasureBefore(vertices_, points_.size() / stride);
+    const std::vector<size_t> runs = RunsOf(stride);
+    const size_t part_count = runs.size() < kWorthThreads ? 1 : static_cast<size_t>(threads_);
+    std::vector<Part> parts(part_count);
+#pragma omp parallel for num_threads(part_count) schedule(static, 1) if (part_count > 1)
+    for (size_t k = 0; k < parts.size(); ++k) {
+      const size_t first = runs.size() * k / parts.size();
+      const size_t end = runs.size() * (k + 1) / parts.size();
+      parts[k] = Locate(std::span(runs).subspan(first, end - first));
+    }
+    for (size_t k = 1; k < parts.size(); ++k) {
+      Append(parts[k].outside, parts[0].outside);
+      Append(parts[k].seen, parts[0].seen);
+    }
+    for (const Part& part : parts) {
+      for (const VertexId v : part.duplicates) vertices_.CountDuplicate(v);
+      Append(part.astray, astray_);
+      surface_.CountRejected(part.asked, part.rejected);
+    }
+    lists.Take(parts[0].outside, parts[0].seen);
+  }
+
+  template <typename T>
+  static void Append(const std::vector<T>& what, std::vector<T>& to) {
+    to.insert(to.end(), what.begin(), what.end());
+  }
+
+  Part Locate(std::span<const size_t> runs) const {
+    const DirectionMap& directions = *surface_.directions();
+    Part part;
+    std::vector<Vector> survivors;
+    std::vector<uint32_t> of_run;
+    for (const size_t first : runs) {
+      const std::span<const Vector> run = points_.subspan(first, RunSize(first));
+      of_run.clear();
+      directions.AppendSurvivors(run, of_run);
+      // Gathered while they are in the cache.
+      for (const uint32_t i : of_run) {
+        if (!IsDone(first + i)) survivors.push_back(run[i]);
+      }
+      part.asked += run.size();
+    }
+    part.rejected = part.asked - survivors.size();
+    for (const Vector& p : survivors) LocateSurvivor(directions, p, part);
+    return part;
+  }
+
+  void LocateSurvivor(const DirectionMap& directions, const Vector& p, Part& part) const {
+    const std::optional<Surface::Location> location =
+        surface_.Locate(vertices_, p, directions.hint(directions.PlaceOf(p).cell));
+    if (!location) {
+      part.astray.push_back(p);
+    } else if (location->side == Surface::Side::kOutside) {
+      part.outside.push_back(p);
+      part.seen.push_back(location->triangle);
+    } else if (const auto corner = surface_.CornerAt(vertices_, location->triangle, p)) {
+      part.duplicates.push_back(*corner);
+    }
+  }
+
+  // Inserts in rounds what conflict lists gave up and what no sample up to this stride had; all,
+  // for stride 0.
+  bool InsertRounds(size_t stride) {
+    rest_.reserve(points_.size());
+    for (size_t first = 0; first < points_.size(); first += kRun) {
+      if (stride > 0 && first / kRun % stride == 0) continue;
+      const size_t end = std::min(first + kRun, points_.size());
+      for (size_t i = first; i < end; ++i) {
+        if (!IsDone(i)) rest_.push_back(points_[i]);
+      }
+    }
+    return RoundsInsertion(surface_, vertices_, rest_, threads_, should_stop_).Run();
+  }
+
+  Surface& surface_;
+  VertexTable& vertices_;
+  std::span<const Vector> points_;
+  // Indices of points that are not to be inserted, few.
+  std::vector<uint32_t> done_;
+  int threads_;
+  const std::function<bool()>& should_stop_;
+  // The stride of the sample before; 0 when there is none.
+  size_t stride_before_ = 0;
+  // Points that are to be inserted one by one: the walk to them was too long.
+  std::vector<Vector> astray_;
+  // Points that are to be inserted in rounds.
+  std::vector<Vector> rest_;
 };
 
 }  // namespace
@@ -183,8 +394,9 @@ void InsertionRounds::AppendRound(int round, std::vector<uint32_t>& members) con
 }
 
 bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                 std::span<const uint32_t> done, int threads,
                  const std::function<bool()>& should_stop) {
-  return BlockInsertion(surface, vertices, points, should_stop).Run();
+  return BlockInsertion(surface, vertices, points, done, threads, should_stop).Run();
 }
 
 }  // namespace hulld

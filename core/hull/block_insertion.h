@@ -34,10 +34,13 @@ class InsertionRounds {
   uint32_t group_mask_;
 };
 
-// Adds a block of points to a surface, in an order that is fast for any input: rounds of growing
-// size, each reduced to the points that the map of directions cannot reject and sorted along the
-// surface. Stops and returns false when should_stop, which may be empty, says so.
+// Adds a block of points to a surface, all but those with the indices `done`, in an order that is
+// fast for any input: into conflict lists what the map of directions cannot reject, or, where most
+// points are outside, in rounds of growing size sorted along the surface. Stops and returns false
+// when should_stop, which may be empty, says so. Uses up to `threads` OpenMP threads for a large
+// block; the result does not depend on how many.
 bool InsertBlock(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                 std::span<const uint32_t> done, int threads,
                  const std::function<bool()>& should_stop);
 
 }  // namespace hulld

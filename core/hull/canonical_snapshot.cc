@@ -147,9 +147,16 @@ Hull SnapshotOf(const VertexTable& vertices, const Surface& surface) {
   });
   std::sort(facets.begin(), facets.end());
 
-  std::vector<uint32_t> starts = {0};
+  size_t corners = 0;
+  for (const std::vector<uint32_t>& facet : facets) corners += facet.size();
+  // Reserved, as a snapshot stays as it is for long.
+  std::vector<uint32_t> starts;
+  starts.reserve(facets.size() + 1);
+  starts.push_back(0);
   std::vector<uint32_t> facet_vertices;
+  facet_vertices.reserve(corners);
   std::vector<Edge> edges;
+  edges.reserve(corners / 2);
   for (const std::vector<uint32_t>& facet : facets) {
     facet_vertices.insert(facet_vertices.end(), facet.begin(), facet.end());
     starts.push_back(static_cast<uint32_t>(facet_vertices.size()));

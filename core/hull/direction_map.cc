@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "core/numeric/error_bounds.h"
 
@@ -25,10 +26,20 @@ bool HasAvx2() {
 
 }  // namespace
 
-DirectionMap::DirectionMap(const Vector& center, int resolution)
-    : center_(center), n_(resolution), half_(0.5 * resolution) {
+DirectionMap::DirectionMap(const Vector& center) : center_(center), n_(1), half_(0.5) {
   radii_.assign(cell_count(), 0);
   hints_.assign(cell_count(), UINT32_MAX);
+}
+
+DirectionMap::DirectionMap(const Vector& center, int resolution)
+    : center_(center), n_(resolution), half_(0.5 * resolution) {
+  radii_.reserve(cell_count());
+  hints_.reserve(cell_count());
+}
+
+void DirectionMap::AppendCell(double reach, uint32_t hint) {
+  radii_.push_back((1 - kDirectionMapMargin) * reach);
+  hints_.push_back(hint);
 }
 
 Vector DirectionMap::CornerDirection(int face, int i, int j) const {
@@ -46,31 +57,33 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
 // directions. Relative to the least reach of the cell the second term is at most `ratio` (8 + 4
 // (kappa + ratio)) u0, with ratio = largest / least reach and kappa = |c| / least reach; half of
 // kDirectionMapMargin bounds it. Proven.
-void DirectionMap::SetRadii(std::span<const double> reach) {
-  const auto [least, largest] = std::minmax_element(reach.begin(), reach.end());
-  if (!(*least > 0)) return;
-  const double ratio = *largest / *least;
-  const double kappa = center_.cwiseAbs().maxCoeff() / *least;
+void DirectionMap::Finish(double least_reach, double largest_reach) {
+  if (!(least_reach > 0)) return;
+  const double ratio = largest_reach / least_reach;
+  const double kappa = center_.cwiseAbs().maxCoeff() / least_reach;
   const double error = ratio * (8 + 4 * (kappa + ratio)) * kUnitRoundoff;
-  if (!(error < 0.5 * kDirectionMapMargin)) return;
-  const size_t row = static_cast<size_t>(n_) + 1;
-  size_t cell = 0;
-  for (size_t face = 0; face < 6; ++face) {
-    for (size_t i = 0; i + 1 < row; ++i) {
-      for (size_t j = 0; j + 1 < row; ++j) {
-        const size_t corner = (face * row + i) * row + j;
-        const double lowest = std::min(std::min(reach[corner], reach[corner + 1]),
-                                       std::min(reach[corner + row], reach[corner + row + 1]));
-        radii_[cell] = std::max(radii_[cell], (1 - kDirectionMapMargin) * lowest);
-        ++cell;
-      }
+  rejects_ = error < 0.5 * kDirectionMapMargin;
+}
+
+void DirectionMap::Coarsen() {
+  if (n_ % 2 != 0) return;
+  DirectionMap coarse(center_, n_ / 2);
+  const auto row = static_cast<size_t>(n_);
+  for (size_t top = 0; top < radii_.size(); top += 2 * row) {
+    for (size_t k = top; k < top + row; k += 2) {
+      const double least = std::min(std::min(radii_[k], radii_[k + 1]),
+                                    std::min(radii_[k + row], radii_[k + row + 1]));
+      coarse.radii_.push_back(least);
+      coarse.hints_.push_back(hints_[k + row + 1]);
     }
   }
+  coarse.rejects_ = rejects_;
+  *this = std::move(coarse);
 }
 
 void DirectionMap::AppendSurvivors(std::span<const Vector> points,
                                    std::vector<uint32_t>& survivors) const {
-  const size_t done = HasAvx2() ? AppendSurvivorsAvx2(points, survivors) : 0;
+  const size_t done = HasAvx2() && rejects_ ? AppendSurvivorsAvx2(points, survivors) : 0;
   AppendSurvivorsBaseline(points, done, survivors);
 }
 

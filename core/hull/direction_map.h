@@ -28,8 +28,18 @@ class DirectionMap {
     double distance;
   };
 
-  // Directions only, no radii: nothing is certainly inside.
+  // One cell a face, and nothing is certainly inside.
+  explicit DirectionMap(const Vector& center);
+  // No cells yet: they are appended, so that a map can be made little by little.
   DirectionMap(const Vector& center, int resolution);
+  // Appends the next cell, face by face, i major. reach: the least, over the cell's corners, of a
+  // distance m such that the double nearest to center + m * direction, component by component, is
+  // in the set. Cost: O(1).
+  void AppendCell(double reach, uint32_t hint);
+  // Says, when all cells are there, what the least and the largest reach of all corners are. Where
+  // the shape is too slender for the rounding of this map to be negligible, nothing is certainly
+  // inside.
+  void Finish(double least_reach, double largest_reach);
 
   const Vector& center() const { return center_; }
   int resolution() const { return n_; }
@@ -44,18 +54,23 @@ class DirectionMap {
     const double x = std::abs(v.x());
     const double y = std::abs(v.y());
     const double z = std::abs(v.z());
-    const int axis = x >= y ? (x >= z ? 0 : 2) : (y >= z ? 1 : 2);
-    const double m = axis == 0 ? x : axis == 1 ? y : z;
+    // No branches that depend on the direction.
+    const double larger = std::max(x, y);
+    const double m = std::max(larger, z);
+    const int of_two = y > x ? 1 : 0;
+    const int axis = z > larger ? 2 : of_two;
     if (m == 0) return {0, 0};
     if (!(m >= kLeastDistance && m <= kLargestDistance)) return {0, INFINITY};
     const double half = 0.5 * resolution;
     const double scale = half / m;
     const int i = std::min(resolution - 1, static_cast<int>(v[kNext[axis]] * scale + half));
     const int j = std::min(resolution - 1, static_cast<int>(v[kNext[axis + 1]] * scale + half));
-    const int face = 2 * axis + (v[axis] < 0 ? 1 : 0);
+    const int face = 2 * axis + static_cast<int>(v[axis] < 0);
     return {static_cast<size_t>((face * resolution + i) * resolution + j), m};
   }
-  bool IsCertainlyInside(const Place& place) const { return place.distance < radii_[place.cell]; }
+  bool IsCertainlyInside(const Place& place) const {
+    return rejects_ && place.distance < radii_[place.cell];
+  }
 
   uint32_t hint(size_t cell) const { return hints_[cell]; }
   void SetHint(size_t cell, uint32_t hint) { hints_[cell] = hint; }
@@ -63,10 +78,11 @@ class DirectionMap {
   // The direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest component is
   // +-1.
   Vector CornerDirection(int face, int i, int j) const;
-  // Sets the radii from `reach`: for every corner, face by face, i major, a distance m such that
-  // the double nearest to c + m * direction, component by component, is in the set. Does nothing
-  // where the shape is too slender for the rounding of this map to be negligible.
-  void SetRadii(std::span<const double> reach);
+  // Halves the resolution where that is possible: fewer cells, each as near as its nearest part.
+  void Coarsen();
+  size_t MemoryBytes() const {
+    return radii_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
+  }
 
   // Appends the indices of the points that are not certainly inside, ascending.
   void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors) const;
@@ -84,6 +100,7 @@ class DirectionMap {
   Vector center_;
   int n_;
   double half_;
+  bool rejects_ = false;
   std::vector<double> radii_;
   std::vector<uint32_t> hints_;
 };

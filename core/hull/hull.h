@@ -50,6 +50,13 @@ class Hull {
   // The mean of the six vertices that are extreme along the coordinate axes, rounded: a place in
   // the hull to search from. Zero when empty.
   const Vector& center() const { return center_; }
+  // What the snapshot holds in memory, by capacities, in bytes: below 100 a vertex where facets are
+  // triangles and vertices many.
+  size_t MemoryBytes() const {
+    return sizeof(*this) + vertices_.capacity() * sizeof(Vector) +
+           (facet_starts_.capacity() + facet_vertices_.capacity()) * sizeof(uint32_t) +
+           edges_.capacity() * sizeof(Edge);
+  }
 
  private:
   int dimension_ = -1;

@@ -25,10 +25,24 @@ namespace {
 constexpr size_t kUninterruptedPoints = 1024;
 // Points between two polls of should_stop.
 constexpr size_t kPointsPerPoll = 256;
+// Points looked at for some that are extreme along the axes, at most twice.
+constexpr size_t kExtremesSample = 4096;
+// From this many points on, threads save more than they cost.
+constexpr size_t kWorthThreads = 65536;
+constexpr double kLargest = std::numeric_limits<double>::max();
 // From this many points on, the order of insertion is worth choosing.
 constexpr size_t kWorthOrdering = 128;
 
-absl::Status CheckFinite(std::span<const Vector> points) {
+// No branch but the loop's, so that the compiler tests several at a time.
+bool AreFinite(std::span<const Vector> points) {
+  int64_t bad = 0;
+  for (const Vector& p : points) {
+    for (int k = 0; k < 3; ++k) bad |= std::abs(p[k]) <= kLargest ? 0 : 1;
+  }
+  return bad == 0;
+}
+
+absl::Status DescribeNotFinite(std::span<const Vector> points) {
   constexpr const char* kNames[] = {"x", "y", "z"};
   for (size_t i = 0; i < points.size(); ++i) {
     for (int k = 0; k < 3; ++k) {
@@ -38,6 +52,39 @@ absl::Status CheckFinite(std::span<const Vector> points) {
     }
   }
   return absl::OkStatus();
+}
+
+absl::Status CheckFinite(std::span<const Vector> points, int threads) {
+  // A parallel region costs more than a small block, even with one thread.
+  if (threads <= 1 || points.size() < kWorthThreads) {
+    return AreFinite(points) ? absl::OkStatus() : DescribeNotFinite(points);
+  }
+  const auto parts = static_cast<size_t>(threads);
+  int64_t bad = 0;
+#pragma omp parallel for num_threads(parts) schedule(static, 1) reduction(| : bad)
+  for (size_t k = 0; k < parts; ++k) {
+    const size_t first = points.size() * k / parts;
+    const size_t end = points.size() * (k + 1) / parts;
+    bad |= AreFinite(points.subspan(first, end - first)) ? 0 : 1;
+  }
+  return bad == 0 ? absl::OkStatus() : DescribeNotFinite(points);
+}
+
+// Where the lowest and the highest coordinates are, along each axis, among some points spread over
+// all; each index once. Points to start a hull from.
+std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
+  const size_t stride = points.size() / kExtremesSample + 1;
+  std::array<uint32_t, 6> extremes{};
+  for (size_t i = 0; i < points.size(); i += stride) {
+    for (size_t k = 0; k < 3; ++k) {
+      if (points[i][k] < points[extremes[k]][k]) extremes[k] = static_cast<uint32_t>(i);
+      if (points[i][k] > points[extremes[k + 3]][k]) extremes[k + 3] = static_cast<uint32_t>(i);
+    }
+  }
+  std::vector<uint32_t> distinct(extremes.begin(), extremes.end());
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  return distinct;
 }
 
 bool LexicographicallyLess(const Vector& a, const Vector& b) {
@@ -52,6 +99,7 @@ class HullBuilder::State {
  public:
   void BeginBlock() { vertices_.BeginBlock(); }
   void Insert(const Vector& point) {
+    if (surface_) return surface_->Insert(vertices_, point);
     switch (dimension()) {
       case -1:
         return GrowToPoint(point);
@@ -59,19 +107,28 @@ class HullBuilder::State {
         return GrowToSegment(point);
       case 1:
         return InsertIntoSegment(point);
-      case 2:
-        return InsertIntoPolygon(point);
       default:
-        return surface_->Insert(vertices_, point);
+        return InsertIntoPolygon(point);
     }
   }
 
   // Inserts all points; false when should_stop, which may be empty, said so.
-  bool InsertAll(std::span<const Vector> points, const std::function<bool()>& should_stop) {
+  bool InsertAll(std::span<const Vector> points, int threads,
+                 const std::function<bool()>& should_stop) {
+    if (points.size() < kWorthOrdering) {
+      for (const Vector& point : points) Insert(point);
+      return true;
+    }
+    std::vector<uint32_t> done;
+    if (dimension() < 0) done = AxisExtremes(points);
+    for (const uint32_t i : done) Insert(points[i]);
     for (size_t i = 0; i < points.size(); ++i) {
-      if (surface_ && points.size() - i >= kWorthOrdering) {
-        return InsertBlock(*surface_, vertices_, points.subspan(i), should_stop);
+      if (surface_) {
+        std::erase_if(done, [i](uint32_t index) { return index < i; });
+        for (uint32_t& index : done) index -= static_cast<uint32_t>(i);
+        return InsertBlock(*surface_, vertices_, points.subspan(i), done, threads, should_stop);
       }
+      if (std::find(done.begin(), done.end(), i) != done.end()) continue;
       if (i % kPointsPerPoll == 0 && should_stop && should_stop()) return false;
       Insert(points[i]);
     }
@@ -84,6 +141,13 @@ class HullBuilder::State {
     return static_cast<int>(ends_.size()) - 1;
   }
   const VertexTable& vertices() const { return vertices_; }
+  size_t MemoryBytes() const {
+    size_t bytes = sizeof(State) + vertices_.MemoryBytes() + ends_.capacity() * sizeof(VertexId);
+    if (polygon_) bytes += polygon_->MemoryBytes();
+    if (surface_) bytes += surface_->MemoryBytes();
+    return bytes;
+  }
+  uint64_t housekeeping_steps() const { return surface_ ? surface_->work() : 0; }
 
   Hull Snapshot() const {
     if (surface_) return SnapshotOf(vertices_, *surface_);
@@ -152,14 +216,15 @@ HullBuilder::~HullBuilder() = default;
 
 absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
                                              const AddLimits& limits) {
-  if (absl::Status status = CheckFinite(points); !status.ok()) return status;
+  if (absl::Status status = CheckFinite(points, limits.threads); !status.ok()) return status;
   const bool may_stop = limits.should_stop && points.size() > kUninterruptedPoints;
   const bool may_exceed = vertex_count() + points.size() > limits.max_vertices;
   std::unique_ptr<State> before;
   if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
 
   state_->BeginBlock();
-  if (!state_->InsertAll(points, may_stop ? limits.should_stop : nullptr)) {
+  static const std::function<bool()> kNeverStop;
+  if (!state_->InsertAll(points, limits.threads, may_stop ? limits.should_stop : kNeverStop)) {
     state_ = std::move(before);
     return absl::CancelledError("stopped while adding points; the hull is as before");
   }
@@ -180,6 +245,10 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
 int HullBuilder::dimension() const { return state_->dimension(); }
 
 size_t HullBuilder::vertex_count() const { return state_->vertices().size(); }
+
+size_t HullBuilder::MemoryBytes() const { return sizeof(*this) + state_->MemoryBytes(); }
+
+uint64_t HullBuilder::housekeeping_steps() const { return state_->housekeeping_steps(); }
 
 Hull HullBuilder::Snapshot() const { return state_->Snapshot(); }
 

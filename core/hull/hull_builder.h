@@ -33,6 +33,9 @@ struct AddLimits {
   // Polled every few thousand steps of a block of more than 1024 points; true ends the call with
   // CANCELLED. May be empty.
   std::function<bool()> should_stop;
+  // OpenMP threads that a large block may use, at least 1. The hull and the counts do not depend on
+  // it.
+  int threads = 1;
 };
 
 // Builds the convex hull of a growing point set, exactly.
@@ -58,6 +61,13 @@ class HullBuilder {
 
   int dimension() const;
   size_t vertex_count() const;
+
+  // What the builder holds in memory, by capacities, in bytes. Below 300 a vertex from 1000
+  // vertices on; inside points are not kept. Cost: O(1) from dimension 3 on.
+  size_t MemoryBytes() const;
+  // Steps of work that insertions did so far beyond the triangles that they removed and created:
+  // for tests that no single point stalls.
+  uint64_t housekeeping_steps() const;
 
   // The canonical snapshot of all points added so far. Cost: O(V log V), exact coplanarity tests at
   // every ridge.

@@ -25,6 +25,11 @@ class PolygonBoundary {
   // Adds a point of the plane. Cost: O(log n) amortized.
   void Insert(VertexTable& vertices, const Vector& point);
 
+  // What it holds in memory: each node has three links, a color, a key and an ID. Cost: O(1).
+  size_t MemoryBytes() const {
+    return (lower_.size() + upper_.size()) * (4 * sizeof(void*) + sizeof(Chain::value_type));
+  }
+
   // The vertices in order, counter-clockwise in the coordinate plane.
   std::vector<VertexId> Loop() const;
 

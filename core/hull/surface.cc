@@ -21,10 +21,15 @@ constexpr size_t kWorthMeasuring = 64;
 // Corners of a map that one insertion measures: a map is done long before the surface has doubled.
 constexpr size_t kCornersPerInsertion = 8;
 
+// Simpler than Eigen's for three components, and as exact.
+double LargestComponent(const Vector& v) {
+  return std::max(std::abs(v.x()), std::max(std::abs(v.y()), std::abs(v.z())));
+}
+
 // Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
 // many points than where it only tells where to start walking.
 int ResolutionFor(size_t triangles, bool rejects) {
-  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 12 : 96));
+  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 6 : 96));
   return std::clamp(static_cast<int>(cells_a_side), 2, 256);
 }
 
@@ -37,65 +42,82 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
     std::reverse(loop.begin(), loop.end());
   }
   const size_t n = loop.size();
-  for (size_t i = 1; i + 1 < n; ++i) SetTriangle(vertices, NewId(), loop[0], loop[i], loop[i + 1]);
-  for (size_t i = 0; i < n; ++i) SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
+  for (size_t i = 1; i + 1 < n; ++i)
+    SetTriangle(vertices, NewId(editor_), loop[0], loop[i], loop[i + 1]);
+  for (size_t i = 0; i < n; ++i)
+    SetTriangle(vertices, NewId(editor_), loop[(i + 1) % n], loop[i], apex);
   alive_ = triangles_.size();
   LinkAll();
+  while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   Update(vertices);
 }
 
-void Surface::Insert(VertexTable& vertices, const Vector& point) {
+void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell) {
   const double size = SizeWith(vertices, point);
   std::optional<Location> location;
-  size_t cell = 0;
   if (directions_) {
-    const DirectionMap::Place place = directions_->PlaceOf(point);
-    ++asked_;
-    if (directions_->IsCertainlyInside(place)) {
-      ++rejected_;
-      return;
-    }
-    cell = place.cell;
-    location = Walk(vertices, point, size, Alive(directions_->hint(cell)));
+    location = Walk(vertices, point, size, Alive(directions_->hint(cell)), 0, work_);
   }
-  if (!location) location = Scan(vertices, point, size);
-  last_ = location->triangle;
+  if (!location) {
+    location = Scan(vertices, point, size);
+    work_ += triangles_.size();
+  }
+  editor_.last = location->triangle;
   if (location->side == Side::kInside) {
-    CountIfDuplicate(vertices, location->triangle, point);
+    // A point equal to a vertex lies in the cones of that vertex's triangles alone.
+    const std::optional<VertexId> corner = CornerAt(vertices, location->triangle, point);
+    if (corner) vertices.CountDuplicate(*corner);
   } else {
-    CollectRegion(vertices, location->triangle, point, size);
-    RemoveVertices(vertices);
-    JoinHorizon(vertices, vertices.Add(point));
-    if (directions_) {
-      extent_ = std::max(extent_, (point - directions_->center()).cwiseAbs().maxCoeff());
-    }
+    RemoveVisible(vertices, point, location->triangle);
+    JoinToBoundary(vertices, point);
   }
-  if (directions_) directions_->SetHint(cell, last_);
+  if (directions_) directions_->SetHint(cell, editor_.last);
   if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
   if (alive_ >= next_update_) Update(vertices);
 }
 
-// A dead triangle's first neighbour is one that came in its place.
-TriangleId Surface::Alive(TriangleId id) const {
-  if (id >= triangles_.size()) return last_;
-  while (!IsAlive(id)) id = triangles_[id].neighbours[0];
-  return id;
+std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const Vector& point,
+                                                   TriangleId seen) {
+  CollectRegion(vertices, seen, point, SizeWith(vertices, point), editor_);
+  RemoveVertices(vertices, editor_);
+  return editor_.region;
 }
 
-// What a plane's slope is relative to; infinite where the bound would not hold.
+std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
+  JoinHorizon(vertices, vertices.Add(point), editor_);
+  // Here rather than when they are needed, so that no insertion does it for many.
+  while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
+  if (directions_) {
+    extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
+  }
+  return std::span(editor_.region).first(editor_.horizon.size());
+}
+
+size_t Surface::MemoryBytes() const {
+  size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + vertex_mark_.MemoryBytes();
+  if (directions_) bytes += directions_->MemoryBytes();
+  if (measuring_) {
+    bytes += measuring_->map.MemoryBytes() + measuring_->reach.capacity() * sizeof(double) +
+             measuring_->hint.capacity() * sizeof(TriangleId);
+  }
+  return bytes + editor_.region.capacity() * sizeof(TriangleId) +
+         editor_.horizon.capacity() * sizeof(HorizonEdge) +
+         editor_.visits.capacity() * sizeof(Visit);
+}
+
+void Surface::FinishInsertions(const VertexTable& vertices) {
+  // A map that was made fine for a large block takes more memory than it saves time from here on.
+  if (directions_ && directions_->cell_count() > 4 * alive_) directions_->Coarsen();
+  if (alive_ >= next_update_) Update(vertices);
+}
+
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
-  const double size = vertices.max_abs_coordinate() + point.cwiseAbs().maxCoeff();
+  const double size = vertices.max_abs_coordinate() + LargestComponent(point);
   return size <= kPlaneMaxCoordinate ? size : INFINITY;
 }
 
-// +1 when the point sees the triangle from outside, 0 when it lies in its plane.
-int Surface::SideOf(const VertexTable& vertices, TriangleId id, const Vector& point,
-                    double size) const {
-  const SurfaceTriangle& t = triangles_[id];
-  const double value = t.normal.dot(point) - t.offset;
-  const double bound = static_cast<double>(t.slope) * size;
-  if (value > bound) return 1;
-  if (value < -bound) return -1;
+int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
+                         const Vector& point) const {
   const auto& [a, b, c] = t.corners;
   return Orient3d(vertices[a], vertices[b], vertices[c], point);
 }
@@ -108,17 +130,31 @@ void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a
   t.corners = {a, b, c};
   t.normal = Cross(e, f);
   t.offset = t.normal.dot(vertices[a]);
-  const double slope = kPlaneErrorFactor * e.cwiseAbs().maxCoeff() * f.cwiseAbs().maxCoeff();
+  const double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
   const bool in_range = slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope;
   t.slope = in_range ? static_cast<float>(slope * (1 + 0x1p-20)) : INFINITY;
   t.mark = 0;
 }
 
-TriangleId Surface::NewId() {
+TriangleId Surface::NewId(Editor& editor) {
+  if (editor.zone != 0) {
+    if (editor.free.empty()) return editor.next++;
+    const TriangleId id = editor.free.back();
+    editor.free.pop_back();
+    return id;
+  }
   if (free_.empty()) return static_cast<TriangleId>(triangles_.Extend());
   const TriangleId id = free_.back();
   free_.pop_back();
   return id;
+}
+
+void Surface::FreeId(Editor& editor, TriangleId id) {
+  if (editor.zone != 0) {
+    editor.free.push_back(id);
+  } else {
+    free_.push_back(id);
+  }
 }
 
 // Links neighbours by their common edges, for a surface whose triangles are all new.
@@ -135,41 +171,50 @@ void Surface::LinkAll() {
   }
 }
 
+Surface::Ray Surface::RayTo(const Vector& point) const {
+  const Vector y = point - directions_->center();
+  const double d = std::max(extent_, LargestComponent(y));
+  const bool in_range = d >= kTripleProductMin && d <= kTripleProductMax;
+  return {y, in_range ? kTripleProductErrorFactor * d * d * d : INFINITY};
+}
+
 // Which side of the plane through the interior point and the edge a, b the point lies on: +1 on the
 // side of a triangle to the left of the edge.
-int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b,
-                    const Vector& point) const {
+int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
+                    const Ray& ray) const {
   const Vector& center = directions_->center();
-  const Vector y = point - center;
-  const double value = Dot(y, Cross(vertices[a] - center, vertices[b] - center));
-  const double d = std::max(extent_, y.cwiseAbs().maxCoeff());
-  if (d >= kTripleProductMin && d <= kTripleProductMax) {
-    const double bound = kTripleProductErrorFactor * d * d * d;
-    if (value > bound) return 1;
-    if (value < -bound) return -1;
-  }
+  const double value = Dot(ray.y, Cross(vertices[a] - center, vertices[b] - center));
+  if (value > ray.bound) return 1;
+  if (value < -ray.bound) return -1;
   return Orient3d(center, vertices[a], vertices[b], point);
 }
 
 // Crosses any edge whose plane through the interior point has the point on its far side, starting
 // with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
-// walk is longer than the surface warrants.
+// walk is longer than the surface warrants, or leaves the zone, where one is given.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
-                                               double size, TriangleId start) {
+                                               double size, TriangleId start, uint32_t zone,
+                                               uint64_t& steps) const {
+  const Ray ray = RayTo(point);
   TriangleId at = start;
+  uint32_t random = 1;
   TriangleId from = kDead;
   const size_t longest = 4 * alive_ + 64;
-  for (size_t steps = 0; steps < longest; ++steps) {
+  for (size_t step = 0; step < longest; ++step) {
+    ++steps;
+    if (zone != 0 && (triangles_[at].mark & kZoneMask) != zone) return std::nullopt;
     if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
-    random_ = random_ * 1664525u + 1013904223u;
-    const uint32_t first = (random_ >> 16) % 3;
+    random = random * 1664525u + 1013904223u;
+    const uint32_t first = (random >> 16) % 3;
     const SurfaceTriangle& t = triangles_[at];
     TriangleId next = kDead;
     for (uint32_t k = 0; k < 3 && next == kDead; ++k) {
       const uint32_t i = (first + k) % 3;
       // The edge just crossed has the point on this side, as the sign was exact.
       if (t.neighbours[i] == from) continue;
-      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point) < 0) next = t.neighbours[i];
+      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point, ray) < 0) {
+        next = t.neighbours[i];
+      }
     }
     if (next == kDead) return Location{Side::kInside, at};
     from = at;
@@ -180,7 +225,7 @@ std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, cons
 
 Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point,
                                 double size) const {
-  Location location{Side::kInside, Alive(last_)};
+  Location location{Side::kInside, Alive(editor_.last)};
   for (TriangleId id = 0; id < triangles_.size(); ++id) {
     if (!IsAlive(id)) continue;
     const int side = SideOf(vertices, id, point, size);
@@ -195,14 +240,12 @@ Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point
   return location;
 }
 
-// A point equal to a vertex lies in the cones of that vertex's triangles alone.
-void Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const {
+std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleId id,
+                                          const Vector& point) const {
   for (const VertexId v : triangles_[id].corners) {
-    if (vertices[v] == point) {
-      vertices.CountDuplicate(v);
-      return;
-    }
+    if (vertices[v] == point) return v;
   }
+  return std::nullopt;
 }
 
 // Looks for an interior point while none is known, and starts to measure the surface for its
@@ -210,17 +253,25 @@ void Surface::CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vecto
 // amortized.
 void Surface::Update(const VertexTable& vertices) {
   next_update_ = 2 * alive_;
-  if (!directions_) {
-    const std::optional<Vector> interior = FindInterior(vertices);
-    if (!interior) return;
-    directions_.emplace(*interior, 1);
-    ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-      for (const VertexId v : t.corners) {
-        extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
-      }
-    });
-  }
-  if (IsWorthMeasuring() && !measuring_) StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
+  if (!directions_) SetCenter(vertices);
+  if (IsWorthMeasuring() && !measuring_) {
+    StartMeasuring(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
+  };
+}
+
+// Puts the center strictly inside and forgets what was measured; does nothing where no double is
+// inside.
+void Surface::SetCenter(const VertexTable& vertices) {
+  work_ += 2 * triangles_.size();
+  const std::optional<Vector> interior = FindInterior(vertices);
+  if (!interior) return;
+  directions_.emplace(*interior);
+  extent_ = 0;
+  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
+    for (const VertexId v : t.corners) {
+      extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
+    }
+  });
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
@@ -240,53 +291,67 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
 }
 
 // At extreme scales every sign is decided by integers, and a map costs more than it saves.
-bool Surface::IsWorthMeasuring() const {
-  return alive_ >= kWorthMeasuring && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
-}
+bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
   if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
   // A tenth as many walks as points, at most.
   const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
-  const int wanted = std::min(affordable, 2 * ResolutionFor(alive_, true));
+  const int wanted = std::min(affordable, 3 * ResolutionFor(alive_, true)) & ~1;
   if (wanted < 4) return;
   if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
-    StartMeasuring(wanted);
-    ContinueMeasuring(vertices, measuring_->reach.size());
+    StartMeasuring(vertices, wanted);
+    ContinueMeasuring(vertices, SIZE_MAX);
   }
 }
 
-void Surface::StartMeasuring(int resolution) {
+void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
+  // The first surface, from which the center comes, may have been a corner of what it is now.
+  if (directions_->resolution() == 1) SetCenter(vertices);
   measured_at_ = alive_;
   asked_ = 0;
   rejected_ = 0;
   const size_t row = static_cast<size_t>(resolution) + 1;
-  measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
-                           std::vector<double>(6 * row * row), 0, Alive(last_)};
+  work_ += row;
+  measuring_ =
+      Measurement{DirectionMap(directions_->center(), resolution), std::vector<double>(row),
+                  std::vector<TriangleId>(row, Alive(editor_.last))};
 }
 
 void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
-  Measurement& m = *measuring_;
-  const int resolution = m.map.resolution();
-  const auto row = static_cast<size_t>(resolution) + 1;
-  const size_t end = std::min(m.done + corners, m.reach.size());
-  m.near = Alive(m.near);
-  for (; m.done < end; ++m.done) {
-    const int face = static_cast<int>(m.done / (row * row));
-    const int i = static_cast<int>(m.done / row % row);
-    const int k = static_cast<int>(m.done % row);
-    // Back and forth, so that each walk starts next to where the last one ended.
-    const int j = i % 2 == 0 ? k : resolution - k;
-    const auto corner = static_cast<size_t>((face * (resolution + 1) + i) * (resolution + 1) + j);
-    m.reach[corner] = Reach(vertices, m.map.CornerDirection(face, i, j), m.near);
-    if (i < resolution && j < resolution) {
-      m.map.SetHint(static_cast<size_t>((face * resolution + i) * resolution + j), m.near);
-    }
-  }
-  if (end < m.reach.size()) return;
-  m.map.SetRadii(m.reach);
-  directions_ = std::move(m.map);
+  for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
+  if (measuring_->face < 6) return;
+  measuring_->map.Finish(measuring_->least, measuring_->largest);
+  directions_ = std::move(measuring_->map);
   measuring_.reset();
+}
+
+// Measures one corner, and makes the cell whose last corner it is.
+void Surface::MeasureCorner(const VertexTable& vertices) {
+  Measurement& m = *measuring_;
+  const auto j = static_cast<size_t>(m.j);
+  const double reach_above = m.reach[j];
+  const TriangleId hint_above = m.hint[j];
+  // From the corner to the left, or from the one above.
+  TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
+  const double reach = Reach(vertices, m.map.CornerDirection(m.face, m.i, m.j), near);
+  m.reach[j] = reach;
+  m.hint[j] = near;
+  m.least = std::min(m.least, reach);
+  m.largest = std::max(m.largest, reach);
+  if (m.i > 0 && m.j > 0) {
+    m.map.AppendCell(
+        std::min(std::min(m.reach_before, reach_above), std::min(m.reach[j - 1], reach)),
+        m.hint_before);
+  }
+  m.reach_before = reach_above;
+  m.hint_before = hint_above;
+  ++work_;
+  if (++m.j <= m.map.resolution()) return;
+  m.j = 0;
+  if (++m.i <= m.map.resolution()) return;
+  m.i = 0;
+  ++m.face;
 }
 
 // A distance m, near the largest, such that the double nearest to center + m * direction is inside;
@@ -295,15 +360,17 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
 double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
   const Vector center = directions_->center();
   double m = extent_;
-  // A walk to a point outside ends at any triangle that it sees, hence the rounds.
+  // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
+  // nearly coplanar, their rounded planes tell little, hence the growing steps.
   for (int round = 0; round < kMostRounds; ++round) {
     const SurfaceTriangle& t = triangles_[near];
     const double climb = t.normal.dot(direction);
     const double height = t.offset - t.normal.dot(center);
     if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
-    m *= 1 - 0x1p-30;
+    m *= 1 - std::ldexp(0x1p-30, round / 2);
     const Vector point = center + m * direction;
-    const std::optional<Location> location = Walk(vertices, point, SizeWith(vertices, point), near);
+    const std::optional<Location> location =
+        Walk(vertices, point, SizeWith(vertices, point), near, 0, work_);
     if (!location) return 0;
     near = location->triangle;
     if (location->side == Side::kInside) return m;
@@ -311,24 +378,27 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
   return 0;
 }
 
-// Fills region_ with the connected triangles that the point sees or whose planes hold it, and
-// horizon_ with their boundary, in order round it: depth first, the edges of each triangle
-// counter-clockwise from the one it was entered by.
-void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                            double size) {
-  if (++mark_ == 0) {
-    for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
-    std::fill(vertex_mark_.begin(), vertex_mark_.end(), 0);
-    mark_ = 1;
-  }
-  region_.assign(1, first);
-  horizon_.clear();
-  triangles_[first].mark = mark_;
-  visits_.assign(1, {first, 0, 3});
-  while (!visits_.empty()) {
-    Visit& visit = visits_.back();
+void Surface::ResetMarks() {
+  for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
+  for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_[id] = 0;
+  editor_.mark = 0;
+}
+
+// Fills the editor's region with the connected triangles that the point sees or whose planes hold
+// it, and the horizon with their boundary, in order round it: depth first, the edges of each
+// triangle counter-clockwise from the one it was entered by. False when that leaves the zone.
+bool Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                            double size, Editor& editor) {
+  if (editor.mark > UINT32_MAX - 2 * (kZoneMask + 1)) ResetMarks();
+  const uint32_t mark = editor.mark += kZoneMask + 1;
+  editor.region.assign(1, first);
+  editor.horizon.clear();
+  triangles_[first].mark = mark;
+  editor.visits.assign(1, {first, 0, 3});
+  while (!editor.visits.empty()) {
+    Visit& visit = editor.visits.back();
     if (visit.left == 0) {
-      visits_.pop_back();
+      editor.visits.pop_back();
       continue;
     }
     const SurfaceTriangle& t = triangles_[visit.triangle];
@@ -338,53 +408,61 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
     --visit.left;
     const TriangleId next = t.neighbours[i];
     SurfaceTriangle& other = triangles_[next];
-    if (other.mark == mark_) continue;
+    if (other.mark == mark) continue;
+    if (editor.zone != 0 && (other.mark & kZoneMask) != editor.zone) return false;
     const uint32_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
     if (SideOf(vertices, next, point, size) >= 0) {
-      other.mark = mark_;
-      region_.push_back(next);
-      visits_.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
+      other.mark = mark;
+      editor.region.push_back(next);
+      editor.visits.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
     } else {
-      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
+      editor.horizon.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
     }
   }
+  return true;
 }
 
-// Removes the vertices that only triangles of region_ have: those not on the horizon. By Euler's
+// Removes the vertices that only triangles of the region have: those not on the horizon. By Euler's
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
-void Surface::RemoveVertices(VertexTable& vertices) {
-  if (region_.size() + 2 == horizon_.size()) return;
-  vertex_mark_.resize(vertices.id_bound(), 0);
-  for (const HorizonEdge& edge : horizon_) vertex_mark_[edge.tail] = mark_;
-  for (const TriangleId id : region_) {
+void Surface::RemoveVertices(VertexTable& vertices, Editor& editor) {
+  if (editor.region.size() + 2 == editor.horizon.size()) return;
+  for (const HorizonEdge& edge : editor.horizon) vertex_mark_[edge.tail] = editor.mark;
+  for (const TriangleId id : editor.region) {
     for (const VertexId v : triangles_[id].corners) {
-      if (vertex_mark_[v] == mark_) continue;
-      vertex_mark_[v] = mark_;
-      vertices.Remove(v);
+      if (vertex_mark_[v] == editor.mark) continue;
+      vertex_mark_[v] = editor.mark;
+      if (editor.zone != 0) {
+        vertices.Remove(v, editor.vertices);
+      } else {
+        vertices.Remove(v);
+      }
     }
   }
 }
 
 // Joins the apex to the horizon; the new triangles take the places of the region's first.
-void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
-  const size_t old_count = region_.size();
-  const size_t new_count = horizon_.size();
-  while (region_.size() < new_count) region_.push_back(NewId());
+void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor) {
+  std::vector<TriangleId>& region = editor.region;
+  const size_t old_count = region.size();
+  const size_t new_count = editor.horizon.size();
+  while (region.size() < new_count) region.push_back(NewId(editor));
   for (size_t k = 0; k < new_count; ++k) {
-    const HorizonEdge& edge = horizon_[k];
-    const TriangleId id = region_[k];
+    const HorizonEdge& edge = editor.horizon[k];
+    const TriangleId id = region[k];
     SetTriangle(vertices, id, edge.tail, edge.head, apex);
-    triangles_[id].neighbours = {edge.beyond, region_[k + 1 == new_count ? 0 : k + 1],
-                                 region_[k == 0 ? new_count - 1 : k - 1]};
+    triangles_[id].mark = editor.zone;
+    triangles_[id].neighbours = {edge.beyond, region[k + 1 == new_count ? 0 : k + 1],
+                                 region[k == 0 ? new_count - 1 : k - 1]};
     triangles_[edge.beyond].neighbours[edge.edge_beyond] = id;
   }
   for (size_t k = new_count; k < old_count; ++k) {
-    triangles_[region_[k]].corners[0] = kDead;
-    triangles_[region_[k]].neighbours[0] = region_[0];
-    free_.push_back(region_[k]);
+    triangles_[region[k]].corners[0] = kDead;
+    triangles_[region[k]].neighbours[0] = region[0];
+    FreeId(editor, region[k]);
   }
-  alive_ = alive_ - old_count + new_count;
-  last_ = region_[0];
+  if (editor.zone == 0) alive_ = alive_ - old_count + new_count;
+  editor.alive += static_cast<int64_t>(new_count) - static_cast<int64_t>(old_count);
+  editor.last = region[0];
 }
 
 }  // namespace hulld

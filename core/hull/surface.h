@@ -2,7 +2,9 @@
 #define HULLD_CORE_HULL_SURFACE_H_
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "core/hull/chunked_vector.h"
 #include "core/hull/direction_map.h"
 #include "core/hull/vertex_table.h"
+#include "core/numeric/error_bounds.h"
 
 namespace hulld {
 
@@ -52,11 +55,66 @@ class Surface {
 
   // Adds a point. Cost: the triangles removed and created, and a walk of a few exact signs; a scan
   // of all triangles where no double lies strictly inside the polytope.
-  void Insert(VertexTable& vertices, const Vector& point);
+  void Insert(VertexTable& vertices, const Vector& point) {
+    size_t cell = 0;
+    if (directions_) {
+      const DirectionMap::Place place = directions_->PlaceOf(point);
+      ++asked_;
+      if (directions_->IsCertainlyInside(place)) {
+        ++rejected_;
+        return;
+      }
+      cell = place.cell;
+    }
+    InsertSurvivor(vertices, point, cell);
+  }
+
+  // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
+  // (inside).
+  enum class Side { kInside, kOutside };
+  struct Location {
+    Side side;
+    TriangleId triangle;
+  };
+  // Finds where a point lies and changes nothing. `start`: where to start walking. Requires that an
+  // interior point is known; empty when the walk is longer than the surface warrants.
+  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
+                                 TriangleId start) const {
+    uint64_t steps = 0;
+    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), 0, steps);
+  }
+  // True when the point lies strictly outside the triangle's plane, exactly.
+  bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
+    return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
+  }
+  // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
+  // returns the triangles that go, for the caller to move what it keeps by triangle; the second
+  // joins the point to their boundary and returns the triangles that come, which take over IDs.
+  // The spans hold until the next insertion.
+  std::span<const TriangleId> RemoveVisible(VertexTable& vertices, const Vector& point,
+                                            TriangleId seen);
+  std::span<const TriangleId> JoinToBoundary(VertexTable& vertices, const Vector& point);
+  // The corner of the triangle that the point equals.
+  std::optional<VertexId> CornerAt(const VertexTable& vertices, TriangleId id,
+                                   const Vector& point) const;
+  // Does what insertions in two steps leave undone: housekeeping for what comes.
+  void FinishInsertions(const VertexTable& vertices);
+
+  // Adds points, in the order given, by threads that each have a zone of the surface: the triangles
+  // with all corners in one part of space. Returns those that would change anything else, few,
+  // which are not added. zones: 2 or 4. Requires that an interior point is known.
+  // Empty when should_stop, which may be empty, said so: then the surface is of no use any more.
+  std::optional<std::vector<Vector>> InsertInZones(VertexTable& vertices,
+                                                   std::span<const Vector> points, uint32_t zones,
+                                                   const std::function<bool()>& should_stop);
 
   // The map of directions, for choosing what to insert and in which order; null where no interior
   // point is known.
   const DirectionMap* directions() const { return directions_ ? &*directions_ : nullptr; }
+  // True when an interior point is known and no scale is extreme.
+  bool IsMeasurable() const {
+    return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
+  }
   // Measures the surface anew when that pays for so many points to be inserted. Does nothing where
   // no interior point is known. Cost: at most some walks per ten points.
   void MeasureBefore(const VertexTable& vertices, size_t points);
@@ -65,6 +123,12 @@ class Surface {
     asked_ += asked;
     rejected_ += rejected;
   }
+
+  // Steps of all walks and scans, corners measured, and cells made, since this surface began: the
+  // work of insertions beyond the triangles that they remove and create.
+  uint64_t work() const { return work_; }
+  // What it holds in memory. Cost: O(1).
+  size_t MemoryBytes() const;
 
   // Calls visit(id, triangle) for every triangle.
   template <typename Visitor>
@@ -76,6 +140,8 @@ class Surface {
   const SurfaceTriangle& triangle(TriangleId id) const { return triangles_[id]; }
   // IDs of triangles lie below this.
   size_t id_bound() const { return triangles_.size(); }
+  // What a plane's slope is relative to; infinite where the bound would not hold.
+  double SizeWith(const VertexTable& vertices, const Vector& point) const;
   size_t triangle_count() const { return alive_; }
 
  private:
@@ -86,61 +152,113 @@ class Surface {
     TriangleId beyond;
     uint32_t edge_beyond;
   };
+  // What the steps of a walk share: the point from the center, and what a triple product of it and
+  // two vertices from the center errs by.
+  struct Ray {
+    Vector y;
+    double bound;
+  };
   // A triangle of the region under traversal, the edge to cross next, and how many are left.
   struct Visit {
     TriangleId triangle;
     uint8_t edge;
     uint8_t left;
   };
+  // What one insertion works with. Marks hold a count of insertions and, in the lowest bits, a
+  // zone.
+  struct Editor {
+    std::vector<TriangleId> region;
+    std::vector<HorizonEdge> horizon;
+    std::vector<Visit> visits;
+    uint32_t mark = 0;
+    // Where the last insertion was.
+    TriangleId last = 0;
+    // 0 for the whole surface. Otherwise only triangles marked with this zone may be changed, and
+    // new IDs come from `free`, then from `next` on, up to `end`.
+    uint32_t zone = 0;
+    std::vector<TriangleId> free;
+    TriangleId next = 0;
+    TriangleId end = 0;
+    int64_t alive = 0;
+    VertexTable::Zone vertices;
+    uint64_t work = 0;
+  };
   // A map of directions in the making. Its corners are measured some at a time, so that no
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
   struct Measurement {
     DirectionMap map;
-    // By corner, face by face, i major.
+    // Of the corners of the last row up to the one to measure, and of the row before from there on:
+    // how far the surface is, and where the direction leaves it.
     std::vector<double> reach;
-    // How many corners are done, and where the last one's direction left the surface.
-    size_t done = 0;
-    TriangleId near;
-  };
-  enum class Side { kInside, kOutside };
-  // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
-  // (inside).
-  struct Location {
-    Side side;
-    TriangleId triangle;
+    std::vector<TriangleId> hint;
+    // Both of the corner that stood before in the last one's place.
+    double reach_before = 0;
+    TriangleId hint_before = 0;
+    // The corner to measure: its face, row and column.
+    int face = 0;
+    int i = 0;
+    int j = 0;
+    double least = INFINITY;
+    double largest = 0;
   };
 
   bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
-  TriangleId Alive(TriangleId id) const;
-  double SizeWith(const VertexTable& vertices, const Vector& point) const;
-  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const;
+  // A dead triangle's first neighbour is one that came in its place.
+  TriangleId Alive(TriangleId id) const {
+    if (id >= triangles_.size()) return editor_.last;
+    while (!IsAlive(id)) id = triangles_[id].neighbours[0];
+    return id;
+  }
+  // +1 when the point sees the triangle from outside, 0 when it lies in its plane.
+  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const {
+    const SurfaceTriangle& t = triangles_[id];
+    const double value = t.normal.dot(point) - t.offset;
+    const double bound = static_cast<double>(t.slope) * size;
+    if (value > bound) return 1;
+    if (value < -bound) return -1;
+    return ExactSideOf(vertices, t, point);
+  }
+  int ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point) const;
   void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
-  TriangleId NewId();
+  TriangleId NewId(Editor& editor);
+  void FreeId(Editor& editor, TriangleId id);
   void LinkAll();
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
-                               TriangleId start);
-  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point) const;
+                               TriangleId start, uint32_t zone, uint64_t& steps) const;
+  Ray RayTo(const Vector& point) const;
+  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
+             const Ray& ray) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
-  void CountIfDuplicate(VertexTable& vertices, TriangleId id, const Vector& point) const;
   void Update(const VertexTable& vertices);
   bool IsWorthMeasuring() const;
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
-  void StartMeasuring(int resolution);
+  void SetCenter(const VertexTable& vertices);
+  void StartMeasuring(const VertexTable& vertices, int resolution);
   void ContinueMeasuring(const VertexTable& vertices, size_t corners);
+  void MeasureCorner(const VertexTable& vertices);
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
-  void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                     double size);
-  void RemoveVertices(VertexTable& vertices);
-  void JoinHorizon(const VertexTable& vertices, VertexId apex);
+  bool CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                     double size, Editor& editor);
+  void InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell);
+  void RemoveVertices(VertexTable& vertices, Editor& editor);
+  void JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor);
+  void ResetMarks();
+
+  void MarkZones(const VertexTable& vertices, std::span<Editor> zones);
+  bool InsertInZone(VertexTable& vertices, const Vector& point, double size, Editor& zone);
+  void LeaveZones(VertexTable& vertices, std::span<Editor> zones);
 
   static constexpr VertexId kDead = UINT32_MAX;
+  static constexpr uint32_t kZoneMask = 7;
 
   ChunkedVector<SurfaceTriangle> triangles_;
-  std::vector<TriangleId> free_;
+  ChunkedVector<TriangleId> free_;
   size_t alive_ = 0;
+  // By vertex: the last insertion whose region it was in.
+  ChunkedVector<uint32_t> vertex_mark_;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.
   std::optional<DirectionMap> directions_;
@@ -155,15 +273,9 @@ class Surface {
   size_t rejected_ = 0;
   // The count of triangles when it was last measured.
   size_t measured_at_ = 0;
-  TriangleId last_ = 0;
-  uint32_t random_ = 1;
+  uint64_t work_ = 0;
 
-  // Scratch of one insertion.
-  std::vector<TriangleId> region_;
-  std::vector<HorizonEdge> horizon_;
-  std::vector<Visit> visits_;
-  std::vector<uint32_t> vertex_mark_;
-  uint32_t mark_ = 0;
+  Editor editor_;
 };
 
 }  // namespace hulld

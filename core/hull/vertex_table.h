@@ -62,12 +62,73 @@ class VertexTable {
     free_.push_back(id);
   }
 
+  // IDs for one thread to add and remove vertices by while others do so in theirs, and what became
+  // of points meanwhile. A thread may remove and count only vertices that no other one does.
+  struct Zone {
+    std::vector<VertexId> free;
+    VertexId next = 0;
+    VertexId end = 0;
+    int64_t outside = 0;
+    int64_t duplicate = 0;
+  };
+  Zone AddZone(size_t points) {
+    Zone zone;
+    zone.next = static_cast<VertexId>(points_.size());
+    for (size_t k = 0; k < points; ++k) {
+      points_.Extend();
+      counts_.Extend();
+    }
+    zone.end = static_cast<VertexId>(points_.size());
+    return zone;
+  }
+  // Requires room, and that EnlargeMaxAbsCoordinate knows the point's coordinates.
+  VertexId Add(const Vector& given, Zone& zone) {
+    VertexId id = zone.next;
+    if (zone.free.empty()) {
+      ++zone.next;
+    } else {
+      id = zone.free.back();
+      zone.free.pop_back();
+    }
+    points_[id] = given + Vector::Zero();
+    counts_[id] = {block_, 0, true};
+    ++zone.outside;
+    return id;
+  }
+  void CountDuplicate(VertexId id, Zone& zone) {
+    Counts& counts = counts_[id];
+    if (counts.block != block_) counts = {block_, 0, false};
+    ++counts.duplicates;
+    ++zone.duplicate;
+  }
+  void Remove(VertexId id, Zone& zone) {
+    const Counts& counts = counts_[id];
+    if (counts.block == block_) {
+      zone.duplicate -= counts.duplicates;
+      if (counts.is_new) --zone.outside;
+    }
+    zone.free.push_back(id);
+  }
+  // Takes back what a zone did not use, and its counts.
+  void RemoveZone(const Zone& zone) {
+    for (VertexId id = zone.next; id < zone.end; ++id) free_.push_back(id);
+    for (const VertexId id : zone.free) free_.push_back(id);
+    outside_ = static_cast<uint64_t>(static_cast<int64_t>(outside_) + zone.outside);
+    duplicate_ = static_cast<uint64_t>(static_cast<int64_t>(duplicate_) + zone.duplicate);
+  }
+  void EnlargeMaxAbsCoordinate(double value) {
+    max_abs_coordinate_ = std::max(max_abs_coordinate_, value);
+  }
+
   const Vector& operator[](VertexId id) const { return points_[id]; }
   // Vertices that live.
   size_t size() const { return points_.size() - free_.size(); }
   // IDs lie below this.
   size_t id_bound() const { return points_.size(); }
-  // Largest absolute coordinate of all vertices that ever lived.
+  size_t MemoryBytes() const {
+    return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes();
+  }
+  // At least the largest absolute coordinate of all vertices that ever lived.
   double max_abs_coordinate() const { return max_abs_coordinate_; }
 
  private:
@@ -80,7 +141,7 @@ class VertexTable {
 
   ChunkedVector<Vector> points_;
   ChunkedVector<Counts> counts_;
-  std::vector<VertexId> free_;
+  ChunkedVector<VertexId> free_;
   double max_abs_coordinate_ = 0;
   uint64_t block_ = 0;
   uint64_t outside_ = 0;

@@ -50,7 +50,7 @@ inline constexpr double kTripleProductMin = 0x1p-300;
 inline constexpr double kTripleProductMax = 0x1p300;
 
 // What a direction map takes off its radii; its rounding errors are below half of this (see
-// DirectionMap::SetRadii).
+// DirectionMap::Finish).
 inline constexpr double kDirectionMapMargin = 0x1p-20;
 
 // The distance |p - s e - t f| for differences p, e, f of doubles and s, t in [0, 1] with rounded
@@ -145,6 +145,34 @@ inline constexpr double kDirectionErrorFactor = 8;
 // whose exact sum exceeds 1 by 2 u move it by 2 u * 8 S, rounding by at most 8 u * 8 S; times
 // sqrt(3) for the norm, at most 2.1 (128 + 80) u S. Times S. Proven.
 inline constexpr double kNearPointErrorFactor = 512 * kUnitRoundoff;
+
+// Signed separation. A point v = sum of l_i w_i over at most three computed Minkowski vertices, the
+// weights l_i >= 0 computed with a sum within 8 u of 1: the vertices err by 128 u S per component,
+// the products and sums by 5 u * 4 S, dividing by the sum of the weights moves v by 8 u * 4 S. So a
+// point of A - B lies within sqrt(3) * 180 u S = 312 u S of v; the norm of v, at most 7 S, errs by
+// 8 u of itself: 368 u S. Also the bound per point of A or B. Times S. Proven.
+inline constexpr double kCombinationErrorFactor = 448 * kUnitRoundoff;
+
+// The reach of A - B along a computed unit vector n (length within 8 u of 1), from a support value
+// with its error 512 u S: the value is at most 7 S, so the length costs 56 u S, the rounding of the
+// sum 7 u S. Times S. Proven.
+inline constexpr double kReachErrorFactor = 640 * kUnitRoundoff;
+
+// The least of n . p over the corners p of a triangle of computed Minkowski vertices, n a unit
+// vector as above, against the distance of the triangle of the true vertices from the origin: these
+// err by sqrt(3) * 128 u S, the length by 56 u S, products and sums by 4 u * 7 S, the difference by
+// 7 u S: 313 u S. Times S. Proven.
+inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
+
+// The sign of det[p, q, r] for computed Minkowski vertices in a unit with S < 2, so that components
+// are below 8 and those of the edges below 16: the normal errs by 2048 u per component, its product
+// with p by 3 * 8 * 2048 u, products and sums by 3 * 3 u * 8 * 512: below 2^17 u. What exceeds twice
+// that is certainly positive. Proven.
+inline constexpr double kLeastOutward = 0x1p-35;
+
+// A rational number or the square root of one, with 60 bits or more, rounded to a double: u of
+// itself and less than 2^-60; twice that, and the least double for gradual underflow. Proven.
+inline constexpr double kRoundedRelativeError = 2 * kUnitRoundoff;
 
 // Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
 // u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). So is the mean of

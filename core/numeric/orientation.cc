@@ -1,7 +1,10 @@
 #include "core/numeric/orientation.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <optional>
 
@@ -41,6 +44,64 @@ std::optional<int> FilteredOrient3d(const Vector& r, const Vector& s, const Vect
   return CertainSign(det, kOrient3dErrorFactor * permanent + (size + 1) * kUnderflowError);
 }
 
+__extension__ using Int128 = __int128;
+
+// Four points as integers below 2^60 in magnitude, on one scale.
+struct FixedPoints {
+  std::array<std::array<int64_t, 3>, 4> points;
+};
+
+// A power of two for each factor of a scale that brings `largest` to [2^59, 2^60); two factors, as
+// one may exceed the range of doubles.
+std::array<double, 2> FixedPointScale(double largest) {
+  const int exponent = 1082 - static_cast<int>(std::bit_cast<uint64_t>(largest) >> 52);
+  const auto power = [](int e) {
+    return std::bit_cast<double>(static_cast<uint64_t>(1023 + e) << 52);
+  };
+  return {power(exponent / 2), power(exponent - exponent / 2)};
+}
+
+// Empty unless all coordinates are integers on the scale of the largest: those of a lattice, a
+// drawing or a scan mostly are.
+std::optional<FixedPoints> ToFixedPoints(const std::array<const Vector*, 4>& points) {
+  double largest = 0;
+  for (const Vector* p : points) largest = std::max(largest, p->cwiseAbs().maxCoeff());
+  const std::array<double, 2> scale = FixedPointScale(largest);
+  FixedPoints fixed;
+  bool is_exact = true;
+  for (size_t i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const double x = (*points[i])[k];
+      // Scaling rounds only what becomes smaller than one, which no integer equals but zero.
+      const double scaled = x * scale[0] * scale[1];
+      const auto integer = static_cast<int64_t>(scaled);
+      is_exact &= static_cast<double>(integer) == scaled && (integer == 0) == (x == 0);
+      fixed.points[i][k] = integer;
+    }
+  }
+  return is_exact ? std::optional(fixed) : std::nullopt;
+}
+
+// Differences are below 2^61, minors below 2^123; the sum of their products is gathered in two
+// halves, the lower one below 3 * 2^125.
+int FixedPointOrient3d(const FixedPoints& fixed) {
+  const auto& [a, b, c, d] = fixed.points;
+  Int128 low = 0;
+  Int128 high = 0;
+  for (int k = 0; k < 3; ++k) {
+    const int i = k == 2 ? 0 : k + 1;
+    const int j = k == 0 ? 2 : k - 1;
+    const Int128 minor = static_cast<Int128>(c[i] - a[i]) * (d[j] - a[j]) -
+                         static_cast<Int128>(c[j] - a[j]) * (d[i] - a[i]);
+    const int64_t r = b[k] - a[k];
+    low += static_cast<Int128>(r) * static_cast<uint64_t>(minor);
+    high += static_cast<Int128>(r) * static_cast<int64_t>(minor >> 64);
+  }
+  high += low >> 64;
+  if (high != 0) return high > 0 ? 1 : -1;
+  return static_cast<uint64_t>(low) != 0 ? 1 : 0;
+}
+
 bool InExpansionRange(std::initializer_list<double> coordinates) {
   return std::all_of(coordinates.begin(), coordinates.end(), [](double x) {
     const double magnitude = std::abs(x);
@@ -49,6 +110,29 @@ bool InExpansionRange(std::initializer_list<double> coordinates) {
 }
 
 bool InExpansionRange(const Vector& v) { return InExpansionRange({v.x(), v.y(), v.z()}); }
+
+using FourPoints = std::array<Vector, 4>;
+
+// The points times the power of two that brings their largest coordinate next below kExpansionMax,
+// which changes no sign; empty where some other coordinate stays below kExpansionMin, so that the
+// product might be rounded. Requires a coordinate that is not zero.
+std::optional<FourPoints> ScaledToExpansionRange(const FourPoints& points) {
+  double largest = 0;
+  for (const Vector& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  const int exponent = std::ilogb(kExpansionMax) - 1 - std::ilogb(largest);
+  // Two factors, as one may exceed the range of doubles.
+  const double first = std::ldexp(1.0, exponent / 2);
+  const double second = std::ldexp(1.0, exponent - exponent / 2);
+  FourPoints scaled;
+  for (size_t i = 0; i < 4; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      scaled[i][k] = points[i][k] * first * second;
+      const bool is_exact = points[i][k] == 0 || std::abs(scaled[i][k]) >= kExpansionMin;
+      if (!is_exact) return std::nullopt;
+    }
+  }
+  return scaled;
+}
 
 using Difference = Expansion<2>;
 
@@ -107,9 +191,21 @@ int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d)
     ++counts.filter;
     return *sign;
   }
+  // Duplicates ask for the corners of triangles themselves.
+  if (d == a || d == b || d == c) {
+    ++counts.filter;
+    return 0;
+  }
+  if (const std::optional<FixedPoints> fixed = ToFixedPoints({&a, &b, &c, &d})) {
+    ++counts.fixed_point;
+    return FixedPointOrient3d(*fixed);
+  }
   if (InExpansionRange(a) && InExpansionRange(b) && InExpansionRange(c) && InExpansionRange(d)) {
     ++counts.expansion;
     return ExpansionOrient3d(a, b, c, d);
+  }
+  if (const std::optional<FourPoints> scaled = ScaledToExpansionRange({a, b, c, d})) {
+    return Orient3d((*scaled)[0], (*scaled)[1], (*scaled)[2], (*scaled)[3]);
   }
   ++counts.integer;
   return IntegerOrient3d(a, b, c, d);

@@ -1,17 +1,22 @@
 #include "core/query/collision.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <compare>
+#include <limits>
 #include <span>
 #include <utility>
 
 #include "core/query/axis_description.h"
+#include "core/query/certification.h"
 #include "core/query/exact_pair.h"
 #include "core/query/float_pair.h"
 #include "core/query/ladder.h"
+#include "core/query/separation.h"
 #include "core/query/textbook_sat.h"
 
 namespace hulld {
@@ -59,6 +64,13 @@ Answer Mirrored(Answer answer) {
     answer.axis->kind = Mirrored(answer.axis->kind);
     std::swap(answer.axis->feature_a, answer.axis->feature_b);
   }
+  if (answer.witness) std::swap(answer.witness->p_WA, answer.witness->p_WB);
+  if (answer.certificate) {
+    auto& direction = answer.certificate->direction;
+    if (Vector* n = std::get_if<Vector>(&direction)) *n = -*n;
+    if (IntegerVector* n = std::get_if<IntegerVector>(&direction)) *n = -*n;
+    for (VertexPair& pair : answer.certificate->pairs) std::swap(pair.a, pair.b);
+  }
   return answer;
 }
 
@@ -72,6 +84,47 @@ std::optional<IntegerVector> ExactAxis(const Decision& decision) {
   return std::nullopt;
 }
 
+// Whether the answer needs more than the relation.
+bool NeedsMore(const QueryOptions& options) {
+  return options.want_certificate || options.want_separation || options.want_witness ||
+         options.clearance.has_value();
+}
+
+// What the options ask for beyond the relation, the axis and the analysis.
+absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bool cold,
+                             const QueryOptions& options, Answer& answer) {
+  if (options.want_certificate) {
+    ExactPair exact(pair);
+    absl::StatusOr<Certificate> certificate = MakeCertificate(exact, decision, options.should_stop);
+    if (!certificate.ok()) return certificate.status();
+    answer.certificate = *std::move(certificate);
+  }
+  if (!options.want_separation && !options.want_witness && !options.clearance) {
+    return absl::OkStatus();
+  }
+  const SeparationRequest request = {options.want_separation, options.want_witness,
+                                     options.max_error, options.clearance};
+  SeparationAnswer found;
+  if (absl::Status s = FindSeparation(pair, decision, cold, request, options.should_stop, found);
+      !s.ok()) {
+    return s;
+  }
+  answer.separation = found.separation;
+  answer.witness = found.witness;
+  answer.within_clearance = found.within_clearance;
+  return absl::OkStatus();
+}
+
+void AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions& options,
+             Answer& answer) {
+  const std::optional<IntegerVector> n = ExactAxis(decision);
+  if (!n) return;
+  ExactPair exact(pair);
+  SeparatingAxis axis = DescribeAxis(exact, *n);
+  answer.analysis.stage = axis.kind;
+  if (options.want_axis) answer.axis = std::move(axis);
+}
+
 // A and B in the order of their content.
 absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
                                        const QueryOptions& options, PairCache* cache) {
@@ -83,13 +136,10 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
   answer.relation = decision->relation;
   answer.rung = decision->rung;
   answer.analysis.axes_tested = decision->directions_tried;
-  if (options.want_axis || options.want_analysis) {
-    if (const std::optional<IntegerVector> n = ExactAxis(*decision)) {
-      ExactPair exact(pair);
-      SeparatingAxis axis = DescribeAxis(exact, *n);
-      answer.analysis.stage = axis.kind;
-      if (options.want_axis) answer.axis = std::move(axis);
-    }
+  if (options.want_axis || options.want_analysis) AddAxis(pair, *decision, options, answer);
+  if (NeedsMore(options)) {
+    absl::Status s = AddWhatIsWanted(pair, *decision, cache == nullptr, options, answer);
+    if (!s.ok()) return s;
   }
   return answer;
 }
@@ -110,15 +160,67 @@ absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const Placed
   return Mirrored(*std::move(answer));
 }
 
+// The textbook's answer, and what else is wanted as the search finds it.
+absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
+                                const QueryOptions& options) {
+  absl::StatusOr<Answer> answer = TextbookSat(a, b, options);
+  if (!answer.ok() || !NeedsMore(options)) return answer;
+  QueryOptions rest = options;
+  rest.want_axis = false;
+  rest.want_analysis = false;
+  absl::StatusOr<Answer> more = CertifiedSearchOfEither(a, b, rest, nullptr);
+  if (!more.ok()) return more;
+  more->rung = answer->rung;
+  more->axis = std::move(answer->axis);
+  more->analysis = answer->analysis;
+  return more;
+}
+
+Answer AnswerOfEmpty(const QueryOptions& options) {
+  Answer answer;
+  if (options.want_separation) {
+    answer.separation = Separation{std::numeric_limits<double>::infinity(), 0};
+  }
+  if (options.clearance) answer.within_clearance = false;
+  return answer;
+}
+
+absl::Status CheckLength(const char* name, double length) {
+  if (length >= 0) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(name, std::isnan(length) ? " is NaN" : " is negative"));
+}
+
+absl::Status ValidateOptions(const QueryOptions& options) {
+  if (absl::Status s = CheckLength("tolerance", options.tolerance); !s.ok()) return s;
+  if (absl::Status s = CheckLength("max_error", options.max_error.value_or(0)); !s.ok()) return s;
+  if (std::isnan(options.clearance.value_or(0))) {
+    return absl::InvalidArgumentError("clearance is NaN");
+  }
+  if (options.tolerance == 0) return absl::OkStatus();
+  const char* excluded = options.want_separation                  ? "separation"
+                         : options.want_witness                   ? "witness points"
+                         : options.want_certificate               ? "certificate"
+                         : options.clearance.has_value()          ? "clearance"
+                         : options.method == Method::kTextbookSat ? "textbook method"
+                                                                  : nullptr;
+  if (excluded == nullptr) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "the ", excluded, " needs the relation, which a tolerance > 0 may leave open; ask with 0"));
+}
+
 }  // namespace
 
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {
+  if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
   std::optional<std::chrono::steady_clock::time_point> start;
   if (options.want_analysis) start = std::chrono::steady_clock::now();
-  absl::StatusOr<Answer> answer = Answer{};
-  if (!a.hull().empty() && !b.hull().empty()) {
-    answer = options.method == Method::kTextbookSat ? TextbookSat(a, b, options)
+  absl::StatusOr<Answer> answer;
+  if (a.hull().empty() || b.hull().empty()) {
+    answer = AnswerOfEmpty(options);
+  } else {
+    answer = options.method == Method::kTextbookSat ? Textbook(a, b, options)
                                                     : CertifiedSearchOfEither(a, b, options, cache);
   }
   if (answer.ok() && start) answer->analysis.time = std::chrono::steady_clock::now() - *start;

@@ -56,9 +56,14 @@ ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
     a_.rows[i] = (R_B.norm_squared << (exponent_a - common)) * R_A.rows[i];
     b_.rows[i] = (R_A.norm_squared << (exponent_b - common)) * R_B.rows[i];
   }
+  exponent_ = common;
+  norm_ = R_A.norm_squared * R_B.norm_squared;
   a_.shift = {0, 0, 0};
-  b_.shift =
-      R_A.norm_squared * R_B.norm_squared * (ToInteger(X_WB.t, common) - ToInteger(X_WA.t, common));
+  b_.shift = norm_ * (ToInteger(X_WB.t, common) - ToInteger(X_WA.t, common));
+}
+
+IntegerVector ExactPair::TranslationA() const {
+  return norm_ * ToInteger(filter_->a().X_WH().t, exponent_);
 }
 
 IntegerVector ExactPair::ToWorld(const Side& side, const IntegerVector& own) {

@@ -28,6 +28,12 @@ class ExactPair {
   const Hull& a() const { return a_.hull->hull(); }
   const Hull& b() const { return b_.hull->hull(); }
 
+  // The scale: an integer coordinate times 2^exponent() / norm() is the length. norm() > 0.
+  int exponent() const { return exponent_; }
+  const Integer& norm() const { return norm_; }
+  // t_A in the same unit: what turns the shifted coordinates into world coordinates.
+  IntegerVector TranslationA() const;
+
   const IntegerVector& VertexA(uint32_t i) { return Vertex(a_, i); }
   const IntegerVector& VertexB(uint32_t i) { return Vertex(b_, i); }
   // Multiplies out every vertex: from then on all functions may be called by several threads at
@@ -70,6 +76,8 @@ class ExactPair {
   std::vector<uint32_t> AllOf(const Side& side) const;
 
   const FloatPair* filter_;
+  int exponent_;
+  Integer norm_;
   Side a_;
   Side b_;
 };

@@ -40,7 +40,12 @@ size_t FclScene::CountCollisions(const std::vector<Pose>& poses) {
     data_->objects[i]->setTransform(ToFcl(poses[i]));
     data_->objects[i]->computeAABB();
   }
-  data_->manager.update();
+  // Every object moved: to build the tree anew is faster than to mend it (manager.update()).
+  std::vector<fcl::CollisionObjectd*> objects;
+  for (const auto& object : data_->objects) objects.push_back(object.get());
+  data_->manager.clear();
+  data_->manager.registerObjects(objects);
+  data_->manager.setup();
   size_t count = 0;
   data_->manager.collide(&count, CountPair);
   return count;

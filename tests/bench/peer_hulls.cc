@@ -1,10 +1,12 @@
 #include "tests/bench/peer_hulls.h"
 
+#include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/convex_hull_3.h>
 
 #include <cstdio>
+#include <iterator>
 
 extern "C" {
 #include <libqhull_r/qhull_ra.h>
@@ -44,6 +46,25 @@ size_t CgalPoints::HullVertices() const {
   CGAL::Surface_mesh<Kernel::Point_3> mesh;
   CGAL::convex_hull_3(data_->points.begin(), data_->points.end(), mesh);
   return mesh.number_of_vertices();
+}
+
+struct CgalStream::Data {
+  CGAL::Delaunay_triangulation_3<Kernel, CGAL::Fast_location> triangulation;
+};
+
+CgalStream::CgalStream() : data_(new Data) {}
+
+CgalStream::~CgalStream() { delete data_; }
+
+void CgalStream::Insert(const Vector& point) {
+  data_->triangulation.insert(Kernel::Point_3(point.x(), point.y(), point.z()));
+}
+
+size_t CgalStream::HullVertices() const {
+  std::vector<decltype(data_->triangulation)::Vertex_handle> vertices;
+  data_->triangulation.adjacent_vertices(data_->triangulation.infinite_vertex(),
+                                         std::back_inserter(vertices));
+  return vertices.size();
 }
 
 }  // namespace hulld::bench

@@ -30,6 +30,23 @@ class CgalPoints {
   Data* data_;
 };
 
+// CGAL's Delaunay_triangulation_3 with fast location: what CGAL's manual recommends for hulls of
+// points that come and go. Its hull is what is next to the infinite vertex; exact as above. (qhull
+// has no supported way to add points to a hull.)
+class CgalStream {
+ public:
+  CgalStream();
+  ~CgalStream();
+  CgalStream(const CgalStream&) = delete;
+  CgalStream& operator=(const CgalStream&) = delete;
+  void Insert(const Vector& point);
+  size_t HullVertices() const;
+
+ private:
+  struct Data;
+  Data* data_;
+};
+
 }  // namespace hulld::bench
 
 #endif  // HULLD_TESTS_BENCH_PEER_HULLS_H_

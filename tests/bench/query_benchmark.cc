@@ -2,21 +2,21 @@
 // one process:
 //
 //   query_benchmark --benchmark_enable_random_interleaving=true --benchmark_repetitions=5
-//       --benchmark_filter='^ur5/' --benchmark_out=FILE.csv
+//       --benchmark_filter='^relation/' --benchmark_out=FILE.csv
 //
-// writes the medians (QueryReport). An iteration answers a block of distinct questions that know
-// nothing of each other. Columns: `ns` per question (processor time, real time where several
-// threads work); `questions` in the block; `wrong`, how many verdicts differ from hulld's exact
-// relation, which the tests hold against an independent oracle. `wrong` is left out of the regime
-// "touch", where a pose means another question to a library that rounds its rotation. Rows:
+// writes medians (CsvReporter). An iteration answers a block of distinct questions that know
+// nothing of each other. Columns: `questions` in the block; `ns` per question (processor time, real
+// time where several threads work); `wrong`, how many verdicts differ from hulld's exact relation,
+// which the tests hold against an independent oracle. `wrong` is left out of the regime "touch",
+// where a pose means another question to a library that rounds its rotation. Suites:
 //
-//   SET/REGIME/relation/METHOD    hulls at their poses -> colliding or not
-//   SET/REGIME/from_pose/METHOD   the same, poses converted to the method's own types each time
-//   SET/REGIME/contact/METHOD     depth, normal and witness points of hulls that overlap
-//   SET/REGIME/distance/METHOD    distance and witness points of hulls apart
-//   SET/REGIME/warm/METHOD        the same pairs again and again, moved a little each time
-//   SET/REGIME/batch:T/METHOD     all questions at once on T threads; real time
-//   SET/scene:N/collisions/METHOD N hulls, each moved: all pairs that collide (scene_benchmark.h)
+//   relation  hulls at their poses -> colliding or not; "from poses": poses converted to the
+//             method's own types each time
+//   contact   depth, normal and witness points of hulls that overlap; `none`: no depth was found
+//   distance  distance and witness points of hulls apart
+//   motion    the same pairs again and again, moved a little each time, with and without a cache
+//   batch     all questions at once on 1 or 2 threads; real time
+//   scene     all pairs that collide among many hulls (scene_benchmark.h)
 
 #include <benchmark/benchmark.h>
 
@@ -29,8 +29,8 @@
 
 #include "core/query/batch.h"
 #include "core/query/collision.h"
+#include "tests/bench/csv_reporter.h"
 #include "tests/bench/query_method.h"
-#include "tests/bench/query_report.h"
 #include "tests/bench/query_sets.h"
 #include "tests/bench/scene_benchmark.h"
 
@@ -131,8 +131,8 @@ void FindRelationsFromPoses(benchmark::State& state, Subject& subject) {
   ReportWrong(state, *subject.workload, verdicts);
 }
 
-// `none`: how many questions the method found no value for. `error`: the largest difference from
-// hulld's separation, whose own bound is about 1e-12.
+// `none`: how many questions the method found no value for. `largest_error`: the largest difference
+// from hulld's separation, whose own bound is about 1e-12.
 void ReportValues(benchmark::State& state, const std::vector<std::optional<double>>& values,
                   const std::vector<std::optional<double>>& truth) {
   ReportTime(state, values.size());
@@ -146,7 +146,7 @@ void ReportValues(benchmark::State& state, const std::vector<std::optional<doubl
     }
   }
   state.counters["none"] = static_cast<double>(none);
-  state.counters["error"] = error;
+  state.counters["largest_error"] = error;
 }
 
 void MeasureContacts(benchmark::State& state, Subject& subject) {
@@ -249,9 +249,9 @@ std::vector<std::shared_ptr<QueryMethod>> MakeMethods() {
   return methods;
 }
 
-std::string RowName(const std::string& set, Regime regime, const std::string& what,
-                    const std::string& method) {
-  return set + "/" + Name(regime) + "/" + what + "/" + method;
+std::string RowName(const std::string& suite, const std::string& set, Regime regime,
+                    const std::string& method, const std::string& how = "") {
+  return suite + "/" + set + " " + Name(regime) + how + "/" + method;
 }
 
 void AddRow(const std::string& name, void (*function)(benchmark::State&, Subject&),
@@ -274,9 +274,9 @@ void RegisterRelations(const std::string& set, Regime regime,
   std::vector<std::shared_ptr<QueryMethod>> methods = MakeMethods();
   if (!TextbookTakesTooLong(set, regime)) methods.push_back(MakeTextbookInDouble());
   for (const std::shared_ptr<QueryMethod>& method : methods) {
-    AddRow(RowName(set, regime, "relation", method->name()), FindRelations, workload, method);
-    AddRow(RowName(set, regime, "from_pose", method->name()), FindRelationsFromPoses, workload,
-           method);
+    AddRow(RowName("relation", set, regime, method->name()), FindRelations, workload, method);
+    AddRow(RowName("relation", set, regime, method->name(), " from poses"), FindRelationsFromPoses,
+           workload, method);
   }
 }
 
@@ -286,10 +286,10 @@ void RegisterMeasures(const std::string& set, Regime regime,
   const bool apart = regime == Regime::kFar || regime == Regime::kClose || regime == Regime::kGap;
   for (const std::shared_ptr<QueryMethod>& method : MakeMethods()) {
     if (deep && method->knows_depth()) {
-      AddRow(RowName(set, regime, "contact", method->name()), MeasureContacts, workload, method);
+      AddRow(RowName("contact", set, regime, method->name()), MeasureContacts, workload, method);
     }
     if (apart && method->knows_distance()) {
-      AddRow(RowName(set, regime, "distance", method->name()), MeasureDistances, workload, method);
+      AddRow(RowName("distance", set, regime, method->name()), MeasureDistances, workload, method);
     }
   }
 }
@@ -302,7 +302,7 @@ void RegisterSequences(const std::string& set, Regime regime,
   for (const bool warm : {true, false}) {
     if (at_contact) break;
     benchmark::RegisterBenchmark(
-        RowName(set, regime, warm ? "warm" : "cold_motion", "hulld").c_str(),
+        RowName("motion", set, regime, "hulld", warm ? " warm" : " cold").c_str(),
         [=](benchmark::State& state) { FollowMotion(state, *workload, warm); })
         ->Unit(benchmark::kMicrosecond)
         ->MinTime(0.02);
@@ -310,7 +310,7 @@ void RegisterSequences(const std::string& set, Regime regime,
   if (regime != Regime::kClose && regime != Regime::kDeep) return;
   for (const int threads : {1, 2}) {
     benchmark::RegisterBenchmark(
-        RowName(set, regime, "batch:" + std::to_string(threads), "hulld").c_str(),
+        RowName("batch", set, regime, "hulld", " " + std::to_string(threads) + " threads").c_str(),
         [=](benchmark::State& state) { AnswerBatch(state, *workload, threads); })
         ->Unit(benchmark::kMillisecond)
         ->MinTime(0.1)
@@ -335,11 +335,5 @@ void Register() {
 
 int main(int argc, char** argv) {
   hulld::bench::Register();
-  const bool to_file = std::any_of(argv, argv + argc, [](const char* argument) {
-    return std::string_view(argument).starts_with("--benchmark_out=");
-  });
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  hulld::bench::QueryReport report;
-  benchmark::RunSpecifiedBenchmarks(nullptr, to_file ? &report : nullptr);
+  return hulld::bench::RunBenchmarks(argc, argv);
 }

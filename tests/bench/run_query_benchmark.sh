@@ -1,35 +1,43 @@
-#!/usr/bin/env bash
-# Measures everything about queries anew: builds, runs, and writes the rows to tests/bench/results.
+#!/bin/bash
+# Measures collision queries and keeps the rows and the plot in tests/bench/results/.
 #
-#   bash tests/bench/run_query_benchmark.sh NAME [SET ...]
+#   bash tests/bench/run_query_benchmark.sh [MACHINE] [SUITE...]
 #
-# NAME tells the machine and the compiler, as in "epyc_gcc12". SETs are those of query_benchmark, all
-# by default. HULLD_DATA: the folder of meshes. REPETITIONS: 5 by default; medians count.
+# MACHINE names the files, as in query_relation_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
+# default. SUITEs are relation, contact, distance, motion, batch, scene, accuracy and trade; all by
+# default. REPETITIONS (5) of which the median counts. HULLD_DATA: the folder of meshes. Needs what
+# docker/packages.txt lists under [build], [test] and [bench]. Nothing else should run on the
+# machine meanwhile.
 set -euo pipefail
-cd "$(dirname "$0")/../.."
-name=${1:?name the machine and the compiler, as in epyc_gcc12}
-shift
-sets=("$@")
-[ ${#sets[@]} -gt 0 ] || sets=(sphere:8 sphere:64 sphere:512 sphere:10000 ur5)
-repetitions=${REPETITIONS:-5}
-results=tests/bench/results
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-cmake --preset release -DHULLD_BUILD_BENCH=ON
-cmake --build --preset release --target query_benchmark query_accuracy hulld-bench
+machine=${1:-epyc_gcc12}
+shift || true
+suites=("$@")
+((${#suites[@]})) || suites=(relation contact distance motion batch scene accuracy trade)
+results=tests/bench/results
 programs=build/release/tests/bench
 
-rows=$(mktemp -d)
-trap 'rm -rf "$rows"' EXIT
-# One process per set: what one set keeps in memory does not slow the next.
-for set in "${sets[@]}"; do
-  echo "$set"
-  "$programs/query_benchmark" --benchmark_filter="^$set/" --benchmark_repetitions="$repetitions" \
-    --benchmark_enable_random_interleaving=true --benchmark_report_aggregates_only=true \
-    --benchmark_out="$rows/$set.csv" > "$rows/$set.txt"
+cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
+cmake --build --preset release --target query_benchmark query_accuracy hulld-bench
+
+for suite in "${suites[@]}"; do
+  out=$results/query_${suite}_$machine.csv
+  case $suite in
+    # In turn with their peers, against drifts of the machine's speed.
+    relation | contact | distance | motion | batch | scene)
+      "$programs/query_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
+        --benchmark_repetitions="${REPETITIONS:-5}" --benchmark_enable_random_interleaving=true \
+        --benchmark_report_aggregates_only=true
+      ;;
+    # Counts, the same on every machine.
+    accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;
+    trade)
+      "$programs/hulld-bench" trade --csv "$out" --plot "$results/query_trade_$machine.svg"
+      ;;
+    *)
+      echo "run_query_benchmark.sh: unknown suite $suite" >&2
+      exit 2
+      ;;
+  esac
 done
-head -n 1 "$rows/${sets[0]}.csv" > "$results/query_$name.csv"
-for set in "${sets[@]}"; do
-  tail -n +2 "$rows/$set.csv" >> "$results/query_$name.csv"
-done
-"$programs/query_accuracy" > "$results/query_accuracy.csv"
-"$programs/hulld-bench" trade --csv "$results/trade_$name.csv" --plot tests/bench/trade.svg

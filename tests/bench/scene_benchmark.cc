@@ -120,8 +120,7 @@ void RegisterScenes() {
   for (const char* set : {"sphere:64", "ur5"}) {
     for (const size_t count : {size_t{1000}, size_t{10000}}) {
       const auto scene = std::make_shared<SceneWorkload>(set, count);
-      const std::string name =
-          std::string(set) + "/scene:" + std::to_string(count) + "/collisions/";
+      const std::string name = "scene/" + std::to_string(count) + " of " + std::string(set) + "/";
       AddRow(name + "hulld", RunHulld, scene);
 #ifdef HULLD_HAVE_FCL
       AddRow(name + "FCL tree", RunFcl, scene);

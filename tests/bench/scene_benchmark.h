@@ -3,7 +3,7 @@
 
 namespace hulld::bench {
 
-// Rows SET/scene:N/collisions/METHOD: N hulls of the set at random poses in a cube, so dense that
+// Rows scene/N of SET/METHOD: N hulls of the set at random poses in a cube, so dense that
 // each meets a few; all move, then all colliding pairs are found. Of hulld and of FCL's dynamic
 // tree of bounding boxes. `pairs` is how many were found, `wrong` by how many that differs from
 // hulld, `ns` is of the whole scene.

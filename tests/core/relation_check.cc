@@ -3,6 +3,7 @@
 #include <string>
 
 #include "tests/core/axis_check.h"
+#include "tests/core/certificate_bridge.h"
 #include "tests/core/oracle_bridge.h"
 
 namespace hulld {
@@ -62,6 +63,7 @@ testing::AssertionResult RelationCheck::AskOnce(const Hull& a, const Pose& X_WA,
   QueryOptions options;
   options.method = method;
   options.want_axis = true;
+  options.want_certificate = !textbook;
   const absl::StatusOr<Answer> answer = CheckCollision(a, X_WA, b, X_WB, options);
   if (!answer.ok()) return failure() << answer.status();
   if (answer->relation != expected) {
@@ -69,6 +71,10 @@ testing::AssertionResult RelationCheck::AskOnce(const Hull& a, const Pose& X_WA,
   }
   const testing::AssertionResult axis = AxisIsValid(a, X_WA, b, X_WB, *answer);
   if (!axis) return failure() << axis.message();
+  if (!textbook) {
+    const testing::AssertionResult certificate = CertificateIsValid(a, X_WA, b, X_WB, *answer);
+    if (!certificate) return failure() << certificate.message();
+  }
   if (textbook) {
     const std::string fault = AnalysisFault(a, b, *answer);
     if (!fault.empty()) return failure() << Name(expected) << ": " << fault;

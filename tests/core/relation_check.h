@@ -19,7 +19,7 @@ class RelationCheck {
   };
 
   // Whether core says `expected` for A and B and for B and A, by both methods, each with a valid
-  // axis and a consistent analysis.
+  // axis and a consistent analysis, and the search with a certificate that proves it.
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                Relation expected, Ways ways = kAllWays);
 

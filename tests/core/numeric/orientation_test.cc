@@ -75,16 +75,72 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
       const double s = unit(random);
       const double t = unit(random);
       p[3] = i % 3 == 0 ? Vector(s, t, unit(random)) : p[0] + s * (p[1] - p[0]) + t * (p[2] - p[0]);
+      // Of like magnitudes along the axes, or of unlike ones, which take more bits.
+      const int spread = i % 2 == 0 ? 0 : 12;
       for (Vector& v : p) {
-        for (int k = 0; k < 3; ++k) v[k] = std::ldexp(v[k], scale);
+        for (int k = 0; k < 3; ++k) v[k] = std::ldexp(v[k], scale - k * spread);
       }
       ExpectExact(p);
     }
   }
   const OrientationCounts after = ThreadOrientationCounts();
   EXPECT_GT(after.filter - before.filter, 1000u);
+  EXPECT_GT(after.fixed_point - before.fixed_point, 1000u);
   EXPECT_GT(after.expansion - before.expansion, 1000u);
-  EXPECT_GT(after.integer - before.integer, 1000u);
+  // A common power of two takes no integers.
+  EXPECT_EQ(after.integer, before.integer);
+}
+
+// A power of two on each axis: past the spread of exponents that one power of two on all can undo.
+TEST(Orient3d, ExactWhereAxesAreFarApart) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const auto& [low, high] : {std::array{-1060, 1020},
+                                  {-1060, -440},
+                                  {-300, 330},
+                                  {-306, 329},
+                                  {-310, 333},
+                                  {500, 1020}}) {
+    const OrientationCounts before = ThreadOrientationCounts();
+    for (int i = 0; i < 300; ++i) {
+      Points p;
+      for (int k = 0; k < 3; ++k) p[k] = Vector(unit(random), unit(random), unit(random));
+      p[3] = p[0] + unit(random) * (p[1] - p[0]) + unit(random) * (p[2] - p[0]);
+      for (Vector& v : p) {
+        v = Vector(std::ldexp(v.x(), low), v.y(), std::ldexp(v.z(), high));
+        v.y() = std::ldexp(v.y(), (low + high) / 2);
+      }
+      ExpectExact(p);
+    }
+    const uint64_t by_integers = ThreadOrientationCounts().integer - before.integer;
+    if (high - low > 660) {
+      EXPECT_GT(by_integers, 300u) << low << " to " << high;
+    }
+    if (high - low < 600) {
+      EXPECT_EQ(by_integers, 0u) << low << " to " << high;
+    }
+  }
+}
+
+// Numbers that just fit into the integers of fixed size, and that just do not.
+TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
+  const uint64_t seed = 7;
+  std::mt19937_64 random(seed);
+  std::uniform_int_distribution<int> pick(0, 5);
+  const double values[] = {0x1p60 - 0x1p8, -(0x1p60 - 0x1p8), 0x1p60, 1, -1, 0.5};
+  const OrientationCounts before = ThreadOrientationCounts();
+  for (const int scale : {-1070, -60, 0, 900}) {
+    for (int i = 0; i < 2000; ++i) {
+      Points p;
+      for (Vector& v : p) {
+        for (int k = 0; k < 3; ++k) v[k] = std::ldexp(values[pick(random)], scale);
+      }
+      ExpectExact(p);
+    }
+  }
+  const OrientationCounts after = ThreadOrientationCounts();
+  EXPECT_GT(after.fixed_point - before.fixed_point, 100u) << "seed " << seed;
+  EXPECT_GT(after.expansion - before.expansion, 100u) << "seed " << seed;
 }
 
 TEST(Orient3d, ExactOnMixedMagnitudes) {

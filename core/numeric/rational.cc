@@ -1,0 +1,79 @@
+#include "core/numeric/rational.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "core/numeric/error_bounds.h"
+
+namespace hulld {
+namespace {
+
+constexpr double kLeastDouble = std::numeric_limits<double>::denorm_min();
+
+// Bits of the quotients before they are rounded: 64 after a square root.
+constexpr int kQuotientBits = 128;
+
+int BitsOf(const Integer& value) {
+  return value.is_zero() ? 0 : static_cast<int>(msb(Integer(abs(value)))) + 1;
+}
+
+// value * 2^shift, rounded down. Requires value >= 0.
+Integer Shifted(const Integer& value, int shift) {
+  return shift >= 0 ? Integer(value << shift) : Integer(value >> -shift);
+}
+
+// mantissa * 2^exponent of a number other than 0, with relative error below 2^-60.
+Rounded Round(double mantissa, int exponent) {
+  const double value = std::ldexp(mantissa, exponent);
+  if (std::isinf(value)) {
+    return {std::copysign(std::numeric_limits<double>::max(), mantissa),
+            std::numeric_limits<double>::infinity()};
+  }
+  if (value == 0) return {std::copysign(kLeastDouble, mantissa), kLeastDouble};
+  return {value, std::abs(value) * kRoundedRelativeError + kLeastDouble};
+}
+
+}  // namespace
+
+ScaledDouble ToScaledDouble(const Integer& value) {
+  const int shift = 62 - BitsOf(value);
+  const auto magnitude = static_cast<int64_t>(Shifted(abs(value), shift));
+  const double mantissa = static_cast<double>(magnitude);
+  return {Sign(value) < 0 ? -mantissa : mantissa, -shift};
+}
+
+Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exponent) {
+  if (numerator.is_zero()) return {0, 0};
+  const int shift = kQuotientBits + BitsOf(denominator) - BitsOf(numerator);
+  const Integer magnitude = abs(numerator);
+  const Integer quotient = shift >= 0 ? Integer((magnitude << shift) / denominator)
+                                      : Integer(magnitude / (denominator << -shift));
+  const ScaledDouble scaled = ToScaledDouble(quotient);
+  return Round(Sign(numerator) < 0 ? -scaled.mantissa : scaled.mantissa,
+               scaled.exponent - shift + exponent);
+}
+
+Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent) {
+  if (numerator.is_zero()) return {0, 0};
+  const int half = (kQuotientBits + BitsOf(denominator) - BitsOf(numerator)) / 2;
+  const Integer quotient = half >= 0 ? Integer((numerator << 2 * half) / denominator)
+                                     : Integer(numerator / (denominator << -2 * half));
+  const ScaledDouble scaled = ToScaledDouble(sqrt(quotient));
+  return Round(scaled.mantissa, scaled.exponent - half + exponent);
+}
+
+int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int exponent,
+                      double threshold) {
+  if (threshold == 0) return Sign(numerator);
+  const int lowest = LowestBitExponent(threshold);
+  const Integer odd = ToInteger(threshold, lowest);
+  // numerator * 4^exponent against odd^2 * 4^lowest * denominator.
+  const int shift = 2 * (exponent - lowest);
+  Integer left = numerator;
+  Integer right = odd * odd * denominator;
+  (shift >= 0 ? left : right) <<= std::abs(shift);
+  return left < right ? -1 : left > right ? 1 : 0;
+}
+
+}  // namespace hulld

@@ -1,0 +1,37 @@
+#ifndef HULLD_CORE_NUMERIC_RATIONAL_H_
+#define HULLD_CORE_NUMERIC_RATIONAL_H_
+
+#include "core/numeric/integer.h"
+
+namespace hulld {
+
+// mantissa * 2^exponent within a relative 2^-52; mantissa 0, or at least 2^61 and at most 2^62 in
+// magnitude.
+struct ScaledDouble {
+  double mantissa;
+  int exponent;
+};
+ScaledDouble ToScaledDouble(const Integer& value);
+
+// A real number rounded to a double: |value - number| <= bound. The sign is that of the number:
+// what is too small becomes the least positive double, or minus that. What is too large saturates,
+// and the bound is infinite.
+struct Rounded {
+  double value;
+  double bound;
+};
+
+// numerator / denominator * 2^exponent. Requires denominator > 0.
+Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exponent);
+
+// sqrt(numerator / denominator) * 2^exponent. Requires numerator >= 0, denominator > 0.
+Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent);
+
+// Sign of sqrt(numerator / denominator) * 2^exponent - threshold, exactly. Requires numerator >= 0,
+// denominator > 0, threshold finite and >= 0.
+int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int exponent,
+                      double threshold);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_NUMERIC_RATIONAL_H_

@@ -1,0 +1,129 @@
+#include "core/query/certification.h"
+
+#include <absl/status/status.h>
+
+#include <optional>
+#include <span>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/query/exact_nearest.h"
+
+namespace hulld {
+namespace {
+
+// Sign of the largest n.(a - b).
+int SignOfSupport(ExactPair& pair, const IntegerVector& n) {
+  return Sign(Dot(n, pair.VertexA(pair.FarthestA(n)) - pair.VertexB(pair.FarthestB(n))));
+}
+
+// n without common divisor.
+IntegerVector Reduced(const IntegerVector& n) {
+  const Integer divisor = gcd(gcd(abs(n.x), abs(n.y)), abs(n.z));
+  return {n.x / divisor, n.y / divisor, n.z / divisor};
+}
+
+// n in the shortest form of which the support has the sign of n's own, -1 or 0.
+std::variant<std::monostate, Vector, IntegerVector> Shortest(ExactPair& pair,
+                                                             const IntegerVector& n, int sign) {
+  IntegerVector reduced = Reduced(n);
+  // The power of two is for the eye: components of at most 2.
+  const Vector rounded = ToScaledDoubles(reduced) * 0x1p-62;
+  const IntegerVector exact = ToInteger(rounded, LowestBitExponent(rounded, kAboveAllExponents));
+  if (SignOfSupport(pair, exact) <= sign) return rounded;
+  return reduced;
+}
+
+// Vertices of A - B that surround the origin.
+class Surrounding {
+ public:
+  Surrounding(ExactPair& pair, const std::function<bool()>& should_stop)
+      : pair_(pair), should_stop_(should_stop) {}
+
+  // As long as some half-space holds all vertices found and the origin on its boundary, the
+  // farthest vertex outside it is added; then those that are not needed are dropped, until each is.
+  // That leaves at most six (Steinitz 1913). Requires the origin strictly inside A - B.
+  absl::StatusOr<std::vector<VertexPair>> Find() {
+    while (const std::optional<IntegerVector> n = Escape(corners_)) {
+      if (should_stop_ && should_stop_()) return absl::CancelledError("stopped in a certificate");
+      const VertexPair farthest = {pair_.FarthestA(*n), pair_.FarthestB(*n)};
+      corners_.push_back({pair_.VertexA(farthest.a) - pair_.VertexB(farthest.b), farthest});
+    }
+    for (size_t i = corners_.size(); i-- > 0;) {
+      std::vector<Corner> fewer = corners_;
+      fewer.erase(fewer.begin() + i);
+      if (!Escape(fewer)) corners_ = std::move(fewer);
+    }
+    std::vector<VertexPair> pairs;
+    for (const Corner& corner : corners_) pairs.push_back(corner.pair);
+    return pairs;
+  }
+
+ private:
+  struct Corner {
+    IntegerVector w;
+    VertexPair pair;
+  };
+
+  // A direction n, not zero, with n.w <= 0 for all corners; none when the origin is strictly inside
+  // their hull. The directions form a cone; when the corners span R^3 its extreme rays are cross
+  // products of two of them, and when they span a plane its normal is such a product as well.
+  static std::optional<IntegerVector> Escape(const std::vector<Corner>& corners) {
+    bool parallel = true;
+    for (size_t i = 0; i < corners.size(); ++i) {
+      for (size_t j = i + 1; j < corners.size(); ++j) {
+        const IntegerVector n = Cross(corners[i].w, corners[j].w);
+        if (IsZero(n)) continue;
+        parallel = false;
+        bool below = true;
+        bool above = true;
+        for (size_t k = 0; k < corners.size() && (below || above); ++k) {
+          const int sign = Sign(Dot(n, corners[k].w));
+          below &= sign <= 0;
+          above &= sign >= 0;
+        }
+        if (below) return n;
+        if (above) return -n;
+      }
+    }
+    if (!parallel) return std::nullopt;
+    for (const Corner& corner : corners) {
+      if (!IsZero(corner.w)) return AnyPerpendicular(corner.w);
+    }
+    return IntegerVector{1, 0, 0};
+  }
+
+  ExactPair& pair_;
+  const std::function<bool()>& should_stop_;
+  std::vector<Corner> corners_;
+};
+
+}  // namespace
+
+absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
+                                            const std::function<bool()>& should_stop) {
+  Certificate certificate;
+  certificate.direction = decision.axis;
+  if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) {
+    const int sign = decision.relation == Relation::kSeparated ? -1 : 0;
+    certificate.direction = Shortest(exact, *n, sign);
+  }
+  const std::span<const VertexPair> known(decision.pairs.data(), decision.pair_count);
+  if (decision.relation == Relation::kTouching) {
+    absl::StatusOr<ExactNearest> nearest = FindNearestExactly(exact, known, should_stop);
+    if (!nearest.ok()) return nearest.status();
+    certificate.pairs = std::move(nearest->point.pairs);
+  } else if (decision.relation == Relation::kOverlapping) {
+    if (!known.empty()) {
+      certificate.pairs.assign(known.begin(), known.end());
+      return certificate;
+    }
+    absl::StatusOr<std::vector<VertexPair>> pairs = Surrounding(exact, should_stop).Find();
+    if (!pairs.ok()) return pairs.status();
+    certificate.pairs = *std::move(pairs);
+  }
+  return certificate;
+}
+
+}  // namespace hulld

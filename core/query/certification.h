@@ -1,0 +1,23 @@
+#ifndef HULLD_CORE_QUERY_CERTIFICATION_H_
+#define HULLD_CORE_QUERY_CERTIFICATION_H_
+
+#include <absl/status/statusor.h>
+
+#include <functional>
+
+#include "core/query/certificate.h"
+#include "core/query/exact_pair.h"
+#include "core/query/ladder.h"
+
+namespace hulld {
+
+// What makes the decision checkable. Where the decision came from floating point with all that is
+// needed, it is copied; otherwise found in exact arithmetic. Requires a relation other than
+// kWithinTolerance, and `exact` of the same pair. CANCELLED when should_stop said so (it may be
+// empty).
+absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
+                                            const std::function<bool()>& should_stop);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_CERTIFICATION_H_

@@ -1,0 +1,243 @@
+#include "core/query/separation.h"
+
+#include <absl/status/statusor.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/rational.h"
+#include "core/query/exact_depth.h"
+#include "core/query/exact_nearest.h"
+#include "core/query/exact_pair.h"
+#include "core/query/float_depth.h"
+#include "core/query/float_distance.h"
+#include "core/query/float_search.h"
+#include "core/query/separation_bounds.h"
+
+namespace hulld {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// The absolute value of the separation between bounds: their middle and half their width, rounded
+// up. The middle is positive, as the upper bound is.
+Separation MiddleOf(const SeparationBounds& bounds) {
+  const double middle = bounds.low + (bounds.high - bounds.low) / 2;
+  const double half = std::max(bounds.high - middle, middle - bounds.low);
+  return {middle, std::nextafter(half, kInfinity)};
+}
+
+// Whether separation <= clearance, when the absolute separation compares so with |clearance|.
+bool IsWithin(Relation relation, int comparison) {
+  return relation == Relation::kSeparated ? comparison <= 0 : comparison >= 0;
+}
+
+class SeparationSearch {
+ public:
+  SeparationSearch(const FloatPair& pair, const Decision& decision, bool cold,
+                   const std::function<bool()>& should_stop)
+      : pair_(pair),
+        relation_(decision.relation),
+        should_stop_(should_stop),
+        size_(pair.a().query_hull().radius() + pair.b().query_hull().radius()) {
+    if (relation_ == Relation::kTouching) {
+      start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
+    } else if (pair.usable()) {
+      StartFrom(decision, cold);
+    }
+  }
+
+  absl::Status AddValues(const SeparationRequest& request, SeparationAnswer& answer) {
+    if (relation_ == Relation::kTouching) {
+      if (request.separation) answer.separation = Separation{0, 0};
+      return request.witness ? AddExactWitness(answer) : absl::OkStatus();
+    }
+    SeparationGoal goal;
+    if (request.max_error) {
+      goal.absolute_error = *request.max_error;
+    } else {
+      goal.relative_error = kDefaultRelativeMaxError;
+      goal.size = size_;
+    }
+    Bound(goal, request.witness);
+    const Separation middle = MiddleOf(bounds_);
+    const bool close =
+        std::isfinite(bounds_.high) &&
+        middle.bound <= goal.absolute_error + goal.relative_error * (goal.size + middle.value);
+    if (request.separation) {
+      if (close) {
+        answer.separation = WithSign(middle);
+      } else if (absl::Status s = AddExactSeparation(answer); !s.ok()) {
+        return s;
+      }
+    }
+    if (!request.witness) return absl::OkStatus();
+    if (close && AddFloatWitness(answer)) return absl::OkStatus();
+    return AddExactWitness(answer);
+  }
+
+  absl::Status AddClearance(double clearance, SeparationAnswer& answer) {
+    if (relation_ == Relation::kTouching || (relation_ == Relation::kSeparated && clearance <= 0) ||
+        (relation_ == Relation::kOverlapping && clearance >= 0) || std::isinf(clearance)) {
+      // The signs decide, as a separation is finite.
+      answer.within_clearance = relation_ == Relation::kSeparated ? clearance > 0 : clearance >= 0;
+      return absl::OkStatus();
+    }
+    const double threshold = std::abs(clearance);
+    const auto open = [&] { return !(bounds_.low > threshold || bounds_.high < threshold); };
+    if (open()) {
+      SeparationGoal goal;
+      goal.threshold = threshold;
+      Bound(goal, false);
+    }
+    int comparison = bounds_.high < threshold ? -1 : 1;
+    if (open()) {
+      if (absl::Status s = FindExactly(); !s.ok()) return s;
+      comparison = CompareSquareRoot(nearest_->numerator,
+                                     exact_->norm() * exact_->norm() * nearest_->denominator,
+                                     exact_->exponent(), threshold);
+    }
+    answer.within_clearance = IsWithin(relation_, comparison);
+    return absl::OkStatus();
+  }
+
+ private:
+  // Where floating point starts: the axis that it found, or four pairs whose differences surround
+  // the origin; the same whatever a cache suggested.
+  void StartFrom(const Decision& decision, bool cold) {
+    towards_ = -pair_.CenterDifference();
+    if (cold || decision.rung == Rung::kBounds) {
+      if (const Vector* n = std::get_if<Vector>(&decision.axis)) towards_ = *n;
+      start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
+      return;
+    }
+    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0);
+    if (found.verdict == FloatVerdict::kSeparated) towards_ = found.axis;
+    if (found.verdict != FloatVerdict::kOverlapping) return;
+    start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
+  }
+
+  // Bounds in floating point, as close to the goal as that allows. The vertices that it met are
+  // where exact arithmetic starts.
+  void Bound(const SeparationGoal& goal, bool want_point) {
+    if (!pair_.usable()) return;
+    if (relation_ == Relation::kSeparated) {
+      bounds_ = BoundDistance(pair_, towards_, goal);
+      seed_.assign(bounds_.point.pairs.begin(), bounds_.point.pairs.begin() + bounds_.point.count);
+    } else {
+      seed_.clear();
+      bounds_ = BoundDepth(pair_, start_, goal, want_point, &seed_);
+    }
+  }
+
+  absl::Status FindExactly() {
+    if (nearest_) return absl::OkStatus();
+    exact_.emplace(pair_);
+    absl::StatusOr<ExactNearest> nearest =
+        relation_ == Relation::kOverlapping ? FindDepthExactly(*exact_, seed_, should_stop_)
+        : relation_ == Relation::kSeparated ? FindNearestExactly(*exact_, seed_, should_stop_)
+                                            : FindNearestExactly(*exact_, start_, should_stop_);
+    if (!nearest.ok()) return nearest.status();
+    nearest_ = *std::move(nearest);
+    return absl::OkStatus();
+  }
+
+  Rounded ExactLength() const {
+    return RoundSquareRoot(nearest_->numerator,
+                           exact_->norm() * exact_->norm() * nearest_->denominator,
+                           exact_->exponent());
+  }
+
+  Separation WithSign(const Separation& length) const {
+    return {relation_ == Relation::kOverlapping ? -length.value : length.value, length.bound};
+  }
+
+  absl::Status AddExactSeparation(SeparationAnswer& answer) {
+    if (absl::Status s = FindExactly(); !s.ok()) return s;
+    const Rounded length = ExactLength();
+    answer.separation = WithSign({length.value, length.bound});
+    return absl::OkStatus();
+  }
+
+  // False when the point is not known well enough.
+  bool AddFloatWitness(SeparationAnswer& answer) const {
+    const FloatCombination& point = bounds_.point;
+    if (point.count == 0) return false;
+    const double rounding = kCombinationErrorFactor * pair_.size();
+    const double width =
+        std::max(bounds_.point_length - bounds_.low, bounds_.high - bounds_.point_length);
+    if (width > 4 * (MiddleOf(bounds_).bound + rounding)) return false;
+    Vector p_A = Vector::Zero();
+    Vector p_B = Vector::Zero();
+    for (uint32_t i = 0; i < point.count; ++i) {
+      p_A += point.weights[i] * pair_.PositionA(point.pairs[i].a);
+      p_B += point.weights[i] * pair_.PositionB(point.pairs[i].b);
+    }
+    const Vector& t = pair_.a().X_WH().t;
+    Witness witness{p_A + t, p_B + t, 0};
+    const double largest =
+        std::max(witness.p_WA.cwiseAbs().maxCoeff(), witness.p_WB.cwiseAbs().maxCoeff());
+    witness.error = width + 2 * rounding + 4 * kUnitRoundoff * largest;
+    answer.witness = witness;
+    return true;
+  }
+
+  // The sum of weighted vertices of A, or of B, in the world.
+  Vector ExactPoint(bool of_a, double& error) {
+    const ExactCombination& point = nearest_->point;
+    IntegerVector sum = point.weight_sum * exact_->TranslationA();
+    for (size_t i = 0; i < point.pairs.size(); ++i) {
+      const IntegerVector& vertex =
+          of_a ? exact_->VertexA(point.pairs[i].a) : exact_->VertexB(point.pairs[i].b);
+      sum = sum + point.weights[i] * vertex;
+    }
+    const Integer denominator = point.weight_sum * exact_->norm();
+    Vector result;
+    for (int i = 0; i < 3; ++i) {
+      const Rounded rounded = RoundRatio(sum[i], denominator, exact_->exponent());
+      result[i] = rounded.value;
+      error += rounded.bound;
+    }
+    return result;
+  }
+
+  absl::Status AddExactWitness(SeparationAnswer& answer) {
+    if (absl::Status s = FindExactly(); !s.ok()) return s;
+    Witness witness;
+    witness.p_WA = ExactPoint(true, witness.error);
+    witness.p_WB = ExactPoint(false, witness.error);
+    answer.witness = witness;
+    return absl::OkStatus();
+  }
+
+  const FloatPair& pair_;
+  const Relation relation_;
+  const std::function<bool()>& should_stop_;
+  const double size_;
+  Vector towards_ = Vector::Zero();
+  std::vector<VertexPair> start_;
+  std::vector<VertexPair> seed_;
+  SeparationBounds bounds_;
+  std::optional<ExactPair> exact_;
+  std::optional<ExactNearest> nearest_;
+};
+
+}  // namespace
+
+absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
+                            const SeparationRequest& request,
+                            const std::function<bool()>& should_stop, SeparationAnswer& answer) {
+  SeparationSearch search(pair, decision, cold, should_stop);
+  if (request.separation || request.witness) {
+    if (absl::Status s = search.AddValues(request, answer); !s.ok()) return s;
+  }
+  if (!request.clearance) return absl::OkStatus();
+  return search.AddClearance(*request.clearance, answer);
+}
+
+}  // namespace hulld

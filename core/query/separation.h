@@ -1,0 +1,40 @@
+#ifndef HULLD_CORE_QUERY_SEPARATION_H_
+#define HULLD_CORE_QUERY_SEPARATION_H_
+
+#include <absl/status/status.h>
+
+#include <functional>
+#include <optional>
+
+#include "core/query/collision.h"
+#include "core/query/float_pair.h"
+#include "core/query/ladder.h"
+
+namespace hulld {
+
+// What is to be known of the signed separation beyond the relation.
+struct SeparationRequest {
+  bool separation = false;
+  bool witness = false;
+  std::optional<double> max_error;
+  std::optional<double> clearance;
+};
+
+struct SeparationAnswer {
+  std::optional<Separation> separation;
+  std::optional<Witness> witness;
+  std::optional<bool> within_clearance;
+};
+
+// Fills `answer`. Floating point with a proven bound where that is close enough, else exact
+// arithmetic, whose result is rounded. Depends on the pair alone: not on how the relation was
+// found. Requires a relation other than kWithinTolerance. `cold`: whether no cache helped to find
+// the decision, so that its pairs may be used. CANCELLED when should_stop said so (it may be
+// empty).
+absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
+                            const SeparationRequest& request,
+                            const std::function<bool()>& should_stop, SeparationAnswer& answer);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_SEPARATION_H_

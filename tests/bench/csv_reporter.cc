@@ -1,0 +1,120 @@
+#include "tests/bench/csv_reporter.h"
+
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <thread>
+
+namespace hulld::bench {
+namespace {
+
+// Every counter there is, in the order of the columns.
+constexpr const char* kCounters[] = {"points",
+                                     "vertices",
+                                     "vertices_missing_or_extra",
+                                     "p50_us",
+                                     "p99_us",
+                                     "p999_us",
+                                     "max_us",
+                                     "times_generic",
+                                     "ns_per_facet",
+                                     "filter_signs",
+                                     "fixed_point_signs",
+                                     "expansion_signs",
+                                     "integer_signs",
+                                     "questions",
+                                     "ns",
+                                     "wrong",
+                                     "none",
+                                     "largest_error",
+                                     "cached_share",
+                                     "pairs"};
+
+std::string CpuName() {
+  std::ifstream in("/proc/cpuinfo");
+  std::string name = "unknown CPU";
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("model name")) {
+      name = line.substr(line.find(':') + 2);
+      break;
+    }
+  }
+  return name.append(" (")
+      .append(std::to_string(std::thread::hardware_concurrency()))
+      .append(" cores)");
+}
+
+#ifdef __clang__
+constexpr const char* kCompiler = "clang++ " __clang_version__ " " HULLD_BENCH_FLAGS;
+#else
+constexpr const char* kCompiler = "g++ " __VERSION__ " " HULLD_BENCH_FLAGS;
+#endif
+
+// The two last parts of "suite/workload/library", with a comma between.
+std::string WorkloadAndLibrary(const std::string& name) {
+  const size_t library = name.rfind('/');
+  const size_t workload = name.rfind('/', library - 1) + 1;
+  return name.substr(workload, library - workload).append(",").append(name.substr(library + 1));
+}
+
+// A count in full, a measure in six digits.
+void Write(std::ostream& out, double value) {
+  if (value == std::floor(value) && std::abs(value) < 1e15) {
+    out << static_cast<int64_t>(value);
+  } else {
+    out << value;
+  }
+}
+
+bool IsFinal(const benchmark::BenchmarkReporter::Run& run) {
+  if (run.error_occurred) return false;
+  return run.repetitions > 1 ? run.aggregate_name == "median" : true;
+}
+
+}  // namespace
+
+bool CsvReporter::ReportContext(const Context&) { return true; }
+
+void CsvReporter::WriteHeader(const Run& run) {
+  GetOutputStream() << "workload,library";
+  for (const char* counter : kCounters) {
+    if (!run.counters.contains(counter)) continue;
+    columns_.push_back(counter);
+    GetOutputStream() << "," << counter;
+  }
+  GetOutputStream() << ",milliseconds,compiler,cpu\n";
+}
+
+void CsvReporter::ReportRuns(const std::vector<Run>& runs) {
+  static const std::string kCpu = CpuName();
+  for (const Run& run : runs) {
+    if (!IsFinal(run)) continue;
+    if (columns_.empty()) WriteHeader(run);
+    std::ostream& out = GetOutputStream();
+    out << WorkloadAndLibrary(run.run_name.function_name);
+    for (const std::string& column : columns_) {
+      out << ",";
+      if (const auto found = run.counters.find(column); found != run.counters.end()) {
+        Write(out, found->second.value);
+      }
+    }
+    const bool is_cpu_time = run.run_name.time_type.empty();
+    out << "," << (is_cpu_time ? run.GetAdjustedCPUTime() : run.GetAdjustedRealTime()) << ","
+        << kCompiler << "," << kCpu << std::endl;
+  }
+}
+
+int RunBenchmarks(int argc, char** argv) {
+  // The CSV is only written where a file is asked for.
+  bool has_file = false;
+  for (int i = 1; i < argc; ++i) {
+    has_file |= std::string(argv[i]).starts_with("--benchmark_out=");
+  }
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  CsvReporter csv;
+  benchmark::RunSpecifiedBenchmarks(nullptr, has_file ? &csv : nullptr);
+  return 0;
+}
+
+}  // namespace hulld::bench

@@ -1,0 +1,29 @@
+#ifndef HULLD_TESTS_ORACLE_CERTIFICATE_CHECK_H_
+#define HULLD_TESTS_ORACLE_CERTIFICATE_CHECK_H_
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/oracle/brute_force_relation.h"
+#include "tests/oracle/exact_integers.h"
+
+namespace hulld::oracle {
+
+// A certificate as a stranger gets it: a direction, empty when there is none, and pairs of a vertex
+// of A and a vertex of B.
+struct Certificate {
+  std::vector<Integer> direction;
+  std::vector<std::pair<uint32_t, uint32_t>> pairs;
+};
+
+// What is wrong with a certificate of a relation; empty when it proves it. Exact, and by the
+// certificate alone: SEPARATED: max n.A < min n.B, no pairs. TOUCHING: n not zero, max n.A <= min
+// n.B, and at most four pairs whose differences hold 0 in their hull. OVERLAPPING: no direction, at
+// most six pairs whose differences hold 0 strictly inside their hull.
+std::string FaultOf(const Certificate& certificate, Relation relation, const WorldPoints& points);
+
+}  // namespace hulld::oracle
+
+#endif  // HULLD_TESTS_ORACLE_CERTIFICATE_CHECK_H_
