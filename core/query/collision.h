@@ -112,7 +112,7 @@ struct QueryOptions {
   // kDefaultRelativeMaxError times the sizes of the hulls and the separation. Where a double cannot
   // hold the value so well, the bound is that of its rounding.
   std::optional<double> max_error;
-  // Whether Answer::within_clearance must be known: whether separation <= this, decided exactly.
+  // Answer::within_clearance: separation <= this, exactly; always at infinity, never at -infinity.
   std::optional<double> clearance;
   // tau >= 0, length. 0: the relation is exact, always. Positive: it may be kWithinTolerance where
   // |separation| <= tau. Not with a wanted separation, witness, clearance or certificate, nor the

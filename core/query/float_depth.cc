@@ -65,9 +65,7 @@ class Expansion {
  private:
   using Entry = std::pair<double, uint32_t>;  // a facet by its distance
 
-  void AddCorner(VertexPair pair) {
-    corners_.push_back({pair_.Difference(pair) * per_unit_, pair});
-  }
+  Corner At(VertexPair pair) const { return {pair_.Difference(pair) * per_unit_, pair}; }
 
   double HighOf(const FloatPair::Support& farthest) const {
     return farthest.value + kReachErrorFactor * pair_.size();
@@ -86,7 +84,7 @@ class Expansion {
   // A tetrahedron, its corner 3 inside of its facet 0, 1, 2.
   bool Start(std::span<const VertexPair> start) {
     if (start.size() == 4) {
-      for (const VertexPair& pair : start) AddCorner(pair);
+      for (const VertexPair& pair : start) corners_.push_back(At(pair));
     } else if (!SpanTetrahedron()) {
       return false;
     }
@@ -103,15 +101,15 @@ class Expansion {
     const VertexPair pairs[2] = {Reach(n, 0).pair, Reach(-n, 0).pair};
     double heights[2];
     for (int i = 0; i < 2; ++i) {
-      heights[i] = std::abs(n.dot(pair_.Difference(pairs[i]) * per_unit_ - corners_[0].w));
+      heights[i] = std::abs(n.dot(At(pairs[i]).w - corners_[0].w));
     }
     const int farther = heights[1] > heights[0];
-    AddCorner(pairs[farther]);
+    corners_.push_back(At(pairs[farther]));
     return heights[farther] > kRelativeVisibility;
   }
 
   bool SpanTetrahedron() {
-    AddCorner(Reach(Vector::UnitX(), 0).pair);
+    corners_.push_back(At(Reach(Vector::UnitX(), 0).pair));
     if (!AddFarther(Vector::UnitX())) return false;
     const Vector e = corners_[1].w - corners_[0].w;
     const Vector across = e.cross(Vector::UnitY());
@@ -158,9 +156,13 @@ class Expansion {
     return std::min(bounds_.high, distance - kTriangleDistanceErrorFactor * pair_.size());
   }
 
-  bool IsAbove(uint32_t facet, VertexPair pair) const {
-    const Vector w = pair_.Difference(pair) * per_unit_;
-    return planes_[facet].n.dot(w) > planes_[facet].distance + kRelativeVisibility;
+  bool Contains(VertexPair pair) const {
+    return std::any_of(corners_.begin(), corners_.end(),
+                       [&](const Corner& corner) { return corner.pair == pair; });
+  }
+
+  bool IsAbove(uint32_t facet, const Corner& corner) const {
+    return planes_[facet].n.dot(corner.w) > planes_[facet].distance + kRelativeVisibility;
   }
 
   // Expands the nearest facet; false when the goal is met or nothing is gained.
@@ -171,13 +173,16 @@ class Expansion {
     const double low = std::max(0.0, Low(nearest));
     FloatPair::Support farthest = Reach(n, low);
     if (goal_.Met(low, bounds_.high)) return false;
-    if (!farthest.certain && !IsAbove(*nearest, farthest.pair)) {
+    Corner corner = At(farthest.pair);
+    if (!farthest.certain && !IsAbove(*nearest, corner)) {
       farthest = pair_.CertainFarthest(n);
       bounds_.high = std::min(bounds_.high, HighOf(farthest));
+      corner = At(farthest.pair);
     }
-    if (!IsAbove(*nearest, farthest.pair)) return false;
-    AddCorner(farthest.pair);
-    const Vector w = corners_.back().w;
+    // One of its own vertices: the surface is not convex up to rounding.
+    if (!IsAbove(*nearest, corner) || Contains(farthest.pair)) return false;
+    corners_.push_back(corner);
+    const Vector w = corner.w;
     const auto apex = static_cast<uint32_t>(corners_.size() - 1);
     const std::optional<uint32_t> first = surface_.Expand(*nearest, apex, [&](uint32_t i) {
       return planes_[i].n.dot(w) > planes_[i].distance + kRelativeVisibility;
@@ -252,10 +257,10 @@ class Expansion {
 
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
                             const SeparationGoal& goal, bool want_point,
-                            std::vector<VertexPair>* vertices) {
+                            std::vector<VertexPair>& vertices) {
   Expansion expansion(pair, goal);
   const SeparationBounds bounds = expansion.Run(start, want_point);
-  if (vertices != nullptr) expansion.AppendVertices(*vertices);
+  if (!goal.Met(bounds.low, bounds.high)) expansion.AppendVertices(vertices);
   return bounds;
 }
 

@@ -21,11 +21,11 @@ namespace hulld {
 // the winding number.
 //
 // `start`: four pairs whose differences are the corners of a tetrahedron, as a rule round the
-// origin; or none. `vertices`, which may be null, gets the pairs of all vertices of the polytope.
-// The bounds may miss the goal. Requires pair.usable() and the relation OVERLAPPING.
+// origin; or none. The bounds may miss the goal; then `vertices` gets the pairs of all vertices of
+// the polytope. Requires pair.usable() and the relation OVERLAPPING.
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
                             const SeparationGoal& goal, bool want_point,
-                            std::vector<VertexPair>* vertices);
+                            std::vector<VertexPair>& vertices);
 
 }  // namespace hulld
 

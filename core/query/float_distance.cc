@@ -26,8 +26,9 @@ class Walk {
       : pair_(pair), goal_(goal), unit_(UnitOf(pair.size())), per_unit_(1 / unit_) {}
 
   SeparationBounds Run(Vector n) {
+    n /= n.cwiseAbs().maxCoeff();
     for (int step = 0; step < kMaxSteps; ++step) {
-      const double length = n.stableNorm();
+      const double length = n.norm();
       if (!(length > 0)) break;
       n /= length;
       FloatPair::Support farthest = pair_.Farthest(n);

@@ -131,7 +131,7 @@ class SeparationSearch {
       seed_.assign(bounds_.point.pairs.begin(), bounds_.point.pairs.begin() + bounds_.point.count);
     } else {
       seed_.clear();
-      bounds_ = BoundDepth(pair_, start_, goal, want_point, &seed_);
+      bounds_ = BoundDepth(pair_, start_, goal, want_point, seed_);
     }
   }
 
