@@ -21,7 +21,14 @@ constexpr const char* kCounters[] = {"points",
                                      "filter_signs",
                                      "fixed_point_signs",
                                      "expansion_signs",
-                                     "integer_signs"};
+                                     "integer_signs",
+                                     "questions",
+                                     "ns",
+                                     "wrong",
+                                     "none",
+                                     "largest_error",
+                                     "cached_share",
+                                     "pairs"};
 
 std::string CpuName() {
   std::ifstream in("/proc/cpuinfo");

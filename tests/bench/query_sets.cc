@@ -7,48 +7,18 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <random>
 
 #include "core/hull/hull_builder.h"
 #include "core/query/collision.h"
+#include "tests/bench/bench_random.h"
 
 namespace hulld::bench {
 namespace {
 
 constexpr size_t kHullsPerSet = 32;
-
-class Random {
- public:
-  explicit Random(uint64_t seed) : engine_(seed) {}
-  double Between(double low, double high) {
-    return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
-  }
-  size_t Below(size_t n) { return engine_() % n; }
-  // By Marsaglia's rejection.
-  Vector UnitVector() {
-    for (;;) {
-      const Vector v(Between(-1, 1), Between(-1, 1), Between(-1, 1));
-      const double squared = v.squaredNorm();
-      if (squared > 0.01 && squared <= 1) return v / std::sqrt(squared);
-    }
-  }
-  std::array<double, 4> Rotation() {
-    for (;;) {
-      std::array<double, 4> q;
-      double squared = 0;
-      for (double& component : q) {
-        component = Between(-1, 1);
-        squared += component * component;
-      }
-      if (squared < 0.01 || squared > 1) continue;
-      for (double& component : q) component /= std::sqrt(squared);
-      return q;
-    }
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
+// Of hulls with more vertices than kLargeHull there are fewer: their copies fill the memory.
+constexpr size_t kLargeHullsPerSet = 8;
+constexpr size_t kLargeHull = 5000;
 
 Hull BuildHull(const std::vector<Vector>& points) {
   HullBuilder builder;
@@ -78,6 +48,23 @@ std::vector<Vector> ReadStl(const std::filesystem::path& path) {
   return points;
 }
 
+// To the nearest multiples of 2^-40: sums and differences of a few of them are doubles.
+Vector Snapped(const Vector& p) { return (p * 0x1p40).array().round() * 0x1p-40; }
+
+Hull Snapped(const Hull& hull) {
+  std::vector<Vector> points;
+  for (const Vector& p : hull.vertices()) points.push_back(Snapped(p));
+  return BuildHull(points);
+}
+
+// One of the rotations of a cube that turn about a diagonal or not at all: they permute the axes,
+// and their matrices are exact.
+std::array<double, 4> AxisPermutation(Random& random) {
+  if (random.Below(4) == 0) return {1, 0, 0, 0};
+  const auto sign = [&] { return random.Below(2) == 0 ? 1.0 : -1.0; };
+  return {1, sign(), sign(), sign()};
+}
+
 void AddHulls(const std::string& name, Random& random, QuerySet& set) {
   if (name == "ur5") {
     const char* data = std::getenv("HULLD_DATA");
@@ -92,8 +79,23 @@ void AddHulls(const std::string& name, Random& random, QuerySet& set) {
     return;
   }
   const size_t count = std::stoul(name.substr(name.find(':') + 1));
-  for (size_t i = 0; i < kHullsPerSet; ++i)
-    set.hulls.push_back(BuildHull(OnEllipsoid(random, count)));
+  const size_t hulls = count > kLargeHull ? kLargeHullsPerSet : kHullsPerSet;
+  for (size_t i = 0; i < hulls; ++i) set.hulls.push_back(BuildHull(OnEllipsoid(random, count)));
+}
+
+// The pose of B at which its farthest vertex against `direction` is A's farthest along it: they
+// touch there, the plane across `direction` between them. Requires snapped hulls and exact
+// rotations.
+Pose TouchVertices(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pose X_WB,
+                   const Vector& direction) {
+  const Eigen::Matrix3d R_WA = PlacedHull::Make(a, X_WA)->R_WH();
+  const Eigen::Matrix3d R_WB = PlacedHull::Make(b, X_WB)->R_WH();
+  const auto farthest = [](const QueryHull& hull, const Vector& n) {
+    return hull.hull().vertices()[hull.support().CertainFarthest(n, 0).vertex];
+  };
+  const Vector p = R_WA * farthest(a, R_WA.transpose() * direction) + X_WA.t;
+  X_WB.t = p - R_WB * farthest(b, R_WB.transpose() * -direction);
+  return X_WB;
 }
 
 // B moved from A's centre along `direction` so far that the pair is in the regime.
@@ -143,6 +145,8 @@ const char* Name(Regime regime) {
       return "gap";
     case Regime::kTouch:
       return "touch";
+    case Regime::kContact:
+      return "contact";
     case Regime::kGraze:
       return "graze";
     case Regime::kDeep:
@@ -157,20 +161,30 @@ QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count) {
   Random random(20261121 + static_cast<uint64_t>(regime));
   AddHulls(name, random, set);
   if (set.hulls.empty()) return set;
+  const bool exact = regime == Regime::kContact;
+  if (exact) {
+    for (Hull& hull : set.hulls) hull = Snapped(hull);
+  }
   for (const Hull& hull : set.hulls) set.query_hulls.emplace_back(hull);
   for (size_t i = 0; i < count; ++i) {
     const size_t hull_a = random.Below(set.hulls.size());
     const size_t hull_b = random.Below(set.hulls.size());
+    const QueryHull& a = set.query_hulls[hull_a];
+    const QueryHull& b = set.query_hulls[hull_b];
     Pose X_WA;
-    X_WA.q = random.Rotation();
+    X_WA.q = exact ? AxisPermutation(random) : random.Rotation();
     X_WA.t = random.UnitVector() * random.Between(0, 2);
     Pose X_WB;
-    X_WB.q = random.Rotation();
-    X_WB = Place(set.query_hulls[hull_a], X_WA, set.query_hulls[hull_b], X_WB, random.UnitVector(),
-                 regime, random);
+    X_WB.q = exact ? AxisPermutation(random) : random.Rotation();
+    if (exact) {
+      X_WA.t = Snapped(X_WA.t);
+      X_WB = TouchVertices(a, X_WA, b, X_WB, random.UnitVector());
+    } else {
+      X_WB = Place(a, X_WA, b, X_WB, random.UnitVector(), regime, random);
+    }
     set.queries.push_back({hull_a, hull_b, X_WA, X_WB});
-    set.a.push_back(*PlacedHull::Make(set.query_hulls[hull_a], X_WA));
-    set.b.push_back(*PlacedHull::Make(set.query_hulls[hull_b], X_WB));
+    set.a.push_back(*PlacedHull::Make(a, X_WA));
+    set.b.push_back(*PlacedHull::Make(b, X_WB));
   }
   return set;
 }

@@ -12,15 +12,17 @@ namespace hulld::bench {
 
 // How far apart the hulls of a query are, relative to the sum of their radii.
 enum class Regime {
-  kFar,    // spheres round the hulls are 0.5 to 2 apart
-  kClose,  // 1 to 5 % apart along the line of centres
-  kGap,    // 1e-6 apart
-  kTouch,  // as near to contact as doubles come
-  kGraze,  // 1e-6 deep
-  kDeep,   // half of the way from contact to coinciding centres
+  kFar,      // spheres round the hulls are 0.5 to 2 apart
+  kClose,    // 1 to 5 % apart along the line of centres
+  kGap,      // 1e-6 apart
+  kTouch,    // as near to contact as doubles come
+  kContact,  // exactly touching, vertex to vertex
+  kGraze,    // 1e-6 deep
+  kDeep,     // half of the way from contact to coinciding centres
 };
-inline constexpr Regime kRegimes[] = {Regime::kFar,   Regime::kClose, Regime::kGap,
-                                      Regime::kTouch, Regime::kGraze, Regime::kDeep};
+inline constexpr Regime kRegimes[] = {Regime::kFar,   Regime::kClose,   Regime::kGap,
+                                      Regime::kTouch, Regime::kContact, Regime::kGraze,
+                                      Regime::kDeep};
 const char* Name(Regime regime);
 
 // Distinct questions on distinct hulls.
@@ -43,6 +45,10 @@ struct QuerySet {
 // Hulls by name: "sphere:V" (V random points on an ellipsoid with axes between 0.5 and 1.5), or
 // "ur5" (the links of the robot arm in HULLD_DATA, by default ../shared/data; no queries when it is
 // not there). Poses are random. Fixed seeds: the same name and regime give the same questions.
+//
+// In kContact coordinates are multiples of 2^-40 and rotations map the axes onto each other, so
+// that every library receives the same geometry. Elsewhere a rotation matrix is rounded by those
+// that need one; but for kTouch that is far below the distance to contact.
 QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count);
 
 }  // namespace hulld::bench
