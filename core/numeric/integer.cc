@@ -47,13 +47,18 @@ IntegerVector ToInteger(const Vector& v, int exponent) {
   return {ToInteger(v.x(), exponent), ToInteger(v.y(), exponent), ToInteger(v.z(), exponent)};
 }
 
-Vector ToScaledDoubles(const IntegerVector& v) {
-  int bits = 0;
+unsigned BitLength(const IntegerVector& v) {
+  unsigned bits = 0;
   for (int i = 0; i < 3; ++i) {
     if (!v[i].is_zero()) {
-      bits = std::max(bits, static_cast<int>(boost::multiprecision::msb(abs(v[i]))) + 1);
+      bits = std::max(bits, static_cast<unsigned>(boost::multiprecision::msb(abs(v[i]))) + 1);
     }
   }
+  return bits;
+}
+
+Vector ToScaledDoubles(const IntegerVector& v) {
+  const int bits = static_cast<int>(BitLength(v));
   Vector result;
   for (int i = 0; i < 3; ++i) {
     const int shift = bits - 63;

@@ -68,6 +68,9 @@ int LowestBitExponent(const Vector& v, int otherwise);
 Integer ToInteger(double x, int exponent);
 IntegerVector ToInteger(const Vector& v, int exponent);
 
+// The number of bits of the largest component; 0 for the zero vector.
+unsigned BitLength(const IntegerVector& v);
+
 // v divided by the power of two that brings its largest component into [2^62, 2^63), rounded: each
 // component of the result errs by less than 2^-52 times the largest component, relative to the
 // exact quotient. Requires v not zero.

@@ -2,6 +2,7 @@
 
 #include <absl/status/status.h>
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <utility>
@@ -68,9 +69,12 @@ class Surrounding {
 
   // A direction n, not zero, with n.w <= 0 for all corners; none when the origin is strictly inside
   // their hull. The directions form a cone; when the corners span R^3 its extreme rays are cross
-  // products of two of them, and when they span a plane its normal is such a product as well.
+  // products of two of them, and when they span a plane its normal is such a product as well. The
+  // direction is in the middle of the cone, the sum of its rays at about equal lengths: the corner
+  // found along it cuts the cone deep, so that few are needed.
   static std::optional<IntegerVector> Escape(const std::vector<Corner>& corners) {
     bool parallel = true;
+    std::vector<IntegerVector> rays;
     for (size_t i = 0; i < corners.size(); ++i) {
       for (size_t j = i + 1; j < corners.size(); ++j) {
         const IntegerVector n = Cross(corners[i].w, corners[j].w);
@@ -83,15 +87,28 @@ class Surrounding {
           below &= sign <= 0;
           above &= sign >= 0;
         }
-        if (below) return n;
-        if (above) return -n;
+        if (below && above) return n;
+        if (below) rays.push_back(n);
+        if (above) rays.push_back(-n);
       }
     }
+    if (!rays.empty()) return Middle(rays);
     if (!parallel) return std::nullopt;
     for (const Corner& corner : corners) {
       if (!IsZero(corner.w)) return AnyPerpendicular(corner.w);
     }
     return IntegerVector{1, 0, 0};
+  }
+
+  // The sum of the rays, each times the power of two that makes it about as long as the longest.
+  static IntegerVector Middle(const std::vector<IntegerVector>& rays) {
+    unsigned longest = 0;
+    for (const IntegerVector& ray : rays) longest = std::max(longest, BitLength(ray));
+    IntegerVector sum = {0, 0, 0};
+    for (const IntegerVector& ray : rays) {
+      sum = sum + (Integer(1) << (longest - BitLength(ray))) * ray;
+    }
+    return sum;
   }
 
   ExactPair& pair_;
