@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/hull/hull_builder.h"
+#include "core/query/query_hull.h"
 #include "tests/core/oracle_bridge.h"
 #include "tests/core/point_sets.h"
 
@@ -130,6 +131,8 @@ TEST(HullCost, MemoryIsBoundedByTheVertices) {
       const Hull hull = b->Snapshot();
       EXPECT_LE(static_cast<double>(hull.MemoryBytes()) / vertices, 100) << cloud.name;
       EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 300) << cloud.name;
+      const auto queried = static_cast<double>(hull.MemoryBytes() + QueryHull(hull).MemoryBytes());
+      EXPECT_LE(queried / vertices, 350) << cloud.name;
       // At least the vertices and the triangles are counted.
       EXPECT_GE(static_cast<double>(hull.MemoryBytes()) / vertices, 24 + 24 + 24) << cloud.name;
       EXPECT_GE(static_cast<double>(b->MemoryBytes()) / vertices, 24 + 2 * 64 - 1) << cloud.name;
