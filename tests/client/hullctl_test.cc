@@ -376,6 +376,28 @@ TEST_F(HullctlTest, MeshWritesObjThatReadsBackExactly) {
   EXPECT_EQ(Ask({"mesh", "a", "-o", "/no/such/folder/a.obj"}).code, 2);
 }
 
+TEST_F(HullctlTest, CheckAsksAgainWhenAHullMovesOnBeforeItIsVerified) {
+  fake_.mesh_parts = Tetrahedron();
+  fake_.mesh_parts[0].mutable_header()->mutable_hull()->set_revision(7);
+  v1::CheckCollisionResponse& answer = fake_.collision_answer;
+  answer.set_relation(v1::RELATION_TOUCHING);
+  answer.mutable_hull_a()->set_hull_id("a");
+  answer.mutable_hull_b()->set_hull_id("a");
+  answer.mutable_certificate()->add_pairs();
+  answer.mutable_certificate()->mutable_direction()->set_x(1);
+  answer.mutable_hull_a()->set_revision(6);
+  const Ran moved = Ask({"check", "a", "a", "--verify"});
+  EXPECT_EQ(moved.code, 6);
+  EXPECT_THAT(moved.err, HasSubstr("hull a is at revision 7; the answer is from revision 6"));
+  EXPECT_EQ(fake_.calls("CheckCollision"), 5);
+  answer.mutable_hull_a()->set_revision(7);
+  answer.mutable_hull_b()->set_revision(7);
+  const Ran wrong = Ask({"check", "a", "a", "--verify"});
+  EXPECT_EQ(wrong.code, 5);
+  EXPECT_EQ(fake_.calls("CheckCollision"), 6);
+  EXPECT_THAT(wrong.err, HasSubstr("does not prove the answer"));
+}
+
 TEST_F(HullctlTest, SimplifiedMeshTellsItsError) {
   fake_.mesh_parts = Tetrahedron();
   v1::MeshHeader& header = *fake_.mesh_parts[0].mutable_header();
