@@ -166,8 +166,8 @@ inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
 
 // The sign of det[p, q, r] for computed Minkowski vertices in a unit with S < 2, so that components
 // are below 8 and those of the edges below 16: the normal errs by 2048 u per component, its product
-// with p by 3 * 8 * 2048 u, products and sums by 3 * 3 u * 8 * 512: below 2^17 u. What exceeds twice
-// that is certainly positive. Proven.
+// with p by 3 * 8 * 2048 u, products and sums by 3 * 3 u * 8 * 512: below 2^17 u. What exceeds
+// twice that is certainly positive. Proven.
 inline constexpr double kLeastOutward = 0x1p-35;
 
 // A rational number or the square root of one, with 60 bits or more, rounded to a double: u of

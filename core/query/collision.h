@@ -157,9 +157,9 @@ struct PairCache {
 // The relation of hull A and hull B at their poses, exact for every finite input, and what else the
 // options ask for. `cache` may be null; with it the relation, the separation and its bound are
 // those without it. Swapping A and B mirrors the answer.
-// INVALID_ARGUMENT: options that exclude each other, a negative or NaN tolerance, max_error or
-// clearance. RESOURCE_EXHAUSTED: the textbook method would test more axes than allowed. CANCELLED:
-// should_stop said so.
+// INVALID_ARGUMENT: options that exclude each other, a negative or NaN tolerance or max_error, a
+// NaN clearance. RESOURCE_EXHAUSTED: the textbook method would test more axes than allowed.
+// CANCELLED: should_stop said so.
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options = {}, PairCache* cache = nullptr);
 

@@ -16,9 +16,11 @@
 namespace hulld {
 namespace {
 
-// Placements between two calls of emit: enough to keep the threads busy, few enough for answers to
-// flow and memory to stay small.
-constexpr uint32_t kPlacementsPerSlice = 256;
+// Between two calls of emit as many placements are searched as gave so many candidates last time,
+// about: enough to keep the threads busy, few enough for answers to flow and memory to stay small.
+constexpr uint64_t kCandidatesPerSlice = 16384;
+constexpr uint32_t kFirstSlicePlacements = 16;
+constexpr uint32_t kMostSlicePlacements = 1024;
 
 class SceneSearch {
  public:
@@ -44,11 +46,12 @@ class SceneSearch {
     const BoxTree tree(boxes_);
     SceneTotals totals;
     totals.pairs = CountPairs();
-    std::vector<std::vector<SceneAnswer>> slice(kPlacementsPerSlice);
+    std::vector<std::vector<SceneAnswer>> slice(kMostSlicePlacements);
+    uint32_t slice_placements = kFirstSlicePlacements;
     std::vector<SceneAnswer> answers;
     const uint32_t end = options_.movers ? std::min(*options_.movers, count) : count;
-    for (uint32_t begin = 0; begin < end; begin += kPlacementsPerSlice) {
-      const uint32_t size = std::min(kPlacementsPerSlice, end - begin);
+    for (uint32_t begin = 0, size = 0; begin < end; begin += size) {
+      size = std::min(slice_placements, end - begin);
       std::atomic<uint64_t> candidates = 0;
 #pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
       for (uint32_t i = 0; i < size; ++i) {
@@ -63,6 +66,9 @@ class SceneSearch {
       totals.candidates += candidates;
       totals.found += answers.size();
       if (!answers.empty()) emit(answers);
+      const uint64_t wished = kCandidatesPerSlice * size / std::max<uint64_t>(candidates, 1);
+      slice_placements = static_cast<uint32_t>(
+          std::clamp<uint64_t>(wished, 1, std::min(2 * size, kMostSlicePlacements)));
     }
     return totals;
   }
