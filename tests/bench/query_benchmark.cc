@@ -310,7 +310,7 @@ void RegisterSequences(const std::string& set, Regime regime,
   if (regime != Regime::kClose && regime != Regime::kDeep) return;
   for (const int threads : {1, 2}) {
     benchmark::RegisterBenchmark(
-        RowName("batch", set, regime, "hulld", " " + std::to_string(threads) + " threads").c_str(),
+        RowName("batch", set, regime, "hulld", threads == 1 ? " 1 thread" : " 2 threads").c_str(),
         [=](benchmark::State& state) { AnswerBatch(state, *workload, threads); })
         ->Unit(benchmark::kMillisecond)
         ->MinTime(0.1)
