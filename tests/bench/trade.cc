@@ -125,22 +125,15 @@ std::vector<Verdict> ExactVerdicts(const TradeQuestions& questions) {
   return verdicts;
 }
 
-// The depths as well as doubles hold them, none where hulls are apart: hulld's, asked for an error
-// far below that of its default and of any other method.
+// None where hulls are apart.
 std::vector<std::optional<double>> BestDepths(const TradeQuestions& questions) {
-  constexpr double kRelativeMaxError = 1e-15;
-  QueryOptions options;
-  options.want_separation = true;
-  options.max_error = kRelativeMaxError * questions.size;
   std::vector<std::optional<double>> depths;
   for (size_t i = 0; i < questions.depth.count; ++i) {
     const QuerySet::Query& query = questions.queries[questions.depth.first + i];
-    const absl::StatusOr<Answer> answer =
-        CheckCollision(questions.hulls[query.hull_a], query.X_WA, questions.hulls[query.hull_b],
-                       query.X_WB, options);
+    const double separation = BestSeparation(questions.hulls[query.hull_a], query.X_WA,
+                                             questions.hulls[query.hull_b], query.X_WB);
     depths.emplace_back();
-    if (!answer.ok() || !answer->separation || answer->separation->value > 0) continue;
-    depths.back() = -answer->separation->value;
+    if (separation <= 0) depths.back() = -separation;
   }
   return depths;
 }
