@@ -213,16 +213,17 @@ absl::StatusOr<v1::CheckCollisionResponse> Client::CheckCollision(
   return Call(collisions_.get(), &v1::CollisionService::Stub::CheckCollision, request, true);
 }
 
-absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
-                                          const BatchReceiver& receive) const {
+template <typename Response, typename Start>
+absl::Status Client::Receive(const Start& start,
+                             const std::function<absl::Status(const Response&)>& receive) const {
   const Deadline deadline = NextDeadline();
   bool received = false;
   absl::Status receiver_status;
   const auto attempt = [&] {
     grpc::ClientContext context;
     context.set_deadline(deadline);
-    const auto reader = collisions_->BatchCheckCollisions(&context, request);
-    v1::BatchCheckCollisionsResponse response;
+    const auto reader = start(&context);
+    Response response;
     while (receiver_status.ok() && reader->Read(&response)) {
       received = true;
       receiver_status = receive(response);
@@ -237,6 +238,26 @@ absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest&
   } while (absl::IsUnavailable(status) && !received &&
            WaitBeforeRetry(options_.retry, ++failures, deadline));
   return receiver_status.ok() ? status : receiver_status;
+}
+
+absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
+                                          const BatchReceiver& receive) const {
+  return Receive<v1::BatchCheckCollisionsResponse>(
+      [&](grpc::ClientContext* context) {
+        return collisions_->BatchCheckCollisions(context, request);
+      },
+      receive);
+}
+
+absl::Status Client::FindCollisions(const v1::FindCollisionsRequest& request,
+                                    const SceneReceiver& receive) const {
+  return Receive<v1::FindCollisionsResponse>(
+      [&](grpc::ClientContext* context) { return collisions_->FindCollisions(context, request); },
+      receive);
+}
+
+std::unique_ptr<CollisionStream> Client::OpenCollisionStream() const {
+  return std::make_unique<CollisionStream>(collisions_, options_.timeout);
 }
 
 absl::StatusOr<v1::GetStatusResponse> Client::GetStatus() const {

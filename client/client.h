@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "client/appender.h"
+#include "client/collision_stream.h"
 #include "client/retry.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
@@ -90,6 +91,15 @@ class Client {
   absl::Status BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
                                     const BatchReceiver& receive) const;
 
+  // A stream of pose changes, to be opened with its first message. The timeout bounds the wait for
+  // each answer.
+  std::unique_ptr<CollisionStream> OpenCollisionStream() const;
+
+  // The same as BatchCheckCollisions for all pairs of a scene.
+  using SceneReceiver = std::function<absl::Status(const v1::FindCollisionsResponse&)>;
+  absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
+                              const SceneReceiver& receive) const;
+
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;
 
   // What grpc.health.v1 says of the whole server: OK when it is serving, FAILED_PRECONDITION when
@@ -101,6 +111,11 @@ class Client {
  private:
   Deadline NextDeadline() const;
 
+  // A call whose answer streams; `start` starts it. Retried only while nothing was received.
+  template <typename Response, typename Start>
+  absl::Status Receive(const Start& start,
+                       const std::function<absl::Status(const Response&)>& receive) const;
+
   // One unary call; `retry` when it is safe to repeat.
   template <typename Response, typename Request, typename Stub>
   absl::StatusOr<Response> Call(Stub* stub,
@@ -111,7 +126,7 @@ class Client {
   ClientOptions options_;
   std::shared_ptr<grpc::Channel> channel_;
   std::shared_ptr<v1::HullService::Stub> hulls_;
-  std::unique_ptr<v1::CollisionService::Stub> collisions_;
+  std::shared_ptr<v1::CollisionService::Stub> collisions_;
   std::unique_ptr<v1::StatusService::Stub> status_;
 };
 

@@ -28,8 +28,8 @@ class BatchColumns {
   std::vector<v1::BatchCheckCollisionsResponse> Take();
 
  private:
-  void AddRow(v1::Relation relation, v1::Rung rung);
-  void AddProblem(const absl::Status& status);
+  // The message that takes the next row.
+  v1::BatchCheckCollisionsResponse* MessageForNext();
 
   const v1::Wanted wanted_;
   uint64_t next_pair_;

@@ -1,18 +1,12 @@
 #include "server/batch_stream.h"
 
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
-#include <string>
-#include <unordered_map>
 #include <utility>
 
 #include "server/batch_columns.h"
-#include "server/decode.h"
-#include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/query_settings.h"
 #include "server/status_map.h"
 
@@ -29,13 +23,6 @@ constexpr size_t kLeastSlicePairsPerThread = 16;
 // Projections of one slice under TEXTBOOK_SAT, whose cost can be foretold. A pair above it makes a
 // slice of its own, parallel over its axes.
 constexpr double kSliceProjections = 3e7;
-
-// Stands in for the hull of placements that cannot be answered.
-const QueryHull& NoHull() {
-  static const Hull empty;
-  static const QueryHull no_hull(empty);
-  return no_hull;
-}
 
 double TextbookProjections(const Hull& a, const Hull& b) {
   const double axes = static_cast<double>(a.edges().size()) * static_cast<double>(b.edges().size());
@@ -60,76 +47,20 @@ grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchStream::Start(
 }
 
 absl::Status BatchStream::Validate() {
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(request_.method(), request_.wanted(), registry_.limits(), lifetime_);
+  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
+      request_.method(), request_.wanted(), request_.tolerance(), registry_.limits(), lifetime_);
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
-  if (request_.pairs_size() % 2 != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("pairs holds ", request_.pairs_size(), " indices; each pair needs two"));
-  }
-  const uint64_t most = registry_.limits().max_pairs_per_batch;
-  if (pair_count() > most) {
-    return absl::ResourceExhaustedError(absl::StrCat("the batch holds ", pair_count(),
-                                                     " pairs; the limit is ", most,
-                                                     " (--max-pairs-per-batch)"));
-  }
-  const auto placements = static_cast<uint32_t>(request_.placements_size());
-  for (int i = 0; i < request_.pairs_size(); ++i) {
-    if (request_.pairs(i) >= placements) {
-      return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", request_.pairs(i),
-                                                     ", but placements holds ", placements,
-                                                     "; indices start at 0"));
-    }
-  }
-  return absl::OkStatus();
+  return ValidatePairs(request_.pairs(), static_cast<size_t>(request_.placements_size()),
+                       registry_.limits().max_pairs_per_batch, "the batch");
 }
 
-// Fills hulls_, placements_, answerable_ and head_.
+// Fills table_ and head_.
 absl::Status BatchStream::ResolvePlacements() {
-  const int count = request_.placements_size();
-  std::vector<absl::Status> problems(count);
-  std::vector<size_t> hull_of(count);
-  std::vector<std::string> ids;
-  std::unordered_map<std::string, size_t> index_of;
-  std::vector<Pose> poses(count);
-  for (int i = 0; i < count; ++i) {
-    const v1::Placement& placement = request_.placements(i);
-    const std::string field = absl::StrCat("placements[", i, "]");
-    problems[i] = ValidateHullId(placement.hull_id(), field + ".hull_id");
-    if (!problems[i].ok()) continue;
-    const absl::StatusOr<Pose> pose = DecodePose(placement.pose(), field + ".pose");
-    problems[i] = pose.status();
-    if (!problems[i].ok()) continue;
-    poses[i] = *pose;
-    const auto [known, is_new] = index_of.emplace(placement.hull_id(), ids.size());
-    if (is_new) ids.push_back(placement.hull_id());
-    hull_of[i] = known->second;
-  }
-
-  const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, options_.should_stop);
-  if (!resolved.ok()) return resolved.status();
-  EncodeHeader(registry_.store(), resolved->store_revision, head_.mutable_header());
-  snapshots_.resize(ids.size());
-  for (size_t i = 0; i < ids.size(); ++i) {
-    if (resolved->hulls[i].ok()) snapshots_[i] = resolved->hulls[i]->snapshot;
-  }
-  answerable_.resize(count);
-  for (int i = 0; i < count; ++i) {
-    v1::HullVersion* version = head_.add_hulls();
-    if (problems[i].ok()) problems[i] = resolved->hulls[hull_of[i]].status();
-    if (problems[i].ok()) {
-      answerable_[i] = true;
-      placements_.push_back(*PlacedHull::Make(snapshots_[hull_of[i]]->query_hull(), poses[i]));
-      EncodeVersion(resolved->hulls[hull_of[i]]->record, version);
-      continue;
-    }
-    placements_.push_back(*PlacedHull::Make(NoHull(), Pose()));
-    v1::PlacementProblem* problem = head_.add_placement_problems();
-    problem->set_placement(i);
-    problem->set_code(ToGrpc(problems[i].code()));
-    problem->set_message(std::string(problems[i].message()));
-  }
+  table_ = PlacementTable(request_.placements());
+  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  table_.EncodeHeader(registry_.store(), head_.mutable_header());
+  table_.EncodeHulls(head_.mutable_hulls(), head_.mutable_placement_problems());
   return absl::OkStatus();
 }
 
@@ -154,7 +85,7 @@ PlacedPair BatchStream::PairAt(size_t i) const {
 }
 
 bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
-  return answerable_[pair.a] && answerable_[pair.b];
+  return table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
 }
 
 // Where the slice that starts at next_pair_ ends.
@@ -164,7 +95,8 @@ size_t BatchStream::SliceEnd() const {
   double projections = 0;
   for (size_t i = next_pair_; i < most; ++i) {
     const PlacedPair pair = PairAt(i);
-    projections += TextbookProjections(placements_[pair.a].hull(), placements_[pair.b].hull());
+    projections +=
+        TextbookProjections(table_.placed()[pair.a].hull(), table_.placed()[pair.b].hull());
     if (projections > kSliceProjections) return std::max(i, next_pair_ + 1);
   }
   return most;
@@ -173,12 +105,13 @@ size_t BatchStream::SliceEnd() const {
 std::vector<absl::StatusOr<Answer>> BatchStream::AnswerPairs(
     const std::vector<PlacedPair>& pairs) const {
   if (pairs.size() != 1) {
-    return CheckCollisions(placements_, pairs, options_, executor_.threads());
+    return CheckCollisions(table_.placed(), pairs, options_, executor_.threads());
   }
   QueryOptions options = options_;
   options.threads = executor_.threads();
   std::vector<absl::StatusOr<Answer>> answers;
-  answers.push_back(CheckCollision(placements_[pairs[0].a], placements_[pairs[0].b], options));
+  answers.push_back(
+      CheckCollision(table_.placed()[pairs[0].a], table_.placed()[pairs[0].b], options));
   return answers;
 }
 
@@ -205,8 +138,8 @@ absl::Status BatchStream::ComputeSlice() {
       continue;
     }
     const absl::StatusOr<Answer>& answer = answers[answered++];
-    const Hull& a = placements_[pair.a].hull();
-    const Hull& b = placements_[pair.b].hull();
+    const Hull& a = table_.placed()[pair.a].hull();
+    const Hull& b = table_.placed()[pair.b].hull();
     if (answer.ok()) {
       columns.Add(answer, a, b);
     } else {

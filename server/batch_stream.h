@@ -18,6 +18,7 @@
 #include "server/admission.h"
 #include "server/call_lifetime.h"
 #include "server/executor.h"
+#include "server/placement_table.h"
 #include "server/registry.h"
 #include "server/worker_pool.h"
 
@@ -70,9 +71,7 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
 
   // Owned by the one task that runs for this call, if any.
   QueryOptions options_;
-  std::vector<std::shared_ptr<const Snapshot>> snapshots_;
-  std::vector<PlacedHull> placements_;
-  std::vector<char> answerable_;  // by placement
+  PlacementTable table_;
   v1::BatchCheckCollisionsResponse head_;
   size_t next_pair_ = 0;
   size_t slice_pairs_ = 0;

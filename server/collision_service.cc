@@ -9,10 +9,12 @@
 
 #include "core/query/collision.h"
 #include "server/batch_stream.h"
+#include "server/collision_stream.h"
 #include "server/decode.h"
 #include "server/encode.h"
 #include "server/hull_id.h"
 #include "server/query_settings.h"
+#include "server/scene_stream.h"
 #include "server/unary_call.h"
 
 namespace hulld::server {
@@ -40,8 +42,8 @@ absl::StatusOr<PairQuery> Prepare(Registry& registry, const CallLifetime& lifeti
                                   const v1::CheckCollisionRequest& request,
                                   v1::CheckCollisionResponse* response) {
   PairQuery query;
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(request.method(), request.wanted(), registry.limits(), lifetime);
+  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
+      request.method(), request.wanted(), request.tolerance(), registry.limits(), lifetime);
   if (!options.ok()) return options.status();
   query.options = *std::move(options);
   const absl::StatusOr<Pose> X_WA = ReadPlacement(request.has_a(), request.a(), "a");
@@ -78,6 +80,12 @@ absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
   if (wanted.analysis()) EncodeAnalysis(answer->analysis, a, b, response->mutable_analysis());
+  if (answer->certificate) {
+    EncodeCertificate(*answer->certificate, a, b, response->mutable_certificate());
+  }
+  if (answer->separation) EncodeSeparation(*answer->separation, response->mutable_separation());
+  if (answer->witness) EncodeWitness(*answer->witness, response->mutable_witness());
+  if (answer->within_clearance) response->set_within_clearance(*answer->within_clearance);
   if (!wanted.axis() || !answer->axis.has_value()) return absl::OkStatus();
   return EncodeAxis(*answer->axis, a, b, response->mutable_axis());
 }
@@ -105,6 +113,16 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
 grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* CollisionService::BatchCheckCollisions(
     grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest* request) {
   return BatchStream::Start(*context, admission_, registry_, readers_, executor_, *request);
+}
+
+grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
+CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
+  return CollisionStream::Start(*context, admission_, registry_, readers_);
+}
+
+grpc::ServerWriteReactor<v1::FindCollisionsResponse>* CollisionService::FindCollisions(
+    grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) {
+  return SceneStream::Start(*context, admission_, registry_, readers_, executor_, *request);
 }
 
 }  // namespace hulld::server

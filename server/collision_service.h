@@ -12,8 +12,9 @@
 namespace hulld::server {
 
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
-// answered by one of the `readers`, so that it never waits for a batch; TEXTBOOK_SAT, whose loop
-// over axes is parallel, and batches go to the executor.
+// answered by one of the `readers`, so that it never waits for a batch, and so are the few pairs of
+// a stream's step; TEXTBOOK_SAT, whose loop over axes is parallel, batches and scenes go to the
+// executor.
 class CollisionService : public v1::CollisionService::CallbackService {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
@@ -26,6 +27,10 @@ class CollisionService : public v1::CollisionService::CallbackService {
   grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchCheckCollisions(
       grpc::CallbackServerContext* context,
       const v1::BatchCheckCollisionsRequest* request) override;
+  grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
+  StreamCollisions(grpc::CallbackServerContext* context) override;
+  grpc::ServerWriteReactor<v1::FindCollisionsResponse>* FindCollisions(
+      grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) override;
 
  private:
   Registry& registry_;

@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <variant>
+
 #include "server/config.h"
 
 namespace hulld::server {
@@ -20,6 +22,23 @@ absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature
   }
   if (feature.facet.has_value()) message->set_facet_index(*feature.facet);
   return absl::OkStatus();
+}
+
+// (Integer::str() trips a false warning of GCC 12.)
+std::string Decimal(const Integer& number) {
+  if (number.is_zero()) return "0";
+  const Integer base = 1'000'000'000'000'000'000;
+  Integer rest = abs(number);
+  std::string digits;  // last first
+  while (!rest.is_zero()) {
+    auto part = static_cast<uint64_t>(Integer(rest % base));
+    rest /= base;
+    for (int i = 0; i < 18 && (part > 0 || !rest.is_zero()); ++i, part /= 10) {
+      digits.push_back(static_cast<char>('0' + part % 10));
+    }
+  }
+  if (number.sign() < 0) digits.push_back('-');
+  return {digits.rbegin(), digits.rend()};
 }
 
 void EncodeSize(const Hull& hull, v1::HullSize* message) {
@@ -137,6 +156,35 @@ void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::
   message->set_axes_total(analysis.axes_total);
   if (analysis.stage.has_value()) message->set_stage(EncodeAxisKind(*analysis.stage));
   if (analysis.axis_index.has_value()) message->set_axis_index(*analysis.axis_index);
+}
+
+void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
+                       v1::Certificate* message) {
+  if (const Vector* n = std::get_if<Vector>(&certificate.direction)) {
+    EncodeVector(*n, message->mutable_direction());
+  } else if (const auto* integers = std::get_if<IntegerVector>(&certificate.direction)) {
+    message->mutable_integer_direction()->set_x(Decimal(integers->x));
+    message->mutable_integer_direction()->set_y(Decimal(integers->y));
+    message->mutable_integer_direction()->set_z(Decimal(integers->z));
+  }
+  for (const VertexPair& pair : certificate.pairs) {
+    v1::VertexPair* const encoded = message->add_pairs();
+    encoded->set_index_a(pair.a);
+    encoded->set_index_b(pair.b);
+    EncodeVector(a.vertices()[pair.a], encoded->mutable_vertex_a());
+    EncodeVector(b.vertices()[pair.b], encoded->mutable_vertex_b());
+  }
+}
+
+void EncodeSeparation(const Separation& separation, v1::Separation* message) {
+  message->set_value(separation.value);
+  message->set_bound(separation.bound);
+}
+
+void EncodeWitness(const Witness& witness, v1::Witness* message) {
+  EncodeVector(witness.p_WA, message->mutable_point_a());
+  EncodeVector(witness.p_WB, message->mutable_point_b());
+  message->set_error(witness.error);
 }
 
 }  // namespace hulld::server

@@ -33,6 +33,11 @@ v1::Durability EncodeDurability(Durability durability);
 absl::Status EncodeAxis(const SeparatingAxis& axis, const Hull& a, const Hull& b,
                         v1::Axis* message);
 void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::Analysis* message);
+// a, b: the hulls whose vertices the pairs name.
+void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
+                       v1::Certificate* message);
+void EncodeSeparation(const Separation& separation, v1::Separation* message);
+void EncodeWitness(const Witness& witness, v1::Witness* message);
 
 }  // namespace hulld::server
 

@@ -11,9 +11,11 @@
 namespace hulld::server {
 
 // The options of core for what a request wants; the query ends with `lifetime`, which must outlive
-// it. INVALID_ARGUMENT: a number that stands for no method.
+// it. INVALID_ARGUMENT, naming the field: a number that stands for no method, a length that is
+// negative or NaN, or wishes that exclude each other.
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
-                                              const Limits& limits, const CallLifetime& lifetime);
+                                              double tolerance, const Limits& limits,
+                                              const CallLifetime& lifetime);
 
 // An error of core's query in the words of the server: RESOURCE_EXHAUSTED names the limit's flag.
 absl::Status NameQueryLimit(const absl::Status& status);

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "client/verify/answer_check.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -22,6 +23,14 @@ std::string HullSizeText(const v1::HullSize& size);
 std::string StageText(const v1::Analysis& analysis);
 // "0.1 0.2 0.3".
 std::string DirectionText(const v1::Vector3& direction);
+// "n = 0 0 1; A 3 with B 5, A 0 with B 2"; long integers by their number of digits.
+std::string CertificateText(const v1::Certificate& certificate);
+// "-0.25 within 1e-16".
+std::string SeparationText(const v1::Separation& separation);
+// "valid", or the verdict and the reason.
+std::string VerificationText(const Verification& verification);
+// {"verdict":"INVALID","reason":...}
+std::string VerificationJson(const Verification& verification);
 
 }  // namespace hulld
 

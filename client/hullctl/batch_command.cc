@@ -2,21 +2,23 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 
+#include "client/hullctl/answer_row.h"
 #include "client/hullctl/answer_text.h"
 #include "client/hullctl/batch_file.h"
 #include "client/hullctl/commands.h"
 #include "client/hullctl/json.h"
+#include "client/hullctl/query_options.h"
+#include "client/verify/answer_check.h"
 
 namespace hulld {
 namespace {
 
 struct BatchArguments {
   std::string file;
-  bool textbook = false;
-  bool axis = false;
-  bool report = false;
+  QueryWishes wishes;
   bool colliding = false;
 };
 
@@ -30,7 +32,11 @@ struct Problem {
 class BatchRun {
  public:
   BatchRun(const Invocation& run, const BatchArguments& arguments, const BatchScene& scene)
-      : run_(run), arguments_(arguments), scene_(scene), client_(run.MakeClient()) {}
+      : run_(run),
+        arguments_(arguments),
+        scene_(scene),
+        client_(run.MakeClient()),
+        checker_(client_) {}
 
   absl::Status Run() {
     if (run_.json) run_.out << "{\"answers\":[";
@@ -43,6 +49,9 @@ class BatchRun {
   }
 
   uint64_t failed() const { return failed_; }
+  // Whose certificates do not prove them, and whose could not be checked.
+  uint64_t invalid() const { return invalid_; }
+  uint64_t unchecked() const { return unchecked_; }
 
  private:
   static constexpr size_t kPairsPerCall = 100000;
@@ -59,11 +68,12 @@ class BatchRun {
       use(scene_.pairs[i].first);
       use(scene_.pairs[i].second);
     }
-    if (arguments_.textbook) request.set_method(v1::METHOD_TEXTBOOK_SAT);
-    request.mutable_wanted()->set_axis(arguments_.axis);
-    request.mutable_wanted()->set_analysis(arguments_.report);
+    request.set_method(arguments_.wishes.method);
+    request.set_tolerance(arguments_.wishes.tolerance);
+    *request.mutable_wanted() = arguments_.wishes.wanted;
     request_ = &request;
     placement_problems_.clear();
+    head_.Clear();
     size_t next = begin;
     absl::Status status =
         client_.BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {
@@ -77,6 +87,10 @@ class BatchRun {
 
   absl::Status Take(const v1::BatchCheckCollisionsResponse& part, size_t begin, size_t end,
                     size_t* next) {
+    if (part.has_header()) {
+      *head_.mutable_header() = part.header();
+      *head_.mutable_hulls() = part.hulls();
+    }
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       placement_problems_[problem.placement()] = {problem.code(), problem.message()};
     }
@@ -86,18 +100,22 @@ class BatchRun {
     }
     const size_t count = static_cast<size_t>(part.relations_size());
     if (count == 0) return absl::OkStatus();
-    const auto fits = [count](int size) { return size == 0 || static_cast<size_t>(size) == count; };
-    if (begin + part.first_pair() != *next || count > end - *next || !fits(part.rungs_size()) ||
-        !fits(part.axes_size()) || !fits(part.analyses_size())) {
+    if (begin + part.first_pair() != *next || count > end - *next || !AreParallel(part, count)) {
       return absl::InternalError("the answers do not follow one another");
     }
     for (size_t i = 0; i < count; ++i, ++*next) {
+      const AnswerRow row = RowAt(part, static_cast<int>(i));
       const Problem* problem = nullptr;
-      if (part.relations(static_cast<int>(i)) == v1::RELATION_UNSPECIFIED) {
+      std::optional<Verification> verification;
+      if (row.relation == v1::RELATION_UNSPECIFIED) {
         problem = FindProblem(pair_problems, *next - begin);
         ++failed_;
+      } else if (arguments_.wishes.verify) {
+        auto verified = Verify(row, *next - begin);
+        if (!verified.ok()) return verified.status();
+        verification = *std::move(verified);
       }
-      Print(part, static_cast<int>(i), scene_.pairs[*next], problem);
+      Print(row, scene_.pairs[*next], problem, verification);
     }
     return absl::OkStatus();
   }
@@ -115,44 +133,53 @@ class BatchRun {
     return kUnknown;
   }
 
-  void Print(const v1::BatchCheckCollisionsResponse& part, int i,
-             const std::pair<uint32_t, uint32_t>& pair, const Problem* problem) {
-    const v1::Relation relation = part.relations(i);
-    ++counts_[relation];
-    if (arguments_.colliding && relation == v1::RELATION_SEPARATED) return;
+  absl::StatusOr<Verification> Verify(const AnswerRow& row, size_t pair) {
+    const uint32_t a = request_->pairs(static_cast<int>(2 * pair));
+    const uint32_t b = request_->pairs(static_cast<int>(2 * pair + 1));
+    const auto hulls = static_cast<uint32_t>(head_.hulls_size());
+    if (a >= hulls || b >= hulls || row.certificate == nullptr) {
+      return absl::InternalError("the answers lack the hulls or the certificates they are about");
+    }
+    auto verification = checker_.Check(
+        {request_->placements(static_cast<int>(a)), request_->placements(static_cast<int>(b)),
+         row.relation, *row.certificate, head_.header().store_id(),
+         head_.hulls(static_cast<int>(a)), head_.hulls(static_cast<int>(b))});
+    if (!verification.ok()) return verification;
+    if (verification->verdict == Verdict::kInvalid) {
+      ++invalid_;
+    } else if (verification->verdict != Verdict::kValid) {
+      ++unchecked_;
+    }
+    return verification;
+  }
+
+  void Print(const AnswerRow& row, const std::pair<uint32_t, uint32_t>& pair,
+             const Problem* problem, const std::optional<Verification>& verification) {
+    ++counts_[row.relation];
+    const bool as_expected = !verification || verification->verdict == Verdict::kValid;
+    if (arguments_.colliding && row.relation == v1::RELATION_SEPARATED && as_expected) return;
     const std::string& a = scene_.names[pair.first];
     const std::string& b = scene_.names[pair.second];
-    const v1::Axis* const axis = part.axes_size() > 0 ? &part.axes(i) : nullptr;
-    const v1::Analysis* const analysis = part.analyses_size() > 0 ? &part.analyses(i) : nullptr;
     if (run_.json) {
-      run_.out << (printed_++ > 0 ? ",\n" : "\n") << Json(part, i, a, b, problem);
+      run_.out << (printed_++ > 0 ? ",\n" : "\n") << Json(row, a, b, problem, verification);
       return;
     }
-    run_.out << a << "\t" << b << "\t" << (problem != nullptr ? "FAILED" : RelationText(relation));
+    run_.out << a << "\t" << b << "\t";
     if (problem != nullptr) {
-      run_.out << "\t" << problem->message << "\n";
+      run_.out << "FAILED\t" << problem->message << "\n";
       return;
     }
-    if (axis != nullptr) {
-      const bool found = axis->kind() != v1::AXIS_KIND_UNSPECIFIED;
-      run_.out << "\t"
-               << (found ? AxisKindText(axis->kind()) + " " + DirectionText(axis->direction())
-                         : "no axis");
-    }
-    if (analysis != nullptr) {
-      run_.out << "\t" << DurationText(analysis->time()) << "\t" << analysis->axes_tested()
-               << " axes\t" << StageText(*analysis);
-    }
+    run_.out << RowText(row);
+    if (verification) run_.out << "\t" << VerificationText(*verification);
     run_.out << "\n";
   }
 
-  static std::string Json(const v1::BatchCheckCollisionsResponse& part, int i, const std::string& a,
-                          const std::string& b, const Problem* problem) {
+  static std::string Json(const AnswerRow& row, const std::string& a, const std::string& b,
+                          const Problem* problem, const std::optional<Verification>& verification) {
     JsonObject object;
-    object.Add("a", a).Add("b", b).Add("relation", v1::Relation_Name(part.relations(i)));
-    if (part.rungs_size() > 0) object.Add("rung", v1::Rung_Name(part.rungs(i)));
-    if (part.axes_size() > 0) object.AddJson("axis", MessageJson(part.axes(i)));
-    if (part.analyses_size() > 0) object.AddJson("analysis", MessageJson(part.analyses(i)));
+    object.Add("a", a).Add("b", b);
+    AddRow(row, &object);
+    if (verification) object.AddJson("verification", VerificationJson(*verification));
     if (problem != nullptr) {
       object.AddJson("problem", JsonObject()
                                     .AddJson("code", std::to_string(problem->code))
@@ -165,14 +192,17 @@ class BatchRun {
   void PrintEnd(const absl::Status& status) {
     if (run_.json) {
       JsonObject summary;
-      for (const auto& [name, relation] : kSummary) summary.Add(name, counts_[relation]);
+      for (const SummaryEntry& entry : kSummary) {
+        if (IsSummed(entry)) summary.Add(entry.name, counts_[entry.relation]);
+      }
       run_.out << "],\n\"complete\":" << (status.ok() ? "true" : "false")
                << ",\n\"summary\":" << summary.Close() << "}\n";
       return;
     }
     run_.out << "#";
-    for (const auto& [name, relation] : kSummary)
-      run_.out << " " << name << " " << counts_[relation];
+    for (const SummaryEntry& entry : kSummary) {
+      if (IsSummed(entry)) run_.out << " " << entry.name << " " << counts_[entry.relation];
+    }
     run_.out << "\n";
   }
 
@@ -183,17 +213,27 @@ class BatchRun {
   static constexpr SummaryEntry kSummary[] = {{"separated", v1::RELATION_SEPARATED},
                                               {"touching", v1::RELATION_TOUCHING},
                                               {"overlapping", v1::RELATION_OVERLAPPING},
+                                              {"within_tolerance", v1::RELATION_WITHIN_TOLERANCE},
                                               {"failed", v1::RELATION_UNSPECIFIED}};
+  // A tolerance of 0 leaves no pair within it.
+  bool IsSummed(const SummaryEntry& entry) const {
+    return entry.relation != v1::RELATION_WITHIN_TOLERANCE || arguments_.wishes.tolerance > 0;
+  }
 
   const Invocation& run_;
   const BatchArguments& arguments_;
   const BatchScene& scene_;
   const Client client_;
+  AnswerChecker checker_;
+  // The header and the hulls of the call that runs.
+  v1::BatchCheckCollisionsResponse head_;
   const v1::BatchCheckCollisionsRequest* request_ = nullptr;
   std::unordered_map<uint32_t, Problem> placement_problems_;
   std::unordered_map<int, uint64_t> counts_;
   uint64_t printed_ = 0;
   uint64_t failed_ = 0;
+  uint64_t invalid_ = 0;
+  uint64_t unchecked_ = 0;
 };
 
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
@@ -207,10 +247,18 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
   }
   BatchRun batch(run, arguments, *scene);
   if (absl::Status status = batch.Run(); !status.ok()) return run.Fail(status);
-  if (batch.failed() == 0) return ExitCode::kDone;
-  run.err << "hullctl: " << batch.failed() << " of " << scene->pairs.size()
-          << " pairs have no answer; each names its cause\n";
-  return ExitCode::kSomeFailed;
+  const auto report = [&](uint64_t count, const char* what) {
+    if (count == 0) return false;
+    run.err << "hullctl: " << count << " of " << scene->pairs.size() << " pairs " << what << "\n";
+    return true;
+  };
+  const bool failed = report(batch.failed(), "have no answer; each names its cause");
+  const bool unchecked = report(batch.unchecked(), "could not be checked; each says why");
+  const bool invalid = report(batch.invalid(), "have a certificate that does not prove them");
+  return invalid     ? ExitCode::kInvalidCertificate
+         : failed    ? ExitCode::kSomeFailed
+         : unchecked ? ExitCode::kCannotCheck
+                     : ExitCode::kDone;
 }
 
 }  // namespace
@@ -220,11 +268,7 @@ void AddBatchCommand(CLI::App* app, Invocation* invocation) {
   CLI::App* command = app->add_subcommand("batch", "Ask about many pairs from a file");
   command->add_option("FILE", arguments->file, "Placements and pairs; - is standard input")
       ->required();
-  command->add_flag("--textbook", arguments->textbook,
-                    "Use the textbook's separating-axis test instead of the certified search");
-  command->add_flag("--axis", arguments->axis, "Also show the separating or touching axes");
-  command->add_flag("--report", arguments->report,
-                    "Also show time, axes tested and where separation was found");
+  AddQueryOptions(command, &arguments->wishes);
   command->add_flag("--colliding", arguments->colliding, "Leave out the pairs that are separated");
   command->footer(kBatchFileHelp);
   command->callback([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });

@@ -1,18 +1,21 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/answer_text.h"
 #include "client/hullctl/arguments.h"
 #include "client/hullctl/commands.h"
 #include "client/hullctl/json.h"
+#include "client/hullctl/query_options.h"
 #include "client/hullctl/table.h"
+#include "client/verify/answer_check.h"
 
 namespace hulld {
 namespace {
 
 struct CheckArguments {
   v1::CheckCollisionRequest request;
-  bool textbook = false;
+  QueryWishes wishes;
 };
 
 std::string VersionText(const v1::HullVersion& hull) {
@@ -42,33 +45,92 @@ void AddAnalysis(const v1::Analysis& analysis, Table* table) {
       .Row({"found at", StageText(analysis)});
 }
 
-ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
-  const auto response = run.MakeClient().CheckCollision(arguments.request);
-  if (!response.ok()) return run.Fail(response.status());
-  if (run.json) {
-    run.out << MessageJson(*response) << "\n";
-    return ExitCode::kDone;
+void AddAxis(const v1::CheckCollisionResponse& response, Table* table) {
+  if (!response.has_axis()) {
+    table->Row({"axis", "none separates or touches"});
+    return;
   }
+  const v1::Axis& axis = response.axis();
+  table->Row({"axis", DirectionText(axis.direction()) + "  (" + AxisKindText(axis.kind()) + ")"})
+      .Row({"A reaches", FeatureText(axis.feature_a())})
+      .Row({"B reaches", FeatureText(axis.feature_b())});
+}
+
+void AddMeasures(const v1::CheckCollisionRequest& request,
+                 const v1::CheckCollisionResponse& response, Table* table) {
+  if (response.has_separation()) {
+    table->Row({"separation", SeparationText(response.separation())});
+  }
+  if (response.has_witness()) {
+    const v1::Witness& witness = response.witness();
+    table->Row({"point of A", DirectionText(witness.point_a())})
+        .Row({"point of B", DirectionText(witness.point_b())})
+        .Row({"points within", ShortestText(witness.error())});
+  }
+  if (response.has_within_clearance()) {
+    const std::string clearance = ShortestText(request.wanted().clearance());
+    table->Row({"clearance", (response.within_clearance() ? "within " : "more than ") + clearance});
+  }
+}
+
+void PrintTable(const v1::CheckCollisionRequest& request,
+                const v1::CheckCollisionResponse& response, const Verification* verification,
+                std::ostream& out) {
   Table table;
-  table.Row({"relation", RelationText(response->relation())})
-      .Row({"A", VersionText(response->hull_a())})
-      .Row({"B", VersionText(response->hull_b())})
-      .Row({"decided by", RungText(response->rung())});
-  if (response->has_axis()) {
-    const v1::Axis& axis = response->axis();
-    table.Row({"axis", DirectionText(axis.direction()) + "  (" + AxisKindText(axis.kind()) + ")"})
-        .Row({"A reaches", FeatureText(axis.feature_a())})
-        .Row({"B reaches", FeatureText(axis.feature_b())});
-  } else if (arguments.request.wanted().axis()) {
-    table.Row({"axis", "none separates or touches"});
+  table.Row({"relation", RelationText(response.relation())})
+      .Row({"A", VersionText(response.hull_a())})
+      .Row({"B", VersionText(response.hull_b())})
+      .Row({"decided by", RungText(response.rung())});
+  AddMeasures(request, response, &table);
+  if (request.wanted().axis()) AddAxis(response, &table);
+  if (request.wanted().certificate()) {
+    table.Row({"certificate", CertificateText(response.certificate())});
   }
-  if (response->has_analysis()) {
-    const bool textbook = arguments.request.method() == v1::METHOD_TEXTBOOK_SAT;
+  if (verification != nullptr) table.Row({"verified", VerificationText(*verification)});
+  if (response.has_analysis()) {
+    const bool textbook = request.method() == v1::METHOD_TEXTBOOK_SAT;
     table.Row({"method", textbook ? "textbook SAT" : "certified search"});
-    AddAnalysis(response->analysis(), &table);
+    AddAnalysis(response.analysis(), &table);
   }
-  table.Print(run.out);
-  return ExitCode::kDone;
+  table.Print(out);
+}
+
+// A certificate comes with the question, so that `hullctl verify` has all it needs.
+std::string ResponseJson(const v1::CheckCollisionRequest& request,
+                         const v1::CheckCollisionResponse& response,
+                         const Verification* verification) {
+  const std::string json = MessageJson(response);
+  if (!request.wanted().certificate()) return json;
+  JsonObject object;
+  object.AddJson("request", MessageJson(request));
+  if (verification != nullptr) object.AddJson("verification", VerificationJson(*verification));
+  const std::string front = object.Close();
+  return front.substr(0, front.size() - 1) + "," + json.substr(1);
+}
+
+ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
+  v1::CheckCollisionRequest request = arguments.request;
+  *request.mutable_wanted() = arguments.wishes.wanted;
+  request.set_method(arguments.wishes.method);
+  request.set_tolerance(arguments.wishes.tolerance);
+  const Client client = run.MakeClient();
+  VerifiedResponse answer;
+  const Verification* const verification = arguments.wishes.verify ? &answer.verification : nullptr;
+  if (verification != nullptr) {
+    auto verified = CheckCollisionVerified(client, request);
+    if (!verified.ok()) return run.Fail(verified.status());
+    answer = *std::move(verified);
+  } else {
+    auto response = client.CheckCollision(request);
+    if (!response.ok()) return run.Fail(response.status());
+    answer.response = *std::move(response);
+  }
+  if (run.json) {
+    run.out << ResponseJson(request, answer.response, verification) << "\n";
+  } else {
+    PrintTable(request, answer.response, verification, run.out);
+  }
+  return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
 }
 
 void AddPoseOption(CLI::App* command, const std::string& name, v1::Placement* placement) {
@@ -97,15 +159,14 @@ void AddCheckCommand(CLI::App* app, Invocation* invocation) {
   command->add_option("B", *request->mutable_b()->mutable_hull_id(), "Name of a hull")->required();
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
-  command->add_flag_callback(
-      "--textbook", [request] { request->set_method(v1::METHOD_TEXTBOOK_SAT); },
-      "Use the textbook's separating-axis test instead of the certified search");
-  command->add_flag_callback(
-      "--axis", [request] { request->mutable_wanted()->set_axis(true); },
-      "Also show the separating or touching axis and the features on it");
-  command->add_flag_callback(
-      "--report", [request] { request->mutable_wanted()->set_analysis(true); },
-      "Also show time, sizes, axes tested and where separation was found");
+  AddQueryOptions(command, &arguments->wishes);
+  command->footer(
+      "Lengths are in the unit of the points. For example:\n"
+      "  hullctl check arm box --pose-b 0.2,0,0 --separation --witness\n"
+      "  hullctl check arm box --clearance 0.01\n"
+      "  hullctl check arm box --verify\n"
+      "  hullctl check arm box --certificate --output json > answer.json; hullctl verify "
+      "answer.json");
   command->callback([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
 }
 

@@ -14,6 +14,10 @@ enum class ExitCode {
   kUnreachable = 3,
   // Of many items, some have no answer; the others have.
   kSomeFailed = 4,
+  // A certificate does not prove its answer.
+  kInvalidCertificate = 5,
+  // A certificate could not be checked, as its hulls have changed or there is none.
+  kCannotCheck = 6,
 };
 
 inline constexpr char kExitCodeHelp[] =
@@ -22,7 +26,9 @@ inline constexpr char kExitCodeHelp[] =
     "  1  the request failed: the server refused it, or an audit found something\n"
     "  2  the command line or an input file is wrong, or a file cannot be written\n"
     "  3  no answer: the server cannot be reached, is draining, or took longer than --timeout\n"
-    "  4  some items of a batch have no answer\n";
+    "  4  some items of a batch have no answer\n"
+    "  5  a certificate does not prove its answer\n"
+    "  6  a certificate cannot be checked: there is none, or its hulls have changed\n";
 
 }  // namespace hulld
 

@@ -52,6 +52,9 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddMeshCommand(app, invocation);
   AddCheckCommand(app, invocation);
   AddBatchCommand(app, invocation);
+  AddSceneCommand(app, invocation);
+  AddStreamCommand(app, invocation);
+  AddVerifyCommand(app, invocation);
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
   AddPictureCommand(app, invocation);

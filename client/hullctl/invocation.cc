@@ -74,4 +74,19 @@ ExitCode Invocation::FailUsage(const absl::Status& status) const {
   return ExitCode::kUsage;
 }
 
+ExitCode Invocation::Judge(const Verification& verification) const {
+  switch (verification.verdict) {
+    case Verdict::kValid:
+      return ExitCode::kDone;
+    case Verdict::kInvalid:
+      err << "hullctl: the certificate does not prove the answer: " << verification.reason << "\n";
+      return ExitCode::kInvalidCertificate;
+    case Verdict::kCannotCheck:
+    case Verdict::kMoved:
+      break;
+  }
+  err << "hullctl: the certificate cannot be checked: " << verification.reason << "\n";
+  return ExitCode::kCannotCheck;
+}
+
 }  // namespace hulld

@@ -9,6 +9,7 @@
 
 #include "client/client.h"
 #include "client/hullctl/exit_code.h"
+#include "client/verify/answer_check.h"
 
 namespace hulld {
 
@@ -34,6 +35,8 @@ struct Invocation {
   ExitCode Fail(const absl::Status& status) const;
   // The same for input and output files and arguments.
   ExitCode FailUsage(const absl::Status& status) const;
+  // Says why unless valid; returns the exit code that fits the verdict on a certificate.
+  ExitCode Judge(const Verification& verification) const;
 };
 
 }  // namespace hulld

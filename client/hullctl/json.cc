@@ -1,5 +1,6 @@
 #include "client/hullctl/json.h"
 
+#include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 
 namespace hulld {
@@ -11,6 +12,26 @@ std::string MessageJson(const google::protobuf::Message& message) {
   // Fails only for messages with an Any of unknown type, of which the contract has none.
   if (!google::protobuf::util::MessageToJsonString(message, &json, options).ok()) return "null";
   return json;
+}
+
+absl::Status ParseJson(const std::string& json, UnknownFields unknown,
+                       google::protobuf::Message* message) {
+  google::protobuf::util::JsonParseOptions options;
+  options.ignore_unknown_fields = unknown == UnknownFields::kIgnore;
+  const auto status = google::protobuf::util::JsonStringToMessage(json, message, options);
+  if (status.ok()) return absl::OkStatus();
+  return absl::InvalidArgumentError(status.message().as_string());
+}
+
+absl::Status ParseMember(const std::string& json, const std::string& name,
+                         google::protobuf::Message* message) {
+  google::protobuf::Struct object;
+  if (absl::Status s = ParseJson(json, UnknownFields::kRefuse, &object); !s.ok()) return s;
+  const auto member = object.fields().find(name);
+  if (member == object.fields().end()) {
+    return absl::InvalidArgumentError("there is no member \"" + name + "\"");
+  }
+  return ParseJson(MessageJson(member->second), UnknownFields::kIgnore, message);
 }
 
 std::string QuoteJson(std::string_view text) {

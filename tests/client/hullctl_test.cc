@@ -124,8 +124,9 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
 TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
   const Ran help = RunTool({"--help"});
   EXPECT_EQ(help.code, 0);
-  for (const char* word : {"create", "append", "get", "list", "delete", "mesh", "check", "batch",
-                           "generate", "status", "picture", "HULLCTL_SERVER", "Exit codes"}) {
+  for (const char* word :
+       {"create", "append", "get", "list", "delete", "mesh", "check", "batch", "scene", "stream",
+        "verify", "generate", "status", "picture", "HULLCTL_SERVER", "Exit codes"}) {
     EXPECT_THAT(help.out, HasSubstr(word));
   }
   EXPECT_THAT(RunTool({"--version"}).out, StartsWith("hullctl "));
@@ -208,6 +209,38 @@ TEST_F(HullctlTest, CheckPassesPosesAndWishesOn) {
                              HasSubstr("EDGE_EDGE, axis 16"), HasSubstr("12 edges")));
 }
 
+TEST_F(HullctlTest, CheckShowsWhatWasMeasured) {
+  v1::CheckCollisionResponse& answer = fake_.collision_answer;
+  answer.set_relation(v1::RELATION_SEPARATED);
+  answer.mutable_separation()->set_value(0.5);
+  answer.mutable_separation()->set_bound(1e-16);
+  answer.mutable_witness()->mutable_point_a()->set_x(1);
+  answer.mutable_witness()->mutable_point_b()->set_x(1.5);
+  answer.mutable_witness()->set_error(2e-16);
+  answer.set_within_clearance(true);
+  answer.mutable_certificate()->mutable_integer_direction()->set_x(
+      "123456789012345678901234567890");
+  answer.mutable_certificate()->mutable_integer_direction()->set_y("-7");
+  answer.mutable_certificate()->mutable_integer_direction()->set_z("0");
+  answer.mutable_certificate()->add_pairs()->set_index_a(3);
+  const Ran ran = Ask({"check", "a", "b", "--max-error", "1e-3", "--witness", "--clearance", "0.75",
+                       "--certificate"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  const v1::Wanted wanted = fake_.last_collision_request().wanted();
+  EXPECT_TRUE(wanted.separation() && wanted.witness() && wanted.certificate());
+  EXPECT_EQ(wanted.max_error(), 1e-3);
+  EXPECT_EQ(wanted.clearance(), 0.75);
+  EXPECT_FALSE(wanted.axis() || wanted.analysis());
+  EXPECT_THAT(
+      ran.out,
+      AllOf(HasSubstr("separation     0.5 within 1e-16\n"), HasSubstr("point of B     1.5 0 0\n"),
+            HasSubstr("points within  2e-16\n"), HasSubstr("clearance      within 0.75\n"),
+            HasSubstr("n = 12345678...(30 digits) -7 0; A 3 with B 0\n")));
+  EXPECT_EQ(Ask({"check", "a", "b", "--tolerance", "0.25"}).code, 0);
+  EXPECT_EQ(fake_.last_collision_request().tolerance(), 0.25);
+  EXPECT_FALSE(fake_.last_collision_request().wanted().has_clearance());
+}
+
 TEST_F(HullctlTest, ACollisionIsNoError) {
   fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
   EXPECT_EQ(Ask({"check", "a", "b"}).code, 0);
@@ -270,7 +303,10 @@ TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
   v1::BatchCheckCollisionsResponse ragged;
   for (int i = 0; i < 2; ++i) ragged.add_relations(v1::RELATION_TOUCHING);
   ragged.add_axes();
-  for (const auto& answer : {late, few, many, ragged}) {
+  v1::BatchCheckCollisionsResponse half;
+  for (int i = 0; i < 2; ++i) half.add_relations(v1::RELATION_TOUCHING);
+  for (int i = 0; i < 2; ++i) half.add_separations(1);
+  for (const auto& answer : {late, few, many, ragged, half}) {
     fake_.batch_answers = {answer};
     EXPECT_EQ(Ask({"batch", file.path()}).code, 1);
   }

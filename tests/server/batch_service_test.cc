@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <random>
 
 #include "tests/server/test_server.h"
@@ -22,6 +24,11 @@ class BatchCall : public ServerTest {
     std::vector<v1::Axis> axes;
     std::vector<v1::Analysis> analyses;
     std::vector<v1::PairProblem> problems;
+    std::vector<v1::Certificate> certificates;
+    std::vector<double> separations;
+    std::vector<double> separation_bounds;
+    std::vector<double> witness_xyz;
+    std::vector<bool> within_clearance;
     int messages = 0;
     size_t largest_message = 0;
   };
@@ -40,6 +47,17 @@ class BatchCall : public ServerTest {
       for (const int r : part.rungs()) batch.rungs.push_back(static_cast<v1::Rung>(r));
       batch.axes.insert(batch.axes.end(), part.axes().begin(), part.axes().end());
       batch.analyses.insert(batch.analyses.end(), part.analyses().begin(), part.analyses().end());
+      batch.certificates.insert(batch.certificates.end(), part.certificates().begin(),
+                                part.certificates().end());
+      batch.separations.insert(batch.separations.end(), part.separations().begin(),
+                               part.separations().end());
+      batch.separation_bounds.insert(batch.separation_bounds.end(),
+                                     part.separation_bounds().begin(),
+                                     part.separation_bounds().end());
+      batch.witness_xyz.insert(batch.witness_xyz.end(), part.witness_xyz().begin(),
+                               part.witness_xyz().end());
+      batch.within_clearance.insert(batch.within_clearance.end(), part.within_clearance().begin(),
+                                    part.within_clearance().end());
       batch.problems.insert(batch.problems.end(), part.pair_problems().begin(),
                             part.pair_problems().end());
     }
@@ -83,6 +101,10 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
   v1::BatchCheckCollisionsRequest request;
   request.mutable_wanted()->set_axis(true);
   request.mutable_wanted()->set_analysis(true);
+  request.mutable_wanted()->set_certificate(true);
+  request.mutable_wanted()->set_separation(true);
+  request.mutable_wanted()->set_witness(true);
+  request.mutable_wanted()->set_clearance(0.25);
   std::mt19937 random(5);
   std::uniform_int_distribution<int> half_steps(-2, 2);
   for (int i = 0; i < 24; ++i) {
@@ -100,6 +122,11 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
     ASSERT_EQ(batch.relations.size(), 24 * 24);
     ASSERT_EQ(batch.axes.size(), 24 * 24);
     ASSERT_EQ(batch.analyses.size(), 24 * 24);
+    ASSERT_EQ(batch.certificates.size(), 24 * 24);
+    ASSERT_EQ(batch.separations.size(), 24 * 24);
+    ASSERT_EQ(batch.separation_bounds.size(), 24 * 24);
+    ASSERT_EQ(batch.witness_xyz.size(), 6 * 24 * 24);
+    ASSERT_EQ(batch.within_clearance.size(), 24 * 24);
     EXPECT_EQ(batch.head.hulls(1).revision(), Get("ball").hull().revision());
     int counts[4] = {};
     for (size_t i = 0; i < batch.relations.size(); ++i) {
@@ -113,6 +140,15 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
       ASSERT_EQ(batch.rungs[i], answer.rung()) << i;
       ASSERT_EQ(batch.axes[i].DebugString(), answer.axis().DebugString()) << i;
       ASSERT_EQ(batch.analyses[i].axes_tested(), answer.analysis().axes_tested()) << i;
+      ASSERT_EQ(batch.certificates[i].DebugString(), answer.certificate().DebugString()) << i;
+      ASSERT_EQ(batch.separations[i], answer.separation().value()) << i;
+      ASSERT_EQ(batch.separation_bounds[i], answer.separation().bound()) << i;
+      ASSERT_EQ(batch.within_clearance[i], answer.within_clearance()) << i;
+      if (answer.has_witness()) {
+        ASSERT_EQ(batch.witness_xyz[6 * i + 4], answer.witness().point_b().y()) << i;
+      } else {
+        ASSERT_TRUE(std::isnan(batch.witness_xyz[6 * i])) << i;
+      }
       ++counts[batch.relations[i]];
     }
     EXPECT_EQ(counts[v1::RELATION_UNSPECIFIED], 0);
@@ -213,6 +249,8 @@ TEST_F(BatchCall, LongBatchesStreamInMessagesOfAMebibyte) {
   request.mutable_wanted()->set_axis(true);
   *request.add_placements() = PlacementOf("cube");
   *request.add_placements() = PlacementOf("cube", 3);
+  request.mutable_wanted()->set_certificate(true);
+  request.mutable_wanted()->set_separation(true);
   constexpr size_t kPairs = 20'000;
   for (size_t i = 0; i < kPairs; ++i) AddPair(&request, i % 2, 1);
   const Batch batch = Run(request);
@@ -237,6 +275,41 @@ TEST_F(BatchCall, AMillionPairsFitInOneRequest) {
   EXPECT_EQ(std::count(batch.relations.begin(), batch.relations.end(), v1::RELATION_TOUCHING), 50);
   EXPECT_EQ(std::count(batch.relations.begin(), batch.relations.end(), v1::RELATION_SEPARATED),
             999'950);
+}
+
+TEST_F(BatchCall, WishesThatExcludeEachOtherFailWhole) {
+  Put("cube", Cube());
+  v1::BatchCheckCollisionsRequest request;
+  *request.add_placements() = PlacementOf("cube");
+  AddPair(&request, 0, 0);
+  request.set_tolerance(0.5);
+  EXPECT_TRUE(Run(request).status.ok());
+  request.mutable_wanted()->set_witness(true);
+  ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT,
+                "tolerance is 0.5, but wanted.witness needs the exact relation");
+  request.set_tolerance(std::numeric_limits<double>::quiet_NaN());
+  ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "tolerance is NaN");
+}
+
+// The same with measures wanted of every pair, whose cost nobody can foretell.
+TEST_F(BatchCall, CancellingEndsALongBatchOfMeasures) {
+  Put("ball", Sphere(2000));
+  v1::BatchCheckCollisionsRequest request;
+  *request.add_placements() = PlacementOf("ball");
+  *request.add_placements() = PlacementOf("ball", 0.5);
+  request.mutable_wanted()->set_separation(true);
+  request.mutable_wanted()->set_certificate(true);
+  for (int i = 0; i < 900'000; ++i) AddPair(&request, 0, 1);
+  grpc::ClientContext context;
+  auto stream = collisions_->BatchCheckCollisions(&context, request);
+  v1::BatchCheckCollisionsResponse part;
+  ASSERT_TRUE(stream->Read(&part));
+  context.TryCancel();
+  while (stream->Read(&part)) {
+  }
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  server_->BeginDrain();
+  EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
 TEST_F(BatchCall, CancellingEndsALongBatch) {

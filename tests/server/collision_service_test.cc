@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "tests/server/test_server.h"
@@ -116,6 +117,86 @@ TEST_F(CheckCollisionCall, ErrorsNameTheField) {
          grpc::StatusCode::INVALID_ARGUMENT, "b.pose.translation.z is infinite");
   expect(Pair(cube, cube, static_cast<v1::Method>(7)), grpc::StatusCode::INVALID_ARGUMENT,
          "method is 7");
+}
+
+TEST_F(CheckCollisionCall, WishesThatAreMalformedOrExcludeEachOtherAreRefused) {
+  Put("cube", Cube());
+  const auto expect = [&](const std::function<void(v1::CheckCollisionRequest*)>& change,
+                          const std::string& what) {
+    v1::CheckCollisionRequest request = Pair(PlacementOf("cube"), PlacementOf("cube", 3));
+    change(&request);
+    const grpc::Status status = CheckError(request);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
+    EXPECT_THAT(status.error_message(), HasSubstr(what));
+  };
+  expect([](auto* r) { r->set_tolerance(-0.5); }, "tolerance is -0.5; it is a length");
+  expect([](auto* r) { r->set_tolerance(NAN); }, "tolerance is NaN");
+  expect([](auto* r) { r->mutable_wanted()->set_max_error(-1); }, "wanted.max_error is -1");
+  expect([](auto* r) { r->mutable_wanted()->set_clearance(NAN); }, "wanted.clearance is NaN");
+  const auto exclude = [&](const std::function<void(v1::CheckCollisionRequest*)>& change,
+                           const std::string& what) {
+    expect(
+        [&](v1::CheckCollisionRequest* request) {
+          request->set_tolerance(0.1);
+          change(request);
+        },
+        "tolerance is 0.1, but " + what);
+  };
+  exclude([](auto* r) { r->set_method(v1::METHOD_TEXTBOOK_SAT); }, "METHOD_TEXTBOOK_SAT");
+  exclude([](auto* r) { r->mutable_wanted()->set_certificate(true); }, "wanted.certificate");
+  exclude([](auto* r) { r->mutable_wanted()->set_separation(true); }, "wanted.separation");
+  exclude([](auto* r) { r->mutable_wanted()->set_witness(true); }, "wanted.witness");
+  exclude([](auto* r) { r->mutable_wanted()->set_clearance(1); }, "wanted.clearance");
+}
+
+TEST_F(CheckCollisionCall, MeasuresComeWhenWanted) {
+  Put("cube", Cube());
+  Create("empty");
+  const auto check = [&](const v1::Placement& b, double clearance) {
+    v1::CheckCollisionRequest request = Pair(PlacementOf("cube"), b);
+    request.mutable_wanted()->set_certificate(true);
+    request.mutable_wanted()->set_separation(true);
+    request.mutable_wanted()->set_witness(true);
+    request.mutable_wanted()->set_clearance(clearance);
+    return Check(request);
+  };
+  const v1::CheckCollisionResponse apart = check(PlacementOf("cube", 3), 2);
+  EXPECT_LE(std::abs(apart.separation().value() - 2), apart.separation().bound());
+  EXPECT_LE(apart.separation().bound(), 1e-11);
+  EXPECT_TRUE(apart.within_clearance());
+  EXPECT_NEAR(apart.witness().point_a().x(), 1, apart.witness().error());
+  EXPECT_NEAR(apart.witness().point_b().x(), 3, apart.witness().error());
+  EXPECT_LE(apart.witness().error(), 1e-11);
+  EXPECT_TRUE(apart.certificate().has_direction());
+  EXPECT_FALSE(check(PlacementOf("cube", 3), std::nextafter(2, 0)).within_clearance());
+  const v1::CheckCollisionResponse touching = check(PlacementOf("cube", 1), 0);
+  EXPECT_EQ(touching.separation().value(), 0);
+  EXPECT_TRUE(touching.within_clearance());
+  EXPECT_GT(touching.certificate().pairs_size(), 0);
+  const v1::CheckCollisionResponse deep = check(PlacementOf("cube", 0.5), 0);
+  EXPECT_LE(std::abs(deep.separation().value() + 0.5), deep.separation().bound());
+  EXPECT_TRUE(deep.within_clearance());
+  const v1::CheckCollisionResponse nothing = check(PlacementOf("empty"), 5);
+  EXPECT_EQ(nothing.separation().value(), std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(nothing.has_within_clearance());
+  EXPECT_FALSE(nothing.within_clearance());
+  EXPECT_FALSE(nothing.has_witness() || nothing.has_certificate());
+  const v1::CheckCollisionResponse bare = Check(Pair(PlacementOf("cube"), PlacementOf("cube", 3)));
+  EXPECT_FALSE(bare.has_separation() || bare.has_witness() || bare.has_certificate() ||
+               bare.has_within_clearance());
+}
+
+TEST_F(CheckCollisionCall, ATolerancePermitsNotToLookCloser) {
+  Put("cube", Cube());
+  const auto relation = [&](double x, double tolerance) {
+    v1::CheckCollisionRequest request = Pair(PlacementOf("cube"), PlacementOf("cube", x));
+    request.set_tolerance(tolerance);
+    return Check(request).relation();
+  };
+  EXPECT_EQ(relation(3, 0.5), v1::RELATION_SEPARATED);
+  EXPECT_EQ(relation(0, 0.5), v1::RELATION_OVERLAPPING);
+  EXPECT_EQ(relation(1, 0.5), v1::RELATION_WITHIN_TOLERANCE);
+  EXPECT_EQ(relation(1, 0), v1::RELATION_TOUCHING);
 }
 
 TEST_F(CheckCollisionCall, TextbookAxesAreLimited) {

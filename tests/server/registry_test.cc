@@ -52,13 +52,13 @@ TEST_F(RegistryTest, ASnapshotIsMadeOnceAndSharedUntilTheNextChange) {
   const auto first = registry_.Resolve("h", {});
   ASSERT_TRUE(Append(session, 2, {{0.5, 0, 0}}).ok());
   const auto second = registry_.Resolve("h", {});
-  EXPECT_EQ(first->second.hull, second->second.hull);
+  EXPECT_EQ(first->second.snapshot, second->second.snapshot);
   EXPECT_EQ(second->second.record.counts.received, 3);
   ASSERT_TRUE(Append(session, 3, {{2, 0, 0}}).ok());
   const auto third = registry_.Resolve("h", {});
-  EXPECT_NE(first->second.hull, third->second.hull);
-  EXPECT_EQ(first->second.hull->vertices()[1], Vector(1, 0, 0));
-  EXPECT_EQ(third->second.hull->vertices()[1], Vector(2, 0, 0));
+  EXPECT_NE(first->second.snapshot, third->second.snapshot);
+  EXPECT_EQ(first->second.snapshot->hull().vertices()[1], Vector(1, 0, 0));
+  EXPECT_EQ(third->second.snapshot->hull().vertices()[1], Vector(2, 0, 0));
 }
 
 TEST_F(RegistryTest, ACurrentSnapshotIsReadWhileAChunkIsInProgress) {
@@ -73,13 +73,13 @@ TEST_F(RegistryTest, ACurrentSnapshotIsReadWhileAChunkIsInProgress) {
     ++polls;
     const auto view = registry_.Resolve("h", {});
     EXPECT_TRUE(view.ok());
-    EXPECT_EQ(view->second.hull->vertices().size(), 1);
+    EXPECT_EQ(view->second.snapshot->hull().vertices().size(), 1);
     EXPECT_EQ(registry_.List("", "", 10).hulls.size(), 1);
     return false;
   });
   EXPECT_TRUE(result.ok());
   EXPECT_GT(polls, 1);
-  EXPECT_EQ(registry_.Resolve("h", {})->second.hull->vertices().size(), 2);
+  EXPECT_EQ(registry_.Resolve("h", {})->second.snapshot->hull().vertices().size(), 2);
 }
 
 TEST_F(RegistryTest, ACancelledChunkChangesNothingAndMayBeSentAgain) {
@@ -161,8 +161,8 @@ TEST_F(RegistryTest, ResolvesManyHullsAtOneRevision) {
   EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
   EXPECT_EQ(resolved->hulls[0]->record.hull_id, "b");
   EXPECT_EQ(resolved->hulls[1].status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(resolved->hulls[2]->hull->vertices()[0], Vector(0, 0, 0));
-  EXPECT_EQ(resolved->hulls[0]->hull, resolved->hulls[3]->hull);
+  EXPECT_EQ(resolved->hulls[2]->snapshot->hull().vertices()[0], Vector(0, 0, 0));
+  EXPECT_EQ(resolved->hulls[0]->snapshot, resolved->hulls[3]->snapshot);
 }
 
 }  // namespace

@@ -1,0 +1,129 @@
+#include "client/collision_stream.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "client/grpc_status.h"
+
+namespace hulld {
+namespace {
+
+// Appends a piece of an answer to what came before. Problems name positions in the columns.
+void Append(const v1::StreamCollisionsResponse& piece, v1::StreamCollisionsResponse* answer) {
+  const int before = answer->pairs_size();
+  const int problems = answer->columns().pair_problems_size();
+  answer->MergeFrom(piece);
+  v1::AnswerColumns* const columns = answer->mutable_columns();
+  for (int i = problems; i < columns->pair_problems_size(); ++i) {
+    v1::PairProblem* const problem = columns->mutable_pair_problems(i);
+    problem->set_pair(problem->pair() + static_cast<uint64_t>(before));
+  }
+}
+
+}  // namespace
+
+CollisionStream::CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
+                                 std::chrono::milliseconds timeout)
+    : stub_(std::move(stub)), timeout_(timeout) {
+  stub_->async()->StreamCollisions(&context_, this);
+  AddHold();
+  StartRead(&incoming_);
+  StartCall();
+}
+
+CollisionStream::~CollisionStream() {
+  context_.TryCancel();
+  ReleaseHold();
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return done_; });
+}
+
+absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Open(v1::CollisionStreamOpen open) {
+  *request_.mutable_open() = std::move(open);
+  return Ask();
+}
+
+absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Update(
+    v1::CollisionStreamUpdate update) {
+  *request_.mutable_update() = std::move(update);
+  return Ask();
+}
+
+absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Ask() {
+  std::unique_lock lock(mutex_);
+  if (!held_ || reads_ended_) {
+    lock.unlock();
+    return Ended();
+  }
+  answer_.Clear();
+  answered_ = false;
+  written_ = false;
+  lock.unlock();
+  StartWrite(&request_);
+  lock.lock();
+  const bool in_time =
+      changed_.wait_for(lock, timeout_, [this] { return (answered_ && written_) || reads_ended_; });
+  if (in_time && answered_) return std::move(answer_);
+  lock.unlock();
+  if (in_time) return Ended();
+  context_.TryCancel();
+  static_cast<void>(WaitUntilDone());
+  return absl::DeadlineExceededError("the stream did not answer in time");
+}
+
+absl::Status CollisionStream::Close() {
+  if (held_) StartWritesDone();
+  return WaitUntilDone();
+}
+
+// Why there is no answer.
+absl::Status CollisionStream::Ended() {
+  const absl::Status status = WaitUntilDone();
+  return status.ok() ? absl::InternalError("the server ended the stream before its answer")
+                     : status;
+}
+
+absl::Status CollisionStream::WaitUntilDone() {
+  ReleaseHold();
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return done_; });
+  return FromGrpcStatus(status_);
+}
+
+void CollisionStream::ReleaseHold() {
+  if (!std::exchange(held_, false)) return;
+  RemoveHold();
+}
+
+void CollisionStream::OnReadDone(bool ok) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (ok) {
+      Append(incoming_, &answer_);
+      answered_ = incoming_.last();
+    } else {
+      reads_ended_ = true;
+    }
+    changed_.notify_all();
+  }
+  if (!ok) return;
+  incoming_.Clear();
+  StartRead(&incoming_);
+}
+
+void CollisionStream::OnWriteDone(bool /*ok*/) {
+  // After a failed write the reads end too and bring the reason.
+  const std::lock_guard lock(mutex_);
+  written_ = true;
+  changed_.notify_all();
+}
+
+void CollisionStream::OnDone(const grpc::Status& status) {
+  const std::lock_guard lock(mutex_);
+  status_ = status;
+  done_ = true;
+  changed_.notify_all();
+}
+
+}  // namespace hulld

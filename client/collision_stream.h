@@ -1,0 +1,67 @@
+#ifndef HULLD_CLIENT_COLLISION_STREAM_H_
+#define HULLD_CLIENT_COLLISION_STREAM_H_
+
+#include <absl/status/statusor.h>
+#include <grpcpp/client_context.h>
+#include <grpcpp/support/client_callback.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+
+#include "hulld/v1/collision.grpc.pb.h"
+
+namespace hulld {
+
+// One StreamCollisions call, step by step: poses go up, the relations of the pairs that they change
+// come down. Never retried: what the server keeps of a stream ends with it. Driven by one thread.
+class CollisionStream final
+    : public grpc::ClientBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse> {
+ public:
+  // timeout: for each answer.
+  CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
+                  std::chrono::milliseconds timeout);
+  // Cancels the call unless it has ended, and waits for gRPC to let go of it.
+  ~CollisionStream() override;
+
+  // Sends a message and waits for its answer, whose pieces are put together. An error ends the
+  // stream, and every later call returns it.
+  absl::StatusOr<v1::StreamCollisionsResponse> Open(v1::CollisionStreamOpen open);
+  absl::StatusOr<v1::StreamCollisionsResponse> Update(v1::CollisionStreamUpdate update);
+
+  // Says that nothing follows; returns how the call ended.
+  absl::Status Close();
+
+ private:
+  absl::StatusOr<v1::StreamCollisionsResponse> Ask();
+  void ReleaseHold();
+  absl::Status Ended();
+  absl::Status WaitUntilDone();
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override;
+  void OnDone(const grpc::Status& status) override;
+
+  const std::shared_ptr<v1::CollisionService::Stub> stub_;
+  const std::chrono::milliseconds timeout_;
+  grpc::ClientContext context_;
+  v1::StreamCollisionsRequest request_;
+  v1::StreamCollisionsResponse incoming_;
+  // Keeps the call from being finished while more may be sent.
+  bool held_ = true;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // The rest is guarded by the mutex.
+  v1::StreamCollisionsResponse answer_;
+  bool answered_ = false;
+  bool written_ = false;
+  bool reads_ended_ = false;
+  bool done_ = false;
+  grpc::Status status_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_COLLISION_STREAM_H_

@@ -1,0 +1,73 @@
+#ifndef HULLD_CLIENT_VERIFY_ANSWER_CHECK_H_
+#define HULLD_CLIENT_VERIFY_ANSWER_CHECK_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "client/client.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+enum class Verdict {
+  // The certificate proves the relation.
+  kValid,
+  // It does not.
+  kInvalid,
+  // There is nothing to check, or the hulls that the answer was computed from are gone.
+  kCannotCheck,
+  // The same because a hull has changed since; asking again may do better.
+  kMoved,
+};
+
+struct Verification {
+  Verdict verdict = Verdict::kCannotCheck;
+  // Why, unless valid.
+  std::string reason;
+};
+
+// One answer and what it answers.
+struct CheckedAnswer {
+  const v1::Placement& a;
+  const v1::Placement& b;
+  v1::Relation relation;
+  const v1::Certificate& certificate;
+  const std::string& store_id;
+  const v1::HullVersion& hull_a;
+  const v1::HullVersion& hull_b;
+};
+
+// Checks answers against hulls as the server shows them to anyone (GetHullMesh).
+class AnswerChecker {
+ public:
+  // `client` must outlive this.
+  explicit AnswerChecker(const Client& client) : client_(client) {}
+
+  // Fetches the hulls that it does not have yet. Errors are those of the fetching, but a hull that
+  // is gone is kCannotCheck.
+  absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
+
+ private:
+  // Null, with the reason, when the mesh at that version cannot be had.
+  absl::StatusOr<const HullMesh*> Fetch(const std::string& store_id, const v1::HullVersion& version,
+                                        Verification* problem);
+
+  const Client& client_;
+  std::map<std::string, HullMesh> meshes_;
+};
+
+// Asks, and checks the answer, anew when a hull changes in between, a few times. The answer that
+// was checked last comes with its verification.
+struct VerifiedResponse {
+  v1::CheckCollisionResponse response;
+  Verification verification;
+};
+absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,
+                                                        const v1::CheckCollisionRequest& request);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_VERIFY_ANSWER_CHECK_H_

@@ -1,0 +1,102 @@
+#include "client/verify/exact_vector.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace hulld {
+namespace {
+
+constexpr int kMantissaBits = 53;
+
+// An integer of 53 bits times 2^exponent.
+struct Parts {
+  int64_t mantissa;
+  int exponent;
+};
+
+Parts Split(double number) {
+  int exponent = 0;
+  const double fraction = std::frexp(number, &exponent);
+  auto mantissa = static_cast<int64_t>(std::ldexp(fraction, kMantissaBits));
+  exponent -= kMantissaBits;
+  while (mantissa != 0 && mantissa % 2 == 0) {
+    mantissa /= 2;
+    ++exponent;
+  }
+  return {mantissa, exponent};
+}
+
+// Whether all are at least 0, and not all 0.
+bool AreWeights(std::span<const BigInteger> numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](const auto& x) { return x >= 0; }) &&
+         std::any_of(numbers.begin(), numbers.end(), [](const auto& x) { return x > 0; });
+}
+
+bool IsBetween(const BigVector& a, const BigVector& b) {
+  return IsZero(Cross(a, b)) && Dot(a, b) <= 0;
+}
+
+// 0 = (b x c) a + (c x a) b + (a x b) c in the plane of the three, measured along its normal; a
+// triangle without area is left to its sides.
+bool IsInTriangle(const BigVector& a, const BigVector& b, const BigVector& c) {
+  const BigVector bc = Cross(b, c);
+  const BigVector ca = Cross(c, a);
+  const BigVector ab = Cross(a, b);
+  const BigVector normal = bc + ca + ab;
+  if (IsZero(normal) || Dot(normal, a) != 0) return false;
+  const BigInteger weights[] = {Dot(bc, normal), Dot(ca, normal), Dot(ab, normal)};
+  return AreWeights(weights);
+}
+
+}  // namespace
+
+void CommonExponent::Include(double number) {
+  if (number != 0) exponent_ = std::min(exponent_, Split(number).exponent);
+}
+
+BigInteger CommonExponent::ToInteger(double number) const {
+  const Parts parts = Split(number);
+  if (parts.mantissa == 0) return 0;
+  return BigInteger(parts.mantissa) << (parts.exponent - exponent_);
+}
+
+// By Caratheodory 1907: those points whose hull holds 0 lie in the plane that bounds the half
+// space, so three of them suffice.
+bool HoldsOriginOnBoundary(std::span<const BigVector> points) {
+  const size_t n = points.size();
+  for (size_t i = 0; i < n; ++i) {
+    if (IsZero(points[i])) return true;
+    for (size_t j = i + 1; j < n; ++j) {
+      if (IsBetween(points[i], points[j])) return true;
+      for (size_t k = j + 1; k < n; ++k) {
+        if (IsInTriangle(points[i], points[j], points[k])) return true;
+      }
+    }
+  }
+  return false;
+}
+
+// 0 is inside unless all points lie on one side of a plane through 0, or in it. The normals of such
+// planes form a cone; it is pointed when the points span space, and then has an edge, which is
+// across two of the points. So the cross products of two points are all that need be tried.
+bool HoldsOriginInside(std::span<const BigVector> points) {
+  bool spans_space = false;
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (size_t j = i + 1; j < points.size(); ++j) {
+      const BigVector normal = Cross(points[i], points[j]);
+      if (IsZero(normal)) continue;
+      bool above = false;
+      bool below = false;
+      for (const BigVector& point : points) {
+        const BigInteger height = Dot(normal, point);
+        above |= height > 0;
+        below |= height < 0;
+      }
+      if (!above || !below) return false;
+      spans_space = true;
+    }
+  }
+  return spans_space;
+}
+
+}  // namespace hulld

@@ -1,0 +1,257 @@
+#include "server/collision_stream.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "server/answer_columns.h"
+#include "server/config.h"
+#include "server/decode.h"
+#include "server/encode.h"
+#include "server/query_settings.h"
+#include "server/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+// After this long other calls get their turn on the thread.
+constexpr std::chrono::milliseconds kSliceTime(20);
+// The clock is read once for so many pairs.
+constexpr size_t kPairsPerLook = 64;
+constexpr int kPoseNumbers = 7;
+// An index among the pairs, as a varint.
+constexpr size_t kIndexBytes = 5;
+
+// Nothing but the exact relation.
+bool IsRelationOnly(const v1::Wanted& wanted, double tolerance) {
+  return tolerance == 0 && !wanted.axis() && !wanted.analysis() && !wanted.certificate() &&
+         !wanted.separation() && !wanted.witness() && !wanted.has_clearance();
+}
+
+absl::StatusOr<Pose> PoseAt(const v1::CollisionStreamUpdate& update, int i) {
+  const double* const numbers = update.poses().data() + static_cast<ptrdiff_t>(kPoseNumbers) * i;
+  Pose pose;
+  pose.q = {numbers[0], numbers[1], numbers[2], numbers[3]};
+  pose.t = Vector(numbers[4], numbers[5], numbers[6]);
+  if (absl::Status s = ValidatePose(pose); !s.ok()) {
+    return Prefixed(absl::StrCat("poses[", i, "]."), s);
+  }
+  return pose;
+}
+
+}  // namespace
+
+grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
+CollisionStream::Start(const grpc::CallbackServerContext& context, Admission& admission,
+                       Registry& registry, WorkerPool& readers) {
+  const std::shared_ptr<CollisionStream> stream(new CollisionStream(context, registry, readers));
+  stream->self_ = stream;
+  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
+  if (ticket.ok()) {
+    stream->ticket_ = *std::move(ticket);
+    stream->StartRead(&stream->request_);
+  } else {
+    stream->Finish(ToGrpc(ticket.status()));
+  }
+  return stream.get();
+}
+
+void CollisionStream::OnReadDone(bool ok) {
+  // Without a message the client has said all, or is gone.
+  if (!ok) return End(absl::OkStatus());
+  readers_.Submit([self = shared_from_this()] { self->Handle(); });
+}
+
+void CollisionStream::OnWriteDone(bool ok) {
+  if (!ok) return End(absl::CancelledError("the client is gone"));
+  const bool answered = response_.last();
+  response_.Clear();
+  response_bytes_ = 0;
+  if (answered) return StartRead(&request_);
+  readers_.Submit([self = shared_from_this()] { self->AnswerSlice(); });
+}
+
+void CollisionStream::End(const absl::Status& status) {
+  Finish(ToGrpc(lifetime_.ShouldStop() ? lifetime_.StopStatus() : status));
+}
+
+void CollisionStream::Handle() {
+  asked_.clear();
+  next_asked_ = 0;
+  const absl::Status status = HandleMessage();
+  if (!status.ok()) return End(status);
+  request_.Clear();
+  std::sort(asked_.begin(), asked_.end());
+  for (const uint32_t pair : asked_) is_asked_[pair] = false;
+  table_.EncodeHeader(registry_.store(), response_.mutable_header());
+  response_bytes_ = response_.ByteSizeLong();
+  AnswerSlice();
+}
+
+absl::Status CollisionStream::HandleMessage() {
+  switch (request_.message_case()) {
+    case v1::StreamCollisionsRequest::kOpen:
+      if (open_) {
+        return absl::InvalidArgumentError(
+            "open came twice; other placements or pairs need another stream");
+      }
+      return HandleOpen();
+    case v1::StreamCollisionsRequest::kUpdate:
+      if (!open_) return absl::InvalidArgumentError("the first message must be open, not update");
+      ++messages_;
+      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request_.update()));
+    case v1::StreamCollisionsRequest::MESSAGE_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError("the message is empty; set open or update");
+}
+
+absl::Status CollisionStream::HandleOpen() {
+  const v1::CollisionStreamOpen& open = request_.open();
+  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
+      v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(), lifetime_);
+  if (!options.ok()) return Prefixed("open: ", options.status());
+  const auto placements = static_cast<size_t>(open.placements_size());
+  const absl::Status valid =
+      ValidatePairs(open.pairs(), placements, registry_.limits().max_pairs_per_batch, "the stream");
+  if (!valid.ok()) return Prefixed("open: ", valid);
+  options_ = *std::move(options);
+  wanted_ = open.wanted();
+  only_changes_ = open.only_changes();
+  table_ = PlacementTable(open.placements());
+
+  pairs_begin_.assign(placements + 1, 0);
+  for (int i = 0; i < open.pairs_size(); i += 2) {
+    pairs_.push_back({open.pairs(i), open.pairs(i + 1), {}, v1::RELATION_UNSPECIFIED});
+    ++pairs_begin_[pairs_.back().a];
+    ++pairs_begin_[pairs_.back().b];
+  }
+  size_t sum = 0;
+  for (size_t& begin : pairs_begin_) begin = sum += begin;
+  pairs_of_.resize(sum);
+  for (size_t i = pairs_.size(); i-- > 0;) {
+    pairs_of_[--pairs_begin_[pairs_[i].a]] = static_cast<uint32_t>(i);
+    pairs_of_[--pairs_begin_[pairs_[i].b]] = static_cast<uint32_t>(i);
+  }
+  open_ = true;
+  is_asked_.assign(pairs_.size(), false);
+  for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
+  return Refresh();
+}
+
+// Checks all of the update before it applies any.
+absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& update) {
+  const int moved = update.placements_size();
+  if (update.poses_size() != kPoseNumbers * moved) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("poses holds ", update.poses_size(), " numbers for ", moved,
+                     " placements; each needs seven: w x y z and x y z"));
+  }
+  std::vector<char> named(table_.size());
+  std::vector<Pose> poses;
+  for (int i = 0; i < moved; ++i) {
+    const uint32_t placement = update.placements(i);
+    if (placement >= table_.size()) {
+      return absl::InvalidArgumentError(absl::StrCat("placements[", i, "] is ", placement,
+                                                     ", but the stream has ", table_.size(),
+                                                     "; indices start at 0"));
+    }
+    if (named[placement]) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
+    }
+    named[placement] = true;
+    const absl::StatusOr<Pose> pose = PoseAt(update, i);
+    if (!pose.ok()) return pose.status();
+    poses.push_back(*pose);
+  }
+  if (update.refresh_hulls()) {
+    if (absl::Status s = Refresh(); !s.ok()) return s;
+  }
+  for (int i = 0; i < moved; ++i) {
+    table_.Move(update.placements(i), poses[i]);
+    AskAboutPairsOf(update.placements(i));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CollisionStream::Refresh() {
+  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  for (size_t i = 0; i < table_.size(); ++i) {
+    if (!table_.hull_changed(i)) continue;
+    AskAboutPairsOf(i);
+    // The vertices that a cache names are those of the hull before.
+    for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) pairs_[pairs_of_[k]].cache = {};
+  }
+  table_.EncodeHulls(response_.mutable_hulls(), response_.mutable_placement_problems());
+  return absl::OkStatus();
+}
+
+void CollisionStream::AskAbout(uint32_t pair) {
+  if (is_asked_[pair]) return;
+  is_asked_[pair] = true;
+  asked_.push_back(pair);
+}
+
+void CollisionStream::AskAboutPairsOf(size_t placement) {
+  for (size_t k = pairs_begin_[placement]; k < pairs_begin_[placement + 1]; ++k) {
+    AskAbout(pairs_of_[k]);
+  }
+}
+
+absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
+  const PlacedHull& a = table_.placed()[pair.a];
+  const PlacedHull& b = table_.placed()[pair.b];
+  if (!IsRelationOnly(wanted_, options_.tolerance)) {
+    return CheckCollision(a, b, options_, &pair.cache);
+  }
+  const RelationAnswer found = FindRelation(a, b, &pair.cache);
+  Answer answer;
+  answer.relation = found.relation;
+  answer.rung = found.rung;
+  return answer;
+}
+
+void CollisionStream::AddAnswer(uint32_t index) {
+  PairState& pair = pairs_[index];
+  const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
+  absl::StatusOr<Answer> answer;
+  if (answerable) answer = AnswerPair(pair);
+  const v1::Relation relation =
+      answerable && answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
+  const bool changed = relation != pair.relation;
+  pair.relation = relation;
+  if (only_changes_ && messages_ > 0 && !changed) return;
+  v1::AnswerColumns* const columns = response_.mutable_columns();
+  const auto position = static_cast<uint64_t>(response_.pairs_size());
+  response_.add_pairs(index);
+  response_bytes_ += kIndexBytes;
+  if (!answerable) {
+    response_bytes_ += AddUnanswered(wanted_, columns);
+    return;
+  }
+  response_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
+                                       table_.placed()[pair.b].hull(), wanted_, position, columns);
+}
+
+// Computes until the answer is complete, a message is full, or it is the turn of others.
+void CollisionStream::AnswerSlice() {
+  const auto end = std::chrono::steady_clock::now() + kSliceTime;
+  while (next_asked_ < asked_.size()) {
+    if (response_bytes_ >= Config::kReplyMessageBytes) break;
+    AddAnswer(asked_[next_asked_++]);
+    if (next_asked_ % kPairsPerLook != 0) continue;
+    if (lifetime_.ShouldStop()) break;
+    if (std::chrono::steady_clock::now() >= end) {
+      return readers_.Submit([self = shared_from_this()] { self->AnswerSlice(); });
+    }
+  }
+  if (lifetime_.ShouldStop()) return End(lifetime_.StopStatus());
+  response_.set_update(messages_);
+  response_.set_last(next_asked_ == asked_.size());
+  StartWrite(&response_);
+}
+
+}  // namespace hulld::server

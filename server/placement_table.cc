@@ -1,0 +1,129 @@
+#include "server/placement_table.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <unordered_map>
+#include <utility>
+
+#include "server/decode.h"
+#include "server/encode.h"
+#include "server/hull_id.h"
+#include "server/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+// Stands in for the hull of placements that cannot be answered for.
+const QueryHull& NoHull() {
+  static const Hull empty;
+  static const QueryHull no_hull(empty);
+  return no_hull;
+}
+
+bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b) {
+  if (!a.ok() || !b.ok()) return a.ok() == b.ok();
+  return a->record.revision == b->record.revision &&
+         a->record.create_revision == b->record.create_revision;
+}
+
+}  // namespace
+
+PlacementTable::PlacementTable(
+    const google::protobuf::RepeatedPtrField<v1::Placement>& placements) {
+  std::unordered_map<std::string, size_t> index_of;
+  entries_.resize(placements.size());
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    const v1::Placement& placement = placements[static_cast<int>(i)];
+    const std::string field = absl::StrCat("placements[", i, "]");
+    Entry& entry = entries_[i];
+    entry.malformed = ValidateHullId(placement.hull_id(), field + ".hull_id");
+    if (!entry.malformed.ok()) continue;
+    const auto [known, is_new] = index_of.emplace(placement.hull_id(), ids_.size());
+    if (is_new) ids_.push_back(placement.hull_id());
+    entry.hull = known->second;
+    const absl::StatusOr<Pose> pose = DecodePose(placement.pose(), field + ".pose");
+    entry.malformed = pose.status();
+    if (pose.ok()) entry.pose = *pose;
+  }
+}
+
+absl::Status PlacementTable::Resolve(Registry& registry, const std::function<bool()>& should_stop) {
+  absl::StatusOr<Resolved> resolved = registry.Resolve(ids_, should_stop);
+  if (!resolved.ok()) return resolved.status();
+  changed_.assign(ids_.size(), true);
+  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved->hulls[i]);
+  const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
+  hulls_ = std::move(resolved->hulls);
+  store_revision_ = resolved->store_revision;
+  placed_.clear();
+  placed_.reserve(entries_.size());
+  for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
+  return absl::OkStatus();
+}
+
+PlacedHull PlacementTable::Place(size_t i) const {
+  if (!is_answerable(i)) return *PlacedHull::Make(NoHull(), Pose());
+  const Entry& entry = entries_[i];
+  return *PlacedHull::Make(hulls_[*entry.hull]->snapshot->query_hull(), entry.pose);
+}
+
+const absl::Status& PlacementTable::problem(size_t i) const {
+  const Entry& entry = entries_[i];
+  return entry.malformed.ok() ? hulls_[*entry.hull].status() : entry.malformed;
+}
+
+bool PlacementTable::hull_changed(size_t i) const {
+  return entries_[i].hull.has_value() && changed_[*entries_[i].hull];
+}
+
+void PlacementTable::Move(size_t i, const Pose& X_WH) {
+  Entry& entry = entries_[i];
+  if (!entry.hull.has_value()) return;
+  entry.pose = X_WH;
+  entry.malformed = absl::OkStatus();
+  placed_[i] = Place(i);
+}
+
+void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
+  server::EncodeHeader(store, store_revision_, header);
+}
+
+void PlacementTable::EncodeHulls(
+    google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
+    google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const {
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    v1::HullVersion* const version = hulls->Add();
+    const absl::Status& status = problem(i);
+    if (status.ok()) {
+      EncodeVersion(hulls_[*entries_[i].hull]->record, version);
+      continue;
+    }
+    v1::PlacementProblem* const encoded = problems->Add();
+    encoded->set_placement(static_cast<uint32_t>(i));
+    encoded->set_code(ToGrpc(status.code()));
+    encoded->set_message(std::string(status.message()));
+  }
+}
+
+absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
+                           size_t placements, uint64_t max_pairs, const char* what) {
+  if (pairs.size() % 2 != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("pairs holds ", pairs.size(), " indices; each pair needs two"));
+  }
+  const auto count = static_cast<uint64_t>(pairs.size()) / 2;
+  if (count > max_pairs) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        what, " holds ", count, " pairs; the limit is ", max_pairs, " (--max-pairs-per-batch)"));
+  }
+  for (int i = 0; i < pairs.size(); ++i) {
+    if (pairs[i] >= placements) {
+      return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", pairs[i],
+                                                     ", but placements holds ", placements,
+                                                     "; indices start at 0"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,78 @@
+#ifndef HULLD_SERVER_PLACEMENT_TABLE_H_
+#define HULLD_SERVER_PLACEMENT_TABLE_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <google/protobuf/repeated_field.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/query/placed_hull.h"
+#include "core/query/pose.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/registry.h"
+
+namespace hulld::server {
+
+// The placements of one call, by index: each ready for queries, or with the reason why it cannot be
+// answered for. One that cannot stands in as an empty hull.
+class PlacementTable {
+ public:
+  PlacementTable() = default;
+  // Notes what is malformed; no hull is known before Resolve.
+  explicit PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements);
+
+  // Resolves every hull once, all at one revision of the store. Not for gRPC's threads.
+  // CANCELLED: should_stop said so.
+  absl::Status Resolve(Registry& registry, const std::function<bool()>& should_stop);
+
+  size_t size() const { return entries_.size(); }
+  std::span<const PlacedHull> placed() const { return placed_; }
+  bool is_answerable(size_t i) const { return problem(i).ok(); }
+  // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
+  bool hull_changed(size_t i) const;
+
+  // Requires a valid pose.
+  void Move(size_t i, const Pose& X_WH);
+
+  // The store's revision of the last Resolve.
+  void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
+  // A version per placement, and the problems.
+  void EncodeHulls(google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
+                   google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
+
+ private:
+  struct Entry {
+    // Index into hulls_; none when the ID is malformed.
+    std::optional<size_t> hull;
+    // Of the ID or the pose.
+    absl::Status malformed;
+    Pose pose;
+  };
+
+  const absl::Status& problem(size_t i) const;
+  PlacedHull Place(size_t i) const;
+
+  std::vector<Entry> entries_;
+  std::vector<std::string> ids_;
+  // Parallel to ids_.
+  std::vector<absl::StatusOr<HullView>> hulls_;
+  std::vector<char> changed_;
+  uint64_t store_revision_ = 0;
+  std::vector<PlacedHull> placed_;
+};
+
+// INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
+// max_pairs (--max-pairs-per-batch). `what` holds the pairs, as in "the batch".
+absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
+                           size_t placements, uint64_t max_pairs, const char* what);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_PLACEMENT_TABLE_H_
