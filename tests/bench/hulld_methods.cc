@@ -90,6 +90,14 @@ struct HulldSimplified {
 
 }  // namespace
 
+double BestSeparation(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB) {
+  constexpr double kRelativeMaxError = 1e-15;
+  QueryOptions options;
+  options.want_separation = true;
+  options.max_error = kRelativeMaxError * (QueryHull(a).radius() + QueryHull(b).radius());
+  return OrFail(CheckCollision(a, X_WA, b, X_WB, options)).separation->value;
+}
+
 std::unique_ptr<QueryMethod> MakeHulld() { return MakeHulldWithin(0, "hulld"); }
 
 std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name) {

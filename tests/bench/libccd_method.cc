@@ -15,6 +15,8 @@ struct Libccd {
     Eigen::Matrix3d R;
     Vector t;
     Vector center;
+    // Where the last support point of the query was.
+    mutable uint32_t last = Shape::kNowhere;
   };
 
   Algorithm algorithm;
@@ -23,7 +25,7 @@ struct Libccd {
     const Placed& placed = *static_cast<const Placed*>(object);
     const Vector n =
         placed.R.transpose() * Vector(direction->v[0], direction->v[1], direction->v[2]);
-    const Vector p = placed.R * placed.shape->Farthest(n) + placed.t;
+    const Vector p = placed.R * placed.shape->Farthest(n, placed.last) + placed.t;
     ccdVec3Set(point, p.x(), p.y(), p.z());
   }
 
@@ -51,11 +53,15 @@ struct Libccd {
 
   Placed Place(const Shape& shape, const Pose& X_WA) {
     const Eigen::Matrix3d R = RotationOf(X_WA);
-    return {&shape, R, X_WA.t, R * shape.center() + X_WA.t};
+    return {&shape, R, X_WA.t, R * shape.center() + X_WA.t, Shape::kNowhere};
   }
+
+  // Each question stands alone.
+  static void Forget(const Placed& a, const Placed& b) { a.last = b.last = Shape::kNowhere; }
 
   Verdict Ask(const Placed& a, const Placed& b) {
     static const ccd_t settings = Settings();
+    Forget(a, b);
     const int colliding = algorithm == Algorithm::kMpr ? ccdMPRIntersect(&a, &b, &settings)
                                                        : ccdGJKIntersect(&a, &b, &settings);
     return colliding != 0 ? Verdict::kColliding : Verdict::kApart;
@@ -63,6 +69,7 @@ struct Libccd {
 
   std::optional<double> Depth(const Placed& a, const Placed& b) {
     static const ccd_t settings = Settings();
+    Forget(a, b);
     ccd_real_t depth = 0;
     ccd_vec3_t direction;
     ccd_vec3_t position;

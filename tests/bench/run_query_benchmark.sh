@@ -29,6 +29,8 @@ for suite in "${suites[@]}"; do
       "$programs/query_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
         --benchmark_repetitions="${REPETITIONS:-5}" --benchmark_enable_random_interleaving=true \
         --benchmark_report_aggregates_only=true
+      { head -1 "$out" && tail -n +2 "$out" | sort -t, -k1,1V -k2,2; } >"$out.sorted"
+      mv "$out.sorted" "$out"
       ;;
     # Counts, the same on every machine.
     accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;
@@ -41,3 +43,5 @@ for suite in "${suites[@]}"; do
       ;;
   esac
 done
+# For the README.
+bash tests/bench/query_tables.sh "$machine"

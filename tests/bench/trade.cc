@@ -125,11 +125,16 @@ std::vector<Verdict> ExactVerdicts(const TradeQuestions& questions) {
   return verdicts;
 }
 
-std::vector<std::optional<double>> ExactDepths(const TradeQuestions& questions) {
-  const std::unique_ptr<QueryMethod> exact = MakeHulld();
-  exact->Prepare(questions.hulls, questions.queries);
-  std::vector<std::optional<double>> depths(questions.depth.count);
-  exact->MeasureDepths(questions.depth.first, depths);
+// None where hulls are apart.
+std::vector<std::optional<double>> BestDepths(const TradeQuestions& questions) {
+  std::vector<std::optional<double>> depths;
+  for (size_t i = 0; i < questions.depth.count; ++i) {
+    const QuerySet::Query& query = questions.queries[questions.depth.first + i];
+    const double separation = BestSeparation(questions.hulls[query.hull_a], query.X_WA,
+                                             questions.hulls[query.hull_b], query.X_WB);
+    depths.emplace_back();
+    if (separation <= 0) depths.back() = -separation;
+  }
   return depths;
 }
 
@@ -183,7 +188,7 @@ Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& me
                    const TradeSettings& settings) {
   Trade trade;
   const std::vector<Verdict> truth = ExactVerdicts(questions);
-  const std::vector<std::optional<double>> depths = ExactDepths(questions);
+  const std::vector<std::optional<double>> depths = BestDepths(questions);
   trade.questions = truth.size();
   CheckByOracle(questions, truth, trade);
 
@@ -195,7 +200,8 @@ Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& me
                         {method, &QueryMethod::Answer, questions.near_contact},
                         {}});
     Measured& last = measured.back();
-    if (method->knows_depth()) {
+    // The depth is never less than exact for a tolerance.
+    if (method->knows_depth() && each.family != TradeFamily::kTolerance) {
       last.depth.emplace(method, &QueryMethod::MeasureDepths, questions.depth);
       last.depth->RunFirst(settings.max_seconds);
     }

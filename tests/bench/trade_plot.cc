@@ -115,8 +115,10 @@ class PanelDrawing {
       most = std::max(most, mark.nanoseconds);
     }
     if (panel.marks.empty()) least = most = 100;
-    low_ = static_cast<int>(std::floor(std::log10(least)));
-    high_ = std::max(low_ + 1, static_cast<int>(std::ceil(std::log10(most))));
+    // Room for the marks beside the frame.
+    constexpr double kRoom = 1.25;
+    low_ = static_cast<int>(std::floor(std::log10(least / kRoom)));
+    high_ = std::max(low_ + 1, static_cast<int>(std::ceil(std::log10(most * kRoom))));
   }
 
   void Draw() {
@@ -248,9 +250,9 @@ Panel AnswersPanel(const Trade& trade, std::string title,
 Panel DepthPanel(const Trade& trade) {
   Panel panel{"Penetration depth",
               "largest error of the depth, relative to the hulls' radius",
-              "exact",
+              "0",
               -16,
-              0,
+              1,
               {},
               {}};
   int number = 0;

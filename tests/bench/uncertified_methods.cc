@@ -126,7 +126,7 @@ class LookedUp {
   using Scalar = double;
   explicit LookedUp(const Hull& hull) : query_hull_(hull) {}
   const Vector& center() const { return query_hull_.hull().center(); }
-  const Vector& Farthest(const Vector& n) const {
+  const Vector& Farthest(const Vector& n, uint32_t& /*from*/) const {
     return query_hull_.hull().vertices()[query_hull_.support().Farthest(n).vertex];
   }
 
@@ -172,9 +172,11 @@ struct PlainGjk {
   static Verdict Ask(const Placed& a, const Placed& b) {
     constexpr int kMaxSteps = 64;
     const Vector3 offset = (b.t - a.t).template cast<Scalar>();
+    uint32_t last_a = ClimbingHull<Scalar>::kNowhere;
+    uint32_t last_b = ClimbingHull<Scalar>::kNowhere;
     const auto difference = [&](const Vector3& n) -> Vector3 {
-      return a.R * a.shape->Farthest(a.R.transpose() * n) -
-             (b.R * b.shape->Farthest(-(b.R.transpose() * n)) + offset);
+      return a.R * a.shape->Farthest(a.R.transpose() * n, last_a) -
+             (b.R * b.shape->Farthest(-(b.R.transpose() * n), last_b) + offset);
     };
     Vector3 n = -(a.R * a.shape->center() - (b.R * b.shape->center() + offset));
     if (n.squaredNorm() == 0) n = Vector3::UnitX();
