@@ -17,6 +17,8 @@ suites=("$@")
 ((${#suites[@]})) || suites=(relation contact distance motion batch scene accuracy trade)
 results=tests/bench/results
 programs=build/release/tests/bench
+# Threads that wait leave the core to those that work, also where other programs run.
+export OMP_WAIT_POLICY=passive
 
 cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
 cmake --build --preset release --target query_benchmark query_accuracy hulld-bench
