@@ -9,7 +9,8 @@ namespace hulld {
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
                                                     const QueryOptions& options, int threads) {
-  std::vector<absl::StatusOr<Answer>> answers(pairs.size(), absl::CancelledError("stopped"));
+  // Without a message the status is a number: with one, all answers would share and count it.
+  std::vector<absl::StatusOr<Answer>> answers(pairs.size(), absl::CancelledError());
   QueryOptions each = options;
   each.threads = 1;
   const auto count = static_cast<int64_t>(pairs.size());
@@ -18,7 +19,10 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
   constexpr int kPairsPerPiece = 16;
 #pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
   for (int64_t i = 0; i < count; ++i) {
-    if (each.should_stop && each.should_stop()) continue;
+    if (each.should_stop && each.should_stop()) {
+      answers[i] = absl::CancelledError("stopped");
+      continue;
+    }
     answers[i] = CheckCollision(placements[pairs[i].a], placements[pairs[i].b], each);
   }
   return answers;

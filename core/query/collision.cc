@@ -150,6 +150,29 @@ PairCache Mirrored(PairCache cache) {
   return cache;
 }
 
+// What the ladder decides of A and B, the axis and the pairs of which may be those of B and A.
+absl::StatusOr<Decision> DecideEither(const PlacedHull& a, const PlacedHull& b, double tolerance,
+                                      PairCache* cache, const std::function<bool()>& should_stop) {
+  if (Compare(a, b) <= 0) return Decide(FloatPair(a, b), tolerance, cache, should_stop);
+  if (cache != nullptr) *cache = Mirrored(*cache);
+  absl::StatusOr<Decision> decision = Decide(FloatPair(b, a), tolerance, cache, should_stop);
+  if (cache != nullptr) *cache = Mirrored(*cache);
+  return decision;
+}
+
+// The relation and nothing else, which is what most callers want of most pairs.
+absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
+                                    const QueryOptions& options, PairCache* cache) {
+  const absl::StatusOr<Decision> decision =
+      DecideEither(a, b, options.tolerance, cache, options.should_stop);
+  if (!decision.ok()) return decision.status();
+  absl::StatusOr<Answer> answer(absl::in_place);
+  answer->relation = decision->relation;
+  answer->rung = decision->rung;
+  answer->analysis.axes_tested = decision->directions_tried;
+  return answer;
+}
+
 absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const PlacedHull& b,
                                                const QueryOptions& options, PairCache* cache) {
   if (Compare(a, b) <= 0) return CertifiedSearch(a, b, options, cache);
@@ -214,6 +237,10 @@ absl::Status ValidateOptions(const QueryOptions& options) {
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {
   if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
+  if (options.method == Method::kCertifiedSearch && !options.want_axis && !options.want_analysis &&
+      !NeedsMore(options) && !a.hull().empty() && !b.hull().empty()) {
+    return RelationOnly(a, b, options, cache);
+  }
   std::optional<std::chrono::steady_clock::time_point> start;
   if (options.want_analysis) start = std::chrono::steady_clock::now();
   absl::StatusOr<Answer> answer;
@@ -238,13 +265,10 @@ absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hul
   return CheckCollision(*placed_a, *placed_b, options);
 }
 
-RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache) {
+RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache,
+                            double tolerance) {
   if (a.hull().empty() || b.hull().empty()) return {Relation::kSeparated, Rung::kBounds};
-  const bool swapped = Compare(a, b) > 0;
-  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
-  const FloatPair pair = swapped ? FloatPair(b, a) : FloatPair(a, b);
-  const absl::StatusOr<Decision> decision = Decide(pair, 0, cache, {});
-  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  const absl::StatusOr<Decision> decision = DecideEither(a, b, tolerance, cache, {});
   // Nothing stops the search.
   return {decision->relation, decision->rung};
 }

@@ -168,12 +168,14 @@ absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,
                                       const Pose& X_WB, const QueryOptions& options = {});
 
-// The relation alone, as CheckCollision with default options finds it: the fastest way to ask.
+// The relation alone, as CheckCollision finds it with this tolerance: the fastest way to ask.
+// Requires tolerance >= 0.
 struct RelationAnswer {
   Relation relation;
   Rung rung;
 };
-RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache = nullptr);
+RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache = nullptr,
+                            double tolerance = 0);
 
 }  // namespace hulld
 

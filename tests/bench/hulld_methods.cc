@@ -41,10 +41,7 @@ struct Hulld {
     return OrFail(PlacedHull::Make(shape, X_WA));
   }
   Verdict Ask(const Placed& a, const Placed& b) {
-    if (tolerance == 0) return ToVerdict(FindRelation(a, b).relation);
-    QueryOptions options;
-    options.tolerance = tolerance;
-    return ToVerdict(OrFail(CheckCollision(a, b, options)).relation);
+    return ToVerdict(FindRelation(a, b, nullptr, tolerance).relation);
   }
   std::optional<double> Depth(const Placed& a, const Placed& b) {
     const std::optional<double> separation = Separate(a, b);
