@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <vector>
 
 #include "core/query/collision.h"
@@ -131,6 +132,56 @@ TEST(NearContact, TinyHullsFarFromTheirOriginMatchTheOracle) {
   }
   EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions() / 10);
   EXPECT_GT(check.count(Rung::kExact), check.questions() / 4);
+}
+
+// How many questions the next test asks: HULLD_NEAR_CONTACT_QUESTIONS in the environment, a million
+// by hand; few by default.
+int QuestionsToAsk() {
+  const char* given = std::getenv("HULLD_NEAR_CONTACT_QUESTIONS");
+  return given != nullptr ? std::atoi(given) : kRounds;
+}
+
+// Lattice hulls of all dimensions side by side, some coordinates moved by an ulp, at poses of small
+// integers, scaled by anything: touching, missing and overlapping by nothing, by an ulp, or by a
+// rounding of the pose.
+TEST(NearContact, RandomQuestionsMatchTheOracle) {
+  const uint64_t seed = TestSeed(904);
+  Random random(seed);
+  RelationCheck check;
+  for (int question = 0; question < QuestionsToAsk(); ++question) {
+    const double scale = std::ldexp(1.0, random.Between(-900, 900));
+    const auto points = [&](const Vector& offset) {
+      std::vector<Vector> result =
+          Scaled(Shifted(RandomLatticePoints(random, random.Between(1, 12), 3), offset), scale);
+      for (Vector& p : result) {
+        if (random.Below(6) != 0) continue;
+        double& coordinate = p[random.Below(3)];
+        coordinate = std::nextafter(coordinate, random.Below(2) == 0 ? -INFINITY : INFINITY);
+      }
+      return result;
+    };
+    Pose X_WA, X_WB;
+    for (double& q : X_WA.q) q = random.Between(-3, 3);
+    if (X_WA.q == std::array<double, 4>{0, 0, 0, 0}) X_WA.q[0] = 1;
+    X_WB.q = X_WA.q;
+    X_WA.t = X_WB.t = scale * Vector(random.Between(-1000, 1000), 1e6, random.Real(-1, 1));
+    const Hull a = BuildHull(points(Vector::Zero()));
+    const Hull b = BuildHull(
+        points(Vector(random.Between(-2, 2), random.Between(-2, 2), random.Between(-2, 2))));
+    const Relation expected = OracleRelation(a, X_WA, b, X_WB);
+    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, expected, RelationCheck::kSearchOnly))
+        << "seed " << seed << " question " << question;
+  }
+  for (Relation relation : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
+    RecordProperty(Name(relation), check.count(relation));
+    EXPECT_GT(check.count(relation), check.questions() / 40) << Name(relation);
+  }
+  RecordProperty("spheres", check.count(Rung::kBounds));
+  RecordProperty("floating_point", check.count(Rung::kFloatingPoint));
+  RecordProperty("exact", check.count(Rung::kExact));
+  EXPECT_GT(check.count(Rung::kBounds), check.questions() / 100);
+  EXPECT_GT(check.count(Rung::kFloatingPoint), check.questions() / 10);
+  EXPECT_GT(check.count(Rung::kExact), check.questions() / 10);
 }
 
 // The solids of the cube's symmetry, whole and flat, in units of four.
