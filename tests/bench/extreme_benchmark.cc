@@ -8,7 +8,6 @@
 // arithmetic decided are those of one build.
 
 #include <benchmark/benchmark.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <ctime>
@@ -76,7 +75,6 @@ void CountSigns(benchmark::State& state, Build build, const std::vector<Vector>&
 }
 
 void Measure(benchmark::State& state, const Extreme& extreme, Build build) {
-  omp_set_num_threads(1);
   const bool is_quadratic = extreme.facets_one_by_one != nullptr;
   const int n = is_quadratic ? kQuadraticPoints : kPoints;
   const std::vector<Vector> points = extreme.make(n);

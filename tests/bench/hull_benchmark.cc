@@ -9,7 +9,6 @@
 // is by how many vertices a library's hull differs from hulld's exact one, which is audited.
 
 #include <benchmark/benchmark.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <chrono>
@@ -59,7 +58,6 @@ using Function = void (*)(benchmark::State&, Workload&);
 
 // False, with the reason in the state, when there is nothing to measure.
 bool IsReady(benchmark::State& state, Workload& workload) {
-  omp_set_num_threads(1);
   if (workload.points().empty()) {
     state.SkipWithError("skipped: no data");
   } else if (workload.vertices() == 0) {
@@ -77,24 +75,15 @@ void Report(benchmark::State& state, Workload& workload, size_t vertices) {
   state.counters["vertices_missing_or_extra"] = difference < 0 ? -difference : difference;
 }
 
+template <int kThreads>
 void BuildByHulld(benchmark::State& state, Workload& workload) {
   if (!IsReady(state, workload)) return;
+  AddLimits limits;
+  limits.threads = kThreads;
   size_t vertices = 0;
   for (auto _ : state) {
     HullBuilder builder;
-    benchmark::DoNotOptimize(builder.Add(workload.points()));
-    vertices = builder.vertex_count();
-  }
-  Report(state, workload, vertices);
-}
-
-void BuildByHulldOnTwoThreads(benchmark::State& state, Workload& workload) {
-  if (!IsReady(state, workload)) return;
-  omp_set_num_threads(2);
-  size_t vertices = 0;
-  for (auto _ : state) {
-    HullBuilder builder;
-    benchmark::DoNotOptimize(builder.Add(workload.points()));
+    benchmark::DoNotOptimize(builder.Add(workload.points(), limits));
     vertices = builder.vertex_count();
   }
   Report(state, workload, vertices);
@@ -195,8 +184,8 @@ void RegisterBuilds() {
         "sphere:100000", "sphere:1000000", "mesh:stanford-bunny.obj", "mesh:rocker-arm.obj",
         "mesh:spot.obj", "lattice:50"}) {
     const auto workload = std::make_shared<Workload>(name);
-    Add("build", "hulld", BuildByHulld, workload);
-    Add("build", "hulld on two threads", BuildByHulldOnTwoThreads, workload)->UseRealTime();
+    Add("build", "hulld", BuildByHulld<1>, workload);
+    Add("build", "hulld on two threads", BuildByHulld<2>, workload)->UseRealTime();
     // What takes many seconds is measured once.
     const int repetitions = workload->name() == "sphere:1000000" ? 1 : 3;
     Add("build", "qhull", BuildByQhull, workload)->Repetitions(repetitions);
@@ -222,7 +211,7 @@ void RegisterCosts() {
     for (const int n : {100, 300, 1000, 3000, 10000, 30000, 100000, 300000, 1000000}) {
       const auto workload =
           std::make_shared<Workload>(std::string(shape) + ":" + std::to_string(n));
-      Add("cost", "hulld", BuildByHulld, workload);
+      Add("cost", "hulld", BuildByHulld<1>, workload);
       Add("cost", "hulld one at a time", InsertOneByOne<HulldStream>, workload);
       Add("cost", "qhull", BuildByQhull, workload)->Repetitions(n > 100000 ? 1 : 3);
       Add("cost", "cgal", BuildByCgal, workload)->Repetitions(n > 100000 ? 1 : 3);
