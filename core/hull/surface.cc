@@ -33,6 +33,13 @@ int ResolutionFor(size_t triangles, bool rejects) {
   return std::clamp(static_cast<int>(cells_a_side), 2, 256);
 }
 
+// Times the power of two that brings the largest component into [1/2, 1).
+Vector WithUnitSize(const Vector& v) {
+  int exponent = 0;
+  std::frexp(LargestComponent(v), &exponent);
+  return v.unaryExpr([exponent](double component) { return std::ldexp(component, -exponent); });
+}
+
 }  // namespace
 
 Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex) {
@@ -113,7 +120,7 @@ void Surface::FinishInsertions(const VertexTable& vertices) {
 
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
   const double size = vertices.max_abs_coordinate() + LargestComponent(point);
-  return size <= kPlaneMaxCoordinate ? size : INFINITY;
+  return size >= kPlaneMinCoordinate && size <= kPlaneMaxCoordinate ? size : INFINITY;
 }
 
 int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
@@ -125,14 +132,18 @@ int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
 void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b,
                           VertexId c) {
   SurfaceTriangle& t = triangles_[id];
-  const Vector e = vertices[b] - vertices[a];
-  const Vector f = vertices[c] - vertices[a];
+  Vector e = vertices[b] - vertices[a];
+  Vector f = vertices[c] - vertices[a];
+  double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
+  if (!(slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope)) {
+    e = WithUnitSize(e);
+    f = WithUnitSize(f);
+    slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
+  }
   t.corners = {a, b, c};
   t.normal = Cross(e, f);
   t.offset = t.normal.dot(vertices[a]);
-  const double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
-  const bool in_range = slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope;
-  t.slope = in_range ? static_cast<float>(slope * (1 + 0x1p-20)) : INFINITY;
+  t.slope = static_cast<float>(slope * (1 + 0x1p-20));
   t.mark = 0;
 }
 

@@ -35,11 +35,14 @@ inline constexpr double kExpansionMax = 0x1p330;
 // + |a|). In total 48 u |e||f| (|p| + |a|) without underflow; 64 u leaves slack for rounding the
 // bound itself. Proven.
 inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
-// The bound is kept as a float per |p| + |a|; outside this range a plane is never certain. Within
-// it, and with |p| and |a| at most kPlaneMaxCoordinate, no product overflows (2^166 * 2^600) and
-// underflow (2^-1074 times at most six coordinates) is below 2^-900 of the bound. Proven.
+// The bound is kept as a float per |p| + |a|. Outside this range e and f are first scaled by powers
+// of two to |e|, |f| in [1/2, 1). So, and with |p| + |a| at least kPlaneMinCoordinate and at most
+// kPlaneMaxCoordinate, no product overflows (2^166 * 2^600), and underflow, at most 2^-1070 in all,
+// is below 2^-50 of the slack, 16 u |e||f| (|p| + |a|) >= 2^-1011. Outside these a plane is never
+// certain. Proven.
 inline constexpr double kPlaneMinSlope = 0x1p-120;
 inline constexpr double kPlaneMaxSlope = 0x1p120;
+inline constexpr double kPlaneMinCoordinate = 0x1p-960;
 inline constexpr double kPlaneMaxCoordinate = 0x1p600;
 
 // y . (A x B) for differences y, A, B of doubles, |A|, |B|, |y| at most D: at most 48 u D^3 as
