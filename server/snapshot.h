@@ -18,7 +18,7 @@ class Snapshot {
 
   const Hull& hull() const { return hull_; }
 
-  // What collision queries need of the hull. The first call makes it, in O(V).
+  // What collision queries need of the hull. The first call makes it.
   const QueryHull& query_hull() const {
     std::call_once(query_hull_once_, [this] { query_hull_.emplace(hull_); });
     return *query_hull_;

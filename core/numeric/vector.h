@@ -9,8 +9,7 @@ namespace hulld {
 // A point or a direction: three doubles, the caller's length unit where it is a point.
 using Vector = Eigen::Vector3d;
 
-// The operations of IntegerVector for doubles, rounded, so that one algorithm can be written for
-// both.
+// The operations of IntegerVector for doubles, rounded.
 inline double Dot(const Vector& a, const Vector& b) { return a.dot(b); }
 inline Vector Cross(const Vector& a, const Vector& b) { return a.cross(b); }
 inline bool IsZero(const Vector& a) { return a.x() == 0 && a.y() == 0 && a.z() == 0; }

@@ -163,17 +163,18 @@ struct PairCache {
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options = {}, PairCache* cache = nullptr);
 
-// The same for hulls that are asked about once: makes what queries need of them, in O(V), and drops
-// it. INVALID_ARGUMENT also for poses that are not valid (ValidatePose).
+// The same for hulls that are asked about once: makes what queries need of them (QueryHull), and
+// drops it. INVALID_ARGUMENT also for poses that are not valid (ValidatePose).
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,
                                       const Pose& X_WB, const QueryOptions& options = {});
 
-// The relation alone, as CheckCollision finds it with this tolerance: the fastest way to ask.
-// Requires tolerance >= 0.
 struct RelationAnswer {
   Relation relation;
   Rung rung;
 };
+
+// The relation alone, as CheckCollision finds it with this tolerance: the fastest way to ask.
+// Requires tolerance >= 0.
 RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache = nullptr,
                             double tolerance = 0);
 

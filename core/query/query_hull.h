@@ -15,7 +15,7 @@ namespace hulld {
 // and kept beside it. Immutable; readable by any thread.
 class QueryHull {
  public:
-  // `hull` must outlive the result. Cost: O(V).
+  // `hull` must outlive the result. Cost: that of a SupportMap.
   explicit QueryHull(const Hull& hull);
 
   const Hull& hull() const { return *hull_; }

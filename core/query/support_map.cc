@@ -14,9 +14,10 @@
 namespace hulld {
 namespace {
 
-// Up to this many vertices a scan beats the cube map. Observed: tests/bench/query_benchmark.
+// Up to this many vertices are scanned: ten blocks of four. A choice, not tuned.
 constexpr size_t kMostScanned = 40;
-// Cells of the cube map per vertex. Observed: more of them save less than their cache misses cost.
+// Cells of the cube map per vertex. A choice: two of 16 bytes each keep all that queries need
+// beyond the snapshot below 75 bytes a vertex (observed: tests/core/hull_cost_test).
 constexpr double kCellsPerVertex = 2;
 // A cell with more vertices than this lists one of them, to climb from.
 constexpr size_t kMostListed = 24;

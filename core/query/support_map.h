@@ -31,7 +31,7 @@ namespace hulld {
 class SupportMap {
  public:
   SupportMap() = default;
-  // `hull` must outlive the map. Cost: O(V) on average.
+  // `hull` must outlive the map. Cost: O(V), for a large hull O(V log V).
   explicit SupportMap(const Hull& hull);
 
   struct Support {
@@ -42,7 +42,7 @@ class SupportMap {
   };
 
   // A vertex far along n, the farthest where certain and almost always otherwise. Requires the hull
-  // not empty. Cost: O(1) on average, some 10 ns.
+  // not empty. Cost: O(V) for a small hull, O(1) on average for a large one.
   Support Farthest(const Vector& n) const { return cells_.empty() ? Scan(n) : LookUp(n); }
 
   // The farthest: `value` is within `blur` of the largest computed value.
