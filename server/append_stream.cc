@@ -33,16 +33,12 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 }  // namespace
 
 grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendStream::Start(
-    const grpc::CallbackServerContext& context, Admission& admission, Registry& registry) {
-  const std::shared_ptr<AppendStream> stream(new AppendStream(context, registry));
+    grpc::CallbackServerContext& context, Admission& admission, Registry& registry) {
+  const std::shared_ptr<AppendStream> stream(new AppendStream(context, admission, registry));
   stream->self_ = stream;
-  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
+  const absl::Status begun = stream->call_.Begin();
   const std::lock_guard lock(stream->mutex_);
-  if (ticket.ok()) {
-    stream->ticket_ = *std::move(ticket);
-  } else {
-    stream->End(ticket.status());
-  }
+  if (!begun.ok()) stream->End(begun);
   stream->Proceed();
   return stream.get();
 }
@@ -56,7 +52,7 @@ void AppendStream::OnReadDone(bool ok) {
       HandleMessage();
     } else {
       // The client has said all, or is gone.
-      End(lifetime_.ShouldStop() ? lifetime_.StopStatus() : absl::OkStatus());
+      End(call_.ShouldStop() ? call_.StopStatus() : absl::OkStatus());
     }
   }
   Proceed();
@@ -75,10 +71,10 @@ void AppendStream::OnWriteDone(bool ok) {
 
 void AppendStream::OnCancel() {
   const std::shared_ptr<AppendStream> self = shared_from_this();
-  lifetime_.Cancel();
+  call_.Cancel();
   const std::lock_guard lock(mutex_);
   next_reply_.reset();
-  End(lifetime_.StopStatus());
+  End(call_.StopStatus());
   Proceed();
 }
 
@@ -138,7 +134,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const std::shared_ptr<AppendStream> self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
   registry_.Append(
-      *session_, *std::move(chunk), [self] { return self->lifetime_.ShouldStop(); },
+      *session_, *std::move(chunk), [self] { return self->call_.ShouldStop(); },
       [self, sequence](const absl::StatusOr<ChunkResult>& result) {
         const std::lock_guard lock(self->mutex_);
         self->applying_ = false;
@@ -149,8 +145,8 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
 
 void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result) {
   if (!result.ok()) {
-    const bool stopped = lifetime_.ShouldStop();
-    return End(stopped ? lifetime_.StopStatus() : result.status());
+    const bool stopped = call_.ShouldStop();
+    return End(stopped ? call_.StopStatus() : result.status());
   }
   if (finished_) return;
   if (!next_reply_.has_value()) next_reply_.emplace();
@@ -188,7 +184,7 @@ void AppendStream::Proceed() {
     StartWrite(&reply_in_flight_);
   } else if (!writing_ && end_.has_value() && !applying_) {
     finished_ = true;
-    Finish(ToGrpc(*end_));
+    Finish(call_.End(*end_));
     return;
   }
   if (!end_.has_value() && !reading_ && !applying_) {

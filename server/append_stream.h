@@ -9,8 +9,7 @@
 #include <optional>
 
 #include "hulld/v1/hull.pb.h"
-#include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/registry.h"
 
 namespace hulld::server {
@@ -26,11 +25,11 @@ class AppendStream
       public std::enable_shared_from_this<AppendStream> {
  public:
   static grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* Start(
-      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry);
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry);
 
  private:
-  AppendStream(const grpc::CallbackServerContext& context, Registry& registry)
-      : registry_(registry), lifetime_(context.deadline()) {}
+  AppendStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry)
+      : registry_(registry), call_(context, admission, Rpc::kAppendPoints) {}
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -46,8 +45,7 @@ class AppendStream
   void Proceed();
 
   Registry& registry_;
-  CallLifetime lifetime_;
-  std::optional<Admission::Ticket> ticket_;
+  Call call_;
   // Keeps this alive until gRPC is done with it; a queued chunk holds another reference.
   std::shared_ptr<AppendStream> self_;
 

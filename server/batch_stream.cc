@@ -32,23 +32,24 @@ double TextbookProjections(const Hull& a, const Hull& b) {
 }  // namespace
 
 grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchStream::Start(
-    const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
     WorkerPool& readers, Executor& executor, const v1::BatchCheckCollisionsRequest& request) {
-  const std::shared_ptr<BatchStream> stream(new BatchStream(context, registry, executor, request));
+  const std::shared_ptr<BatchStream> stream(
+      new BatchStream(context, admission, registry, executor, request));
   stream->self_ = stream;
-  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
-  if (ticket.ok()) {
-    stream->ticket_ = *std::move(ticket);
+  const absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) {
     readers.Submit([stream] { stream->Open(); });
   } else {
-    stream->Finish(ToGrpc(ticket.status()));
+    stream->Finish(stream->call_.End(begun));
   }
   return stream.get();
 }
 
 absl::Status BatchStream::Validate() {
-  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
-      request_.method(), request_.wanted(), request_.tolerance(), registry_.limits(), lifetime_);
+  absl::StatusOr<QueryOptions> options =
+      MakeQueryOptions(request_.method(), request_.wanted(), request_.tolerance(),
+                       registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
   return ValidatePairs(request_.pairs(), static_cast<size_t>(request_.placements_size()),
@@ -67,7 +68,7 @@ absl::Status BatchStream::ResolvePlacements() {
 void BatchStream::Open() {
   absl::Status status = Validate();
   if (status.ok()) status = ResolvePlacements();
-  if (lifetime_.ShouldStop()) status = lifetime_.StopStatus();
+  if (call_.ShouldStop()) status = call_.StopStatus();
   const std::lock_guard lock(mutex_);
   computing_ = false;
   slice_pairs_ = kFirstSlicePairs;
@@ -125,7 +126,7 @@ absl::Status BatchStream::ComputeSlice() {
   }
   const auto start = std::chrono::steady_clock::now();
   const std::vector<absl::StatusOr<Answer>> answers = AnswerPairs(pairs);
-  if (lifetime_.ShouldStop()) return lifetime_.StopStatus();
+  if (call_.ShouldStop()) return call_.StopStatus();
   AdaptSlice(end - begin, std::chrono::steady_clock::now() - start);
 
   BatchColumns columns(std::move(head_), request_.wanted(), begin);
@@ -166,9 +167,9 @@ void BatchStream::OnWriteDone(bool ok) {
   const std::lock_guard lock(mutex_);
   writing_ = false;
   if (!ok) {
-    lifetime_.Cancel();
+    call_.Cancel();
     ready_.clear();
-    if (!end_.has_value()) end_ = lifetime_.StopStatus();
+    if (!end_.has_value()) end_ = call_.StopStatus();
   }
   Proceed();
 }
@@ -184,14 +185,14 @@ void BatchStream::Proceed() {
   if (end_.has_value()) {
     if (writing_ || computing_) return;
     finished_ = true;
-    Finish(ToGrpc(*end_));
+    Finish(call_.End(*end_));
     return;
   }
   if (computing_ || !ready_.empty()) return;
   computing_ = true;
   executor_.Submit([self = shared_from_this()] {
     const absl::Status status =
-        self->lifetime_.ShouldStop() ? self->lifetime_.StopStatus() : self->ComputeSlice();
+        self->call_.ShouldStop() ? self->call_.StopStatus() : self->ComputeSlice();
     const std::lock_guard lock(self->mutex_);
     self->computing_ = false;
     if (self->end_.has_value()) {

@@ -15,8 +15,7 @@
 
 #include "core/query/batch.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/executor.h"
 #include "server/placement_table.h"
 #include "server/registry.h"
@@ -32,19 +31,19 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
  public:
   // `request` must outlive the call, as gRPC's requests do.
   static grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* Start(
-      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
       WorkerPool& readers, Executor& executor, const v1::BatchCheckCollisionsRequest& request);
 
  private:
-  BatchStream(const grpc::CallbackServerContext& context, Registry& registry, Executor& executor,
-              const v1::BatchCheckCollisionsRequest& request)
+  BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+              Executor& executor, const v1::BatchCheckCollisionsRequest& request)
       : registry_(registry),
         executor_(executor),
         request_(request),
-        lifetime_(context.deadline()) {}
+        call_(context, admission, Rpc::kBatchCheckCollisions) {}
 
   void OnWriteDone(bool ok) override;
-  void OnCancel() override { lifetime_.Cancel(); }
+  void OnCancel() override { call_.Cancel(); }
   void OnDone() override { self_.reset(); }
 
   size_t pair_count() const { return static_cast<size_t>(request_.pairs_size()) / 2; }
@@ -64,8 +63,7 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
   Registry& registry_;
   Executor& executor_;
   const v1::BatchCheckCollisionsRequest& request_;
-  CallLifetime lifetime_;
-  std::optional<Admission::Ticket> ticket_;
+  Call call_;
   // Keeps this alive until gRPC is done with it.
   std::shared_ptr<BatchStream> self_;
 

@@ -95,9 +95,10 @@ absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
 grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
                                                            const v1::CheckCollisionRequest* request,
                                                            v1::CheckCollisionResponse* response) {
-  return UnaryCall::Start(*context, admission_, [&](UnaryCall* call) {
+  return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
     readers_.Submit([this, call, request, response] {
-      absl::StatusOr<PairQuery> query = Prepare(registry_, call->lifetime(), *request, response);
+      absl::StatusOr<PairQuery> query =
+          Prepare(registry_, call->call().lifetime(), *request, response);
       if (!query.ok()) return call->End(query.status());
       if (query->options.method != Method::kTextbookSat) {
         return call->End(Answer(*query, request->wanted(), response));

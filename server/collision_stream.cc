@@ -44,16 +44,16 @@ absl::StatusOr<Pose> PoseAt(const v1::CollisionStreamUpdate& update, int i) {
 }  // namespace
 
 grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
-CollisionStream::Start(const grpc::CallbackServerContext& context, Admission& admission,
+CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
                        Registry& registry, WorkerPool& readers) {
-  const std::shared_ptr<CollisionStream> stream(new CollisionStream(context, registry, readers));
+  const std::shared_ptr<CollisionStream> stream(
+      new CollisionStream(context, admission, registry, readers));
   stream->self_ = stream;
-  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
-  if (ticket.ok()) {
-    stream->ticket_ = *std::move(ticket);
+  const absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) {
     stream->StartRead(&stream->request_);
   } else {
-    stream->Finish(ToGrpc(ticket.status()));
+    stream->Finish(stream->call_.End(begun));
   }
   return stream.get();
 }
@@ -74,7 +74,7 @@ void CollisionStream::OnWriteDone(bool ok) {
 }
 
 void CollisionStream::End(const absl::Status& status) {
-  Finish(ToGrpc(lifetime_.ShouldStop() ? lifetime_.StopStatus() : status));
+  Finish(call_.End(call_.ShouldStop() ? call_.StopStatus() : status));
 }
 
 void CollisionStream::Handle() {
@@ -110,8 +110,9 @@ absl::Status CollisionStream::HandleMessage() {
 
 absl::Status CollisionStream::HandleOpen() {
   const v1::CollisionStreamOpen& open = request_.open();
-  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
-      v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(), lifetime_);
+  absl::StatusOr<QueryOptions> options =
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
+                       call_.lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
   const auto placements = static_cast<size_t>(open.placements_size());
   const absl::Status valid =
@@ -243,12 +244,12 @@ void CollisionStream::AnswerSlice() {
     if (response_bytes_ >= Config::kReplyMessageBytes) break;
     AddAnswer(asked_[next_asked_++]);
     if (next_asked_ % kPairsPerLook != 0) continue;
-    if (lifetime_.ShouldStop()) break;
+    if (call_.ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
       return readers_.Submit([self = shared_from_this()] { self->AnswerSlice(); });
     }
   }
-  if (lifetime_.ShouldStop()) return End(lifetime_.StopStatus());
+  if (call_.ShouldStop()) return End(call_.StopStatus());
   response_.set_update(messages_);
   response_.set_last(next_asked_ == asked_.size());
   StartWrite(&response_);

@@ -12,8 +12,7 @@
 
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/placement_table.h"
 #include "server/registry.h"
 #include "server/worker_pool.h"
@@ -31,7 +30,7 @@ class CollisionStream
       public std::enable_shared_from_this<CollisionStream> {
  public:
   static grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>* Start(
-      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
       WorkerPool& readers);
 
  private:
@@ -44,13 +43,13 @@ class CollisionStream
     v1::Relation relation = v1::RELATION_UNSPECIFIED;
   };
 
-  CollisionStream(const grpc::CallbackServerContext& context, Registry& registry,
+  CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
                   WorkerPool& readers)
-      : registry_(registry), readers_(readers), lifetime_(context.deadline()) {}
+      : registry_(registry), readers_(readers), call_(context, admission, Rpc::kStreamCollisions) {}
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
-  void OnCancel() override { lifetime_.Cancel(); }
+  void OnCancel() override { call_.Cancel(); }
   void OnDone() override { self_.reset(); }
 
   void End(const absl::Status& status);
@@ -67,8 +66,7 @@ class CollisionStream
 
   Registry& registry_;
   WorkerPool& readers_;
-  CallLifetime lifetime_;
-  std::optional<Admission::Ticket> ticket_;
+  Call call_;
   // Keeps this alive until gRPC is done with it; a queued task holds another reference.
   std::shared_ptr<CollisionStream> self_;
 

@@ -35,7 +35,8 @@ void EncodeBox(const Hull& hull, v1::GetHullResponse* response) {
 grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* context,
                                                   const v1::CreateHullRequest* request,
                                                   v1::CreateHullResponse* response) {
-  return UnaryCall::Answer(*context, admission_, [&] { return Create(*request, response); });
+  return UnaryCall::Answer(*context, admission_, Rpc::kCreateHull,
+                           [&](const Call&) { return Create(*request, response); });
 }
 
 grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>*
@@ -46,10 +47,9 @@ HullService::AppendPoints(grpc::CallbackServerContext* context) {
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
                                                const v1::GetHullRequest* request,
                                                v1::GetHullResponse* response) {
-  return UnaryCall::AnswerOn(readers_, *context, admission_,
-                             [this, request, response](const CallLifetime& lifetime) {
-                               return Get(*request, lifetime, response);
-                             });
+  return UnaryCall::AnswerOn(
+      readers_, *context, admission_, Rpc::kGetHull,
+      [this, request, response](const Call& call) { return Get(*request, call, response); });
 }
 
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
@@ -60,13 +60,15 @@ grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
                                                  const v1::ListHullsRequest* request,
                                                  v1::ListHullsResponse* response) {
-  return UnaryCall::Answer(*context, admission_, [&] { return List(*request, response); });
+  return UnaryCall::Answer(*context, admission_, Rpc::kListHulls,
+                           [&](const Call&) { return List(*request, response); });
 }
 
 grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
                                                   const v1::DeleteHullRequest* request,
                                                   v1::DeleteHullResponse* response) {
-  return UnaryCall::Answer(*context, admission_, [&] { return Delete(*request, response); });
+  return UnaryCall::Answer(*context, admission_, Rpc::kDeleteHull,
+                           [&](const Call&) { return Delete(*request, response); });
 }
 
 absl::Status HullService::Create(const v1::CreateHullRequest& request,
@@ -82,11 +84,10 @@ absl::Status HullService::Create(const v1::CreateHullRequest& request,
   return absl::OkStatus();
 }
 
-absl::Status HullService::Get(const v1::GetHullRequest& request, const CallLifetime& lifetime,
+absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
                               v1::GetHullResponse* response) {
   if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
-  const auto resolved =
-      registry_.Resolve(request.hull_id(), [&lifetime] { return lifetime.ShouldStop(); });
+  const auto resolved = registry_.Resolve(request.hull_id(), [&call] { return call.ShouldStop(); });
   if (!resolved.ok()) return resolved.status();
   const auto& [revision, view] = *resolved;
   EncodeHeader(registry_.store(), revision, response->mutable_header());

@@ -5,7 +5,7 @@
 
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/registry.h"
 #include "server/worker_pool.h"
 
@@ -37,7 +37,7 @@ class HullService : public v1::HullService::CallbackService {
 
  private:
   absl::Status Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response);
-  absl::Status Get(const v1::GetHullRequest& request, const CallLifetime& lifetime,
+  absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
   absl::Status List(const v1::ListHullsRequest& request, v1::ListHullsResponse* response);
   absl::Status Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response);

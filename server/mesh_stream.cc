@@ -21,33 +21,32 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 }  // namespace
 
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* MeshStream::Start(
-    const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
     WorkerPool& readers, const v1::GetHullMeshRequest& request) {
-  auto* stream = new MeshStream(context);
-  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
-  if (ticket.ok()) {
-    stream->ticket_ = *std::move(ticket);
+  auto* stream = new MeshStream(context, admission);
+  const absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) {
     // gRPC keeps the request until the call is done.
     readers.Submit([stream, &registry, &request] { stream->Open(registry, request); });
   } else {
-    stream->Finish(ToGrpc(ticket.status()));
+    stream->Finish(stream->call_.End(begun));
   }
   return stream;
 }
 
 void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request) {
   absl::Status valid = ValidateHullId(request.hull_id(), "hull_id");
-  if (!valid.ok()) return Finish(ToGrpc(valid));
-  auto resolved = registry.Resolve(request.hull_id(), [this] { return lifetime_.ShouldStop(); });
-  if (lifetime_.ShouldStop()) return Finish(ToGrpc(lifetime_.StopStatus()));
-  if (!resolved.ok()) return Finish(ToGrpc(resolved.status()));
+  if (!valid.ok()) return Finish(call_.End(valid));
+  auto resolved = registry.Resolve(request.hull_id(), [this] { return call_.ShouldStop(); });
+  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
+  if (!resolved.ok()) return Finish(call_.End(resolved.status()));
   mesh_ =
       std::shared_ptr<const Hull>(resolved->second.snapshot, &resolved->second.snapshot->hull());
   v1::MeshHeader* header = message_.mutable_header();
   if (request.has_simplification()) {
     const absl::Status simplified = Simplify(request.simplification(), header);
-    if (lifetime_.ShouldStop()) return Finish(ToGrpc(lifetime_.StopStatus()));
-    if (!simplified.ok()) return Finish(ToGrpc(Prefixed("simplification: ", simplified)));
+    if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
+    if (!simplified.ok()) return Finish(call_.End(Prefixed("simplification: ", simplified)));
   }
   EncodeHeader(registry.store(), resolved->first, header->mutable_header());
   EncodeRecord(resolved->second.record, header->mutable_hull());
@@ -59,8 +58,7 @@ void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request)
 absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
                                   v1::MeshHeader* header) {
   const SimplifyTarget target = {static_cast<size_t>(simplification.max_vertices()),
-                                 simplification.max_error(),
-                                 [this] { return lifetime_.ShouldStop(); }};
+                                 simplification.max_error(), [this] { return call_.ShouldStop(); }};
   absl::StatusOr<SimplifiedHull> simplified;
   switch (simplification.side()) {
     case v1::SIMPLIFICATION_SIDE_INSIDE:
@@ -79,7 +77,7 @@ absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
 }
 
 void MeshStream::OnWriteDone(bool ok) {
-  if (lifetime_.ShouldStop()) return Finish(ToGrpc(lifetime_.StopStatus()));
+  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
   if (!ok) return Finish(grpc::Status(grpc::StatusCode::CANCELLED, "the client is gone"));
   if (!NextMessage()) return Finish(grpc::Status::OK);
   StartWrite(&message_);

@@ -8,8 +8,7 @@
 #include <string>
 
 #include "hulld/v1/hull.pb.h"
-#include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/registry.h"
 #include "server/worker_pool.h"
 
@@ -20,14 +19,15 @@ namespace hulld::server {
 class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
  public:
   static grpc::ServerWriteReactor<v1::GetHullMeshResponse>* Start(
-      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
       WorkerPool& readers, const v1::GetHullMeshRequest& request);
 
  private:
-  explicit MeshStream(const grpc::CallbackServerContext& context) : lifetime_(context.deadline()) {}
+  MeshStream(grpc::CallbackServerContext& context, Admission& admission)
+      : call_(context, admission, Rpc::kGetHullMesh) {}
 
   void OnWriteDone(bool ok) override;
-  void OnCancel() override { lifetime_.Cancel(); }
+  void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
 
   void Open(Registry& registry, const v1::GetHullMeshRequest& request);
@@ -37,8 +37,7 @@ class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
   void FillVertices(v1::MeshVertices* message);
   void FillFacets(v1::MeshFacets* message);
 
-  CallLifetime lifetime_;
-  std::optional<Admission::Ticket> ticket_;
+  Call call_;
   // What is sent: the hull itself, or what stands for it.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;

@@ -60,16 +60,16 @@ std::vector<GroupPair> IgnoredGroups(const v1::FindCollisionsRequest& request) {
 }  // namespace
 
 grpc::ServerWriteReactor<v1::FindCollisionsResponse>* SceneStream::Start(
-    const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
     WorkerPool& readers, Executor& executor, const v1::FindCollisionsRequest& request) {
-  const std::shared_ptr<SceneStream> stream(new SceneStream(context, registry, executor, request));
+  const std::shared_ptr<SceneStream> stream(
+      new SceneStream(context, admission, registry, executor, request));
   stream->self_ = stream;
-  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
-  if (!ticket.ok()) {
-    stream->Finish(ToGrpc(ticket.status()));
+  const absl::Status begun = stream->call_.Begin();
+  if (!begun.ok()) {
+    stream->Finish(stream->call_.End(begun));
     return stream.get();
   }
-  stream->ticket_ = *std::move(ticket);
   readers.Submit([stream] {
     const absl::Status opened = stream->Open();
     if (!opened.ok()) return stream->End(opened);
@@ -82,7 +82,7 @@ grpc::ServerWriteReactor<v1::FindCollisionsResponse>* SceneStream::Start(
 absl::Status SceneStream::Open() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request_.wanted(), request_.tolerance(),
-                       registry_.limits(), lifetime_);
+                       registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
   if (absl::Status s = ValidateGroups(request_); !s.ok()) return s;
   ignored_groups_ = IgnoredGroups(request_);
@@ -90,7 +90,7 @@ absl::Status SceneStream::Open() {
   options_.groups = {request_.groups().data(), static_cast<size_t>(request_.groups_size())};
   if (request_.has_movers()) options_.movers = request_.movers();
   options_.query = *std::move(options);
-  options_.query.should_stop = [this] { return lifetime_.ShouldStop() || too_slow_; };
+  options_.query.should_stop = [this] { return call_.ShouldStop() || too_slow_; };
   options_.threads = executor_.threads();
   table_ = PlacementTable(request_.placements());
   if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
@@ -101,7 +101,7 @@ absl::Status SceneStream::Open() {
 }
 
 absl::Status SceneStream::Search() {
-  if (lifetime_.ShouldStop()) return lifetime_.StopStatus();
+  if (call_.ShouldStop()) return call_.StopStatus();
   const absl::StatusOr<SceneTotals> searched = hulld::FindCollisions(
       table_.placed(), options_, [this](std::span<const SceneAnswer> answers) { Take(answers); });
   if (too_slow_) {
@@ -158,7 +158,7 @@ bool SceneStream::IsIdle() {
 void SceneStream::Send() {
   std::unique_lock lock(mutex_);
   const bool room = sent_.wait_for(lock, kMostPatience, [this] {
-    return ready_.size() < kMostWaiting || end_.has_value() || lifetime_.ShouldStop();
+    return ready_.size() < kMostWaiting || end_.has_value() || call_.ShouldStop();
   });
   if (!room) too_slow_ = true;
   ready_.push_back(std::exchange(filling_, {}));
@@ -169,7 +169,7 @@ void SceneStream::Send() {
 void SceneStream::End(const absl::Status& status) {
   const std::lock_guard lock(mutex_);
   searching_ = false;
-  if (!end_.has_value()) end_ = lifetime_.ShouldStop() ? lifetime_.StopStatus() : status;
+  if (!end_.has_value()) end_ = call_.ShouldStop() ? call_.StopStatus() : status;
   // After an error nobody waits for the rest.
   if (!end_->ok()) ready_.clear();
   Proceed();
@@ -180,9 +180,9 @@ void SceneStream::OnWriteDone(bool ok) {
   const std::lock_guard lock(mutex_);
   writing_ = false;
   if (!ok) {
-    lifetime_.Cancel();
+    call_.Cancel();
     ready_.clear();
-    if (!end_.has_value()) end_ = lifetime_.StopStatus();
+    if (!end_.has_value()) end_ = call_.StopStatus();
   }
   sent_.notify_all();
   Proceed();
@@ -190,7 +190,7 @@ void SceneStream::OnWriteDone(bool ok) {
 
 void SceneStream::OnCancel() {
   const std::lock_guard lock(mutex_);
-  lifetime_.Cancel();
+  call_.Cancel();
   sent_.notify_all();
 }
 
@@ -204,7 +204,7 @@ void SceneStream::Proceed() {
   }
   if (!end_.has_value() || writing_ || searching_) return;
   finished_ = true;
-  Finish(ToGrpc(*end_));
+  Finish(call_.End(*end_));
 }
 
 }  // namespace hulld::server

@@ -16,8 +16,7 @@
 
 #include "core/query/scene.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/executor.h"
 #include "server/placement_table.h"
 #include "server/registry.h"
@@ -33,16 +32,16 @@ class SceneStream : public grpc::ServerWriteReactor<v1::FindCollisionsResponse>,
  public:
   // `request` must outlive the call, as gRPC's requests do.
   static grpc::ServerWriteReactor<v1::FindCollisionsResponse>* Start(
-      const grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
       WorkerPool& readers, Executor& executor, const v1::FindCollisionsRequest& request);
 
  private:
-  SceneStream(const grpc::CallbackServerContext& context, Registry& registry, Executor& executor,
-              const v1::FindCollisionsRequest& request)
+  SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+              Executor& executor, const v1::FindCollisionsRequest& request)
       : registry_(registry),
         executor_(executor),
         request_(request),
-        lifetime_(context.deadline()) {}
+        call_(context, admission, Rpc::kFindCollisions) {}
 
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
@@ -61,8 +60,7 @@ class SceneStream : public grpc::ServerWriteReactor<v1::FindCollisionsResponse>,
   Registry& registry_;
   Executor& executor_;
   const v1::FindCollisionsRequest& request_;
-  CallLifetime lifetime_;
-  std::optional<Admission::Ticket> ticket_;
+  Call call_;
   // Keeps this alive until gRPC is done with it.
   std::shared_ptr<SceneStream> self_;
 

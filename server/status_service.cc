@@ -10,7 +10,7 @@ namespace hulld::server {
 grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* context,
                                                    const v1::GetStatusRequest*,
                                                    v1::GetStatusResponse* response) {
-  return UnaryCall::Answer(*context, admission_, [&] {
+  return UnaryCall::Answer(*context, admission_, Rpc::kGetStatus, [&](const Call&) {
     const RegistrySizes sizes = registry_.Sizes();
     EncodeHeader(registry_.store(), sizes.store_revision, response->mutable_header());
     response->set_version(HULLD_VERSION);

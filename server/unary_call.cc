@@ -6,41 +6,41 @@
 
 namespace hulld::server {
 
-grpc::ServerUnaryReactor* UnaryCall::Start(const grpc::CallbackServerContext& context,
-                                           Admission& admission,
+grpc::ServerUnaryReactor* UnaryCall::Start(grpc::CallbackServerContext& context,
+                                           Admission& admission, Rpc rpc,
                                            const std::function<void(UnaryCall*)>& start) {
-  auto* call = new UnaryCall(context);
-  absl::StatusOr<Admission::Ticket> ticket = admission.Admit();
-  if (ticket.ok()) {
-    call->ticket_ = *std::move(ticket);
+  auto* call = new UnaryCall(context, admission, rpc);
+  const absl::Status begun = call->call_.Begin();
+  if (begun.ok()) {
     start(call);
   } else {
-    call->End(ticket.status());
+    call->End(begun);
   }
   return call;
 }
 
-grpc::ServerUnaryReactor* UnaryCall::Answer(const grpc::CallbackServerContext& context,
-                                            Admission& admission,
-                                            const std::function<absl::Status()>& work) {
-  return Start(context, admission, [&](UnaryCall* call) { call->End(work()); });
+grpc::ServerUnaryReactor* UnaryCall::Answer(grpc::CallbackServerContext& context,
+                                            Admission& admission, Rpc rpc,
+                                            const std::function<absl::Status(const Call&)>& work) {
+  return Start(context, admission, rpc, [&](UnaryCall* call) { call->End(work(call->call_)); });
 }
 
-grpc::ServerUnaryReactor* UnaryCall::AnswerOn(
-    WorkerPool& pool, const grpc::CallbackServerContext& context, Admission& admission,
-    std::function<absl::Status(const CallLifetime&)> work) {
-  return Start(context, admission, [&](UnaryCall* call) {
+grpc::ServerUnaryReactor* UnaryCall::AnswerOn(WorkerPool& pool,
+                                              grpc::CallbackServerContext& context,
+                                              Admission& admission, Rpc rpc,
+                                              std::function<absl::Status(const Call&)> work) {
+  return Start(context, admission, rpc, [&](UnaryCall* call) {
     pool.Submit([call, task = std::move(work)] {
-      const CallLifetime& lifetime = call->lifetime();
-      call->End(lifetime.ShouldStop() ? lifetime.StopStatus() : task(lifetime));
+      const Call& common = call->call_;
+      call->End(common.ShouldStop() ? common.StopStatus() : task(common));
     });
   });
 }
 
 void UnaryCall::End(const absl::Status& status) {
   // What stopped the work is better known here than where it was noticed.
-  const bool stopped = status.code() == absl::StatusCode::kCancelled && lifetime_.ShouldStop();
-  Finish(ToGrpc(stopped ? lifetime_.StopStatus() : status));
+  const bool stopped = status.code() == absl::StatusCode::kCancelled && call_.ShouldStop();
+  Finish(call_.End(stopped ? call_.StopStatus() : status));
 }
 
 }  // namespace hulld::server

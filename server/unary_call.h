@@ -7,8 +7,7 @@
 #include <functional>
 #include <optional>
 
-#include "server/admission.h"
-#include "server/call_lifetime.h"
+#include "server/call.h"
 #include "server/worker_pool.h"
 
 namespace hulld::server {
@@ -18,34 +17,32 @@ class UnaryCall : public grpc::ServerUnaryReactor {
  public:
   // Admits a call and hands it to `start`, which must see to it that End is called exactly once,
   // now or later. A call that is not admitted ends at once.
-  static grpc::ServerUnaryReactor* Start(const grpc::CallbackServerContext& context,
-                                         Admission& admission,
-                                         const std::function<void(UnaryCall*)>& start);
+  static grpc::ServerUnaryReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                                         Rpc rpc, const std::function<void(UnaryCall*)>& start);
 
   // Starts a call that `work` answers here and now; for work of microseconds.
-  static grpc::ServerUnaryReactor* Answer(const grpc::CallbackServerContext& context,
-                                          Admission& admission,
-                                          const std::function<absl::Status()>& work);
+  static grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext& context,
+                                          Admission& admission, Rpc rpc,
+                                          const std::function<absl::Status(const Call&)>& work);
 
   // Starts a call that `work` answers on `pool`.
-  static grpc::ServerUnaryReactor* AnswerOn(WorkerPool& pool,
-                                            const grpc::CallbackServerContext& context,
-                                            Admission& admission,
-                                            std::function<absl::Status(const CallLifetime&)> work);
+  static grpc::ServerUnaryReactor* AnswerOn(WorkerPool& pool, grpc::CallbackServerContext& context,
+                                            Admission& admission, Rpc rpc,
+                                            std::function<absl::Status(const Call&)> work);
 
   // Sends the reply; the call, its request and its response must not be touched afterwards.
   void End(const absl::Status& status);
 
-  const CallLifetime& lifetime() const { return lifetime_; }
+  const Call& call() const { return call_; }
 
  private:
-  explicit UnaryCall(const grpc::CallbackServerContext& context) : lifetime_(context.deadline()) {}
+  UnaryCall(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
+      : call_(context, admission, rpc) {}
 
-  void OnCancel() override { lifetime_.Cancel(); }
+  void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
 
-  CallLifetime lifetime_;
-  std::optional<Admission::Ticket> ticket_;
+  Call call_;
 };
 
 }  // namespace hulld::server
