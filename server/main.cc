@@ -25,6 +25,17 @@ sigset_t EndingSignals() {
   return signals;
 }
 
+void LogStore(const Config& config) {
+  if (config.store == "memory") {
+    spdlog::info("hulls live in memory and end with this process");
+  } else if (config.durability == "sync") {
+    spdlog::info("hulls live in {}; what is acknowledged is on disk", config.data_dir);
+  } else {
+    spdlog::info("hulls live in {}; what is acknowledged is on disk within {} ms", config.data_dir,
+                 Config::kRelaxedSyncInterval.count());
+  }
+}
+
 void LogStart(const Config& config, const Server& server) {
   const Limits& limits = config.limits;
   spdlog::info(
@@ -32,7 +43,7 @@ void LogStart(const Config& config, const Server& server) {
       "per batch, {} textbook axes",
       HULLD_VERSION, config.store, limits.max_points_per_chunk, limits.max_vertices_per_hull,
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
-  if (config.store == "memory") spdlog::info("hulls live in memory and end with this process");
+  LogStore(config);
   if (config.insecure) spdlog::warn("--insecure: nothing is encrypted or authenticated");
   spdlog::info("listening on {}", server.address());
 }

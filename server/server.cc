@@ -10,6 +10,7 @@
 
 #include "server/listen_address.h"
 #include "server/memory_store.h"
+#include "server/rocksdb_store.h"
 
 namespace hulld::server {
 namespace {
@@ -17,10 +18,20 @@ namespace {
 // At least two, so that one long task does not hold up all others.
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
+absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
+  if (config.store == "memory") return std::make_unique<MemoryStore>();
+  RocksDbOptions options;
+  options.data_dir = config.data_dir;
+  options.durability = config.durability == "sync" ? Durability::kSync : Durability::kRelaxed;
+  options.sync_interval = Config::kRelaxedSyncInterval;
+  options.env = config.store_env;
+  return RocksDbStore::Open(std::move(options));
+}
+
 }  // namespace
 
-Server::Server(const Config& config)
-    : store_(std::make_unique<MemoryStore>()),
+Server::Server(const Config& config, std::unique_ptr<Store> store)
+    : store_(std::move(store)),
       writers_(PoolThreads()),
       registry_(*store_, config.limits, writers_),
       readers_(PoolThreads()),
@@ -30,7 +41,10 @@ Server::Server(const Config& config)
       status_service_(registry_, admission_) {}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
-  std::unique_ptr<Server> server(new Server(config));
+  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config);
+  if (!store.ok()) return store.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(store)));
+  if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }

@@ -23,8 +23,8 @@ namespace hulld::server {
 // A running server: store -> registry -> services -> gRPC.
 class Server {
  public:
-  // Listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs --insecure.
-  // UNAVAILABLE: the address cannot be bound.
+  // Opens the store and listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs
+  // --insecure. UNAVAILABLE: the address cannot be bound. Errors of RocksDbStore::Open.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config);
 
   Server(const Server&) = delete;
@@ -42,7 +42,7 @@ class Server {
   bool WaitIdle(std::chrono::milliseconds timeout);
 
  private:
-  explicit Server(const Config& config);
+  Server(const Config& config, std::unique_ptr<Store> store);
 
   absl::Status Listen(const Config& config);
 

@@ -1,6 +1,8 @@
 #ifndef HULLD_SERVER_SNAPSHOT_H_
 #define HULLD_SERVER_SNAPSHOT_H_
 
+#include <atomic>
+#include <cstddef>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -20,14 +22,23 @@ class Snapshot {
 
   // What collision queries need of the hull. The first call makes it.
   const QueryHull& query_hull() const {
-    std::call_once(query_hull_once_, [this] { query_hull_.emplace(hull_); });
+    std::call_once(query_hull_once_, [this] {
+      query_hull_.emplace(hull_);
+      query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_relaxed);
+    });
     return *query_hull_;
+  }
+
+  // What it holds in memory by now.
+  size_t MemoryBytes() const {
+    return sizeof(*this) + hull_.MemoryBytes() + query_hull_bytes_.load(std::memory_order_relaxed);
   }
 
  private:
   const Hull hull_;
   mutable std::once_flag query_hull_once_;
   mutable std::optional<QueryHull> query_hull_;
+  mutable std::atomic<size_t> query_hull_bytes_ = 0;
 };
 
 }  // namespace hulld::server
