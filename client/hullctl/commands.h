@@ -23,6 +23,7 @@ void AddVerifyCommand(CLI::App* app, Invocation* invocation);
 void AddGenerateCommand(CLI::App* app, Invocation* invocation);
 void AddStatusCommand(CLI::App* app, Invocation* invocation);
 void AddPictureCommand(CLI::App* app, Invocation* invocation);
+void AddTokenCommand(CLI::App* app, Invocation* invocation);
 
 }  // namespace hulld
 

@@ -60,6 +60,7 @@ Client Invocation::MakeClient() const {
   ClientOptions options;
   options.server = server;
   options.timeout = timeout;
+  options.security = security;
   return Client(std::move(options));
 }
 
