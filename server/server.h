@@ -13,6 +13,7 @@
 #include "server/config.h"
 #include "server/executor.h"
 #include "server/hull_service.h"
+#include "server/metrics.h"
 #include "server/registry.h"
 #include "server/status_service.h"
 #include "server/store.h"
@@ -46,7 +47,9 @@ class Server {
 
   absl::Status Listen(const Config& config);
 
-  // Calls leave their ticket last of all, hence first here.
+  // All others report to it.
+  Metrics metrics_;
+  // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
   // Chunks, and everything else that may take longer than moving bytes. Two pools, so that readers
