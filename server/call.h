@@ -9,23 +9,9 @@
 #include "server/admission.h"
 #include "server/call_lifetime.h"
 #include "server/caller.h"
+#include "server/rpc.h"
 
 namespace hulld::server {
-
-// What a client may call.
-enum class Rpc {
-  kCreateHull,
-  kAppendPoints,
-  kGetHull,
-  kGetHullMesh,
-  kListHulls,
-  kDeleteHull,
-  kCheckCollision,
-  kBatchCheckCollisions,
-  kStreamCollisions,
-  kFindCollisions,
-  kGetStatus,
-};
 
 // What every running call has, unary or stream: one part of each reactor, as long-lived as that.
 //

@@ -3,8 +3,8 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
-#include "server/call.h"
 #include "server/hull_id.h"
+#include "server/rpc.h"
 
 namespace hulld::server {
 namespace {
@@ -45,6 +45,7 @@ Permission PermissionFor(Rpc rpc) {
     case Rpc::kCreateHull:
     case Rpc::kAppendPoints:
     case Rpc::kDeleteHull:
+    case Rpc::kReplaceHull:
       return Permission::kWrite;
   }
   return Permission::kAdmin;

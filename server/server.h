@@ -14,6 +14,7 @@
 #include "server/executor.h"
 #include "server/guard.h"
 #include "server/hull_service.h"
+#include "server/metrics.h"
 #include "server/registry.h"
 #include "server/status_service.h"
 #include "server/store.h"
@@ -52,7 +53,9 @@ class Server {
   absl::Status Listen(const Config& config);
 
   const std::unique_ptr<Guard> guard_;
-  // Calls leave their ticket last of all, hence before all that they use.
+  // All others report to it.
+  Metrics metrics_;
+  // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
   // Chunks, and everything else that may take longer than moving bytes. Two pools, so that readers

@@ -1,12 +1,16 @@
 // Tokens over the contract: who may call what, and who sees which hulls.
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 #include <openssl/sha.h>
+#include <unistd.h>
 
+#include <cstring>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <regex>
 #include <set>
@@ -27,7 +31,7 @@ std::string TokenLine(const std::string& name, const std::string& role, const st
                       const std::string& token) {
   unsigned char hash[SHA256_DIGEST_LENGTH];
   SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash);
-  std::string text = name + " " + role + " " + prefix + " sha256:";
+  std::string text = absl::StrCat(name, " ", role, " ", prefix, " sha256:");
   for (const unsigned char byte : hash) {
     char digits[3];
     std::snprintf(digits, sizeof digits, "%02x", byte);
@@ -141,7 +145,7 @@ const std::map<std::string, CallRule>& Rules() {
 class Access : public ServerTest {
  protected:
   void SetUp() override {
-    path_ = ::testing::TempDir() + "/hulld_access_test_" + std::to_string(getpid());
+    path_ = absl::StrCat(::testing::TempDir(), "/hulld_access_test_", getpid());
     WriteSecret(path_, TokenLine("viewer", "read-only", "*", "viewer's secret") +
                            TokenLine("robot", "read-write", "*", "robot's secret") +
                            TokenLine("boss", "admin", "*", "boss's secret") +
@@ -154,10 +158,7 @@ class Access : public ServerTest {
     }
   }
 
-  void TearDown() override {
-    ServerTest::TearDown();
-    std::filesystem::remove(path_);
-  }
+  ~Access() override { std::filesystem::remove(path_); }
 
   // Every call that the server knows, by its own account: "hulld.v1.Service.Method".
   std::set<std::string> KnownCalls() {
@@ -222,8 +223,8 @@ class Access : public ServerTest {
 
   Outcome Do(const std::string& call, const std::string& token, const std::string& hull_id) {
     const size_t dot = call.rfind('.');
-    return Run("/" + call.substr(0, dot) + "/" + call.substr(dot + 1), {"Bearer " + token},
-               Rules().at(call).request(hull_id));
+    return Run(absl::StrCat("/", call.substr(0, dot), "/", call.substr(dot + 1)),
+               {absl::StrCat("Bearer ", token)}, Rules().at(call).request(hull_id));
   }
 
   std::vector<std::string> ListedBy(const std::string& token, const std::string& prefix) {
@@ -233,7 +234,7 @@ class Access : public ServerTest {
     request.set_page_size(1);
     do {
       grpc::ClientContext context;
-      context.AddMetadata("authorization", "Bearer " + token);
+      context.AddMetadata("authorization", absl::StrCat("Bearer ", token));
       v1::ListHullsResponse response;
       const grpc::Status status = hulls_->ListHulls(&context, request, &response);
       EXPECT_TRUE(status.ok()) << status.error_message();
@@ -255,7 +256,7 @@ TEST_F(Access, EveryCallOfTheServerHasARule) {
 TEST_F(Access, EveryCallNeedsAKnownToken) {
   for (const auto& [call, rule] : Rules()) {
     const size_t dot = call.rfind('.');
-    const std::string method = "/" + call.substr(0, dot) + "/" + call.substr(dot + 1);
+    const std::string method = absl::StrCat("/", call.substr(0, dot), "/", call.substr(dot + 1));
     const std::vector<std::string> request = rule.request("cell-1/new");
     const std::vector<std::vector<std::string>> wrong = {
         {},
@@ -301,7 +302,7 @@ TEST_F(Access, NoCallTellsWhetherAHullOfOthersExists) {
     if (rule.refusal == CallRule::kNoHull) continue;
     for (const char* theirs : {"cell-10/theirs", "cell", "cell-1"}) {
       if (call.ends_with("ListHulls") && std::string("cell-1/").starts_with(theirs)) continue;
-      const std::string none = std::string(theirs).substr(0, std::string(theirs).size() - 1) + "X";
+      const std::string none = absl::StrCat(std::string(theirs, std::strlen(theirs) - 1), "X");
       const Outcome there = Do(call, "cell's secret", theirs);
       Outcome absent = Do(call, "cell's secret", none);
       const std::string& said =

@@ -34,10 +34,7 @@ class Tls : public ServerTest {
     config_.tls_key = Write("server.key", identity_.key);
   }
 
-  void TearDown() override {
-    ServerTest::TearDown();
-    std::filesystem::remove_all(directory_);
-  }
+  ~Tls() override { std::filesystem::remove_all(directory_); }
 
   std::string Write(const std::string& name, const std::string& text) {
     const std::string path = directory_ + "/" + name;

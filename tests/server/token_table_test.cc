@@ -1,5 +1,6 @@
 #include "server/token_table.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -20,14 +21,14 @@ constexpr char kEmpty[] = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca4959
 
 std::string Line(const std::string& name, const std::string& role, const std::string& prefix,
                  const std::string& hash) {
-  return name + " " + role + " " + prefix + " sha256:" + hash + "\n";
+  return absl::StrCat(name, " ", role, " ", prefix, " sha256:", hash, "\n");
 }
 
 TEST(TokenTable, FindsTheCallerByTheHashOfTheToken) {
-  const absl::StatusOr<TokenTable> table =
-      TokenTable::Parse("# tokens\n\n" + Line("a", "read-write", "cell-1/", kAbc) + "  \t\r\n" +
-                        "b\tadmin\t*\tsha256:E3B0C44298FC1C149AFBF4C8996FB92427AE41E4649B934CA4959"
-                        "91B7852B855");
+  const absl::StatusOr<TokenTable> table = TokenTable::Parse(absl::StrCat(
+      "# tokens\n\n", Line("a", "read-write", "cell-1/", kAbc), "  \t\r\n",
+      "b\tadmin\t*\tsha256:E3B0C44298FC1C149AFBF4C8996FB92427AE41E4649B934CA495991B7852"
+      "B855"));
   ASSERT_TRUE(table.ok()) << table.status();
   EXPECT_EQ(table->size(), 2);
   EXPECT_EQ(table->Find("abc"), (Caller{"a", Permission::kWrite, "cell-1/"}));
@@ -56,7 +57,7 @@ TEST(TokenTable, ErrorsNameTheLineAndQuoteNoHash) {
   expect(Line("b", "admin", "/", kAbc), "line 1: the prefix is empty");
   expect(Line("b", "admin", "a//", kAbc), "line 1: the prefix \"a/\" has an empty segment");
   expect(Line("b", "admin", "*", std::string(kAbc).substr(1)), "line 1: the hash");
-  expect(Line("b", "admin", "*", std::string(kAbc).replace(3, 1, "g")), "line 1: the hash");
+  expect(Line("b", "admin", "*", std::string(64, 'g')), "line 1: the hash");
   expect("b admin * hunter2ba7816bf\n", "never store the token itself");
   expect(good + Line("a", "admin", "*", kEmpty), "line 2: the name \"a\" is taken");
   expect(good + Line("b", "admin", "*", kAbc), "line 2: \"b\" has the token of \"a\"");
