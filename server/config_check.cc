@@ -2,6 +2,10 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <system_error>
 
 #include "server/listen_address.h"
 #include "server/secret_file.h"
@@ -39,6 +43,25 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
     findings.push_back(absl::StrCat("warning: ", warning));
   }
   return findings;
+}
+
+absl::Status CheckDataDir(const std::string& path) {
+  const auto problem = [&path](const std::string& where, const std::string& what) {
+    return absl::InvalidArgumentError(absl::StrCat("--data-dir ", path, ": ", where, " ", what));
+  };
+  // What is not there yet will be made in what is.
+  std::error_code error;
+  std::filesystem::path nearest = std::filesystem::absolute(path, error);
+  while (nearest.has_relative_path() && !std::filesystem::exists(nearest, error)) {
+    nearest = nearest.parent_path();
+  }
+  if (!std::filesystem::is_directory(nearest, error)) {
+    return problem(nearest.string(), "is no directory");
+  }
+  if (access(nearest.c_str(), R_OK | W_OK | X_OK) != 0) {
+    return problem(nearest.string(), "cannot be written by the user who runs this");
+  }
+  return absl::OkStatus();
 }
 
 std::vector<std::string> ExposureWarnings(const Config& config) {

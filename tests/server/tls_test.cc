@@ -20,6 +20,7 @@
 namespace hulld::server {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class Tls : public ServerTest {
@@ -232,6 +233,18 @@ TEST_F(Tls, ACertificateThatIsNotValidNowIsAFinding) {
   EXPECT_THAT(std::string(expired.message()), HasSubstr("expired on "));
   const absl::Status early = CheckConfig(config_, now - std::chrono::hours(48)).status();
   EXPECT_THAT(std::string(early.message()), HasSubstr("starts on "));
+}
+
+TEST_F(Tls, ADataDirectoryCanBeMadeWhereADirectoryIs) {
+  EXPECT_TRUE(CheckDataDir(directory_).ok());
+  EXPECT_TRUE(CheckDataDir(directory_ + "/new/deeper").ok());
+  EXPECT_TRUE(CheckDataDir("relative").ok());
+  for (const char* name : {"/server.crt", "/server.crt/below"}) {
+    EXPECT_THAT(std::string(CheckDataDir(directory_ + name).message()),
+                AllOf(HasSubstr("--data-dir " + directory_), HasSubstr("is no directory")));
+  }
+  if (geteuid() == 0) return;  // root may write everywhere
+  EXPECT_THAT(std::string(CheckDataDir("/proc/new").message()), HasSubstr("cannot be written"));
 }
 
 }  // namespace
