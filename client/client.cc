@@ -1,9 +1,7 @@
 #include "client/client.h"
 
 #include <absl/strings/str_cat.h>
-#include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
-#include <grpcpp/security/credentials.h>
 
 #include <algorithm>
 #include <future>
@@ -17,13 +15,7 @@ namespace {
 // Replies are cut at about 1 MiB by the server; this only bounds what a wrong one can make us hold.
 constexpr int kMaxReceiveBytes = 64 << 20;
 
-bool IsLoopback(const std::string& target) {
-  const auto starts_with = [&target](const char* prefix) { return target.rfind(prefix, 0) == 0; };
-  return starts_with("127.") || starts_with("localhost:") || starts_with("[::1]:") ||
-         starts_with("unix:");
-}
-
-std::shared_ptr<grpc::Channel> Connect(const std::string& server) {
+std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   // A retry shall find a server that has come back meanwhile, rather than gRPC's memory of the
@@ -31,8 +23,8 @@ std::shared_ptr<grpc::Channel> Connect(const std::string& server) {
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   // gRPC would ask the proxy of the environment even for this machine's own services.
-  if (IsLoopback(server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+  if (IsLoopback(options.server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return OpenChannel(options.server, options.security, arguments);
 }
 
 absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
@@ -89,14 +81,15 @@ HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
-Client::Client(ClientOptions options) : Client(options, Connect(options.server)) {}
+Client::Client(ClientOptions options) : Client(options, Connect(options)) {}
 
 Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
     : options_(std::move(options)),
       channel_(std::move(channel)),
       hulls_(v1::HullService::NewStub(channel_)),
       collisions_(v1::CollisionService::NewStub(channel_)),
-      status_(v1::StatusService::NewStub(channel_)) {}
+      status_(v1::StatusService::NewStub(channel_)),
+      maintenance_(v1::MaintenanceService::NewStub(channel_)) {}
 
 Deadline Client::NextDeadline() const {
   return std::chrono::system_clock::now() + options_.timeout;
@@ -138,6 +131,44 @@ absl::StatusOr<std::unique_ptr<Appender>> Client::OpenAppend(const std::string& 
       new Appender(hulls_, std::move(open), std::move(options), options_.timeout, options_.retry));
   if (absl::Status status = appender->OpenFirst(); !status.ok()) return status;
   return appender;
+}
+
+absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
+    const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed) const {
+  grpc::ClientContext context;
+  v1::ReplaceHullResponse response;
+  const auto writer = hulls_->ReplaceHull(&context, &response);
+  v1::ReplaceHullRequest request;
+  *request.mutable_open() = open;
+  // A write that fails means that the call has ended, and Finish says why.
+  bool writable = writer->Write(request);
+  const absl::Status fed = feed([&](const v1::PointBlock& points) {
+    *request.mutable_points() = points;
+    writable = writable && writer->Write(request);
+    return writable ? absl::OkStatus() : absl::CancelledError("the call has ended");
+  });
+  // Without this the server would take what it has for all.
+  if (!fed.ok() && writable) context.TryCancel();
+  writer->WritesDone();
+  const absl::Status status = FromGrpcStatus(writer->Finish());
+  if (!fed.ok() && writable) return fed;
+  if (!status.ok()) return status;
+  return response;
+}
+
+absl::Status Client::SaveSnapshot(
+    const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive) const {
+  grpc::ClientContext context;
+  const auto reader = maintenance_->SaveSnapshot(&context, v1::SaveSnapshotRequest());
+  v1::SaveSnapshotResponse part;
+  while (reader->Read(&part)) {
+    if (absl::Status status = receive(part); !status.ok()) {
+      context.TryCancel();
+      reader->Finish();
+      return status;
+    }
+  }
+  return FromGrpcStatus(reader->Finish());
 }
 
 absl::StatusOr<v1::GetHullResponse> Client::GetHull(const std::string& hull_id, bool audit) const {

@@ -15,9 +15,11 @@
 
 #include "client/appender.h"
 #include "client/collision_stream.h"
+#include "client/connection_security.h"
 #include "client/retry.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
+#include "hulld/v1/maintenance.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
 
 namespace hulld {
@@ -31,6 +33,8 @@ struct ClientOptions {
   // the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
+  // TLS and the token.
+  ConnectionSecurity security;
 };
 
 // The canonical snapshot of a hull, put together from its stream and checked to be consistent.
@@ -49,7 +53,8 @@ struct HullMesh {
 //
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
 // came. Calls that are safe to repeat (all but DeleteHull, and CreateHull without if_absent) are
-// retried after UNAVAILABLE as options.retry says.
+// retried after UNAVAILABLE as options.retry says. ValidateSecurity tells beforehand whether
+// options.security can work.
 class Client {
  public:
   explicit Client(ClientOptions options = {});
@@ -62,6 +67,18 @@ class Client {
   // Opens a stream of chunks into a hull.
   absl::StatusOr<std::unique_ptr<Appender>> OpenAppend(const std::string& hull_id,
                                                        AppendOptions options = {}) const;
+
+  // Puts a new hull in the place of one: `feed` passes blocks of points to the sink it is given; an
+  // error of either ends the call and changes nothing. Not retried, and without a deadline while
+  // points are sent.
+  using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
+  absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
+      const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed) const;
+
+  // Passes each part of a snapshot of the store to `receive`, in order; an error of `receive` ends
+  // the call and is returned. Not retried, and without a deadline.
+  absl::Status SaveSnapshot(
+      const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
 
@@ -128,6 +145,7 @@ class Client {
   std::shared_ptr<v1::HullService::Stub> hulls_;
   std::shared_ptr<v1::CollisionService::Stub> collisions_;
   std::unique_ptr<v1::StatusService::Stub> status_;
+  std::unique_ptr<v1::MaintenanceService::Stub> maintenance_;
 };
 
 }  // namespace hulld

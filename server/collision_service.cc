@@ -12,7 +12,6 @@
 #include "server/collision_stream.h"
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/query_settings.h"
 #include "server/scene_stream.h"
 #include "server/unary_call.h"
@@ -29,27 +28,29 @@ struct PairQuery {
   QueryOptions options;
 };
 
-absl::StatusOr<Pose> ReadPlacement(bool present, const v1::Placement& placement,
-                                   const std::string& field) {
+absl::StatusOr<Pose> ReadPlacement(const Caller& caller, bool present,
+                                   const v1::Placement& placement, const std::string& field) {
   if (!present) {
     return absl::InvalidArgumentError(absl::StrCat(field, " is missing; give a hull ID"));
   }
-  if (absl::Status s = ValidateHullId(placement.hull_id(), field + ".hull_id"); !s.ok()) return s;
+  if (absl::Status s = CheckHullId(caller, placement.hull_id(), field + ".hull_id"); !s.ok()) {
+    return s;
+  }
   return DecodePose(placement.pose(), field + ".pose");
 }
 
-absl::StatusOr<PairQuery> Prepare(Registry& registry, const CallLifetime& lifetime,
+absl::StatusOr<PairQuery> Prepare(Registry& registry, const Call& call,
                                   const v1::CheckCollisionRequest& request,
                                   v1::CheckCollisionResponse* response) {
   PairQuery query;
   absl::StatusOr<QueryOptions> options = MakeQueryOptions(
-      request.method(), request.wanted(), request.tolerance(), registry.limits(), lifetime);
+      request.method(), request.wanted(), request.tolerance(), registry.limits(), call.lifetime());
   if (!options.ok()) return options.status();
   query.options = *std::move(options);
-  const absl::StatusOr<Pose> X_WA = ReadPlacement(request.has_a(), request.a(), "a");
+  const absl::StatusOr<Pose> X_WA = ReadPlacement(call.caller(), request.has_a(), request.a(), "a");
   if (!X_WA.ok()) return X_WA.status();
   query.X_WA = *X_WA;
-  const absl::StatusOr<Pose> X_WB = ReadPlacement(request.has_b(), request.b(), "b");
+  const absl::StatusOr<Pose> X_WB = ReadPlacement(call.caller(), request.has_b(), request.b(), "b");
   if (!X_WB.ok()) return X_WB.status();
   query.X_WB = *X_WB;
 
@@ -97,8 +98,7 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
                                                            v1::CheckCollisionResponse* response) {
   return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
     readers_.Submit([this, call, request, response] {
-      absl::StatusOr<PairQuery> query =
-          Prepare(registry_, call->call().lifetime(), *request, response);
+      absl::StatusOr<PairQuery> query = Prepare(registry_, call->call(), *request, response);
       if (!query.ok()) return call->End(query.status());
       if (query->options.method != Method::kTextbookSat) {
         return call->End(Answer(*query, request->wanted(), response));

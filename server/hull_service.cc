@@ -10,9 +10,9 @@
 #include "server/append_stream.h"
 #include "server/config.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/mesh_stream.h"
 #include "server/page_token.h"
+#include "server/replace_stream.h"
 #include "server/unary_call.h"
 
 namespace hulld::server {
@@ -44,6 +44,11 @@ HullService::AppendPoints(grpc::CallbackServerContext* context) {
   return AppendStream::Start(*context, admission_, registry_);
 }
 
+grpc::ServerReadReactor<v1::ReplaceHullRequest>* HullService::ReplaceHull(
+    grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) {
+  return ReplaceStream::Start(*context, admission_, registry_, readers_, response);
+}
+
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
                                                const v1::GetHullRequest* request,
                                                v1::GetHullResponse* response) {
@@ -61,7 +66,7 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
                                                  const v1::ListHullsRequest* request,
                                                  v1::ListHullsResponse* response) {
   return UnaryCall::Answer(*context, admission_, Rpc::kListHulls,
-                           [&](const Call&) { return List(*request, response); });
+                           [&](const Call& call) { return List(*request, call, response); });
 }
 
 grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
@@ -73,7 +78,9 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
 
 void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,
                          UnaryCall* call) {
-  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return call->End(s);
+  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return call->End(s);
+  }
   registry_.Create(request.hull_id(), request.if_absent(),
                    [this, response, call](const absl::StatusOr<CreateResult>& created) {
                      if (!created.ok()) return call->End(created.status());
@@ -89,7 +96,9 @@ void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullRes
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
                               v1::GetHullResponse* response) {
-  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return s;
+  }
   const auto resolved = registry_.Resolve(request.hull_id(), [&call] { return call.ShouldStop(); });
   if (!resolved.ok()) return resolved.status();
   const auto& [revision, view] = *resolved;
@@ -106,17 +115,18 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   return absl::OkStatus();
 }
 
-absl::Status HullService::List(const v1::ListHullsRequest& request,
+absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& call,
                                v1::ListHullsResponse* response) {
   if (request.page_size() > Config::kMaxPageSize) {
     return absl::InvalidArgumentError(absl::StrCat("page_size is ", request.page_size(),
                                                    "; the limit is ", Config::kMaxPageSize));
   }
-  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), request.prefix());
+  const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
+  if (!prefix.ok()) return prefix.status();
+  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
-  const HullPage page =
-      registry_.List(request.prefix(), *after,
-                     request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
+  const HullPage page = registry_.List(
+      *prefix, *after, request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
   EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
   for (const ListedHull& hull : page.hulls) {
     v1::HullInfo* info = response->add_hulls();
@@ -124,15 +134,16 @@ absl::Status HullService::List(const v1::ListHullsRequest& request,
     info->set_damaged(hull.damaged);
   }
   if (page.more) {
-    response->set_next_page_token(
-        EncodePageToken(request.prefix(), page.hulls.back().record.hull_id));
+    response->set_next_page_token(EncodePageToken(*prefix, page.hulls.back().record.hull_id));
   }
   return absl::OkStatus();
 }
 
 void HullService::Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
                          UnaryCall* call) {
-  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return call->End(s);
+  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return call->End(s);
+  }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
   registry_.Delete(request.hull_id(), if_revision,

@@ -24,6 +24,8 @@ class HullService : public v1::HullService::CallbackService {
                                        v1::CreateHullResponse* response) override;
   grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendPoints(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceHull(
+      grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) override;
   grpc::ServerUnaryReactor* GetHull(grpc::CallbackServerContext* context,
                                     const v1::GetHullRequest* request,
                                     v1::GetHullResponse* response) override;
@@ -42,7 +44,8 @@ class HullService : public v1::HullService::CallbackService {
               UnaryCall* call);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
-  absl::Status List(const v1::ListHullsRequest& request, v1::ListHullsResponse* response);
+  absl::Status List(const v1::ListHullsRequest& request, const Call& call,
+                    v1::ListHullsResponse* response);
   void Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
               UnaryCall* call);
 

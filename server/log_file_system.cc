@@ -61,7 +61,9 @@ IOStatus LogFileSystem::NewWritableFile(const std::string& name,
                                         std::unique_ptr<rocksdb::FSWritableFile>* result,
                                         IODebugContext* debug) {
   const IOStatus opened = FileSystemWrapper::NewWritableFile(name, options, result, debug);
-  if (!opened.ok() || !name.ends_with(".log")) return opened;
+  if (!opened.ok() || !name.starts_with(directory_ + "/") || !name.ends_with(".log")) {
+    return opened;
+  }
   {
     const std::lock_guard lock(mutex_);
     logs_[name] = {};

@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 namespace hulld::server {
 
@@ -19,8 +20,9 @@ namespace hulld::server {
 // and write to a log that failed.
 class LogFileSystem : public rocksdb::FileSystemWrapper {
  public:
-  explicit LogFileSystem(std::shared_ptr<rocksdb::FileSystem> base)
-      : FileSystemWrapper(std::move(base)) {}
+  // directory: where the logs are; copies of them elsewhere are not meant.
+  LogFileSystem(std::shared_ptr<rocksdb::FileSystem> base, std::string directory)
+      : FileSystemWrapper(std::move(base)), directory_(std::move(directory)) {}
   const char* Name() const override { return "LogFileSystem"; }
 
   // Everything that was written to the logs so far is committed.
@@ -43,6 +45,7 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
     uint64_t committed = 0;
   };
 
+  const std::string directory_;
   std::mutex mutex_;
   std::map<std::string, Sizes> logs_;
 };

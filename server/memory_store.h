@@ -27,6 +27,10 @@ class MemoryStore : public Store {
   }
   absl::Status Commit(std::span<const Change* const>) override { return absl::OkStatus(); }
   absl::Status Recover() override { return absl::OkStatus(); }
+  absl::StatusOr<std::string> MakeCopy() override {
+    return absl::FailedPreconditionError(
+        "the store is memory (--store=memory), of which no snapshot can be saved");
+  }
 
  private:
   static absl::Status KeepsNothing() {

@@ -7,7 +7,6 @@
 
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
@@ -28,15 +27,15 @@ bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b
 
 }  // namespace
 
-PlacementTable::PlacementTable(
-    const google::protobuf::RepeatedPtrField<v1::Placement>& placements) {
+PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                               const Caller& caller) {
   std::unordered_map<std::string, size_t> index_of;
   entries_.resize(placements.size());
   for (size_t i = 0; i < entries_.size(); ++i) {
     const v1::Placement& placement = placements[static_cast<int>(i)];
     const std::string field = absl::StrCat("placements[", i, "]");
     Entry& entry = entries_[i];
-    entry.malformed = ValidateHullId(placement.hull_id(), field + ".hull_id");
+    entry.malformed = CheckHullId(caller, placement.hull_id(), field + ".hull_id");
     if (!entry.malformed.ok()) continue;
     const auto [known, is_new] = index_of.emplace(placement.hull_id(), ids_.size());
     if (is_new) ids_.push_back(placement.hull_id());

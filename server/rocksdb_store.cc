@@ -20,6 +20,19 @@ namespace {
 
 std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "/rocksdb"; }
 
+// Of the directories that MakeCopy makes.
+constexpr char kCopyPrefix[] = "copy-";
+
+// What a server that was killed left behind.
+void RemoveCopies(const std::string& data_dir) {
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(data_dir, error)) {
+    if (entry.path().filename().string().starts_with(kCopyPrefix)) {
+      std::filesystem::remove_all(entry.path(), error);
+    }
+  }
+}
+
 std::string_view View(const rocksdb::Slice& slice) { return {slice.data(), slice.size()}; }
 
 // What a failed write means for those who wait for it.
@@ -144,6 +157,7 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   }
   if (absl::Status s = store->OpenDb(); !s.ok()) return s;
   if (absl::Status s = store->ReadMeta(); !s.ok()) return s;
+  if (!store->options_.read_only) RemoveCopies(store->options_.data_dir);
   if (store->options_.durability == Durability::kRelaxed && !store->options_.read_only) {
     store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
   }
@@ -152,7 +166,8 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
 
 RocksDbStore::RocksDbStore(RocksDbOptions options) : options_(std::move(options)) {
   rocksdb::Env* base = options_.env != nullptr ? options_.env : rocksdb::Env::Default();
-  files_ = std::make_shared<LogFileSystem>(base->GetFileSystem());
+  files_ =
+      std::make_shared<LogFileSystem>(base->GetFileSystem(), DatabaseDirectory(options_.data_dir));
   env_ = rocksdb::NewCompositeEnv(files_);
 }
 
@@ -405,14 +420,23 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   return failure_;
 }
 
-absl::Status RocksDbStore::Checkpoint(const std::string& directory) {
+absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
+  const std::string directory = absl::StrCat(options_.data_dir, "/", kCopyPrefix, RandomId());
+  std::error_code error;
+  std::filesystem::create_directory(directory, error);
+  if (error) {
+    return absl::UnavailableError(
+        absl::StrCat("cannot make ", directory, " for the copy: ", error.message()));
+  }
   const std::shared_lock lock(db_mutex_);
   if (db_ == nullptr) return CannotBeRead(options_.data_dir);
   rocksdb::Checkpoint* created = nullptr;
   rocksdb::Status status = rocksdb::Checkpoint::Create(db_.get(), &created);
   const std::unique_ptr<rocksdb::Checkpoint> checkpoint(created);
-  if (status.ok()) status = checkpoint->CreateCheckpoint(directory);
-  return status.ok() ? absl::OkStatus() : WriteError(status, options_.data_dir);
+  if (status.ok()) status = checkpoint->CreateCheckpoint(DatabaseDirectory(directory));
+  if (status.ok()) return directory;
+  std::filesystem::remove_all(directory, error);
+  return WriteError(status, options_.data_dir);
 }
 
 absl::Status RocksDbStore::Recover() {

@@ -61,9 +61,8 @@ class RocksDbStore : public Store {
   absl::Status Commit(std::span<const Change* const> changes) override;
   absl::Status Recover() override;
 
-  // A consistent copy of the database as of some moment during the call, in a directory that must
-  // not exist; hard links where the file system has them.
-  absl::Status Checkpoint(const std::string& directory);
+  // Hard links in <data-dir>/copy-..., in the layout of a data directory.
+  absl::StatusOr<std::string> MakeCopy() override;
 
   const std::string& data_dir() const { return options_.data_dir; }
   // RocksDB's own, for tests that damage what is kept.

@@ -30,20 +30,26 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
 
 }  // namespace
 
-Server::Server(const Config& config, std::unique_ptr<Store> store)
-    : store_(std::move(store)),
+Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
+    : guard_(std::move(guard)),
+      store_(std::move(store)),
       writers_(PoolThreads()),
       registry_(*store_, config.limits, writers_),
       readers_(PoolThreads()),
       executor_(config.threads),
       hull_service_(registry_, admission_, readers_),
       collision_service_(registry_, admission_, readers_, executor_),
-      status_service_(registry_, admission_) {}
+      status_service_(registry_, admission_),
+      maintenance_service_(*store_, registry_, admission_, readers_) {
+  admission_.SetAuthenticator(guard_->authenticator());
+}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
+  absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
+  if (!guard.ok()) return guard.status();
   absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config);
   if (!store.ok()) return store.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(store)));
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
   if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
@@ -52,20 +58,23 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
 absl::Status Server::Listen(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
   if (!address.ok()) return address.status();
-  if (absl::Status s = CheckExposure(*address, config.insecure); !s.ok()) return s;
+  if (absl::Status s = CheckExposure(*address, config.has_tls(), config.insecure); !s.ok()) {
+    return s;
+  }
   if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(config.listen, grpc::InsecureServerCredentials(), &port);
+  builder.AddListeningPort(config.listen, guard_->credentials(), &port);
   // Without this a second server would share the port without a word.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
+  builder.RegisterService(&maintenance_service_);
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr || (port == 0 && !address->is_unix())) {
     return ExplainBindFailure(*address);
@@ -74,7 +83,7 @@ absl::Status Server::Listen(const Config& config) {
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
   for (const char* service :
        {v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
-        v1::StatusService::service_full_name()}) {
+        v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()}) {
     health->SetServingStatus(service, true);
   }
   return absl::OkStatus();

@@ -12,7 +12,10 @@
 #include "server/collision_service.h"
 #include "server/config.h"
 #include "server/executor.h"
+#include "server/guard.h"
 #include "server/hull_service.h"
+#include "server/maintenance_service.h"
+#include "server/metrics.h"
 #include "server/registry.h"
 #include "server/status_service.h"
 #include "server/store.h"
@@ -24,7 +27,8 @@ namespace hulld::server {
 class Server {
  public:
   // Opens the store and listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs
-  // --insecure. UNAVAILABLE: the address cannot be bound. Errors of RocksDbStore::Open.
+  // TLS or --insecure, or a file of certificates or tokens is wrong. UNAVAILABLE: the address
+  // cannot be bound. Errors of RocksDbStore::Open.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config);
 
   Server(const Server&) = delete;
@@ -35,6 +39,9 @@ class Server {
   // Where it listens, with the port that was chosen.
   const std::string& address() const { return address_; }
 
+  // Looks at the files of certificates and tokens now, rather than within the next interval.
+  void ReloadFiles() { guard_->Reload(); }
+
   // Turns health to NOT_SERVING and refuses new calls with UNAVAILABLE; running ones go on.
   void BeginDrain();
 
@@ -42,11 +49,14 @@ class Server {
   bool WaitIdle(std::chrono::milliseconds timeout);
 
  private:
-  Server(const Config& config, std::unique_ptr<Store> store);
+  Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store);
 
   absl::Status Listen(const Config& config);
 
-  // Calls leave their ticket last of all, hence first here.
+  const std::unique_ptr<Guard> guard_;
+  // All others report to it.
+  Metrics metrics_;
+  // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
   // Chunks, and everything else that may take longer than moving bytes. Two pools, so that readers
@@ -58,6 +68,7 @@ class Server {
   HullService hull_service_;
   CollisionService collision_service_;
   StatusService status_service_;
+  MaintenanceService maintenance_service_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
 };

@@ -90,6 +90,10 @@ class Store {
   // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
   virtual absl::Status Recover() = 0;
 
+  // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
+  // directory: whoever asked removes that. FAILED_PRECONDITION: nothing is kept.
+  virtual absl::StatusOr<std::string> MakeCopy() = 0;
+
   // Whether the next change is to bring a new base instead of a delta of `new_vertices`: once the
   // deltas outgrew the base, so that all bases together are as large as all deltas, a few times at
   // most. Each kept delta costs kDeltaBytes beside its vertices.

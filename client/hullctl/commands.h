@@ -11,6 +11,8 @@ namespace hulld {
 // arguments must outlive the action.
 void AddCreateCommand(CLI::App* app, Invocation* invocation);
 void AddAppendCommand(CLI::App* app, Invocation* invocation);
+void AddReplaceCommand(CLI::App* app, Invocation* invocation);
+void AddSnapshotCommand(CLI::App* app, Invocation* invocation);
 void AddGetCommand(CLI::App* app, Invocation* invocation);
 void AddListCommand(CLI::App* app, Invocation* invocation);
 void AddDeleteCommand(CLI::App* app, Invocation* invocation);
@@ -23,6 +25,7 @@ void AddVerifyCommand(CLI::App* app, Invocation* invocation);
 void AddGenerateCommand(CLI::App* app, Invocation* invocation);
 void AddStatusCommand(CLI::App* app, Invocation* invocation);
 void AddPictureCommand(CLI::App* app, Invocation* invocation);
+void AddTokenCommand(CLI::App* app, Invocation* invocation);
 
 }  // namespace hulld
 

@@ -6,26 +6,13 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/simd_path.h"
 
-#if defined(__x86_64__)
+#ifdef HULLD_HAS_AVX2_PATH
 #include <immintrin.h>
-#define HULLD_HAS_AVX2_PATH
 #endif
 
 namespace hulld {
-namespace {
-
-bool HasAvx2() {
-#ifdef HULLD_HAS_AVX2_PATH
-  static const bool has = __builtin_cpu_supports("avx2");
-  return has;
-#else
-  return false;
-#endif
-}
-
-}  // namespace
-
 DirectionMap::DirectionMap(const Vector& center) : center_(center), n_(1), half_(0.5) {
   radii_.assign(cell_count(), 0);
   hints_.assign(cell_count(), UINT32_MAX);
@@ -83,7 +70,8 @@ void DirectionMap::Coarsen() {
 
 void DirectionMap::AppendSurvivors(std::span<const Vector> points,
                                    std::vector<uint32_t>& survivors) const {
-  const size_t done = HasAvx2() && rejects_ ? AppendSurvivorsAvx2(points, survivors) : 0;
+  const size_t done =
+      CurrentSimdPath() == SimdPath::kAvx2 && rejects_ ? AppendSurvivorsAvx2(points, survivors) : 0;
   AppendSurvivorsBaseline(points, done, survivors);
 }
 

@@ -1,8 +1,6 @@
 #include "core/hull/point_blocks.h"
 
-#if defined(__x86_64__)
-#define HULLD_HAS_AVX2_PATH
-#endif
+#include "core/numeric/simd_path.h"
 
 namespace hulld {
 namespace {
@@ -64,8 +62,7 @@ __attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock>
 bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
                  int64_t* matches) {
 #ifdef HULLD_HAS_AVX2_PATH
-  static const bool has_avx2 = __builtin_cpu_supports("avx2");
-  if (has_avx2) return MatchPlanesAvx2(blocks, planes, matches);
+  if (CurrentSimdPath() == SimdPath::kAvx2) return MatchPlanesAvx2(blocks, planes, matches);
 #endif
   return MatchPlanesBaseline(blocks, planes, matches);
 }

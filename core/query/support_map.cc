@@ -7,9 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#if defined(__x86_64__)
-#define HULLD_HAS_AVX2_PATH
-#endif
+#include "core/numeric/simd_path.h"
 
 namespace hulld {
 namespace {
@@ -26,15 +24,6 @@ constexpr size_t kMostFlooded = 64;
 // How far, in cells, arcs are drawn beyond where they pass: far more than rounding, far less than a
 // cell.
 constexpr double kArcMargin = 1e-7;
-
-bool HasAvx2() {
-#ifdef HULLD_HAS_AVX2_PATH
-  static const bool has = __builtin_cpu_supports("avx2");
-  return has;
-#else
-  return false;
-#endif
-}
 
 // Four doubles, and four integers as wide, in whatever registers the function is compiled for.
 using Lanes = double __attribute__((vector_size(32)));
@@ -346,7 +335,7 @@ SupportMap::Support SupportMap::ScanAvx2(const Vector& n) const { return ScanPor
 #endif
 
 SupportMap::Support SupportMap::Scan(const Vector& n) const {
-  return HasAvx2() ? ScanAvx2(n) : ScanPortably(n);
+  return CurrentSimdPath() == SimdPath::kAvx2 ? ScanAvx2(n) : ScanPortably(n);
 }
 
 // Calls visit(vertex, value) for all vertices with a value of at least from.value - slack, or says

@@ -1,0 +1,38 @@
+#ifndef HULLD_CORE_NUMERIC_SIMD_PATH_H_
+#define HULLD_CORE_NUMERIC_SIMD_PATH_H_
+
+#include <atomic>
+
+// Defined where functions compiled for AVX2 exist beside the portable ones.
+#if defined(__x86_64__)
+#define HULLD_HAS_AVX2_PATH
+#endif
+
+namespace hulld {
+
+// The instructions that loops over many points use. Results are the same bits on every path.
+enum class SimdPath {
+  kPortable,  // the baseline that all code is compiled for
+  kAvx2,
+};
+
+namespace internal {
+extern std::atomic<SimdPath> simd_path;
+}  // namespace internal
+
+// The best path of this machine, unless UseSimdPath chose another.
+inline SimdPath CurrentSimdPath() {
+#ifdef HULLD_HAS_AVX2_PATH
+  return internal::simd_path.load(std::memory_order_relaxed);
+#else
+  return SimdPath::kPortable;
+#endif
+}
+
+// Makes every thread take this path from now on; false, and no change, when the machine lacks it.
+// For tests and benchmarks.
+bool UseSimdPath(SimdPath path);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_NUMERIC_SIMD_PATH_H_
