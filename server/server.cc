@@ -48,6 +48,9 @@ absl::Status Server::Listen(const Config& config) {
   builder.AddListeningPort(config.listen, grpc::InsecureServerCredentials(), &port);
   // Without this a second server would share the port without a word.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  // A few bytes unpack to gigabytes, and do so before anything asks for their size.
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
+  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
   builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
