@@ -23,13 +23,15 @@ bool IsLoopback(const std::string& target) {
          starts_with("unix:");
 }
 
-std::shared_ptr<grpc::Channel> Connect(const std::string& server) {
+std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
+  const std::string& server = options.server;
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   // A retry shall find a server that has come back meanwhile, rather than gRPC's memory of the
   // failure.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  if (options.own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // gRPC would ask the proxy of the environment even for this machine's own services.
   if (IsLoopback(server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
@@ -89,7 +91,7 @@ HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
-Client::Client(ClientOptions options) : Client(options, Connect(options.server)) {}
+Client::Client(ClientOptions options) : Client(options, Connect(options)) {}
 
 Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
     : options_(std::move(options)),

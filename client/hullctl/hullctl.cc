@@ -57,6 +57,7 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddVerifyCommand(app, invocation);
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
+  AddBenchCommand(app, invocation);
   AddPictureCommand(app, invocation);
   app->require_subcommand(1);
   // Global options may stand behind the command, too.
