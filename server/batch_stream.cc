@@ -58,7 +58,7 @@ absl::Status BatchStream::Validate() {
 
 // Fills table_ and head_, and sets relations_suffice_.
 absl::Status BatchStream::ResolvePlacements() {
-  table_ = PlacementTable(request_.placements());
+  table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   table_.EncodeHulls(head_.mutable_hulls(), head_.mutable_placement_problems());

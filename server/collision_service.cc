@@ -13,7 +13,6 @@
 #include "server/collision_stream.h"
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/query_settings.h"
 #include "server/scene_stream.h"
 #include "server/status_map.h"
@@ -31,12 +30,14 @@ struct PairQuery {
   QueryOptions options;
 };
 
-absl::StatusOr<Pose> ReadPlacement(bool present, const v1::Placement& placement,
-                                   const std::string& field) {
+absl::StatusOr<Pose> ReadPlacement(const Caller& caller, bool present,
+                                   const v1::Placement& placement, const std::string& field) {
   if (!present) {
     return absl::InvalidArgumentError(absl::StrCat(field, " is missing; give a hull ID"));
   }
-  if (absl::Status s = ValidateHullId(placement.hull_id(), field + ".hull_id"); !s.ok()) return s;
+  if (absl::Status s = CheckHullId(caller, placement.hull_id(), field + ".hull_id"); !s.ok()) {
+    return s;
+  }
   absl::StatusOr<Pose> pose = DecodePose(placement.pose());
   if (!pose.ok()) return Prefixed(absl::StrCat(field, ".pose."), pose.status());
   return pose;
@@ -47,17 +48,17 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
 }
 
 // All of a query but its hulls.
-absl::StatusOr<PairQuery> ReadQuery(const Limits& limits, const CallLifetime& lifetime,
+absl::StatusOr<PairQuery> ReadQuery(const Limits& limits, const Call& call,
                                     const v1::CheckCollisionRequest& request) {
   PairQuery query;
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(request.method(), request.wanted(), request.tolerance(), limits, lifetime);
+  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
+      request.method(), request.wanted(), request.tolerance(), limits, call.lifetime());
   if (!options.ok()) return options.status();
   query.options = *std::move(options);
-  const absl::StatusOr<Pose> X_WA = ReadPlacement(request.has_a(), request.a(), "a");
+  const absl::StatusOr<Pose> X_WA = ReadPlacement(call.caller(), request.has_a(), request.a(), "a");
   if (!X_WA.ok()) return X_WA.status();
   query.X_WA = *X_WA;
-  const absl::StatusOr<Pose> X_WB = ReadPlacement(request.has_b(), request.b(), "b");
+  const absl::StatusOr<Pose> X_WB = ReadPlacement(call.caller(), request.has_b(), request.b(), "b");
   if (!X_WB.ok()) return X_WB.status();
   query.X_WB = *X_WB;
   return query;
@@ -118,8 +119,7 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
                                                            const v1::CheckCollisionRequest* request,
                                                            v1::CheckCollisionResponse* response) {
   return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
-    absl::StatusOr<PairQuery> query =
-        ReadQuery(registry_.limits(), call->call().lifetime(), *request);
+    absl::StatusOr<PairQuery> query = ReadQuery(registry_.limits(), call->call(), *request);
     if (!query.ok()) return call->End(query.status());
     if (query->options.method != Method::kTextbookSat && IsRelationOnly(request->wanted())) {
       std::optional<Resolved> resolved = registry_.TryResolve(HullIds(*request));

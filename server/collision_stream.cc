@@ -137,7 +137,7 @@ absl::Status CollisionStream::HandleOpen() {
   options_ = *std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
-  table_ = PlacementTable(open.placements());
+  table_ = PlacementTable(open.placements(), call_.caller());
 
   pairs_begin_.assign(placements + 1, 0);
   for (int i = 0; i < open.pairs_size(); i += 2) {

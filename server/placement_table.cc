@@ -7,7 +7,6 @@
 
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
@@ -28,8 +27,8 @@ bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b
 
 }  // namespace
 
-PlacementTable::PlacementTable(
-    const google::protobuf::RepeatedPtrField<v1::Placement>& placements) {
+PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                               const Caller& caller) {
   std::unordered_map<std::string, size_t> index_of;
   entries_.resize(placements.size());
   for (size_t i = 0; i < entries_.size(); ++i) {
@@ -38,7 +37,7 @@ PlacementTable::PlacementTable(
     auto known = index_of.find(placement.hull_id());
     if (known == index_of.end()) {
       entry.malformed = Prefixed(absl::StrCat("placements[", i, "]."),
-                                 ValidateHullId(placement.hull_id(), "hull_id"));
+                                 CheckHullId(caller, placement.hull_id(), "hull_id"));
       if (!entry.malformed.ok()) continue;
       known = index_of.emplace(placement.hull_id(), ids_.size()).first;
       ids_.push_back(placement.hull_id());

@@ -24,6 +24,7 @@ void AddGenerateCommand(CLI::App* app, Invocation* invocation);
 void AddStatusCommand(CLI::App* app, Invocation* invocation);
 void AddBenchCommand(CLI::App* app, Invocation* invocation);
 void AddPictureCommand(CLI::App* app, Invocation* invocation);
+void AddTokenCommand(CLI::App* app, Invocation* invocation);
 
 }  // namespace hulld
 
