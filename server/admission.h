@@ -11,9 +11,16 @@
 
 namespace hulld::server {
 
+class Authenticator;
+
 // Lets calls in, until the server drains, and counts those that run.
 class Admission {
  public:
+  // Who tells who calls; set before the first call, and outlives this. Without one everyone may do
+  // everything.
+  void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
+  const Authenticator* authenticator() const { return authenticator_; }
+
   // One running call; it ends with its ticket.
   using Ticket = std::unique_ptr<Admission, void (*)(Admission*)>;
 
@@ -27,6 +34,8 @@ class Admission {
 
  private:
   void Leave();
+
+  const Authenticator* authenticator_ = nullptr;
 
   std::mutex mutex_;
   std::condition_variable idle_;

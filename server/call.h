@@ -8,6 +8,7 @@
 
 #include "server/admission.h"
 #include "server/call_lifetime.h"
+#include "server/caller.h"
 #include "server/rpc.h"
 
 namespace hulld::server {
@@ -23,13 +24,16 @@ class Call {
       : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
 
   Rpc rpc() const { return rpc_; }
+  // Who calls. Requires that Begin succeeded.
+  const Caller& caller() const { return caller_; }
   const CallLifetime& lifetime() const { return lifetime_; }
   bool ShouldStop() const { return lifetime_.ShouldStop(); }
   // Requires ShouldStop().
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }
   void Cancel() { lifetime_.Cancel(); }
 
-  // Lets the call in; it must be ended with the error if there is one. UNAVAILABLE: the server
+  // Finds out who calls and lets the call in; it must be ended with the error if there is one.
+  // UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate. UNAVAILABLE: the server
   // drains.
   absl::Status Begin();
 
@@ -37,10 +41,14 @@ class Call {
   grpc::Status End(const absl::Status& status);
 
  private:
+  // Fills caller_.
+  absl::Status Authenticate();
+
   grpc::CallbackServerContext& context_;
   Admission& admission_;
   const Rpc rpc_;
   CallLifetime lifetime_;
+  Caller caller_;
   // Taken by Begin, given back when the reactor goes.
   std::optional<Admission::Ticket> ticket_;
 };

@@ -26,8 +26,15 @@ struct Limits {
 struct Config {
   // "host:port", "[v6]:port" or "unix:path"; port 0 picks a free one.
   std::string listen = "127.0.0.1:50551";
-  // Allows addresses that other machines can reach, without encryption or authentication.
+  // Allows addresses that other machines can reach without TLS.
   bool insecure = false;
+  // PEM files: the certificate that the server shows with those that lead to its authority, its
+  // private key, and the authorities of clients; the last makes clients need a certificate.
+  std::string tls_cert;
+  std::string tls_key;
+  std::string tls_client_ca;
+  // Who may call (server/token_table.h); empty: everyone who can connect.
+  std::string tokens_file;
   // Threads of parallel queries; 0: one per core.
   int threads = 0;
   // Where hulls live: "memory".
@@ -43,6 +50,10 @@ struct Config {
   uint64_t max_message_bytes = 16 << 20;
   Limits limits;
 
+  bool has_tls() const { return !tls_cert.empty() || !tls_key.empty() || !tls_client_ca.empty(); }
+
+  // How often the files of certificates and tokens are looked at.
+  static constexpr std::chrono::milliseconds kReloadInterval{1000};
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
@@ -55,11 +66,15 @@ struct Config {
   static constexpr size_t kMaxIdCharacters = 256;
 };
 
-// What a command line asks for: to run with `config`, or, when `print` is not empty, to print it
-// and end (--help, --version).
+// What a command line asks for: to run with `config`; or, when `print` is not empty, to print
+// it and end (--help, --version).
 struct CommandLine {
   Config config;
   std::string print;
+  // --check-config: to check the settings, print them and end.
+  bool check = false;
+  // Every setting in force, as lines of the TOML file.
+  std::string settings;
 };
 
 // Looks up an environment variable; nullopt when it is not set.

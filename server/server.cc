@@ -10,6 +10,7 @@
 
 #include "server/listen_address.h"
 #include "server/memory_store.h"
+#include "server/transport.h"
 
 namespace hulld::server {
 namespace {
@@ -19,18 +20,23 @@ int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_co
 
 }  // namespace
 
-Server::Server(const Config& config)
-    : store_(std::make_unique<MemoryStore>()),
+Server::Server(const Config& config, std::unique_ptr<Guard> guard)
+    : guard_(std::move(guard)),
+      store_(std::make_unique<MemoryStore>()),
       writers_(PoolThreads()),
       registry_(*store_, config.limits, writers_),
       readers_(PoolThreads()),
       executor_(config.threads),
       hull_service_(registry_, admission_, readers_),
       collision_service_(registry_, admission_, readers_, executor_),
-      status_service_(registry_, admission_) {}
+      status_service_(registry_, admission_) {
+  admission_.SetAuthenticator(guard_->authenticator());
+}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
-  std::unique_ptr<Server> server(new Server(config));
+  absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
+  if (!guard.ok()) return guard.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard)));
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }
@@ -38,20 +44,17 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
 absl::Status Server::Listen(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
   if (!address.ok()) return address.status();
-  if (absl::Status s = CheckExposure(*address, config.insecure); !s.ok()) return s;
+  if (absl::Status s = CheckExposure(*address, config.has_tls(), config.insecure); !s.ok()) {
+    return s;
+  }
   if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(config.listen, grpc::InsecureServerCredentials(), &port);
-  // Without this a second server would share the port without a word.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  // A few bytes unpack to gigabytes, and do so before anything asks for their size.
-  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
-  builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
+  builder.AddListeningPort(config.listen, guard_->credentials(), &port);
+  SetTransport(config, builder);
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);

@@ -68,12 +68,23 @@ TEST_F(ConfigTest, FlagBeatsVariableBeatsFileBeatsDefault) {
 }
 
 TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
-  const std::map<std::string, std::string> settings = {
-      {"listen", "unix:/tmp/x"},  {"insecure", "true"},           {"threads", "3"},
-      {"store", "memory"},        {"drain-timeout", "0.5"},       {"log-level", "debug"},
-      {"log-format", "json"},     {"max-points-per-chunk", "11"}, {"max-vertices-per-hull", "12"},
-      {"max-hulls", "13"},        {"max-pairs-per-batch", "14"},  {"max-textbook-axes", "15"},
-      {"max-message-bytes", "16"}};
+  const std::map<std::string, std::string> settings = {{"listen", "unix:/tmp/x"},
+                                                       {"insecure", "true"},
+                                                       {"threads", "3"},
+                                                       {"store", "memory"},
+                                                       {"drain-timeout", "0.5"},
+                                                       {"log-level", "debug"},
+                                                       {"log-format", "json"},
+                                                       {"max-points-per-chunk", "11"},
+                                                       {"max-vertices-per-hull", "12"},
+                                                       {"max-hulls", "13"},
+                                                       {"max-pairs-per-batch", "14"},
+                                                       {"max-textbook-axes", "15"},
+                                                       {"max-message-bytes", "16"},
+                                                       {"tls-cert", "/c"},
+                                                       {"tls-key", "/k"},
+                                                       {"tls-client-ca", "/a"},
+                                                       {"tokens-file", "/t"}};
   std::vector<std::string> flags;
   std::map<std::string, std::string> variables;
   std::string toml;
@@ -82,7 +93,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     std::string variable = "HULLD_";
     for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
     variables[variable] = value;
-    const bool is_text = name == "listen" || name == "store" || name.starts_with("log");
+    const bool is_text =
+        name == "listen" || name == "store" || name.starts_with("log") || value.starts_with("/");
     toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
   }
   const auto expect_all = [](const Config& config) {
@@ -98,6 +110,10 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
     EXPECT_EQ(config.limits.max_textbook_axes, 15);
     EXPECT_EQ(config.max_message_bytes, 16);
+    EXPECT_EQ(config.tls_cert, "/c");
+    EXPECT_EQ(config.tls_key, "/k");
+    EXPECT_EQ(config.tls_client_ca, "/a");
+    EXPECT_EQ(config.tokens_file, "/t");
   };
   expect_all(Accepted(flags));
   const std::string file = WriteFile(toml);
@@ -122,13 +138,29 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
 }
 
+TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
+  environment_["HULLD_TLS_CERT"] = "/c \"d\"";
+  const std::vector<std::string> arguments = {"--max-hulls=7", "--insecure", "--check-config"};
+  const absl::StatusOr<CommandLine> parsed = Parse(arguments);
+  ASSERT_TRUE(parsed.ok());
+  EXPECT_TRUE(parsed->check);
+  environment_.clear();
+  const absl::StatusOr<CommandLine> again = Parse({"--config", WriteFile(parsed->settings)});
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->settings, parsed->settings);
+  EXPECT_EQ(again->config.limits.max_hulls, 7);
+  EXPECT_TRUE(again->config.insecure);
+  EXPECT_FALSE(again->check);
+}
+
 TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
   const absl::StatusOr<CommandLine> help = Parse({"--help"});
   ASSERT_TRUE(help.ok());
   for (const char* flag :
        {"--listen", "--insecure", "--threads", "--store", "--drain-timeout", "--log-level",
         "--log-format", "--max-points-per-chunk", "--max-vertices-per-hull", "--max-hulls",
-        "--max-pairs-per-batch", "--max-textbook-axes", "--max-message-bytes", "--config"}) {
+        "--max-pairs-per-batch", "--max-textbook-axes", "--max-message-bytes", "--config",
+        "--tls-cert", "--tls-key", "--tls-client-ca", "--tokens-file", "--check-config"}) {
     EXPECT_THAT(help->print, HasSubstr(flag));
   }
   EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));
