@@ -59,6 +59,7 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddVerifyCommand(app, invocation);
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
+  AddBenchCommand(app, invocation);
   AddPictureCommand(app, invocation);
   AddTokenCommand(app, invocation);
   app->require_subcommand(1);
