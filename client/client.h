@@ -33,6 +33,8 @@ struct ClientOptions {
   // the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
+  // Connections to one server are shared within a process unless this is set.
+  bool own_connection = false;
   // TLS and the token.
   ConnectionSecurity security;
 };

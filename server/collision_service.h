@@ -12,9 +12,10 @@
 namespace hulld::server {
 
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
-// answered by one of the `readers`, so that it never waits for a batch, and so are the few pairs of
-// a stream's step; TEXTBOOK_SAT, whose loop over axes is parallel, batches and scenes go to the
-// executor.
+// answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
+// of moderate size and ready; else by one of the `readers`, so that it never waits for a batch, and
+// so are the few pairs of a stream's step; TEXTBOOK_SAT, whose loop over axes is parallel, batches
+// and scenes go to the executor.
 class CollisionService : public v1::CollisionService::CallbackService {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,

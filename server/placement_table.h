@@ -37,6 +37,8 @@ class PlacementTable {
   size_t size() const { return entries_.size(); }
   std::span<const PlacedHull> placed() const { return placed_; }
   bool is_answerable(size_t i) const { return problem(i).ok(); }
+  // Whether all are.
+  bool all_answerable() const;
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
 

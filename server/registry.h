@@ -203,6 +203,8 @@ class Registry {
   // CANCELLED when should_stop said so.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop);
+  // The same, but nullopt, at once, where it would have to wait or to make what is missing.
+  std::optional<Resolved> TryResolve(std::span<const std::string> ids);
   // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
   absl::StatusOr<std::pair<uint64_t, HullView>> Resolve(const std::string& id,
                                                         const std::function<bool()>& should_stop);

@@ -146,6 +146,27 @@ absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
   return resolved;
 }
 
+std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids) {
+  Resolved resolved;
+  Locked locked(mutex_);
+  for (const std::string& id : ids) {
+    const HullPointer hull = FindVisible(id);
+    if (hull == nullptr) {
+      resolved.hulls.emplace_back(HullNotFound(id));
+    } else if (!hull->damage.ok()) {
+      resolved.hulls.emplace_back(hull->damage);
+    } else if (hull->snapshot == nullptr) {
+      return std::nullopt;
+    } else {
+      resolved.hulls.emplace_back(HullView{hull->committed.record, hull->snapshot});
+      ++cache_.hits;
+      Charge(locked, *hull);
+    }
+  }
+  resolved.store_revision = revision_;
+  return resolved;
+}
+
 absl::StatusOr<std::pair<uint64_t, HullView>> Registry::Resolve(
     const std::string& id, const std::function<bool()>& should_stop) {
   absl::StatusOr<Resolved> resolved = Resolve(std::span(&id, 1), should_stop);

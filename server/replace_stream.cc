@@ -8,6 +8,7 @@
 #include "server/decode.h"
 #include "server/encode.h"
 #include "server/status_map.h"
+#include "server/stream_message.h"
 
 namespace hulld::server {
 
@@ -17,17 +18,23 @@ grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceStream::Start(
   auto* stream = new ReplaceStream(context, admission, registry, workers, response);
   const absl::Status begun = stream->call_.Begin();
   if (begun.ok()) {
-    stream->StartRead(&stream->request_);
+    stream->Read();
   } else {
     stream->End(begun);
   }
   return stream;
 }
 
+void ReplaceStream::Read() {
+  PrepareToRead(&request_);
+  StartRead(&request_);
+}
+
 void ReplaceStream::OnReadDone(bool ok) {
   if (call_.ShouldStop()) return End(call_.StopStatus());
   const bool opened = replacement_.builder != nullptr;
   if (!ok) {
+    if (absl::Status s = WhyNotRead(request_); !s.ok()) return End(s);
     // The client has said all.
     if (opened) return Commit();
     return End(absl::InvalidArgumentError("the stream ended before its first message, open"));
@@ -39,7 +46,7 @@ void ReplaceStream::OnReadDone(bool ok) {
           opened ? absl::InvalidArgumentError("open came twice; start another stream")
                  : HandleOpen(request_.open());
       if (!status.ok()) return End(status);
-      StartRead(&request_);
+      Read();
       return;
     }
     case v1::ReplaceHullRequest::kPoints:
@@ -49,7 +56,7 @@ void ReplaceStream::OnReadDone(bool ok) {
       workers_.Submit([this] {
         const absl::Status built = Build();
         if (!built.ok()) return End(call_.ShouldStop() ? call_.StopStatus() : built);
-        StartRead(&request_);
+        Read();
       });
       return;
     case v1::ReplaceHullRequest::MESSAGE_NOT_SET:

@@ -36,6 +36,7 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
 
+  void Read();
   absl::Status HandleOpen(const v1::ReplaceOpen& open);
   absl::Status Build();
   void Commit();

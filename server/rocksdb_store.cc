@@ -146,6 +146,9 @@ void Encode(rocksdb::WriteBatch& batch, const Change& change) {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions options) {
+  if (options.data_dir.empty()) {
+    return absl::InvalidArgumentError("--data-dir is empty; name the directory of the store");
+  }
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
   if (!store->options_.read_only) {
     std::error_code error;

@@ -41,9 +41,9 @@ struct RocksDbOptions {
 // the hull that is damaged.
 class RocksDbStore : public Store {
  public:
-  // FAILED_PRECONDITION: another process has it open, or a newer hulld wrote it; DATA_LOSS: its log
-  // or its files are damaged; NOT_FOUND: read_only, and there is none; UNAVAILABLE: the file system
-  // refuses.
+  // INVALID_ARGUMENT: no directory; FAILED_PRECONDITION: another process has it open, or a newer
+  // hulld wrote it; DATA_LOSS: its log or its files are damaged; NOT_FOUND: read_only, and there is
+  // none; UNAVAILABLE: the file system refuses.
   static absl::StatusOr<std::unique_ptr<RocksDbStore>> Open(RocksDbOptions options);
 
   ~RocksDbStore() override;

@@ -11,6 +11,7 @@
 #include "server/listen_address.h"
 #include "server/memory_store.h"
 #include "server/rocksdb_store.h"
+#include "server/transport.h"
 
 namespace hulld::server {
 namespace {
@@ -68,9 +69,7 @@ absl::Status Server::Listen(const Config& config) {
   grpc::ServerBuilder builder;
   int port = 0;
   builder.AddListeningPort(config.listen, guard_->credentials(), &port);
-  // Without this a second server would share the port without a word.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
+  SetTransport(config, builder);
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);

@@ -24,10 +24,12 @@ class Snapshot {
   const QueryHull& query_hull() const {
     std::call_once(query_hull_once_, [this] {
       query_hull_.emplace(hull_);
-      query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_relaxed);
+      query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
     });
     return *query_hull_;
   }
+  // Whether query_hull() would only return.
+  bool has_query_hull() const { return query_hull_bytes_.load(std::memory_order_acquire) > 0; }
 
   // What it holds in memory by now.
   size_t MemoryBytes() const {
@@ -38,6 +40,7 @@ class Snapshot {
   const Hull hull_;
   mutable std::once_flag query_hull_once_;
   mutable std::optional<QueryHull> query_hull_;
+  // Above 0 once it is made.
   mutable std::atomic<size_t> query_hull_bytes_ = 0;
 };
 

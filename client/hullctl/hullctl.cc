@@ -61,6 +61,7 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
   AddSnapshotCommand(app, invocation);
+  AddBenchCommand(app, invocation);
   AddPictureCommand(app, invocation);
   AddTokenCommand(app, invocation);
   app->require_subcommand(1);
