@@ -1,8 +1,6 @@
 #include "server/append_stream.h"
 
-#include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
@@ -85,6 +83,7 @@ void AppendStream::OnDone() {
 }
 
 void AppendStream::HandleMessage() {
+  call_.BeginMessage();
   switch (request_.message_case()) {
     case v1::AppendPointsRequest::kOpen:
       return HandleOpen(request_.open());
@@ -115,7 +114,9 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
       });
   if (!opened.ok()) return End(opened.status());
   session_ = std::move(opened->session);
-  if (session_->created_hull) spdlog::info("hull \"{}\" created", open.hull_id());
+  if (session_->created_hull) {
+    call_.Log(LogLevel::kInfo, "hull created", {{"hull", open.hull_id()}});
+  }
   v1::AppendOpened* reply = next_reply_.emplace().mutable_opened();
   EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
@@ -131,6 +132,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!chunk.ok()) return End(chunk.status());
   request_.Clear();
   applying_ = true;
+  call_.AddPoints(chunk->points.size());
   const std::shared_ptr<AppendStream> self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
   registry_.Append(
@@ -148,6 +150,8 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
     const bool stopped = call_.ShouldStop();
     return End(stopped ? call_.StopStatus() : result.status());
   }
+  call_.EndMessage();
+  call_.metrics().CountPoints(result->counts);
   if (finished_) return;
   if (!next_reply_.has_value()) next_reply_.emplace();
   // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
@@ -168,8 +172,7 @@ void AppendStream::End(const absl::Status& status) {
   if (end_.has_value()) return;
   end_ = status;
   if (!status.ok() && session_.has_value()) {
-    spdlog::debug("append by writer \"{}\" ended: {}", absl::CEscape(session_->writer_id),
-                  status.ToString());
+    call_.Log(LogLevel::kDebug, "append ended early", {{"writer", session_->writer_id}});
   }
 }
 

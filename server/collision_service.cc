@@ -67,7 +67,7 @@ absl::StatusOr<PairQuery> Prepare(Registry& registry, const CallLifetime& lifeti
   return query;
 }
 
-absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
+absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted, Metrics& metrics,
                     v1::CheckCollisionResponse* response) {
   const auto placed_a = PlacedHull::Make(query.a.snapshot->query_hull(), query.X_WA);
   if (!placed_a.ok()) return placed_a.status();
@@ -77,6 +77,9 @@ absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
   const Hull& b = placed_b->hull();
   const auto answer = hulld::CheckCollision(*placed_a, *placed_b, query.options);
   if (!answer.ok()) return NameQueryLimit(answer.status());
+  RungCounts counts;
+  counts.Add(answer->rung);
+  metrics.CountPairs(counts);
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
   if (wanted.analysis()) EncodeAnalysis(answer->analysis, a, b, response->mutable_analysis());
@@ -101,11 +104,11 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
           Prepare(registry_, call->call().lifetime(), *request, response);
       if (!query.ok()) return call->End(query.status());
       if (query->options.method != Method::kTextbookSat) {
-        return call->End(Answer(*query, request->wanted(), response));
+        return call->End(Answer(*query, request->wanted(), call->call().metrics(), response));
       }
       query->options.threads = executor_.threads();
       executor_.Submit([call, request, response, query = *std::move(query)] {
-        call->End(Answer(query, request->wanted(), response));
+        call->End(Answer(query, request->wanted(), call->call().metrics(), response));
       });
     });
   });
@@ -113,17 +116,17 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
 
 grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* CollisionService::BatchCheckCollisions(
     grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest* request) {
-  return BatchStream::Start(*context, admission_, registry_, readers_, executor_, *request);
+  return BatchStream::Start(*context, admission_, registry_, long_readers_, executor_, *request);
 }
 
 grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
 CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, registry_, readers_);
+  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_);
 }
 
 grpc::ServerWriteReactor<v1::FindCollisionsResponse>* CollisionService::FindCollisions(
     grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) {
-  return SceneStream::Start(*context, admission_, registry_, readers_, executor_, *request);
+  return SceneStream::Start(*context, admission_, registry_, long_readers_, executor_, *request);
 }
 
 }  // namespace hulld::server

@@ -2,7 +2,6 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <utility>
 
@@ -36,7 +35,7 @@ grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* c
                                                   const v1::CreateHullRequest* request,
                                                   v1::CreateHullResponse* response) {
   return UnaryCall::Answer(*context, admission_, Rpc::kCreateHull,
-                           [&](const Call&) { return Create(*request, response); });
+                           [&](const Call& call) { return Create(*request, call, response); });
 }
 
 grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>*
@@ -47,14 +46,15 @@ HullService::AppendPoints(grpc::CallbackServerContext* context) {
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
                                                const v1::GetHullRequest* request,
                                                v1::GetHullResponse* response) {
+  // An audit takes as long as the hull is large.
   return UnaryCall::AnswerOn(
-      readers_, *context, admission_, Rpc::kGetHull,
+      request->audit() ? long_readers_ : readers_, *context, admission_, Rpc::kGetHull,
       [this, request, response](const Call& call) { return Get(*request, call, response); });
 }
 
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
     grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) {
-  return MeshStream::Start(*context, admission_, registry_, readers_, *request);
+  return MeshStream::Start(*context, admission_, registry_, long_readers_, *request);
 }
 
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
@@ -68,16 +68,18 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
                                                   const v1::DeleteHullRequest* request,
                                                   v1::DeleteHullResponse* response) {
   return UnaryCall::Answer(*context, admission_, Rpc::kDeleteHull,
-                           [&](const Call&) { return Delete(*request, response); });
+                           [&](const Call& call) { return Delete(*request, call, response); });
 }
 
-absl::Status HullService::Create(const v1::CreateHullRequest& request,
+absl::Status HullService::Create(const v1::CreateHullRequest& request, const Call& call,
                                  v1::CreateHullResponse* response) {
   if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
   const absl::StatusOr<CreateResult> created =
       registry_.Create(request.hull_id(), request.if_absent());
   if (!created.ok()) return created.status();
-  if (created->created) spdlog::info("hull \"{}\" created", request.hull_id());
+  if (created->created) {
+    call.Log(LogLevel::kInfo, "hull created", {{"hull", request.hull_id()}});
+  }
   EncodeHeader(registry_.store(), created->store_revision, response->mutable_header());
   EncodeRecord(created->hull, response->mutable_hull());
   response->set_created(created->created);
@@ -122,14 +124,14 @@ absl::Status HullService::List(const v1::ListHullsRequest& request,
   return absl::OkStatus();
 }
 
-absl::Status HullService::Delete(const v1::DeleteHullRequest& request,
+absl::Status HullService::Delete(const v1::DeleteHullRequest& request, const Call& call,
                                  v1::DeleteHullResponse* response) {
   if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
   const absl::StatusOr<uint64_t> revision = registry_.Delete(
       request.hull_id(),
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt);
   if (!revision.ok()) return revision.status();
-  spdlog::info("hull \"{}\" deleted", request.hull_id());
+  call.Log(LogLevel::kInfo, "hull deleted", {{"hull", request.hull_id()}});
   EncodeHeader(registry_.store(), *revision, response->mutable_header());
   return absl::OkStatus();
 }

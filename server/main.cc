@@ -34,6 +34,9 @@ void LogStart(const Config& config, const Server& server) {
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
   if (config.store == "memory") spdlog::info("hulls live in memory and end with this process");
   if (config.insecure) spdlog::warn("--insecure: nothing is encrypted or authenticated");
+  if (!server.metrics_address().empty()) {
+    spdlog::info("metrics at http://{}/metrics", server.metrics_address());
+  }
   spdlog::info("listening on {}", server.address());
 }
 

@@ -9,6 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/limit_error.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
@@ -75,6 +76,17 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
   return RevisionMismatch(record, *chunk.if_revision);
 }
 
+absl::Status CheckPointCount(const HullRecord& record, const Chunk& chunk, const Limits& limits) {
+  const uint64_t received = record.counts.received;
+  if (received <= limits.max_points_per_hull &&
+      chunk.points.size() <= limits.max_points_per_hull - received) {
+    return absl::OkStatus();
+  }
+  return LimitExceeded(absl::StrCat(Quoted(record.hull_id), " has taken ", received,
+                                    " points, and ", chunk.points.size(), " more came"),
+                       limits.max_points_per_hull, "max-points-per-hull");
+}
+
 void AddTo(PointCounts& sums, const PointCounts& counts) {
   sums.received += counts.received;
   sums.outside += counts.outside;
@@ -94,9 +106,8 @@ Registry::HullPointer Registry::Find(const std::string& id) const {
 
 absl::StatusOr<Registry::HullPointer> Registry::CreateLocked(const std::string& id) {
   if (hulls_.size() >= limits_.max_hulls) {
-    return absl::ResourceExhaustedError(absl::StrCat("the store holds ", hulls_.size(),
-                                                     " hulls; the limit is ", limits_.max_hulls,
-                                                     " (--max-hulls)"));
+    return LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
+                         limits_.max_hulls, "max-hulls");
   }
   const uint64_t revision = revision_ + 1;
   if (absl::Status s = store_.Commit(HullCreated{id, revision}); !s.ok()) return s;
@@ -325,6 +336,8 @@ absl::StatusOr<ChunkResult> Registry::Apply(Lock& lock, RegisteredHull& hull,
   }
   absl::Status allowed = CheckChunkRevision(pending.session, hull.record, chunk);
   if (!allowed.ok()) return Prefixed(name, allowed);
+  allowed = CheckPointCount(hull.record, chunk, limits_);
+  if (!allowed.ok()) return Prefixed(name, allowed);
 
   lock.unlock();
   absl::StatusOr<PointCounts> added = absl::CancelledError("the call was cancelled");
@@ -335,9 +348,9 @@ absl::StatusOr<ChunkResult> Registry::Apply(Lock& lock, RegisteredHull& hull,
   lock.lock();
 
   if (added.status().code() == absl::StatusCode::kResourceExhausted) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        name, Quoted(hull.record.hull_id), " would hold too many vertices; the limit is ",
-        limits_.max_vertices_per_hull, " (--max-vertices-per-hull)"));
+    return LimitExceeded(
+        absl::StrCat(name, Quoted(hull.record.hull_id), " would hold too many vertices"),
+        limits_.max_vertices_per_hull, "max-vertices-per-hull");
   }
   if (!added.ok()) return Prefixed(name, added.status());
   if (hull.deleted) return Prefixed(name, Deleted(hull.record));

@@ -151,7 +151,8 @@ class Registry {
   // Queues a chunk; `done` is called on a writer thread once it is committed or refused.
   // Refusals, which change nothing: FAILED_PRECONDITION: a gap in the sequence, or the hull was
   // deleted; ABORTED: if_revision does not match; INVALID_ARGUMENT: a point is not finite;
-  // RESOURCE_EXHAUSTED: --max-vertices-per-hull; CANCELLED: should_stop said so.
+  // RESOURCE_EXHAUSTED: --max-vertices-per-hull, --max-points-per-hull; CANCELLED: should_stop said
+  // so.
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void(absl::StatusOr<ChunkResult>)> done);
 

@@ -17,17 +17,32 @@ namespace {
 // At least two, so that one long task does not hold up all others.
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
+// Long tasks give way to those of microseconds, but not as far as batches do.
+constexpr int kLongReadersNiceness = 5;
+
 }  // namespace
 
 Server::Server(const Config& config)
-    : store_(std::make_unique<MemoryStore>()),
-      writers_(PoolThreads()),
+    : admission_(config.limits, metrics_),
+      store_(std::make_unique<MemoryStore>()),
+      writers_(PoolThreads(), metrics_.AddPool("writers")),
       registry_(*store_, config.limits, writers_),
-      readers_(PoolThreads()),
-      executor_(config.threads),
-      hull_service_(registry_, admission_, readers_),
-      collision_service_(registry_, admission_, readers_, executor_),
-      status_service_(registry_, admission_) {}
+      readers_(PoolThreads(), metrics_.AddPool("readers")),
+      long_readers_(PoolThreads(), metrics_.AddPool("long_readers"), kLongReadersNiceness),
+      executor_(config.threads, metrics_.AddPool("executor")),
+      hull_service_(registry_, admission_, readers_, long_readers_),
+      collision_service_(registry_, admission_, readers_, long_readers_, executor_),
+      status_service_(registry_, admission_) {
+  admission_.SetBacklog([this] { return readers_.waiting() + long_readers_.waiting(); });
+  AddSizesToMetrics();
+}
+
+void Server::AddSizesToMetrics() {
+  metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
+                    [this] { return static_cast<double>(registry_.Sizes().hull_count); });
+  metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
+                    [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
+}
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
   std::unique_ptr<Server> server(new Server(config));
@@ -48,7 +63,7 @@ absl::Status Server::Listen(const Config& config) {
   builder.AddListeningPort(config.listen, grpc::InsecureServerCredentials(), &port);
   // Without this a second server would share the port without a word.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
+  builder.SetMaxReceiveMessageSize(static_cast<int>(config.limits.max_message_bytes));
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
@@ -63,6 +78,11 @@ absl::Status Server::Listen(const Config& config) {
         v1::StatusService::service_full_name()}) {
     health->SetServingStatus(service, true);
   }
+  if (config.metrics_address.empty()) return absl::OkStatus();
+  absl::StatusOr<std::unique_ptr<MetricsEndpoint>> endpoint =
+      MetricsEndpoint::Start(config.metrics_address, config.metrics_insecure, metrics_);
+  if (!endpoint.ok()) return endpoint.status();
+  metrics_endpoint_ = *std::move(endpoint);
   return absl::OkStatus();
 }
 

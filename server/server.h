@@ -14,6 +14,7 @@
 #include "server/executor.h"
 #include "server/hull_service.h"
 #include "server/metrics.h"
+#include "server/metrics_endpoint.h"
 #include "server/registry.h"
 #include "server/status_service.h"
 #include "server/store.h"
@@ -35,6 +36,11 @@ class Server {
 
   // Where it listens, with the port that was chosen.
   const std::string& address() const { return address_; }
+  // Where Prometheus reads metrics; empty when nowhere.
+  std::string metrics_address() const {
+    return metrics_endpoint_ == nullptr ? "" : metrics_endpoint_->address();
+  }
+  const Metrics& metrics() const { return metrics_; }
 
   // Turns health to NOT_SERVING and refuses new calls with UNAVAILABLE; running ones go on.
   void BeginDrain();
@@ -46,23 +52,27 @@ class Server {
   explicit Server(const Config& config);
 
   absl::Status Listen(const Config& config);
+  void AddSizesToMetrics();
 
   // All others report to it.
   Metrics metrics_;
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
-  // Chunks, and everything else that may take longer than moving bytes. Two pools, so that readers
-  // never wait for writers.
+  // Chunks, and everything else that may take longer than moving bytes. Three pools, so that
+  // readers never wait for writers, nor those of microseconds for those of seconds.
   WorkerPool writers_;
   Registry registry_;
   WorkerPool readers_;
+  WorkerPool long_readers_;
   Executor executor_;
   HullService hull_service_;
   CollisionService collision_service_;
   StatusService status_service_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
+  // Reads from all of the above.
+  std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };
 
 }  // namespace hulld::server

@@ -97,7 +97,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_hulls, 13);
     EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
     EXPECT_EQ(config.limits.max_textbook_axes, 15);
-    EXPECT_EQ(config.max_message_bytes, 16);
+    EXPECT_EQ(config.limits.max_message_bytes, 16);
   };
   expect_all(Accepted(flags));
   const std::string file = WriteFile(toml);
