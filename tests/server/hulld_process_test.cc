@@ -4,84 +4,17 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cstdio>
 #include <string>
-#include <vector>
 
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
+#include "tests/server/hulld_process.h"
 
 namespace hulld::server {
 namespace {
 
 using ::testing::HasSubstr;
-
-// A hulld whose standard error is read here.
-class Process {
- public:
-  explicit Process(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), HULLD_PROGRAM);
-    int ends[2];
-    if (pipe(ends) != 0) return;
-    pid_ = fork();
-    if (pid_ == 0) {
-      dup2(ends[1], STDERR_FILENO);
-      close(ends[0]);
-      close(ends[1]);
-      std::vector<char*> argv;
-      for (std::string& argument : arguments) argv.push_back(argument.data());
-      argv.push_back(nullptr);
-      execv(HULLD_PROGRAM, argv.data());
-      _exit(127);
-    }
-    close(ends[1]);
-    errors_ = fdopen(ends[0], "r");
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-  ~Process() {
-    if (!ended_) {
-      Signal(SIGKILL);
-      Wait();
-    }
-    fclose(errors_);
-  }
-
-  // Reads up to the first line that holds `text` and returns it; empty at the end of the output.
-  std::string ReadLineWith(const std::string& text) {
-    char line[4096];
-    while (fgets(line, sizeof line, errors_) != nullptr) {
-      lines_.emplace_back(line);
-      if (lines_.back().find(text) != std::string::npos) return lines_.back();
-    }
-    return "";
-  }
-
-  const std::vector<std::string>& lines() const { return lines_; }
-  void Signal(int number) { kill(pid_, number); }
-
-  // The exit status, or -1 when a signal ended it.
-  int Wait() {
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    ended_ = true;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-
- private:
-  pid_t pid_ = -1;
-  FILE* errors_ = nullptr;
-  bool ended_ = false;
-  std::vector<std::string> lines_;
-};
-
-std::string AddressIn(const std::string& line) {
-  const size_t start = line.find("listening on ") + 13;
-  return line.substr(start, line.find_first_of("\"\n", start) - start);
-}
 
 class HulldProcess : public ::testing::TestWithParam<int> {};
 
