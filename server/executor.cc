@@ -7,8 +7,9 @@ namespace hulld::server {
 
 namespace {
 
-// A tenth of the share of a thread of the ordinary niceness, when both want the same core.
-constexpr int kNiceness = 10;
+// Two thirds of the share of an ordinary thread when both want the same core: a little, as it also
+// gives way to other programs.
+constexpr int kNiceness = 2;
 
 }  // namespace
 

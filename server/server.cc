@@ -18,7 +18,7 @@ namespace {
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
 // Long tasks give way to those of microseconds, but not as far as batches do.
-constexpr int kLongReadersNiceness = 5;
+constexpr int kLongReadersNiceness = 1;
 
 }  // namespace
 

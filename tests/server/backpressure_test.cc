@@ -39,10 +39,11 @@ class Backpressure : public ServerTest {
     return sum;
   }
 
-  // Answers of some 150 bytes each.
+  // Answers of 72 bytes each.
   static v1::BatchCheckCollisionsRequest Batch(int pairs) {
     v1::BatchCheckCollisionsRequest request;
-    request.mutable_wanted()->set_certificate(true);
+    request.mutable_wanted()->set_separation(true);
+    request.mutable_wanted()->set_witness(true);
     *request.add_placements() = PlacementOf("cube");
     *request.add_placements() = PlacementOf("cube", 9);
     for (int i = 0; i < pairs; ++i) {
@@ -81,7 +82,7 @@ TEST_F(Backpressure, MemoryStaysFlatWhilePointsStreamIn) {
 // Both batches take turns on the executor, so the one that is read ends with the other far behind
 // if that is held back, and at the end as well if it is not.
 TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
-  constexpr int kPairs = 400'000;
+  constexpr int kPairs = 500'000;
   Put("cube", Cube());
   const v1::BatchCheckCollisionsRequest request = Batch(kPairs);
   grpc::ClientContext unread_context;
@@ -97,12 +98,14 @@ TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
   EXPECT_GT(ahead, 0);
   EXPECT_LT(ahead, kPairs / 2);
   unread_context.TryCancel();
+  while (unread->Read(&part)) {
+  }
   EXPECT_FALSE(unread->Finish().ok());
 }
 
 // One step of a stream of poses answers all pairs; the client reads none of it.
 TEST_F(Backpressure, AStepOfAStreamThatNobodyReadsIsNotComputedAhead) {
-  constexpr int kPairs = 400'000;
+  constexpr int kPairs = 500'000;
   Put("cube", Cube());
   const v1::BatchCheckCollisionsRequest batch = Batch(kPairs);
   v1::StreamCollisionsRequest open;
@@ -125,7 +128,9 @@ TEST_F(Backpressure, AStepOfAStreamThatNobodyReadsIsNotComputedAhead) {
   EXPECT_GT(ahead, 0);
   EXPECT_LT(ahead, kPairs / 2);
   unread_context.TryCancel();
-  unread->Finish();
+  while (unread->Read(&part)) {
+  }
+  EXPECT_FALSE(unread->Finish().ok());
   read->WritesDone();
   EXPECT_TRUE(read->Finish().ok());
 }

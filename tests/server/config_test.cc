@@ -68,12 +68,29 @@ TEST_F(ConfigTest, FlagBeatsVariableBeatsFileBeatsDefault) {
 }
 
 TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
-  const std::map<std::string, std::string> settings = {
-      {"listen", "unix:/tmp/x"},  {"insecure", "true"},           {"threads", "3"},
-      {"store", "memory"},        {"drain-timeout", "0.5"},       {"log-level", "debug"},
-      {"log-format", "json"},     {"max-points-per-chunk", "11"}, {"max-vertices-per-hull", "12"},
-      {"max-hulls", "13"},        {"max-pairs-per-batch", "14"},  {"max-textbook-axes", "15"},
-      {"max-message-bytes", "16"}};
+  const std::map<std::string, std::string> settings = {{"listen", "unix:/tmp/x"},
+                                                       {"insecure", "true"},
+                                                       {"threads", "3"},
+                                                       {"store", "memory"},
+                                                       {"drain-timeout", "0.5"},
+                                                       {"log-level", "debug"},
+                                                       {"log-format", "json"},
+                                                       {"max-points-per-chunk", "11"},
+                                                       {"max-vertices-per-hull", "12"},
+                                                       {"max-hulls", "13"},
+                                                       {"max-pairs-per-batch", "14"},
+                                                       {"max-textbook-axes", "15"},
+                                                       {"max-message-bytes", "16"},
+                                                       {"max-points-per-hull", "17"},
+                                                       {"max-placements", "18"},
+                                                       {"max-calls", "19"},
+                                                       {"max-waiting-calls", "20"},
+                                                       {"max-streams-per-client", "21"},
+                                                       {"max-concurrent-batches", "22"},
+                                                       {"max-request-time", "2.5"},
+                                                       {"slow-request", "0.25"},
+                                                       {"metrics-address", "127.0.0.1:1"},
+                                                       {"metrics-insecure", "true"}};
   std::vector<std::string> flags;
   std::map<std::string, std::string> variables;
   std::string toml;
@@ -82,7 +99,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     std::string variable = "HULLD_";
     for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
     variables[variable] = value;
-    const bool is_text = name == "listen" || name == "store" || name.starts_with("log");
+    const bool is_text =
+        name == "listen" || name == "metrics-address" || name == "store" || name.starts_with("log");
     toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
   }
   const auto expect_all = [](const Config& config) {
@@ -98,6 +116,16 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
     EXPECT_EQ(config.limits.max_textbook_axes, 15);
     EXPECT_EQ(config.limits.max_message_bytes, 16);
+    EXPECT_EQ(config.limits.max_points_per_hull, 17);
+    EXPECT_EQ(config.limits.max_placements, 18);
+    EXPECT_EQ(config.limits.max_calls, 19);
+    EXPECT_EQ(config.limits.max_waiting_calls, 20);
+    EXPECT_EQ(config.limits.max_streams_per_client, 21);
+    EXPECT_EQ(config.limits.max_concurrent_batches, 22);
+    EXPECT_EQ(config.limits.max_request_time, std::chrono::milliseconds(2500));
+    EXPECT_EQ(config.limits.slow_request, std::chrono::milliseconds(250));
+    EXPECT_EQ(config.metrics_address, "127.0.0.1:1");
+    EXPECT_TRUE(config.metrics_insecure);
   };
   expect_all(Accepted(flags));
   const std::string file = WriteFile(toml);
@@ -125,10 +153,30 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
 TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
   const absl::StatusOr<CommandLine> help = Parse({"--help"});
   ASSERT_TRUE(help.ok());
-  for (const char* flag :
-       {"--listen", "--insecure", "--threads", "--store", "--drain-timeout", "--log-level",
-        "--log-format", "--max-points-per-chunk", "--max-vertices-per-hull", "--max-hulls",
-        "--max-pairs-per-batch", "--max-textbook-axes", "--max-message-bytes", "--config"}) {
+  for (const char* flag : {"--listen",
+                           "--insecure",
+                           "--threads",
+                           "--store",
+                           "--drain-timeout",
+                           "--log-level",
+                           "--log-format",
+                           "--max-points-per-chunk",
+                           "--max-vertices-per-hull",
+                           "--max-hulls",
+                           "--max-pairs-per-batch",
+                           "--max-textbook-axes",
+                           "--max-message-bytes",
+                           "--max-points-per-hull",
+                           "--max-placements",
+                           "--max-calls",
+                           "--max-waiting-calls",
+                           "--max-streams-per-client",
+                           "--max-concurrent-batches",
+                           "--max-request-time",
+                           "--slow-request",
+                           "--metrics-address",
+                           "--metrics-insecure",
+                           "--config"}) {
     EXPECT_THAT(help->print, HasSubstr(flag));
   }
   EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));

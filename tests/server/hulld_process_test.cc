@@ -1,5 +1,7 @@
 // The program itself: started, talked to, ended by a signal.
 
+#include "tests/server/hulld_process.h"
+
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -9,7 +11,6 @@
 
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
-#include "tests/server/hulld_process.h"
 
 namespace hulld::server {
 namespace {

@@ -71,6 +71,14 @@ class LimitsTest : public ServerTest {
     return reader;
   }
 
+  // Reads what is left; gRPC tells the status only after that.
+  static grpc::Status FinishBatch(grpc::ClientReader<v1::BatchCheckCollisionsResponse>& reader) {
+    v1::BatchCheckCollisionsResponse part;
+    while (reader.Read(&part)) {
+    }
+    return reader.Finish();
+  }
+
   // Until no call runs.
   bool WaitIdle() { return server_->WaitIdle(std::chrono::minutes(5)); }
 
@@ -86,7 +94,8 @@ TEST_F(LimitsTest, StatusShowsEveryLimitEvenWhenTheServerIsFull) {
   Config config = TestConfig();
   config.limits.max_calls = 1;
   Restart(config);
-  Put("ball", Sphere(300));
+  Put("ball", Sphere(100));
+  ASSERT_TRUE(WaitIdle());
   Appender idle(*hulls_, "ball", "w");
   ASSERT_TRUE(idle.is_open());
   grpc::ClientContext refused_context;
@@ -139,7 +148,7 @@ TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
   Config config = TestConfig();
   config.limits.max_concurrent_batches = 1;
   Restart(config);
-  Put("ball", Sphere(300));
+  Put("ball", Sphere(100));
   grpc::ClientContext running_context;
   const BatchReader running = StartBatch(&running_context, LongBatch());
 
@@ -158,42 +167,42 @@ TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
   EXPECT_EQ(Check(pair).relation(), v1::RELATION_OVERLAPPING);
 
   running_context.TryCancel();
-  running->Finish();
+  EXPECT_FALSE(FinishBatch(*running).ok());
   ASSERT_TRUE(WaitIdle());
   grpc::ClientContext next_context;
-  EXPECT_TRUE(collisions_->BatchCheckCollisions(&next_context, {})->Finish().ok());
+  EXPECT_TRUE(FinishBatch(*collisions_->BatchCheckCollisions(&next_context, {})).ok());
 }
 
 TEST_F(LimitsTest, ARequestEndsWhenItsTimeIsUp) {
   Config config = TestConfig();
   config.limits.max_request_time = std::chrono::milliseconds(50);
   Restart(config);
-  Put("ball", Sphere(300));
+  Put("ball", Sphere(100));
   grpc::ClientContext context;
-  const BatchReader reader = collisions_->BatchCheckCollisions(&context, LongBatch());
-  v1::BatchCheckCollisionsResponse part;
-  while (reader->Read(&part)) {
-  }
-  ExpectRefused(reader->Finish(), "max-request-time");
+  ExpectRefused(FinishBatch(*collisions_->BatchCheckCollisions(&context, LongBatch())),
+                "max-request-time");
 }
 
 TEST_F(LimitsTest, ACallWhoseClientDoesNotReadLosesItsPlaceWhenItsTimeIsUp) {
   Config config = TestConfig();
   config.limits.max_request_time = std::chrono::seconds(2);
   Restart(config);
-  Put("ball", Sphere(50'000));
-  grpc::ClientContext snapshot_context;
-  GetHull(&snapshot_context);
+  Put("cube", Cube());
   ASSERT_TRUE(WaitIdle());
+  // Some 72 MB, far more than gRPC's windows hold.
+  v1::BatchCheckCollisionsRequest request;
+  request.mutable_wanted()->set_separation(true);
+  request.mutable_wanted()->set_witness(true);
+  *request.add_placements() = PlacementOf("cube");
+  *request.add_placements() = PlacementOf("cube", 9);
+  for (int i = 0; i < 1'000'000; ++i) {
+    request.add_pairs(0);
+    request.add_pairs(1);
+  }
   grpc::ClientContext context;
-  v1::GetHullMeshRequest request;
-  request.set_hull_id("ball");
-  // Megabytes, of which gRPC's window takes the first 64 KiB.
-  const auto unread = hulls_->GetHullMesh(&context, request);
-  v1::GetHullMeshResponse header;
-  ASSERT_TRUE(unread->Read(&header));
+  const BatchReader unread = StartBatch(&context, request);
   EXPECT_TRUE(WaitIdle());
-  EXPECT_FALSE(unread->Finish().ok());
+  EXPECT_FALSE(FinishBatch(*unread).ok());
 }
 
 TEST_F(LimitsTest, PlacementsAndPointsPerHullAreBounded) {
@@ -247,7 +256,7 @@ TEST_F(LimitsTest, LimitsOfSinglePairsInABatchAreCountedToo) {
   ASSERT_TRUE(reader->Read(&part));
   ASSERT_EQ(part.pair_problems_size(), 1);
   EXPECT_THAT(part.pair_problems(0).message(), HasSubstr("(--max-textbook-axes)"));
-  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_TRUE(FinishBatch(*reader).ok());
   EXPECT_EQ(Hits("max-textbook-axes"), 1);
 }
 
