@@ -1,9 +1,7 @@
 #include "client/client.h"
 
 #include <absl/strings/str_cat.h>
-#include <grpcpp/create_channel.h>
 #include <grpcpp/generic/generic_stub.h>
-#include <grpcpp/security/credentials.h>
 
 #include <algorithm>
 #include <future>
@@ -17,22 +15,17 @@ namespace {
 // Replies are cut at about 1 MiB by the server; this only bounds what a wrong one can make us hold.
 constexpr int kMaxReceiveBytes = 64 << 20;
 
-bool IsLoopback(const std::string& target) {
-  const auto starts_with = [&target](const char* prefix) { return target.rfind(prefix, 0) == 0; };
-  return starts_with("127.") || starts_with("localhost:") || starts_with("[::1]:") ||
-         starts_with("unix:");
-}
-
-std::shared_ptr<grpc::Channel> Connect(const std::string& server) {
+std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   // A retry shall find a server that has come back meanwhile, rather than gRPC's memory of the
   // failure.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  if (options.own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
   // gRPC would ask the proxy of the environment even for this machine's own services.
-  if (IsLoopback(server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-  return grpc::CreateCustomChannel(server, grpc::InsecureChannelCredentials(), arguments);
+  if (IsLoopback(options.server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  return OpenChannel(options.server, options.security, arguments);
 }
 
 absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
@@ -89,7 +82,7 @@ HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
-Client::Client(ClientOptions options) : Client(options, Connect(options.server)) {}
+Client::Client(ClientOptions options) : Client(options, Connect(options)) {}
 
 Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
     : options_(std::move(options)),

@@ -15,6 +15,7 @@
 
 #include "client/appender.h"
 #include "client/collision_stream.h"
+#include "client/connection_security.h"
 #include "client/retry.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
@@ -31,6 +32,10 @@ struct ClientOptions {
   // the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
+  // Connections to one server are shared within a process unless this is set.
+  bool own_connection = false;
+  // TLS and the token.
+  ConnectionSecurity security;
 };
 
 // The canonical snapshot of a hull, put together from its stream and checked to be consistent.
@@ -50,7 +55,8 @@ struct HullMesh {
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
 // came. Calls that are safe to repeat (all but DeleteHull, and CreateHull without if_absent) are
 // retried as options.retry says after UNAVAILABLE, and after RESOURCE_EXHAUSTED when the server
-// says when to come again.
+// says when to come again. ValidateSecurity
+// tells beforehand whether options.security can work.
 class Client {
  public:
   explicit Client(ClientOptions options = {});

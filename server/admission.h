@@ -36,10 +36,17 @@ enum class CallKind {
 
 CallKind KindOf(Rpc rpc);
 
+class Authenticator;
+
 // Lets calls in while the limits leave room and until the server drains, counts those that run, and
 // cancels those that neither end nor poll for their end, as when a client reads no more.
 class Admission {
  public:
+  // Who tells who calls; set before the first call, and outlives this. Without one everyone may do
+  // everything.
+  void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
+  const Authenticator* authenticator() const { return authenticator_; }
+
   // One admitted call; it ends with its ticket.
   class Ticket {
    public:
@@ -102,6 +109,8 @@ class Admission {
   const Limits limits_;
   Metrics& metrics_;
   std::function<size_t()> backlog_;
+
+  const Authenticator* authenticator_ = nullptr;
 
   std::mutex mutex_;
   // The rest is guarded by the mutex, `running_` for changes.

@@ -7,7 +7,6 @@
 
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/random_id.h"
 #include "server/status_map.h"
 
@@ -99,7 +98,9 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     return End(absl::InvalidArgumentError(
         "open came twice; one stream appends to one hull, so start another stream"));
   }
-  if (absl::Status s = ValidateHullId(open.hull_id(), "open.hull_id"); !s.ok()) return End(s);
+  if (absl::Status s = CheckHullId(call_.caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
+    return End(s);
+  }
   if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return End(s);
   const std::string writer_id = open.writer_id().empty() ? RandomId() : open.writer_id();
   const std::weak_ptr<AppendStream> weak = weak_from_this();

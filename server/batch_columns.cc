@@ -1,11 +1,19 @@
 #include "server/batch_columns.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "server/answer_columns.h"
 #include "server/config.h"
+#include "server/encode.h"
 
 namespace hulld::server {
+namespace {
+
+// A relation and a rung.
+constexpr size_t kRelationBytes = 2;
+
+}  // namespace
 
 BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                            uint64_t first_pair)
@@ -30,6 +38,23 @@ void BatchColumns::AddUnanswered() {
 void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b) {
   bytes_ += AddAnswer(answer, a, b, wanted_, next_pair_, MessageForNext());
   ++next_pair_;
+}
+
+void BatchColumns::Add(std::span<const RelationAnswer> answers) {
+  while (!answers.empty()) {
+    v1::BatchCheckCollisionsResponse* const message = MessageForNext();
+    const size_t room = (Config::kReplyMessageBytes - bytes_ + kRelationBytes - 1) / kRelationBytes;
+    const std::span<const RelationAnswer> part = answers.first(std::min(room, answers.size()));
+    message->mutable_relations()->Reserve(static_cast<int>(part.size()));
+    message->mutable_rungs()->Reserve(static_cast<int>(part.size()));
+    for (const RelationAnswer& answer : part) {
+      message->mutable_relations()->AddAlreadyReserved(EncodeRelation(answer.relation));
+      message->mutable_rungs()->AddAlreadyReserved(EncodeRung(answer.rung));
+    }
+    bytes_ += kRelationBytes * part.size();
+    next_pair_ += part.size();
+    answers = answers.subspan(part.size());
+  }
 }
 
 std::vector<v1::BatchCheckCollisionsResponse> BatchColumns::Take() { return std::move(messages_); }

@@ -60,12 +60,14 @@ absl::Status BatchStream::Validate() {
                        registry_.limits().max_pairs_per_batch, "the batch");
 }
 
-// Fills table_ and head_.
+// Fills table_ and head_, and sets relations_suffice_.
 absl::Status BatchStream::ResolvePlacements() {
-  table_ = PlacementTable(request_.placements());
+  table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   table_.EncodeHulls(head_.mutable_hulls(), head_.mutable_placement_problems());
+  relations_suffice_ = options_.method == Method::kCertifiedSearch &&
+                       IsRelationOnly(request_.wanted()) && table_.all_answerable();
   return absl::OkStatus();
 }
 
@@ -120,9 +122,30 @@ std::vector<absl::StatusOr<Answer>> BatchStream::AnswerPairs(
   return answers;
 }
 
+// The relations of the pairs from next_pair_ up to `end`. Requires that all can be answered.
+absl::Status BatchStream::ComputeRelations(size_t end) {
+  std::vector<PlacedPair> pairs;
+  pairs.reserve(end - next_pair_);
+  for (size_t i = next_pair_; i < end; ++i) pairs.push_back(PairAt(i));
+  const auto start = std::chrono::steady_clock::now();
+  const absl::StatusOr<std::vector<RelationAnswer>> answers = FindRelations(
+      table_.placed(), pairs, options_.tolerance, options_.should_stop, executor_.threads());
+  if (!answers.ok()) return call_.ShouldStop() ? call_.StopStatus() : answers.status();
+  AdaptSlice(pairs.size(), std::chrono::steady_clock::now() - start);
+  BatchColumns columns(std::move(head_), request_.wanted(), next_pair_);
+  head_.Clear();
+  columns.Add(*answers);
+  RungCounts counts;
+  for (const RelationAnswer& answer : *answers) counts.Add(answer.rung);
+  call_.metrics().CountPairs(counts);
+  Send(columns, end);
+  return absl::OkStatus();
+}
+
 absl::Status BatchStream::ComputeSlice() {
   const size_t begin = next_pair_;
   const size_t end = SliceEnd();
+  if (relations_suffice_) return ComputeRelations(end);
   std::vector<PlacedPair> pairs;
   pairs.reserve(end - begin);
   for (size_t i = begin; i < end; ++i) {
@@ -156,12 +179,17 @@ absl::Status BatchStream::ComputeSlice() {
     }
   }
   call_.metrics().CountPairs(counts);
+  Send(columns, end);
+  return absl::OkStatus();
+}
+
+// Queues what answers the pairs up to `end`.
+void BatchStream::Send(BatchColumns& columns, size_t end) {
   next_pair_ = end;
   const std::lock_guard lock(mutex_);
   for (v1::BatchCheckCollisionsResponse& message : columns.Take()) {
     ready_.push_back(std::move(message));
   }
-  return absl::OkStatus();
 }
 
 void BatchStream::AdaptSlice(size_t pairs, std::chrono::steady_clock::duration elapsed) {

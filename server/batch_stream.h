@@ -15,6 +15,7 @@
 
 #include "core/query/batch.h"
 #include "hulld/v1/collision.pb.h"
+#include "server/batch_columns.h"
 #include "server/call.h"
 #include "server/executor.h"
 #include "server/placement_table.h"
@@ -56,6 +57,8 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
   size_t SliceEnd() const;
   std::vector<absl::StatusOr<Answer>> AnswerPairs(const std::vector<PlacedPair>& pairs) const;
   absl::Status ComputeSlice();
+  absl::Status ComputeRelations(size_t end);
+  void Send(BatchColumns& columns, size_t end);
   void AdaptSlice(size_t pairs, std::chrono::steady_clock::duration elapsed);
   // Requires the mutex: starts whatever may start now.
   void Proceed();
@@ -73,6 +76,8 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
   v1::BatchCheckCollisionsResponse head_;
   size_t next_pair_ = 0;
   size_t slice_pairs_ = 0;
+  // Whether every pair can be answered and nothing but relations is wanted, as mostly.
+  bool relations_suffice_ = false;
 
   std::mutex mutex_;
   // The rest is guarded by the mutex.

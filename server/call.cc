@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "server/authenticator.h"
 #include "server/error_details.h"
 #include "server/limit_error.h"
 #include "server/request_id.h"
@@ -34,6 +35,7 @@ absl::Status Call::Begin() {
   if (given != metadata.end()) request_id_ = {given->second.data(), given->second.size()};
   if (!IsRequestId(request_id_)) request_id_ = NextRequestId();
   context_.AddTrailingMetadata(kRequestIdKey, request_id_);
+  if (absl::Status s = Authenticate(); !s.ok()) return s;
 
   absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
       rpc_, [this] { return Client(); }, context_.c_call());
@@ -43,8 +45,23 @@ absl::Status Call::Begin() {
   return absl::OkStatus();
 }
 
-// The address without the port, which differs for each connection.
+absl::Status Call::Authenticate() {
+  if (admission_.authenticator() == nullptr) return absl::OkStatus();
+  absl::StatusOr<Caller> caller =
+      admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_);
+  if (!caller.ok()) {
+    const bool unknown = absl::IsUnauthenticated(caller.status());
+    metrics().CountAuthFailure(unknown ? "unauthenticated" : "permission_denied");
+    return caller.status();
+  }
+  caller_ = *std::move(caller);
+  return absl::OkStatus();
+}
+
+// The token's name; without tokens the address, without the port, which differs for each
+// connection.
 std::string Call::Client() const {
+  if (!caller_.name.empty()) return "token:" + caller_.name;
   const std::string peer = context_.peer();
   if (!peer.starts_with("ipv4:") && !peer.starts_with("ipv6:")) return peer;
   return peer.substr(0, peer.rfind(':'));

@@ -12,6 +12,7 @@
 
 #include "server/admission.h"
 #include "server/call_lifetime.h"
+#include "server/caller.h"
 #include "server/log.h"
 #include "server/rpc.h"
 
@@ -28,6 +29,8 @@ class Call {
       : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
 
   Rpc rpc() const { return rpc_; }
+  // Who calls. Requires that Begin succeeded.
+  const Caller& caller() const { return caller_; }
   // The client's (metadata x-request-id), or ours. The reply carries it, and so does all that is
   // logged about the call.
   const std::string& request_id() const { return request_id_; }
@@ -39,7 +42,8 @@ class Call {
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }
   void Cancel() { lifetime_.Cancel(); }
 
-  // Lets the call in; it must be ended with the error if there is one. UNAVAILABLE: the server
+  // Finds out who calls and lets the call in; it must be ended with the error if there is one.
+  // UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate. UNAVAILABLE: the server
   // drains. RESOURCE_EXHAUSTED: a limit on calls.
   absl::Status Begin();
 
@@ -64,6 +68,8 @@ class Call {
  private:
   using Clock = std::chrono::steady_clock;
 
+  // Fills caller_.
+  absl::Status Authenticate();
   std::string Client() const;
   void LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const;
 
@@ -76,6 +82,7 @@ class Call {
   std::atomic<uint64_t> pairs_ = 0;
   std::atomic<uint64_t> points_ = 0;
   Clock::time_point message_arrival_;
+  Caller caller_;
   // Taken by Begin, given back when the reactor goes.
   std::optional<Admission::Ticket> ticket_;
 };

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/query/collision.h"
@@ -12,9 +13,9 @@
 #include "server/collision_stream.h"
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/query_settings.h"
 #include "server/scene_stream.h"
+#include "server/status_map.h"
 #include "server/unary_call.h"
 
 namespace hulld::server {
@@ -29,42 +30,64 @@ struct PairQuery {
   QueryOptions options;
 };
 
-absl::StatusOr<Pose> ReadPlacement(bool present, const v1::Placement& placement,
-                                   const std::string& field) {
+absl::StatusOr<Pose> ReadPlacement(const Caller& caller, bool present,
+                                   const v1::Placement& placement, const std::string& field) {
   if (!present) {
     return absl::InvalidArgumentError(absl::StrCat(field, " is missing; give a hull ID"));
   }
-  if (absl::Status s = ValidateHullId(placement.hull_id(), field + ".hull_id"); !s.ok()) return s;
-  return DecodePose(placement.pose(), field + ".pose");
+  if (absl::Status s = CheckHullId(caller, placement.hull_id(), field + ".hull_id"); !s.ok()) {
+    return s;
+  }
+  absl::StatusOr<Pose> pose = DecodePose(placement.pose());
+  if (!pose.ok()) return Prefixed(absl::StrCat(field, ".pose."), pose.status());
+  return pose;
 }
 
-absl::StatusOr<PairQuery> Prepare(Registry& registry, const CallLifetime& lifetime,
-                                  const v1::CheckCollisionRequest& request,
-                                  v1::CheckCollisionResponse* response) {
+std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
+  return {request.a().hull_id(), request.b().hull_id()};
+}
+
+// All of a query but its hulls.
+absl::StatusOr<PairQuery> ReadQuery(const Limits& limits, const Call& call,
+                                    const v1::CheckCollisionRequest& request) {
   PairQuery query;
   absl::StatusOr<QueryOptions> options = MakeQueryOptions(
-      request.method(), request.wanted(), request.tolerance(), registry.limits(), lifetime);
+      request.method(), request.wanted(), request.tolerance(), limits, call.lifetime());
   if (!options.ok()) return options.status();
   query.options = *std::move(options);
-  const absl::StatusOr<Pose> X_WA = ReadPlacement(request.has_a(), request.a(), "a");
+  const absl::StatusOr<Pose> X_WA = ReadPlacement(call.caller(), request.has_a(), request.a(), "a");
   if (!X_WA.ok()) return X_WA.status();
   query.X_WA = *X_WA;
-  const absl::StatusOr<Pose> X_WB = ReadPlacement(request.has_b(), request.b(), "b");
+  const absl::StatusOr<Pose> X_WB = ReadPlacement(call.caller(), request.has_b(), request.b(), "b");
   if (!X_WB.ok()) return X_WB.status();
   query.X_WB = *X_WB;
+  return query;
+}
 
-  const std::array<std::string, 2> ids = {request.a().hull_id(), request.b().hull_id()};
-  absl::StatusOr<Resolved> resolved = registry.Resolve(ids, query.options.should_stop);
+// Gives the query the hulls that were found for it, and the response their versions.
+absl::Status TakeHulls(const Registry& registry, absl::StatusOr<Resolved> resolved,
+                       PairQuery* query, v1::CheckCollisionResponse* response) {
   if (!resolved.ok()) return resolved.status();
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
     if (!hull.ok()) return hull.status();
   }
-  query.a = *std::move(resolved->hulls[0]);
-  query.b = *std::move(resolved->hulls[1]);
+  query->a = *std::move(resolved->hulls[0]);
+  query->b = *std::move(resolved->hulls[1]);
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
-  EncodeVersion(query.a.record, response->mutable_hull_a());
-  EncodeVersion(query.b.record, response->mutable_hull_b());
-  return query;
+  EncodeVersion(query->a.record, response->mutable_hull_a());
+  EncodeVersion(query->b.record, response->mutable_hull_b());
+  return absl::OkStatus();
+}
+
+// Whether a relation, of these hulls, may be found on gRPC's thread: they are of moderate size, and
+// nothing is left to make.
+bool IsQuick(const Resolved& resolved) {
+  for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
+    if (!hull.ok()) continue;
+    const Snapshot& snapshot = *hull->snapshot;
+    if (!snapshot.has_query_hull() || !IsQuickToRelate(snapshot.hull())) return false;
+  }
+  return true;
 }
 
 absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted, Metrics& metrics,
@@ -99,15 +122,27 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
                                                            const v1::CheckCollisionRequest* request,
                                                            v1::CheckCollisionResponse* response) {
   return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
-    readers_.Submit([this, call, request, response] {
-      absl::StatusOr<PairQuery> query =
-          Prepare(registry_, call->call().lifetime(), *request, response);
-      if (!query.ok()) return call->End(query.status());
-      if (query->options.method != Method::kTextbookSat) {
-        return call->End(Answer(*query, request->wanted(), call->call().metrics(), response));
+    absl::StatusOr<PairQuery> query = ReadQuery(registry_.limits(), call->call(), *request);
+    if (!query.ok()) return call->End(query.status());
+    if (query->options.method != Method::kTextbookSat && IsRelationOnly(request->wanted())) {
+      std::optional<Resolved> resolved = registry_.TryResolve(HullIds(*request));
+      if (resolved.has_value() && IsQuick(*resolved)) {
+        const absl::Status taken = TakeHulls(registry_, *std::move(resolved), &*query, response);
+        return call->End(taken.ok()
+                             ? Answer(*query, request->wanted(), call->call().metrics(), response)
+                             : taken);
       }
-      query->options.threads = executor_.threads();
-      executor_.Submit([call, request, response, query = *std::move(query)] {
+    }
+    readers_.Submit([this, call, request, response, query = *std::move(query)]() mutable {
+      const absl::Status taken =
+          TakeHulls(registry_, registry_.Resolve(HullIds(*request), query.options.should_stop),
+                    &query, response);
+      if (!taken.ok()) return call->End(taken);
+      if (query.options.method != Method::kTextbookSat) {
+        return call->End(Answer(query, request->wanted(), call->call().metrics(), response));
+      }
+      query.options.threads = executor_.threads();
+      executor_.Submit([call, request, response, query = std::move(query)] {
         call->End(Answer(query, request->wanted(), call->call().metrics(), response));
       });
     });

@@ -23,14 +23,10 @@ constexpr std::chrono::milliseconds kSliceTime(20);
 // The clock is read once for so many pairs.
 constexpr size_t kPairsPerLook = 64;
 constexpr int kPoseNumbers = 7;
+// Of an update that is answered where it arrives.
+constexpr int kMostQuickPairs = 8;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
-
-// Nothing but the exact relation.
-bool IsRelationOnly(const v1::Wanted& wanted, double tolerance) {
-  return tolerance == 0 && !wanted.axis() && !wanted.analysis() && !wanted.certificate() &&
-         !wanted.separation() && !wanted.witness() && !wanted.has_clearance();
-}
 
 absl::StatusOr<Pose> PoseAt(const v1::CollisionStreamUpdate& update, int i) {
   const double* const numbers = update.poses().data() + static_cast<ptrdiff_t>(kPoseNumbers) * i;
@@ -64,6 +60,7 @@ void CollisionStream::OnReadDone(bool ok) {
   // Without a message the client has said all, or is gone.
   if (!ok) return End(absl::OkStatus());
   call_.BeginMessage();
+  if (IsQuick()) return Handle();
   // The first message resolves hulls, and answers all pairs with cold caches.
   WorkerPool& pool = open_ ? readers_ : long_readers_;
   pool.Submit([self = shared_from_this()] { self->Handle(); });
@@ -80,6 +77,25 @@ void CollisionStream::OnWriteDone(bool ok) {
 
 void CollisionStream::End(const absl::Status& status) {
   Finish(call_.End(call_.ShouldStop() ? call_.StopStatus() : status));
+}
+
+// Whether the message can be answered here and now, on gRPC's thread.
+bool CollisionStream::IsQuick() const {
+  if (!open_ || !request_.has_update() || !IsRelationOnly(wanted_)) return false;
+  const v1::CollisionStreamUpdate& update = request_.update();
+  if (update.refresh_hulls() || update.placements_size() > kMostQuickPairs) return false;
+  int pairs = 0;
+  for (const uint32_t placement : update.placements()) {
+    if (placement >= table_.size()) return true;  // an error
+    for (size_t k = pairs_begin_[placement]; k < pairs_begin_[placement + 1]; ++k) {
+      if (++pairs > kMostQuickPairs) return false;
+      const PairState& pair = pairs_[pairs_of_[k]];
+      for (const uint32_t part : {pair.a, pair.b}) {
+        if (!IsQuickToRelate(table_.placed()[part].hull())) return false;
+      }
+    }
+  }
+  return true;
 }
 
 void CollisionStream::Handle() {
@@ -130,7 +146,7 @@ absl::Status CollisionStream::HandleOpen() {
   options_ = *std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
-  table_ = PlacementTable(open.placements());
+  table_ = PlacementTable(open.placements(), call_.caller());
 
   pairs_begin_.assign(placements + 1, 0);
   for (int i = 0; i < open.pairs_size(); i += 2) {
@@ -214,7 +230,7 @@ void CollisionStream::AskAboutPairsOf(size_t placement) {
 absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
   const PlacedHull& a = table_.placed()[pair.a];
   const PlacedHull& b = table_.placed()[pair.b];
-  if (!IsRelationOnly(wanted_, options_.tolerance)) {
+  if (options_.tolerance != 0 || !IsRelationOnly(wanted_)) {
     return CheckCollision(a, b, options_, &pair.cache);
   }
   const RelationAnswer found = FindRelation(a, b, &pair.cache);

@@ -20,9 +20,10 @@
 
 namespace hulld::server {
 
-// One StreamCollisions call: reads a message, answers it on a reader thread, sends the answer, and
-// only then reads the next, so that a fast client fills gRPC's window and not our memory. Long
-// answers are computed in slices, between which other calls get their turn, and sent in pieces.
+// One StreamCollisions call: reads a message, answers it on a reader thread (or where it arrives,
+// if that takes no time), sends the answer, and only then reads the next, so that a fast client
+// fills gRPC's window and not our memory. Long answers are computed in slices, between which other
+// calls get their turn, and sent in pieces.
 //
 // At any time one of a read, a task and a write is under way, and nothing else touches the state;
 // so it needs no mutex.
@@ -57,6 +58,7 @@ class CollisionStream
   void OnDone() override { self_.reset(); }
 
   void End(const absl::Status& status);
+  bool IsQuick() const;
   void Handle();
   absl::Status HandleMessage();
   absl::Status HandleOpen();

@@ -37,6 +37,7 @@ class Parser {
   Parser()
       : app_("hulld keeps 3D convex hulls by ID and answers exact collision queries.", "hulld") {
     AddServing();
+    AddGuard();
     AddLimits();
     app_.set_config("--config", "", "TOML file with the same settings, as in: max-hulls = 1000")
         ->envname(EnvironmentName("config"))
@@ -83,6 +84,8 @@ class Parser {
     config_.limits.max_request_time = ToMilliseconds(max_request_seconds_);
     config_.limits.slow_request = ToMilliseconds(slow_request_seconds_);
     result->config = config_;
+    result->check = check_;
+    result->settings = app_.config_to_str(/*default_also=*/true, /*write_description=*/false);
     return absl::OkStatus();
   }
 
@@ -107,8 +110,8 @@ class Parser {
     Add("listen", config_.listen,
         "Where to listen: host:port, [v6]:port or unix:path; port 0 picks a free port");
     app_.add_flag("--insecure", config_.insecure,
-                  "Allow --listen on addresses that other machines can reach, although nothing is "
-                  "encrypted or authenticated")
+                  "Allow --listen on addresses that other machines can reach without TLS: whoever "
+                  "is between can read and change what passes, tokens included")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
@@ -135,6 +138,20 @@ class Parser {
     Add("slow-request", slow_request_seconds_,
         "Log requests that take longer than so many seconds; 0: none")
         ->check(CLI::Validator(CheckSeconds, ""));
+  }
+
+  void AddGuard() {
+    Add("tls-cert", config_.tls_cert,
+        "PEM file of the server's certificate and those that lead to its authority; read again "
+        "when it changes, as are the next three");
+    Add("tls-key", config_.tls_key, "PEM file of its private key, which only hulld may read");
+    Add("tls-client-ca", config_.tls_client_ca,
+        "PEM file of the authorities of clients: clients then need a certificate");
+    Add("tokens-file", config_.tokens_file,
+        "File of the tokens that callers need, made by 'hullctl token new'");
+    app_.add_flag("--check-config", check_,
+                  "Check the settings and the files that they name, print them and end: 0 or 2")
+        ->configurable(false);
   }
 
   void AddLimits() {
@@ -190,6 +207,7 @@ class Parser {
 
   CLI::App app_;
   Config config_;
+  bool check_ = false;
   double drain_timeout_seconds_ = ToSeconds(Config().drain_timeout);
   double max_request_seconds_ = ToSeconds(Limits().max_request_time);
   double slow_request_seconds_ = ToSeconds(Limits().slow_request);

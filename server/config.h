@@ -30,7 +30,8 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull and StreamCollisions. A client is a peer address.
+  // Of AppendPoints, ReplaceHull and StreamCollisions. A client is a token or, without tokens, a
+  // peer address.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns.
   uint64_t max_concurrent_batches = 32;
@@ -44,8 +45,15 @@ struct Limits {
 struct Config {
   // "host:port", "[v6]:port" or "unix:path"; port 0 picks a free one.
   std::string listen = "127.0.0.1:50551";
-  // Allows addresses that other machines can reach, without encryption or authentication.
+  // Allows addresses that other machines can reach without TLS.
   bool insecure = false;
+  // PEM files: the certificate that the server shows with those that lead to its authority, its
+  // private key, and the authorities of clients; the last makes clients need a certificate.
+  std::string tls_cert;
+  std::string tls_key;
+  std::string tls_client_ca;
+  // Who may call (server/token_table.h); empty: everyone who can connect.
+  std::string tokens_file;
   // Threads of parallel queries; 0: one per core.
   int threads = 0;
   // Where hulls live: "memory".
@@ -62,6 +70,10 @@ struct Config {
   bool metrics_insecure = false;
   Limits limits;
 
+  bool has_tls() const { return !tls_cert.empty() || !tls_key.empty() || !tls_client_ca.empty(); }
+
+  // How often the files of certificates and tokens are looked at.
+  static constexpr std::chrono::milliseconds kReloadInterval{1000};
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
@@ -74,11 +86,15 @@ struct Config {
   static constexpr size_t kMaxIdCharacters = 256;
 };
 
-// What a command line asks for: to run with `config`, or, when `print` is not empty, to print it
-// and end (--help, --version).
+// What a command line asks for: to run with `config`; or, when `print` is not empty, to print
+// it and end (--help, --version).
 struct CommandLine {
   Config config;
   std::string print;
+  // --check-config: to check the settings, print them and end.
+  bool check = false;
+  // Every setting in force, as lines of the TOML file.
+  std::string settings;
 };
 
 // Looks up an environment variable; nullopt when it is not set.

@@ -3,11 +3,30 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <cstring>
+
 #include "server/limit_error.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
 namespace {
+
+// Three numbers each.
+std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<double>& xyz) {
+  static_assert(sizeof(Vector) == 3 * sizeof(double));
+  std::vector<Vector> points(static_cast<size_t>(xyz.size()) / 3);
+  if (!points.empty())
+    std::memcpy(points.data()->data(), xyz.data(), points.size() * sizeof(Vector));
+  return points;
+}
+
+std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<float>& xyz) {
+  std::vector<Vector> points;
+  points.reserve(static_cast<size_t>(xyz.size()) / 3);
+  const float* const end = xyz.data() + xyz.size();
+  for (const float* p = xyz.data(); p != end; p += 3) points.emplace_back(p[0], p[1], p[2]);
+  return points;
+}
 
 template <typename Coordinates>
 absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates, const char* field,
@@ -21,12 +40,7 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
     return LimitExceeded(absl::StrCat("message holds ", count, " points"), max_points,
                          "max-points-per-chunk");
   }
-  std::vector<Vector> points;
-  points.reserve(count);
-  for (const auto* xyz = coordinates.data(); points.size() < count; xyz += 3) {
-    points.emplace_back(xyz[0], xyz[1], xyz[2]);
-  }
-  return points;
+  return ToPoints(coordinates);
 }
 
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points) {
@@ -56,7 +70,7 @@ absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_p
   return chunk;
 }
 
-absl::StatusOr<Pose> DecodePose(const v1::Pose& message, const std::string& field) {
+absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
   Pose pose;
   if (message.has_rotation()) {
     const v1::Quaternion& q = message.rotation();
@@ -66,7 +80,7 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message, const std::string& fiel
     const v1::Vector3& t = message.translation();
     pose.t = Vector(t.x(), t.y(), t.z());
   }
-  if (absl::Status s = ValidatePose(pose); !s.ok()) return Prefixed(field + ".", s);
+  if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
   return pose;
 }
 

@@ -22,8 +22,8 @@ namespace hulld::server {
 // multiple of three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
 absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points);
 
-// A pose; absent parts mean identity. INVALID_ARGUMENT names `field` and the coordinate.
-absl::StatusOr<Pose> DecodePose(const v1::Pose& message, const std::string& field);
+// A pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in "rotation.w".
+absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
 
 // INVALID_ARGUMENT: a number that stands for no method.
 absl::StatusOr<Method> DecodeMethod(v1::Method method);

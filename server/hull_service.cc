@@ -9,7 +9,6 @@
 #include "server/append_stream.h"
 #include "server/config.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/mesh_stream.h"
 #include "server/page_token.h"
 #include "server/unary_call.h"
@@ -61,7 +60,7 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
                                                  const v1::ListHullsRequest* request,
                                                  v1::ListHullsResponse* response) {
   return UnaryCall::Answer(*context, admission_, Rpc::kListHulls,
-                           [&](const Call&) { return List(*request, response); });
+                           [&](const Call& call) { return List(*request, call, response); });
 }
 
 grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
@@ -73,7 +72,9 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
 
 absl::Status HullService::Create(const v1::CreateHullRequest& request, const Call& call,
                                  v1::CreateHullResponse* response) {
-  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return s;
+  }
   const absl::StatusOr<CreateResult> created =
       registry_.Create(request.hull_id(), request.if_absent());
   if (!created.ok()) return created.status();
@@ -88,7 +89,9 @@ absl::Status HullService::Create(const v1::CreateHullRequest& request, const Cal
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
                               v1::GetHullResponse* response) {
-  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return s;
+  }
   const auto resolved = registry_.Resolve(request.hull_id(), [&call] { return call.ShouldStop(); });
   if (!resolved.ok()) return resolved.status();
   const auto& [revision, view] = *resolved;
@@ -105,28 +108,31 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   return absl::OkStatus();
 }
 
-absl::Status HullService::List(const v1::ListHullsRequest& request,
+absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& call,
                                v1::ListHullsResponse* response) {
   if (request.page_size() > Config::kMaxPageSize) {
     return absl::InvalidArgumentError(absl::StrCat("page_size is ", request.page_size(),
                                                    "; the limit is ", Config::kMaxPageSize));
   }
-  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), request.prefix());
+  const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
+  if (!prefix.ok()) return prefix.status();
+  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
-  const HullPage page =
-      registry_.List(request.prefix(), *after,
-                     request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
+  const HullPage page = registry_.List(
+      *prefix, *after, request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
   EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
   for (const HullRecord& record : page.hulls) EncodeRecord(record, response->add_hulls());
   if (page.more) {
-    response->set_next_page_token(EncodePageToken(request.prefix(), page.hulls.back().hull_id));
+    response->set_next_page_token(EncodePageToken(*prefix, page.hulls.back().hull_id));
   }
   return absl::OkStatus();
 }
 
 absl::Status HullService::Delete(const v1::DeleteHullRequest& request, const Call& call,
                                  v1::DeleteHullResponse* response) {
-  if (absl::Status s = ValidateHullId(request.hull_id(), "hull_id"); !s.ok()) return s;
+  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return s;
+  }
   const absl::StatusOr<uint64_t> revision = registry_.Delete(
       request.hull_id(),
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt);

@@ -45,7 +45,8 @@ class HullService : public v1::HullService::CallbackService {
                       v1::CreateHullResponse* response);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
-  absl::Status List(const v1::ListHullsRequest& request, v1::ListHullsResponse* response);
+  absl::Status List(const v1::ListHullsRequest& request, const Call& call,
+                    v1::ListHullsResponse* response);
   absl::Status Delete(const v1::DeleteHullRequest& request, const Call& call,
                       v1::DeleteHullResponse* response);
 

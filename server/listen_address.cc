@@ -93,12 +93,13 @@ absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const 
   return address;
 }
 
-absl::Status CheckExposure(const ListenAddress& address, bool insecure) {
-  if (insecure || address.is_local()) return absl::OkStatus();
+absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool insecure) {
+  if (has_tls || insecure || address.is_local()) return absl::OkStatus();
   return absl::InvalidArgumentError(absl::StrCat(
       "--listen ", address.host, ":", address.port,
-      " can be reached from other machines, and nothing is encrypted or authenticated; listen on "
-      "127.0.0.1, [::1] or unix:path, or allow it with --insecure"));
+      " can be reached from other machines, which could read and change everything that passes, "
+      "tokens included; encrypt it with --tls-cert and --tls-key, listen on 127.0.0.1, [::1] or "
+      "unix:path, or allow it with --insecure"));
 }
 
 absl::Status CheckSocketFree(const ListenAddress& address) {

@@ -28,8 +28,9 @@ struct ListenAddress {
 absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text,
                                                  const char* flag = "--listen");
 
-// INVALID_ARGUMENT when others can reach the address and `insecure` does not allow that.
-absl::Status CheckExposure(const ListenAddress& address, bool insecure);
+// INVALID_ARGUMENT when others can reach the address, which would be without TLS, and `insecure`
+// does not allow that.
+absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool insecure);
 
 // OK when nobody listens on this unix socket (gRPC would take it over without a word), and for TCP.
 absl::Status CheckSocketFree(const ListenAddress& address);

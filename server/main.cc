@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/config.h"
+#include "server/config_check.h"
 #include "server/log.h"
 #include "server/server.h"
 
@@ -17,12 +18,21 @@ namespace {
 constexpr int kExitFailure = 1;
 constexpr int kExitUsage = 2;
 
-sigset_t EndingSignals() {
+sigset_t HandledSignals() {
   sigset_t signals;
   sigemptyset(&signals);
-  sigaddset(&signals, SIGTERM);
-  sigaddset(&signals, SIGINT);
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, number);
   return signals;
+}
+
+// Waits for SIGTERM or SIGINT, and looks at the files again at each SIGHUP until then.
+int WaitForEnd(const sigset_t& signals, Server& server) {
+  int received = 0;
+  while (sigwait(&signals, &received) == 0 && received == SIGHUP) {
+    spdlog::info("SIGHUP received: looking at the files of certificates and tokens");
+    server.ReloadFiles();
+  }
+  return received;
 }
 
 void LogStart(const Config& config, const Server& server) {
@@ -33,7 +43,7 @@ void LogStart(const Config& config, const Server& server) {
       HULLD_VERSION, config.store, limits.max_points_per_chunk, limits.max_vertices_per_hull,
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
   if (config.store == "memory") spdlog::info("hulls live in memory and end with this process");
-  if (config.insecure) spdlog::warn("--insecure: nothing is encrypted or authenticated");
+  for (const std::string& warning : ExposureWarnings(config)) spdlog::warn("{}", warning);
   if (!server.metrics_address().empty()) {
     spdlog::info("metrics at http://{}/metrics", server.metrics_address());
   }
@@ -44,7 +54,7 @@ void LogStart(const Config& config, const Server& server) {
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
   // Blocked before any thread exists, so that every thread inherits it and this one can wait.
-  const sigset_t signals = EndingSignals();
+  const sigset_t signals = HandledSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
 
@@ -54,8 +64,7 @@ int Run(const Config& config) {
     return kExitFailure;
   }
   LogStart(config, **server);
-  int received = 0;
-  sigwait(&signals, &received);
+  const int received = WaitForEnd(signals, **server);
   spdlog::info("{} received: draining for at most {} ms; once more ends at once",
                received == SIGTERM ? "SIGTERM" : "SIGINT", config.drain_timeout.count());
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
@@ -63,6 +72,18 @@ int Run(const Config& config) {
   if (!(*server)->WaitIdle(config.drain_timeout)) {
     spdlog::warn("the drain timeout passed; cancelling the calls that still run");
   }
+  return 0;
+}
+
+// Says what the settings are and whether they can work.
+int Check(const CommandLine& command_line) {
+  const auto findings = CheckConfig(command_line.config, std::chrono::system_clock::now());
+  if (!findings.ok()) {
+    std::fprintf(stderr, "hulld: %s\n", std::string(findings.status().message()).c_str());
+    return kExitUsage;
+  }
+  std::fputs(command_line.settings.c_str(), stdout);
+  for (const std::string& finding : *findings) std::printf("# %s\n", finding.c_str());
   return 0;
 }
 
@@ -76,6 +97,7 @@ int Main(const std::vector<std::string>& arguments) {
     std::fputs(command_line->print.c_str(), stdout);
     return 0;
   }
+  if (command_line->check) return Check(*command_line);
   const int status = Run(command_line->config);
   if (status == 0) spdlog::info("ended");
   spdlog::shutdown();

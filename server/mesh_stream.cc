@@ -8,7 +8,6 @@
 #include "core/hull/simplify.h"
 #include "server/config.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
@@ -35,7 +34,7 @@ grpc::ServerWriteReactor<v1::GetHullMeshResponse>* MeshStream::Start(
 }
 
 void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request) {
-  absl::Status valid = ValidateHullId(request.hull_id(), "hull_id");
+  absl::Status valid = CheckHullId(call_.caller(), request.hull_id(), "hull_id");
   if (!valid.ok()) return Finish(call_.End(valid));
   auto resolved = registry.Resolve(request.hull_id(), [this] { return call_.ShouldStop(); });
   if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));

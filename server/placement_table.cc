@@ -7,7 +7,6 @@
 
 #include "server/decode.h"
 #include "server/encode.h"
-#include "server/hull_id.h"
 #include "server/limit_error.h"
 #include "server/status_map.h"
 
@@ -29,22 +28,28 @@ bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b
 
 }  // namespace
 
-PlacementTable::PlacementTable(
-    const google::protobuf::RepeatedPtrField<v1::Placement>& placements) {
+PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                               const Caller& caller) {
   std::unordered_map<std::string, size_t> index_of;
   entries_.resize(placements.size());
   for (size_t i = 0; i < entries_.size(); ++i) {
     const v1::Placement& placement = placements[static_cast<int>(i)];
-    const std::string field = absl::StrCat("placements[", i, "]");
     Entry& entry = entries_[i];
-    entry.malformed = ValidateHullId(placement.hull_id(), field + ".hull_id");
-    if (!entry.malformed.ok()) continue;
-    const auto [known, is_new] = index_of.emplace(placement.hull_id(), ids_.size());
-    if (is_new) ids_.push_back(placement.hull_id());
+    auto known = index_of.find(placement.hull_id());
+    if (known == index_of.end()) {
+      entry.malformed = Prefixed(absl::StrCat("placements[", i, "]."),
+                                 CheckHullId(caller, placement.hull_id(), "hull_id"));
+      if (!entry.malformed.ok()) continue;
+      known = index_of.emplace(placement.hull_id(), ids_.size()).first;
+      ids_.push_back(placement.hull_id());
+    }
     entry.hull = known->second;
-    const absl::StatusOr<Pose> pose = DecodePose(placement.pose(), field + ".pose");
-    entry.malformed = pose.status();
-    if (pose.ok()) entry.pose = *pose;
+    const absl::StatusOr<Pose> pose = DecodePose(placement.pose());
+    if (pose.ok()) {
+      entry.pose = *pose;
+    } else {
+      entry.malformed = Prefixed(absl::StrCat("placements[", i, "].pose."), pose.status());
+    }
   }
 }
 
@@ -71,6 +76,13 @@ PlacedHull PlacementTable::Place(size_t i) const {
 const absl::Status& PlacementTable::problem(size_t i) const {
   const Entry& entry = entries_[i];
   return entry.malformed.ok() ? hulls_[*entry.hull].status() : entry.malformed;
+}
+
+bool PlacementTable::all_answerable() const {
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    if (!is_answerable(i)) return false;
+  }
+  return true;
 }
 
 bool PlacementTable::hull_changed(size_t i) const {

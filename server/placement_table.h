@@ -16,6 +16,7 @@
 #include "core/query/placed_hull.h"
 #include "core/query/pose.h"
 #include "hulld/v1/collision.pb.h"
+#include "server/caller.h"
 #include "server/registry.h"
 
 namespace hulld::server {
@@ -25,8 +26,9 @@ namespace hulld::server {
 class PlacementTable {
  public:
   PlacementTable() = default;
-  // Notes what is malformed; no hull is known before Resolve.
-  explicit PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements);
+  // Notes what is malformed and what is not the caller's; no hull is known before Resolve.
+  PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                 const Caller& caller);
 
   // Resolves every hull once, all at one revision of the store. Not for gRPC's threads.
   // CANCELLED: should_stop said so.
@@ -35,6 +37,8 @@ class PlacementTable {
   size_t size() const { return entries_.size(); }
   std::span<const PlacedHull> placed() const { return placed_; }
   bool is_answerable(size_t i) const { return problem(i).ok(); }
+  // Whether all are.
+  bool all_answerable() const;
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
 
@@ -49,7 +53,7 @@ class PlacementTable {
 
  private:
   struct Entry {
-    // Index into hulls_; none when the ID is malformed.
+    // Index into hulls_; none when the ID is malformed or not the caller's.
     std::optional<size_t> hull;
     // Of the ID or the pose.
     absl::Status malformed;

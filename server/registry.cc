@@ -201,12 +201,40 @@ void Registry::MakeSnapshot(Lock& lock, RegisteredHull& hull,
   hull.released.notify_all();
 }
 
+// Requires the lock and that every snapshot is current.
+Resolved Registry::View(std::span<const std::string> ids,
+                        std::span<const HullPointer> hulls) const {
+  Resolved resolved;
+  resolved.store_revision = revision_;
+  resolved.hulls.reserve(ids.size());
+  for (size_t i = 0; i < ids.size(); ++i) {
+    if (hulls[i] == nullptr) {
+      resolved.hulls.emplace_back(NotFound(ids[i]));
+    } else if (!hulls[i]->failure.ok()) {
+      resolved.hulls.emplace_back(hulls[i]->failure);
+    } else {
+      resolved.hulls.emplace_back(HullView{hulls[i]->record, hulls[i]->snapshot});
+    }
+  }
+  return resolved;
+}
+
+std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids) {
+  std::vector<HullPointer> hulls(ids.size());
+  const Lock lock(mutex_);
+  for (size_t i = 0; i < ids.size(); ++i) {
+    hulls[i] = Find(ids[i]);
+    const bool missing = hulls[i] != nullptr && hulls[i]->snapshot == nullptr;
+    if (missing && hulls[i]->failure.ok()) return std::nullopt;
+  }
+  return View(ids, hulls);
+}
+
 // Optimistic first: take what is current, and make the snapshots that are missing. Should a writer
 // have changed one of the hulls meanwhile, hold back the writers of all of them and try again; the
 // chunks in progress then are the last ones to wait for.
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
                                            const std::function<bool()>& should_stop) {
-  Resolved resolved;
   std::vector<HullPointer> hulls(ids.size());
   std::vector<HullPointer> pinned;
   Lock lock(mutex_);
@@ -231,19 +259,8 @@ absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
       stopped = Stopped(should_stop);
     }
   }
-  if (!stopped) {
-    resolved.store_revision = revision_;
-    resolved.hulls.reserve(ids.size());
-    for (size_t i = 0; i < ids.size(); ++i) {
-      if (hulls[i] == nullptr) {
-        resolved.hulls.emplace_back(NotFound(ids[i]));
-      } else if (!hulls[i]->failure.ok()) {
-        resolved.hulls.emplace_back(hulls[i]->failure);
-      } else {
-        resolved.hulls.emplace_back(HullView{hulls[i]->record, hulls[i]->snapshot});
-      }
-    }
-  }
+  Resolved resolved;
+  if (!stopped) resolved = View(ids, hulls);
   for (const HullPointer& hull : pinned) Unpin(hull);
   if (stopped) return absl::CancelledError("the call was cancelled");
   return resolved;

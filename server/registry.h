@@ -136,6 +136,8 @@ class Registry {
   // CANCELLED when should_stop said so.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop);
+  // The same, but nullopt, at once, where it would have to wait or to make what is missing.
+  std::optional<Resolved> TryResolve(std::span<const std::string> ids);
   // The same for one hull; NOT_FOUND is the status.
   absl::StatusOr<std::pair<uint64_t, HullView>> Resolve(const std::string& id,
                                                         const std::function<bool()>& should_stop);
@@ -163,6 +165,7 @@ class Registry {
   using Lock = std::unique_lock<std::mutex>;
 
   HullPointer Find(const std::string& id) const;
+  Resolved View(std::span<const std::string> ids, std::span<const HullPointer> hulls) const;
   absl::StatusOr<HullPointer> CreateLocked(const std::string& id);
   void MakeSnapshot(Lock& lock, RegisteredHull& hull, const std::function<bool()>& should_stop);
   void Unpin(const HullPointer& hull);

@@ -99,7 +99,7 @@ absl::Status SceneStream::Open() {
   options_.query = *std::move(options);
   options_.query.should_stop = [this] { return call_.ShouldStop() || too_slow_; };
   options_.threads = executor_.threads();
-  table_ = PlacementTable(request_.placements());
+  table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
   table_.EncodeHeader(registry_.store(), filling_.mutable_header());
   table_.EncodeHulls(filling_.mutable_hulls(), filling_.mutable_placement_problems());

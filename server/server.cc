@@ -10,6 +10,7 @@
 
 #include "server/listen_address.h"
 #include "server/memory_store.h"
+#include "server/transport.h"
 
 namespace hulld::server {
 namespace {
@@ -22,8 +23,9 @@ constexpr int kLongReadersNiceness = 1;
 
 }  // namespace
 
-Server::Server(const Config& config)
-    : admission_(config.limits, metrics_),
+Server::Server(const Config& config, std::unique_ptr<Guard> guard)
+    : guard_(std::move(guard)),
+      admission_(config.limits, metrics_),
       store_(std::make_unique<MemoryStore>()),
       writers_(PoolThreads(), metrics_.AddPool("writers")),
       registry_(*store_, config.limits, writers_),
@@ -33,6 +35,7 @@ Server::Server(const Config& config)
       hull_service_(registry_, admission_, readers_, long_readers_),
       collision_service_(registry_, admission_, readers_, long_readers_, executor_),
       status_service_(registry_, admission_) {
+  admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this] { return readers_.waiting() + long_readers_.waiting(); });
   AddSizesToMetrics();
 }
@@ -45,7 +48,9 @@ void Server::AddSizesToMetrics() {
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
-  std::unique_ptr<Server> server(new Server(config));
+  absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
+  if (!guard.ok()) return guard.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard)));
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }
@@ -53,17 +58,17 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
 absl::Status Server::Listen(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
   if (!address.ok()) return address.status();
-  if (absl::Status s = CheckExposure(*address, config.insecure); !s.ok()) return s;
+  if (absl::Status s = CheckExposure(*address, config.has_tls(), config.insecure); !s.ok()) {
+    return s;
+  }
   if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
-  builder.AddListeningPort(config.listen, grpc::InsecureServerCredentials(), &port);
-  // Without this a second server would share the port without a word.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(config.limits.max_message_bytes));
+  builder.AddListeningPort(config.listen, guard_->credentials(), &port);
+  SetTransport(config, builder);
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);

@@ -12,6 +12,7 @@
 #include "server/collision_service.h"
 #include "server/config.h"
 #include "server/executor.h"
+#include "server/guard.h"
 #include "server/hull_service.h"
 #include "server/metrics.h"
 #include "server/metrics_endpoint.h"
@@ -25,7 +26,8 @@ namespace hulld::server {
 // A running server: store -> registry -> services -> gRPC.
 class Server {
  public:
-  // Listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs --insecure.
+  // Listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs TLS or --insecure,
+  // or a file of certificates or tokens is wrong.
   // UNAVAILABLE: the address cannot be bound.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config);
 
@@ -42,6 +44,9 @@ class Server {
   }
   const Metrics& metrics() const { return metrics_; }
 
+  // Looks at the files of certificates and tokens now, rather than within the next interval.
+  void ReloadFiles() { guard_->Reload(); }
+
   // Turns health to NOT_SERVING and refuses new calls with UNAVAILABLE; running ones go on.
   void BeginDrain();
 
@@ -49,11 +54,12 @@ class Server {
   bool WaitIdle(std::chrono::milliseconds timeout);
 
  private:
-  explicit Server(const Config& config);
+  Server(const Config& config, std::unique_ptr<Guard> guard);
 
   absl::Status Listen(const Config& config);
   void AddSizesToMetrics();
 
+  const std::unique_ptr<Guard> guard_;
   // All others report to it.
   Metrics metrics_;
   // Calls leave their ticket last of all, hence before what they use.

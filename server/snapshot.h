@@ -1,6 +1,7 @@
 #ifndef HULLD_SERVER_SNAPSHOT_H_
 #define HULLD_SERVER_SNAPSHOT_H_
 
+#include <atomic>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -20,14 +21,20 @@ class Snapshot {
 
   // What collision queries need of the hull. The first call makes it.
   const QueryHull& query_hull() const {
-    std::call_once(query_hull_once_, [this] { query_hull_.emplace(hull_); });
+    std::call_once(query_hull_once_, [this] {
+      query_hull_.emplace(hull_);
+      has_query_hull_.store(true, std::memory_order_release);
+    });
     return *query_hull_;
   }
+  // Whether query_hull() would only return.
+  bool has_query_hull() const { return has_query_hull_.load(std::memory_order_acquire); }
 
  private:
   const Hull hull_;
   mutable std::once_flag query_hull_once_;
   mutable std::optional<QueryHull> query_hull_;
+  mutable std::atomic<bool> has_query_hull_ = false;
 };
 
 }  // namespace hulld::server

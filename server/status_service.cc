@@ -10,7 +10,7 @@ namespace hulld::server {
 grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* context,
                                                    const v1::GetStatusRequest*,
                                                    v1::GetStatusResponse* response) {
-  return UnaryCall::Answer(*context, admission_, Rpc::kGetStatus, [&](const Call&) {
+  return UnaryCall::Answer(*context, admission_, Rpc::kGetStatus, [&](const Call& call) {
     const RegistrySizes sizes = registry_.Sizes();
     EncodeHeader(registry_.store(), sizes.store_revision, response->mutable_header());
     response->set_version(HULLD_VERSION);
@@ -21,8 +21,10 @@ grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* 
         std::chrono::duration_cast<std::chrono::nanoseconds>(started - seconds).count()));
     EncodeDuration(std::chrono::steady_clock::now() - started_steady_, response->mutable_uptime());
     response->set_store_kind(registry_.store().kind());
-    response->set_hull_count(sizes.hull_count);
-    response->set_vertex_count(sizes.vertex_count);
+    if (call.caller().sees_all()) {
+      response->set_hull_count(sizes.hull_count);
+      response->set_vertex_count(sizes.vertex_count);
+    }
     const Limits& limits = registry_.limits();
     v1::Limits* message = response->mutable_limits();
     message->set_max_points_per_chunk(limits.max_points_per_chunk);

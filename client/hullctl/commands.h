@@ -22,7 +22,9 @@ void AddStreamCommand(CLI::App* app, Invocation* invocation);
 void AddVerifyCommand(CLI::App* app, Invocation* invocation);
 void AddGenerateCommand(CLI::App* app, Invocation* invocation);
 void AddStatusCommand(CLI::App* app, Invocation* invocation);
+void AddBenchCommand(CLI::App* app, Invocation* invocation);
 void AddPictureCommand(CLI::App* app, Invocation* invocation);
+void AddTokenCommand(CLI::App* app, Invocation* invocation);
 
 }  // namespace hulld
 

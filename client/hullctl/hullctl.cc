@@ -5,6 +5,7 @@
 
 #include "client/hullctl/arguments.h"
 #include "client/hullctl/commands.h"
+#include "client/hullctl/connection_options.h"
 #include "client/hullctl/exit_code.h"
 #include "client/hullctl/invocation.h"
 
@@ -41,6 +42,7 @@ void AddGlobalOptions(CLI::App* app, Invocation* invocation) {
          "How answers are printed (default table)")
       ->type_name("table|json")
       ->check(CLI::IsMember({"table", "json"}));
+  AddConnectionOptions(app, invocation);
 }
 
 void AddCommands(CLI::App* app, Invocation* invocation) {
@@ -57,7 +59,9 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddVerifyCommand(app, invocation);
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
+  AddBenchCommand(app, invocation);
   AddPictureCommand(app, invocation);
+  AddTokenCommand(app, invocation);
   app->require_subcommand(1);
   // Global options may stand behind the command, too.
   for (CLI::App* command : app->get_subcommands({})) command->fallthrough();
@@ -80,6 +84,8 @@ int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std
     if (app.exit(error, out, err) == 0) return static_cast<int>(ExitCode::kDone);
     return static_cast<int>(ExitCode::kUsage);
   }
+  const absl::Status completed = CompleteConnectionOptions(&invocation);
+  if (!completed.ok()) return static_cast<int>(invocation.FailUsage(completed));
   const ExitCode code = invocation.action();
   out.flush();
   if (!out) {

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "client/grpc_status.h"
+#include "client/hullctl/tls_diagnosis.h"
 
 namespace hulld {
 namespace {
@@ -24,21 +25,29 @@ std::string WithHint(const std::string& message, const std::string& hint) {
   return absl::StrCat(message, " (", hint, ")");
 }
 
+std::string ExplainConnectionFailure(const std::string& message, const std::string& server,
+                                     const ConnectionSecurity& security) {
+  const std::string reason = DiagnoseTls(server, security);
+  if (!reason.empty()) {
+    return absl::StrCat("no connection to the server at ", server, ": ", reason);
+  }
+  return absl::StrCat("cannot reach hulld at ", server,
+                      ": start it with 'hulld', or name another with --server (", message, ")");
+}
+
 std::string Explain(const absl::Status& status, const std::string& server,
-                    std::chrono::milliseconds timeout) {
+                    std::chrono::milliseconds timeout, const ConnectionSecurity& security) {
   const std::string message(status.message().data(), status.message().size());
   switch (status.code()) {
     case absl::StatusCode::kUnavailable:
-      if (IsConnectionFailure(message)) {
-        return absl::StrCat("cannot reach hulld at ", server,
-                            ": start it with 'hulld', or name another with --server (", message,
-                            ")");
-      }
+      if (IsConnectionFailure(message)) return ExplainConnectionFailure(message, server, security);
       return absl::StrCat("hulld at ", server, " is not available: ", message, "; try again later");
     case absl::StatusCode::kDeadlineExceeded:
       return absl::StrCat("no answer from hulld at ", server, " within ", timeout.count(),
                           " ms: raise --timeout, or see whether it is well with 'hullctl status' (",
                           message, ")");
+    case absl::StatusCode::kUnauthenticated:
+      return WithHint(message, "give it with --token-file or $HULLD_TOKEN");
     case absl::StatusCode::kNotFound:
       return WithHint(message, "see 'hullctl list'");
     case absl::StatusCode::kAlreadyExists:
@@ -72,11 +81,12 @@ Client Invocation::MakeClient() const {
   ClientOptions options;
   options.server = server;
   options.timeout = timeout;
+  options.security = security;
   return Client(std::move(options));
 }
 
 ExitCode Invocation::Fail(const absl::Status& status) const {
-  err << "hullctl: " << Explain(status, server, timeout) << "\n";
+  err << "hullctl: " << Explain(status, server, timeout, security) << "\n";
   const bool unreachable = absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status);
   return unreachable ? ExitCode::kUnreachable : ExitCode::kRequestFailed;
 }

@@ -25,6 +25,7 @@ struct Invocation {
   std::string server = kDefaultServer;
   std::chrono::milliseconds timeout{30000};
   bool json = false;
+  ConnectionSecurity security;
 
   // Set by the command that was named.
   std::function<ExitCode()> action;

@@ -16,6 +16,8 @@ class ProgressBar {
   ~ProgressBar() { Clear(); }
 
   void Update(uint64_t bytes, uint64_t points);
+  // The same with a text of the caller's.
+  void Show(const std::string& text);
   // Removes the line, so that other output can follow.
   void Clear();
 
@@ -26,6 +28,9 @@ class ProgressBar {
   uint64_t total_bytes_;
   std::chrono::steady_clock::time_point next_{};
 };
+
+// "[######----]  60 %  " for a share of 0 to 1.
+std::string BarText(double share);
 
 // "[######----]  60 %  1200 points", or "1200 points" when the total is unknown.
 std::string ProgressText(uint64_t bytes, uint64_t total_bytes, uint64_t points);

@@ -25,8 +25,8 @@ void Print(const v1::GetStatusResponse& status, const std::string& server, const
       .Row({"uptime", UptimeText(status.uptime())})
       .Row({"store", status.store_kind() + "  " + status.header().store_id()})
       .Row({"revision", std::to_string(status.header().revision())})
-      .Row({"hulls", std::to_string(status.hull_count())})
-      .Row({"vertices", std::to_string(status.vertex_count())})
+      .Row({"hulls", status.has_hull_count() ? std::to_string(status.hull_count()) : "-"})
+      .Row({"vertices", status.has_vertex_count() ? std::to_string(status.vertex_count()) : "-"})
       .Row({"max points per chunk", std::to_string(limits.max_points_per_chunk())})
       .Row({"max vertices per hull", std::to_string(limits.max_vertices_per_hull())})
       .Row({"max hulls", std::to_string(limits.max_hulls())})
@@ -53,6 +53,13 @@ ExitCode Status(const Invocation& run) {
   return run.Fail(health);
 }
 
+ExitCode Health(const Invocation& run) {
+  const absl::Status health = run.MakeClient().CheckHealth();
+  if (!health.ok()) return run.Fail(health);
+  run.out << "SERVING\n";
+  return ExitCode::kDone;
+}
+
 }  // namespace
 
 void AddStatusCommand(CLI::App* app, Invocation* invocation) {
@@ -60,6 +67,11 @@ void AddStatusCommand(CLI::App* app, Invocation* invocation) {
       app->add_subcommand("status", "Show what the server is and whether it is serving");
   command->footer("Exits with 0 only when the server answers and is serving.");
   command->callback([=] { invocation->action = [=] { return Status(*invocation); }; });
+
+  CLI::App* health =
+      app->add_subcommand("health", "Ask whether the server is serving; needs no token");
+  health->footer("Exits with 0 only when it is.");
+  health->callback([=] { invocation->action = [=] { return Health(*invocation); }; });
 }
 
 }  // namespace hulld

@@ -3,8 +3,15 @@
 #include <absl/status/status.h>
 
 #include <algorithm>
+#include <atomic>
 
 namespace hulld {
+namespace {
+
+// Pairs differ in cost by orders of magnitude, hence small pieces handed out as threads come free.
+constexpr int kPairsPerPiece = 16;
+
+}  // namespace
 
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
@@ -14,9 +21,6 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
   QueryOptions each = options;
   each.threads = 1;
   const auto count = static_cast<int64_t>(pairs.size());
-  // Pairs differ in cost by orders of magnitude, hence small pieces handed out as threads come
-  // free.
-  constexpr int kPairsPerPiece = 16;
 #pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
   for (int64_t i = 0; i < count; ++i) {
     if (each.should_stop && each.should_stop()) {
@@ -25,6 +29,30 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
     }
     answers[i] = CheckCollision(placements[pairs[i].a], placements[pairs[i].b], each);
   }
+  return answers;
+}
+
+absl::StatusOr<std::vector<RelationAnswer>> FindRelations(std::span<const PlacedHull> placements,
+                                                          std::span<const PlacedPair> pairs,
+                                                          double tolerance,
+                                                          const std::function<bool()>& should_stop,
+                                                          int threads) {
+  std::vector<RelationAnswer> answers(pairs.size());
+  const auto count = static_cast<int64_t>(pairs.size());
+  std::atomic<bool> stopped = false;
+#pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
+  for (int64_t i = 0; i < count; ++i) {
+    if (stopped.load(std::memory_order_relaxed)) continue;
+    if (i % kPairsPerPiece == 0 && should_stop && should_stop()) stopped = true;
+    const absl::StatusOr<RelationAnswer> answer =
+        FindRelation(placements[pairs[i].a], placements[pairs[i].b], tolerance, should_stop);
+    if (answer.ok()) {
+      answers[i] = *answer;
+    } else {
+      stopped = true;
+    }
+  }
+  if (stopped) return absl::CancelledError("stopped");
   return answers;
 }
 

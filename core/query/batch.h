@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,15 @@ struct PlacedPair {
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
                                                     const QueryOptions& options, int threads);
+
+// The relations alone, as CheckCollisions finds them when nothing else is wanted: in less time, and
+// a hundredth of the memory. Requires tolerance >= 0. CANCELLED: should_stop, which may be empty,
+// said so.
+absl::StatusOr<std::vector<RelationAnswer>> FindRelations(std::span<const PlacedHull> placements,
+                                                          std::span<const PlacedPair> pairs,
+                                                          double tolerance,
+                                                          const std::function<bool()>& should_stop,
+                                                          int threads);
 
 }  // namespace hulld
 

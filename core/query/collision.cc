@@ -265,6 +265,17 @@ absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hul
   return CheckCollision(*placed_a, *placed_b, options);
 }
 
+absl::StatusOr<RelationAnswer> FindRelation(const PlacedHull& a, const PlacedHull& b,
+                                            double tolerance,
+                                            const std::function<bool()>& should_stop) {
+  if (a.hull().empty() || b.hull().empty()) {
+    return RelationAnswer{Relation::kSeparated, Answer().rung};
+  }
+  const absl::StatusOr<Decision> decision = DecideEither(a, b, tolerance, nullptr, should_stop);
+  if (!decision.ok()) return decision.status();
+  return RelationAnswer{decision->relation, decision->rung};
+}
+
 RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache,
                             double tolerance) {
   if (a.hull().empty() || b.hull().empty()) return {Relation::kSeparated, Rung::kBounds};

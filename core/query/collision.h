@@ -177,6 +177,10 @@ struct RelationAnswer {
 // Requires tolerance >= 0.
 RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache = nullptr,
                             double tolerance = 0);
+// The same, but CANCELLED when should_stop, which may be empty, said so.
+absl::StatusOr<RelationAnswer> FindRelation(const PlacedHull& a, const PlacedHull& b,
+                                            double tolerance,
+                                            const std::function<bool()>& should_stop);
 
 }  // namespace hulld
 

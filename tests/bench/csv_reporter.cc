@@ -8,6 +8,12 @@
 namespace hulld::bench {
 namespace {
 
+#ifdef __clang__
+constexpr const char* kCompiler = "clang++ " __clang_version__ " " HULLD_BENCH_FLAGS;
+#else
+constexpr const char* kCompiler = "g++ " __VERSION__ " " HULLD_BENCH_FLAGS;
+#endif
+
 // Every counter there is, in the order of the columns.
 constexpr const char* kCounters[] = {"points",
                                      "vertices",
@@ -31,26 +37,6 @@ constexpr const char* kCounters[] = {"points",
                                      "cached_share",
                                      "pairs"};
 
-std::string CpuName() {
-  std::ifstream in("/proc/cpuinfo");
-  std::string name = "unknown CPU";
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("model name")) {
-      name = line.substr(line.find(':') + 2);
-      break;
-    }
-  }
-  return name.append(" (")
-      .append(std::to_string(std::thread::hardware_concurrency()))
-      .append(" cores)");
-}
-
-#ifdef __clang__
-constexpr const char* kCompiler = "clang++ " __clang_version__ " " HULLD_BENCH_FLAGS;
-#else
-constexpr const char* kCompiler = "g++ " __VERSION__ " " HULLD_BENCH_FLAGS;
-#endif
-
 // The two last parts of "suite/workload/library", with a comma between.
 std::string WorkloadAndLibrary(const std::string& name) {
   const size_t library = name.rfind('/');
@@ -73,6 +59,22 @@ bool IsFinal(const benchmark::BenchmarkReporter::Run& run) {
 }
 
 }  // namespace
+
+std::string CpuName() {
+  std::ifstream in("/proc/cpuinfo");
+  std::string name = "unknown CPU";
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("model name")) {
+      name = line.substr(line.find(':') + 2);
+      break;
+    }
+  }
+  return name.append(" (")
+      .append(std::to_string(std::thread::hardware_concurrency()))
+      .append(" cores)");
+}
+
+std::string CompilerName() { return kCompiler; }
 
 bool CsvReporter::ReportContext(const Context&) { return true; }
 

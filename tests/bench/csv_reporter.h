@@ -24,6 +24,10 @@ class CsvReporter : public benchmark::BenchmarkReporter {
   std::vector<std::string> columns_;
 };
 
+// Columns that every file has: what compiled the benchmark, and where it runs.
+std::string CompilerName();
+std::string CpuName();
+
 // Runs what is registered: a table on the console, and the CSV in --benchmark_out. The exit code.
 int RunBenchmarks(int argc, char** argv);
 

@@ -3,9 +3,12 @@
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
 
 #include <random>
 #include <sstream>
+#include <thread>
 
 #include "client/client.h"
 #include "client/hullctl/hullctl.h"
@@ -298,6 +301,96 @@ TEST_F(HullctlOnServer, WishesThatExcludeEachOtherAreExplained) {
     EXPECT_EQ(Ask({"check", "cube", "cube", option, "nan"}).code, 2);
     EXPECT_EQ(Ask({"check", "cube", "cube", option, "1e999"}).code, 2);
   }
+}
+
+TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
+  Put("cube", server::Cube());
+  for (const char* mode : {"check", "batch", "append", "mixed"}) {
+    const Ran ran = Ask({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
+                         "--pairs", "50", "--points", "40", "--hulls", "3", "--vertices", "20"});
+    EXPECT_EQ(ran.code, 0) << mode << ": " << ran.err;
+    EXPECT_THAT(ran.out, AllOf(HasSubstr("30, of which 0 failed"), HasSubstr("latency p99.9"),
+                               HasSubstr("requests/s"), HasSubstr("#")))
+        << mode;
+    EXPECT_EQ(ran.err, "") << mode;
+  }
+  EXPECT_EQ(Ask({"list"}).out, Ask({"list", "--prefix", "cube"}).out);
+}
+
+TEST_F(HullctlOnServer, LoadCountsItemsInJson) {
+  const Ran ran = Ask({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
+                       "--rate", "1000", "--json"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  Struct json;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok()) << ran.out;
+  const auto& fields = json.fields();
+  EXPECT_EQ(fields.at("mode").string_value(), "batch");
+  EXPECT_EQ(fields.at("succeeded").string_value(), "5");
+  EXPECT_EQ(fields.at("failed").string_value(), "0");
+  EXPECT_EQ(fields.at("ratePerSecond").number_value(), 1000);
+  EXPECT_FALSE(fields.at("interrupted").bool_value());
+  EXPECT_NEAR(fields.at("itemsPerSecond").number_value(),
+              70 * fields.at("requestsPerSecond").number_value(), 1e-6);
+  const auto& latency = fields.at("latencySeconds").struct_value().fields();
+  EXPECT_LE(latency.at("p50").number_value(), latency.at("p99.9").number_value());
+  EXPECT_LE(latency.at("p99.9").number_value(), latency.at("max").number_value());
+  double counted = 0;
+  for (const auto& row : fields.at("histogram").list_value().values()) {
+    counted += std::stod(row.struct_value().fields().at("count").string_value());
+  }
+  EXPECT_EQ(counted, 5);
+}
+
+TEST_F(HullctlOnServer, LoadRefusesAPrefixThatIsInUse) {
+  Put("mine/cube", server::Cube());
+  const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"mine/cube\" is there already"), HasSubstr("--prefix")));
+  EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
+}
+
+TEST_F(HullctlOnServer, LoadShowsErrorsByCode) {
+  const Ran ran = Ask({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
+                       "--prefix", "a b"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("2, of which 2 failed"), HasSubstr("INVALID_ARGUMENT"),
+                             HasSubstr("malformed")));
+}
+
+// The signal comes once hulls of the load are there; the load itself would last for minutes.
+TEST_F(HullctlOnServer, AnInterruptedLoadReportsAndDeletesItsHulls) {
+  std::thread interrupter([this] {
+    v1::ListHullsRequest request;
+    request.set_prefix("short/append-");
+    v1::ListHullsResponse response;
+    while (response.hulls_size() == 0) {
+      grpc::ClientContext context;
+      if (!hulls_->ListHulls(&context, request, &response).ok()) break;
+    }
+    kill(getpid(), SIGINT);
+  });
+  const Ran ran = Ask({"bench", "load", "--mode", "append", "--duration", "5m", "--points", "10",
+                       "--prefix", "short/"});
+  interrupter.join();
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("interrupted; the hulls of the load are deleted"));
+  EXPECT_THAT(ran.out, HasSubstr("requests/s"));
+  v1::ListHullsResponse left;
+  grpc::ClientContext context;
+  ASSERT_TRUE(hulls_->ListHulls(&context, v1::ListHullsRequest(), &left).ok());
+  EXPECT_EQ(left.hulls_size(), 0);
+}
+
+TEST_F(HullctlOnServer, LoadOptionsThatMakeNoSenseAreExplained) {
+  Ran ran = Ask({"bench", "load", "--rate", "0"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests a second"));
+  ran = Ask({"bench", "load", "--clients", "0"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("whole number from 1 to 1000"));
+  EXPECT_EQ(Ask({"bench", "load", "--mode", "storm"}).code, 2);
+  EXPECT_EQ(Ask({"bench", "load", "--duration", "soon"}).code, 2);
+  EXPECT_EQ(Ask({"bench"}).code, 2);
 }
 
 }  // namespace

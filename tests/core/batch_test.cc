@@ -95,10 +95,45 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
   for (int count : seen) EXPECT_GT(count, 20);
 }
 
+TEST(Batch, RelationsAloneAreThoseOfWholeAnswers) {
+  const Crowd crowd = MakeCrowd(704);
+  for (const double tolerance : {0.0, 0.5}) {
+    QueryOptions options;
+    options.tolerance = tolerance;
+    const auto expected = CheckCollisions(crowd.placements, crowd.pairs, options, 1);
+    std::array<int, 4> seen = {};
+    for (int threads : {1, 2, 8}) {
+      const auto answers = FindRelations(crowd.placements, crowd.pairs, tolerance, {}, threads);
+      ASSERT_TRUE(answers.ok());
+      ASSERT_EQ(answers->size(), crowd.pairs.size());
+      for (size_t i = 0; i < crowd.pairs.size(); ++i) {
+        ASSERT_EQ((*answers)[i].relation, expected[i]->relation) << "pair " << i;
+        ASSERT_EQ((*answers)[i].rung, expected[i]->rung) << "pair " << i;
+        ++seen[static_cast<size_t>((*answers)[i].relation)];
+      }
+    }
+    for (size_t i = 0; i < 3; ++i) EXPECT_GT(seen[i], 20) << i;
+    EXPECT_EQ(seen[3] > 0, tolerance > 0);
+  }
+}
+
+TEST(Batch, RelationsAloneAreCancelledAsAWhole) {
+  const Crowd crowd = MakeCrowd(705);
+  for (int threads : {1, 4}) {
+    std::atomic<int> polls = 0;
+    const auto answers = FindRelations(
+        crowd.placements, crowd.pairs, 0, [&] { return ++polls > 10; }, threads);
+    EXPECT_EQ(answers.status().code(), absl::StatusCode::kCancelled);
+    // Polled again and again, but not for every pair of those that take no time.
+    EXPECT_LT(polls, 1000);
+  }
+}
+
 TEST(Batch, NoPairsGiveNoAnswers) {
   const Crowd crowd = MakeCrowd(702);
   EXPECT_TRUE(CheckCollisions(crowd.placements, {}, {}, 4).empty());
   EXPECT_TRUE(CheckCollisions({}, {}, {}, 1).empty());
+  EXPECT_TRUE(FindRelations(crowd.placements, {}, 0, {}, 4)->empty());
 }
 
 TEST(Batch, CancellationCancelsTheRestAndNothingElse) {

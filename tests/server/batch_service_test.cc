@@ -128,6 +128,9 @@ TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
     ASSERT_EQ(batch.witness_xyz.size(), 6 * 24 * 24);
     ASSERT_EQ(batch.within_clearance.size(), 24 * 24);
     EXPECT_EQ(batch.head.hulls(1).revision(), Get("ball").hull().revision());
+    v1::BatchCheckCollisionsRequest relations_alone = request;
+    relations_alone.clear_wanted();
+    EXPECT_EQ(Run(relations_alone).relations, batch.relations);
     int counts[4] = {};
     for (size_t i = 0; i < batch.relations.size(); ++i) {
       v1::CheckCollisionRequest single;

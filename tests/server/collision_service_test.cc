@@ -95,6 +95,26 @@ TEST_F(CheckCollisionCall, ReadersSeeEachCommittedChunk) {
   }
 }
 
+// The first query of a hull is answered by a reader, which makes what queries need of it, and later
+// ones where they arrive.
+TEST_F(CheckCollisionCall, AnswersDoNotDependOnWhereTheyAreComputed) {
+  Put("cube", Cube());
+  Put("ball", Sphere(200, 1.25));
+  v1::CheckCollisionRequest request;
+  *request.mutable_a() = PlacementOf("cube");
+  *request.mutable_b() = PlacementOf("ball");
+  const v1::CheckCollisionResponse first = Check(request);
+  EXPECT_EQ(first.relation(), v1::RELATION_OVERLAPPING);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(Check(request).ShortDebugString(), first.ShortDebugString());
+  }
+  request.mutable_wanted()->set_axis(true);
+  EXPECT_EQ(Check(request).ShortDebugString(), first.ShortDebugString());
+  ASSERT_TRUE(Delete("ball").ok());
+  request.clear_wanted();
+  EXPECT_EQ(CheckError(request).error_code(), grpc::StatusCode::NOT_FOUND);
+}
+
 TEST_F(CheckCollisionCall, ErrorsNameTheField) {
   Put("cube", Cube());
   const auto expect = [&](const v1::CheckCollisionRequest& request, grpc::StatusCode code,

@@ -90,7 +90,12 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"max-request-time", "2.5"},
                                                        {"slow-request", "0.25"},
                                                        {"metrics-address", "127.0.0.1:1"},
-                                                       {"metrics-insecure", "true"}};
+                                                       {"metrics-insecure", "true"},
+
+                                                       {"tls-cert", "/c"},
+                                                       {"tls-key", "/k"},
+                                                       {"tls-client-ca", "/a"},
+                                                       {"tokens-file", "/t"}};
   std::vector<std::string> flags;
   std::map<std::string, std::string> variables;
   std::string toml;
@@ -99,8 +104,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     std::string variable = "HULLD_";
     for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
     variables[variable] = value;
-    const bool is_text =
-        name == "listen" || name == "metrics-address" || name == "store" || name.starts_with("log");
+    const bool is_text = name == "listen" || name == "metrics-address" || name == "store" ||
+                         name.starts_with("log") || value.starts_with("/");
     toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
   }
   const auto expect_all = [](const Config& config) {
@@ -126,6 +131,10 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.slow_request, std::chrono::milliseconds(250));
     EXPECT_EQ(config.metrics_address, "127.0.0.1:1");
     EXPECT_TRUE(config.metrics_insecure);
+    EXPECT_EQ(config.tls_cert, "/c");
+    EXPECT_EQ(config.tls_key, "/k");
+    EXPECT_EQ(config.tls_client_ca, "/a");
+    EXPECT_EQ(config.tokens_file, "/t");
   };
   expect_all(Accepted(flags));
   const std::string file = WriteFile(toml);
@@ -148,6 +157,21 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--config", WriteFile("max-hull = 3\n")}, "max-hull");
   environment_["HULLD_MAX_HULLS"] = "many";
   ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
+}
+
+TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
+  environment_["HULLD_TLS_CERT"] = "/c \"d\"";
+  const std::vector<std::string> arguments = {"--max-hulls=7", "--insecure", "--check-config"};
+  const absl::StatusOr<CommandLine> parsed = Parse(arguments);
+  ASSERT_TRUE(parsed.ok());
+  EXPECT_TRUE(parsed->check);
+  environment_.clear();
+  const absl::StatusOr<CommandLine> again = Parse({"--config", WriteFile(parsed->settings)});
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->settings, parsed->settings);
+  EXPECT_EQ(again->config.limits.max_hulls, 7);
+  EXPECT_TRUE(again->config.insecure);
+  EXPECT_FALSE(again->check);
 }
 
 TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
@@ -176,7 +200,12 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--slow-request",
                            "--metrics-address",
                            "--metrics-insecure",
-                           "--config"}) {
+                           "--config",
+                           "--tls-cert",
+                           "--tls-key",
+                           "--tls-client-ca",
+                           "--tokens-file",
+                           "--check-config"}) {
     EXPECT_THAT(help->print, HasSubstr(flag));
   }
   EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));

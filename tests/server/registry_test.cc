@@ -61,6 +61,23 @@ TEST_F(RegistryTest, ASnapshotIsMadeOnceAndSharedUntilTheNextChange) {
   EXPECT_EQ(third->second.snapshot->hull().vertices()[1], Vector(2, 0, 0));
 }
 
+TEST_F(RegistryTest, TryResolveGivesUpWhereASnapshotIsMissing) {
+  const std::vector<std::string> ids = {"h", "none"};
+  const AppendSession session = Open("h");
+  ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
+  EXPECT_FALSE(registry_.TryResolve(ids).has_value());
+  const auto waited = registry_.Resolve(ids, {});
+  const auto tried = registry_.TryResolve(ids);
+  ASSERT_TRUE(tried.has_value());
+  EXPECT_EQ(tried->store_revision, waited->store_revision);
+  ASSERT_EQ(tried->hulls.size(), 2);
+  EXPECT_EQ(tried->hulls[0]->snapshot, waited->hulls[0]->snapshot);
+  EXPECT_EQ(tried->hulls[0]->record.revision, waited->hulls[0]->record.revision);
+  EXPECT_EQ(tried->hulls[1].status(), waited->hulls[1].status());
+  ASSERT_TRUE(Append(session, 2, {{1, 0, 0}}).ok());
+  EXPECT_FALSE(registry_.TryResolve(ids).has_value());
+}
+
 TEST_F(RegistryTest, ACurrentSnapshotIsReadWhileAChunkIsInProgress) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());

@@ -46,7 +46,7 @@ TEST(ListenAddress, LoopbackAndUnixSocketsAreLocal) {
     const absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
     ASSERT_TRUE(address.ok()) << text;
     EXPECT_TRUE(address->is_local()) << text;
-    EXPECT_TRUE(CheckExposure(*address, false).ok()) << text;
+    EXPECT_TRUE(CheckExposure(*address, false, false).ok()) << text;
   }
 }
 
@@ -55,10 +55,10 @@ TEST(ListenAddress, OthersNeedInsecure) {
                            "[::ffff:127.0.0.1]:1", "1270.0.0.1:1", "localhost.example.com:1"}) {
     const absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
     ASSERT_TRUE(address.ok()) << text;
-    const absl::Status refused = CheckExposure(*address, false);
+    const absl::Status refused = CheckExposure(*address, false, false);
     EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument) << text;
     EXPECT_THAT(std::string(refused.message()), HasSubstr("--insecure"));
-    EXPECT_TRUE(CheckExposure(*address, true).ok());
+    EXPECT_TRUE(CheckExposure(*address, false, true).ok());
   }
 }
 

@@ -1,0 +1,123 @@
+#include "client/connection_security.h"
+
+#include <absl/strings/str_cat.h>
+#include <grpcpp/create_channel.h>
+#include <grpcpp/security/credentials.h>
+#include <grpcpp/support/client_interceptor.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <utility>
+#include <vector>
+
+namespace hulld {
+namespace {
+
+using grpc::experimental::ClientInterceptorFactoryInterface;
+using grpc::experimental::ClientRpcInfo;
+using grpc::experimental::InterceptionHookPoints;
+using grpc::experimental::Interceptor;
+using grpc::experimental::InterceptorBatchMethods;
+
+// Adds the token to every call of a channel, so that no kind of call can forget it. (gRPC's call
+// credentials do not go over connections without TLS, unix sockets among them.)
+class TokenSender : public Interceptor {
+ public:
+  explicit TokenSender(std::string authorization) : authorization_(std::move(authorization)) {}
+
+  void Intercept(InterceptorBatchMethods* methods) override {
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
+      methods->GetSendInitialMetadata()->emplace("authorization", authorization_);
+    }
+    methods->Proceed();
+  }
+
+ private:
+  const std::string authorization_;
+};
+
+class TokenSenderFactory : public ClientInterceptorFactoryInterface {
+ public:
+  explicit TokenSenderFactory(const std::string& token) : authorization_("Bearer " + token) {}
+  Interceptor* CreateClientInterceptor(ClientRpcInfo*) override {
+    return new TokenSender(authorization_);
+  }
+
+ private:
+  const std::string authorization_;
+};
+
+bool MaySendToken(const ConnectionSecurity& security, const std::string& server) {
+  return security.tls || security.allow_plaintext_token || IsLoopback(server);
+}
+
+// What HTTP/2 takes as a header's value.
+bool IsToken(const std::string& token) {
+  return !token.empty() &&
+         std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 0x7F; });
+}
+
+}  // namespace
+
+bool IsLoopback(const std::string& server) {
+  const auto starts_with = [&server](const char* prefix) { return server.rfind(prefix, 0) == 0; };
+  return starts_with("127.") || starts_with("localhost:") || starts_with("[::1]:") ||
+         starts_with("unix:");
+}
+
+absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::string& server) {
+  if (security.certificate.empty() != security.key.empty()) {
+    return absl::InvalidArgumentError(
+        "a client certificate and its key belong together; give both or neither");
+  }
+  if (security.token.empty()) return absl::OkStatus();
+  if (!IsToken(security.token)) {
+    return absl::InvalidArgumentError("the token holds blanks or control characters");
+  }
+  if (MaySendToken(security, server)) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "the token would travel unencrypted to ", server,
+      ", where everyone on the way could read it; use TLS (--tls), or allow it (--insecure)"));
+}
+
+std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
+                                           const ConnectionSecurity& security,
+                                           const grpc::ChannelArguments& given) {
+  grpc::ChannelArguments arguments = given;
+  std::shared_ptr<grpc::ChannelCredentials> credentials;
+  if (security.tls) {
+    credentials = grpc::SslCredentials({security.authorities, security.key, security.certificate});
+    if (!security.server_name.empty()) arguments.SetSslTargetNameOverride(security.server_name);
+  } else {
+    credentials = grpc::InsecureChannelCredentials();
+  }
+  std::vector<std::unique_ptr<ClientInterceptorFactoryInterface>> interceptors;
+  if (IsToken(security.token) && MaySendToken(security, server)) {
+    interceptors.push_back(std::make_unique<TokenSenderFactory>(security.token));
+  }
+  return grpc::experimental::CreateCustomChannelWithInterceptors(server, credentials, arguments,
+                                                                 std::move(interceptors));
+}
+
+absl::StatusOr<std::string> ReadTokenFile(const std::string& path) {
+  const auto problem = [&path](const std::string& what) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": ", what));
+  };
+  std::ifstream file(path);
+  if (!file) return problem(std::strerror(errno));
+  struct stat info = {};
+  if (stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode) && (info.st_mode & 0077) != 0) {
+    return problem("others can read this token; chmod 600 it");
+  }
+  std::string token;
+  std::string more;
+  if (!(file >> token) || file >> more || !IsToken(token)) {
+    return problem("it does not hold one token, as 'hullctl token new --token-out' writes it");
+  }
+  return token;
+}
+
+}  // namespace hulld

@@ -1,0 +1,83 @@
+#include "server/config_check.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "server/listen_address.h"
+#include "server/secret_file.h"
+#include "server/tls_identity.h"
+#include "server/token_table.h"
+
+namespace hulld::server {
+namespace {
+
+absl::Status CheckListening(const Config& config) {
+  const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
+  if (!address.ok()) return address.status();
+  return CheckExposure(*address, config.has_tls(), config.insecure);
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
+                                                     std::chrono::system_clock::time_point now) {
+  std::vector<std::string> findings;
+  if (absl::Status s = CheckListening(config); !s.ok()) return s;
+  if (config.has_tls()) {
+    const absl::StatusOr<TlsIdentity> identity = LoadTlsIdentity(config);
+    if (!identity.ok()) return identity.status();
+    if (absl::Status s = CheckValidity(*identity, now); !s.ok()) return s;
+    findings.push_back(absl::StrCat("TLS certificate of ", identity->subject, ", valid until ",
+                                    FormatTime(identity->not_after)));
+  }
+  if (!config.tokens_file.empty()) {
+    const absl::StatusOr<TokenTable> tokens = ReadTokensFile(config.tokens_file);
+    if (!tokens.ok()) return tokens.status();
+    findings.push_back(absl::StrCat(tokens->size(), " tokens"));
+  }
+  for (const std::string& warning : ExposureWarnings(config)) {
+    findings.push_back(absl::StrCat("warning: ", warning));
+  }
+  return findings;
+}
+
+absl::Status CheckDataDir(const std::string& path) {
+  const auto problem = [&path](const std::string& where, const std::string& what) {
+    return absl::InvalidArgumentError(absl::StrCat("--data-dir ", path, ": ", where, " ", what));
+  };
+  // What is not there yet will be made in what is.
+  std::error_code error;
+  std::filesystem::path nearest = std::filesystem::absolute(path, error);
+  while (nearest.has_relative_path() && !std::filesystem::exists(nearest, error)) {
+    nearest = nearest.parent_path();
+  }
+  if (!std::filesystem::is_directory(nearest, error)) {
+    return problem(nearest.string(), "is no directory");
+  }
+  if (access(nearest.c_str(), R_OK | W_OK | X_OK) != 0) {
+    return problem(nearest.string(), "cannot be written by the user who runs this");
+  }
+  return absl::OkStatus();
+}
+
+std::vector<std::string> ExposureWarnings(const Config& config) {
+  const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
+  if (!address.ok() || address->is_local()) return {};
+  std::vector<std::string> warnings;
+  if (!config.has_tls()) {
+    warnings.push_back(
+        "other machines can reach this server, and nothing is encrypted (--insecure)");
+  }
+  if (config.tokens_file.empty() && config.tls_client_ca.empty()) {
+    warnings.push_back(
+        "whoever can reach this server may read and change everything; limit that with "
+        "--tokens-file or --tls-client-ca");
+  }
+  return warnings;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,31 @@
+#ifndef HULLD_SERVER_CONFIG_CHECK_H_
+#define HULLD_SERVER_CONFIG_CHECK_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "server/config.h"
+
+namespace hulld::server {
+
+// What --check-config does: everything that can be known of the settings without starting. Returns
+// what was found, a sentence each, none of it secret. INVALID_ARGUMENT names the setting that is
+// wrong; a certificate that is not valid at `now` is.
+absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
+                                                     std::chrono::system_clock::time_point now);
+
+// OK when a store can live in this directory: it can be written, or made where it is to be.
+// INVALID_ARGUMENT names --data-dir.
+absl::Status CheckDataDir(const std::string& path);
+
+// What whoever runs the server should know of who can reach it, a sentence each. Requires a valid
+// config.listen.
+std::vector<std::string> ExposureWarnings(const Config& config);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CONFIG_CHECK_H_

@@ -1,0 +1,205 @@
+// hulld over the wire against a server that does nothing with messages of the same sizes (the
+// floor), and against core in this process: in alternation, in one run.
+//
+//   remote_benchmark [--out FILE.csv] [--suite NAME]... [--filter TEXT] [--rounds N] [--seconds S]
+//                    [--transport tcp|unix] [--hulld PROGRAM] [--hulld-flag=FLAG]...
+//
+// Columns: what the workload counts a second; the time of one call; `of_floor`: per_second as a
+// multiple of the floor's, `p50_of_floor`: p50 as a multiple of the floor's, `of_in_process`:
+// per_second as a multiple of core's. Each is the median over rounds; ratios are of neighbours in
+// one round. `server_cpu_us`: the server's processor time for one of the unit, which other programs
+// disturb less than they do the clock; `cpu_of_floor`: as a multiple of the floor's.
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "tests/bench/csv_reporter.h"
+#include "tests/bench/remote_subject.h"
+
+namespace hulld::bench {
+namespace {
+
+struct Arguments {
+  std::string out;
+  std::vector<std::string> suites;
+  std::string filter;
+  std::string transport;
+  int rounds = 5;
+  double seconds = 0.5;
+  std::string hulld = HULLD_PROGRAM;
+  std::vector<std::string> hulld_flags;
+};
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+// One server's rounds of one workload.
+struct Rounds {
+  std::vector<Sample> samples;
+};
+
+double MedianOf(const Rounds& rounds, double Sample::*field) {
+  std::vector<double> values;
+  for (const Sample& sample : rounds.samples) values.push_back(sample.*field);
+  return Median(values);
+}
+
+// 0 where there is no peer.
+double MedianRatio(const Rounds& rounds, const Rounds* peer, double Sample::*field) {
+  std::vector<double> ratios;
+  for (size_t i = 0; peer != nullptr && i < peer->samples.size(); ++i) {
+    if (peer->samples[i].*field > 0) {
+      ratios.push_back(rounds.samples[i].*field / peer->samples[i].*field);
+    }
+  }
+  return Median(ratios);
+}
+
+void Measure(RemoteSubject& subject, const RemoteWorkload& workload, Rounds& rounds) {
+  const double processor = subject.ProcessorSeconds();
+  const auto start = std::chrono::steady_clock::now();
+  Sample sample = workload.run(subject);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double used = subject.ProcessorSeconds() - processor;
+  sample.server_cpu_us = 1e6 * used / (seconds * sample.per_second);
+  rounds.samples.push_back(sample);
+}
+
+class Report {
+ public:
+  explicit Report(const std::string& path) {
+    if (!path.empty()) file_.open(path);
+    file_ << "workload,transport,server,unit,per_second,p50_us,p99_us,of_floor,p50_of_floor,"
+             "of_in_process,server_cpu_us,cpu_of_floor,rounds,compiler,cpu\n";
+  }
+
+  void Write(const RemoteWorkload& workload, const std::string& transport,
+             const std::string& server, const Rounds& rounds, const Rounds* floor,
+             const Rounds* in_process) {
+    const double rate = MedianOf(rounds, &Sample::per_second);
+    const double p50 = MedianOf(rounds, &Sample::p50_us);
+    const double p99 = MedianOf(rounds, &Sample::p99_us);
+    const double of_floor = MedianRatio(rounds, floor, &Sample::per_second);
+    const double p50_of_floor = MedianRatio(rounds, floor, &Sample::p50_us);
+    const double of_in_process = MedianRatio(rounds, in_process, &Sample::per_second);
+    const double cpu = MedianOf(rounds, &Sample::server_cpu_us);
+    const double cpu_of_floor = MedianRatio(rounds, floor, &Sample::server_cpu_us);
+    std::printf("%-40s %-5s %-11s %11.4g %s/s  p50 %8.1f us  p99 %8.1f us", workload.name.c_str(),
+                transport.c_str(), server.c_str(), rate, workload.unit.c_str(), p50, p99);
+    if (of_floor > 0) std::printf("  %.3f of floor (p50 %.3f)", of_floor, p50_of_floor);
+    if (of_in_process > 0) std::printf("  %.3f of in process", of_in_process);
+    if (cpu > 0) std::printf("  server cpu %.3g us", cpu);
+    if (cpu_of_floor > 0) std::printf(", %.3f of floor", cpu_of_floor);
+    std::printf("\n");
+    std::fflush(stdout);
+    file_ << '"' << workload.name << "\"," << transport << ',' << server << ',' << workload.unit
+          << ',' << rate << ',';
+    const auto optional = [this](double value) {
+      if (value > 0) file_ << value;
+      file_ << ',';
+    };
+    for (const double value :
+         {p50, p99, of_floor, p50_of_floor, of_in_process, cpu, cpu_of_floor}) {
+      optional(value);
+    }
+    file_ << rounds.samples.size() << ',' << CompilerName() << ',' << CpuName() << std::endl;
+  }
+
+ private:
+  std::ofstream file_;
+};
+
+void Run(const RemoteWorkload& workload, RemoteSubject& hulld, RemoteSubject& floor, int rounds,
+         Report& report) {
+  Rounds of_hulld;
+  Rounds of_floor;
+  Rounds in_process;
+  // The first round warms up.
+  for (int round = 0; round <= rounds; ++round) {
+    if (round == 1) of_hulld = of_floor = in_process = {};
+    Measure(floor, workload, of_floor);
+    Measure(hulld, workload, of_hulld);
+    if (workload.run_in_process) in_process.samples.push_back(workload.run_in_process());
+  }
+  const Rounds* core = in_process.samples.empty() ? nullptr : &in_process;
+  report.Write(workload, hulld.transport(), "hulld", of_hulld, &of_floor, core);
+  report.Write(workload, hulld.transport(), "floor", of_floor, nullptr, core);
+  if (core != nullptr) {
+    report.Write(workload, hulld.transport(), "in process", in_process, nullptr, nullptr);
+  }
+}
+
+std::vector<RemoteWorkload> MakeWorkloads(const Arguments& arguments) {
+  std::vector<RemoteWorkload> workloads;
+  const auto add = [&](const std::string& suite, const auto& make) {
+    // Making some takes longer than measuring others.
+    if (!arguments.suites.empty() && std::find(arguments.suites.begin(), arguments.suites.end(),
+                                               suite) == arguments.suites.end()) {
+      return;
+    }
+    for (RemoteWorkload& workload : make()) {
+      if (workload.name.find(arguments.filter) != std::string::npos) {
+        workloads.push_back(std::move(workload));
+      }
+    }
+  };
+  add("check", [&] { return MakeCheckWorkloads(arguments.seconds); });
+  add("batch", [&] { return MakeBatchWorkloads(arguments.seconds); });
+  add("stream", [&] { return MakeStreamWorkloads(arguments.seconds); });
+  add("scene", [&] { return MakeSceneWorkloads(arguments.seconds); });
+  add("ingest", [&] { return MakeIngestWorkloads(); });
+  return workloads;
+}
+
+int Main(int argc, char** argv) {
+  CLI::App app("Measures hulld over the wire against a server that does nothing");
+  Arguments arguments;
+  app.add_option("--out", arguments.out, "Write the numbers to this file");
+  app.add_option("--suite", arguments.suites,
+                 "check, batch, stream, scene, ingest; all by default");
+  app.add_option("--filter", arguments.filter, "Only workloads whose name holds this");
+  app.add_option("--transport", arguments.transport, "tcp or unix; both by default");
+  app.add_option("--rounds", arguments.rounds, "How often; the median counts")
+      ->check(CLI::Range(1, 1000));
+  app.add_option("--seconds", arguments.seconds, "Of each round")->check(CLI::PositiveNumber);
+  app.add_option("--hulld", arguments.hulld, "Another hulld, as of another version");
+  app.add_option("--hulld-flag", arguments.hulld_flags,
+                 "Passed to hulld, as in --hulld-flag=--store=memory");
+  CLI11_PARSE(app, argc, argv);
+
+  const std::vector<RemoteWorkload> workloads = MakeWorkloads(arguments);
+  Report report(arguments.out);
+  for (const std::string transport : {"tcp", "unix"}) {
+    if (!arguments.transport.empty() && arguments.transport != transport) continue;
+    const std::string socket = "/tmp/remote_benchmark_" + std::to_string(getpid());
+    const auto address = [&](const std::string& name) {
+      return transport == "tcp" ? "127.0.0.1:0" : "unix:" + socket + "_" + name;
+    };
+    std::vector<std::string> command = {arguments.hulld, "--listen", address("hulld")};
+    command.insert(command.end(), arguments.hulld_flags.begin(), arguments.hulld_flags.end());
+    RemoteSubject hulld("hulld", transport, command);
+    RemoteSubject floor("floor", transport, {HULLD_FLOOR_PROGRAM, address("floor")});
+    for (const RemoteWorkload& workload : workloads) {
+      Run(workload, hulld, floor, arguments.rounds, report);
+    }
+    unlink((socket + "_hulld").c_str());
+    unlink((socket + "_floor").c_str());
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace hulld::bench
+
+int main(int argc, char** argv) { return hulld::bench::Main(argc, argv); }
