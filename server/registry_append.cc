@@ -81,11 +81,14 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   const HullPointer hull = Find(request->hull_id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(HullNotFound(request->hull_id));
+    // The session opens at the very moment of the creation: the hull may be gone right after.
     return CreateNew(locked, request->hull_id,
-                     [request, retry](Locked& later, const absl::Status& status) {
-                       request->created_hull = status.ok();
-                       if (status.ok()) return retry(later, status);
-                       later.Afterwards([request, status] { request->done(status); });
+                     [this, request](Locked& later, const absl::Status& status) {
+                       if (!status.ok()) {
+                         return later.Afterwards([request, status] { request->done(status); });
+                       }
+                       request->created_hull = true;
+                       OpenSession(later, Find(request->hull_id), request, 0);
                      });
   }
   if (hull->ending) {
@@ -99,11 +102,16 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   if (*last == 0 && hull->head.writer_count >= limits_.max_writers_per_hull) {
     return refuse(TooManyWriters(hull->head, limits_.max_writers_per_hull));
   }
+  OpenSession(locked, hull, request, *last);
+}
+
+void Registry::OpenSession(Locked& locked, const HullPointer& hull,
+                           const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
   result.store_revision = revision_;
   result.hull = hull->committed.record;
-  result.last_sequence = *last;
+  result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_};
   locked.Afterwards([request, result] { request->done(result); });
 }
