@@ -10,6 +10,7 @@
 
 #include "server/listen_address.h"
 #include "server/memory_store.h"
+#include "server/rocksdb_store.h"
 #include "server/transport.h"
 
 namespace hulld::server {
@@ -18,25 +19,39 @@ namespace {
 // At least two, so that one long task does not hold up all others.
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
+absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
+  if (config.store == "memory") return std::make_unique<MemoryStore>();
+  RocksDbOptions options;
+  options.data_dir = config.data_dir;
+  options.durability = config.durability == "sync" ? Durability::kSync : Durability::kRelaxed;
+  options.sync_interval = Config::kRelaxedSyncInterval;
+  options.env = config.store_env;
+  return RocksDbStore::Open(std::move(options));
+}
+
 }  // namespace
 
-Server::Server(const Config& config, std::unique_ptr<Guard> guard)
+Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
     : guard_(std::move(guard)),
-      store_(std::make_unique<MemoryStore>()),
+      store_(std::move(store)),
       writers_(PoolThreads()),
       registry_(*store_, config.limits, writers_),
       readers_(PoolThreads()),
       executor_(config.threads),
       hull_service_(registry_, admission_, readers_),
       collision_service_(registry_, admission_, readers_, executor_),
-      status_service_(registry_, admission_) {
+      status_service_(registry_, admission_),
+      maintenance_service_(*store_, registry_, admission_, readers_) {
   admission_.SetAuthenticator(guard_->authenticator());
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
   absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
   if (!guard.ok()) return guard.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(guard)));
+  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config);
+  if (!store.ok()) return store.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
+  if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }
@@ -58,6 +73,7 @@ absl::Status Server::Listen(const Config& config) {
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
+  builder.RegisterService(&maintenance_service_);
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr || (port == 0 && !address->is_unix())) {
     return ExplainBindFailure(*address);
@@ -66,7 +82,7 @@ absl::Status Server::Listen(const Config& config) {
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
   for (const char* service :
        {v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
-        v1::StatusService::service_full_name()}) {
+        v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()}) {
     health->SetServingStatus(service, true);
   }
   return absl::OkStatus();

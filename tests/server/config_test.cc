@@ -68,23 +68,14 @@ TEST_F(ConfigTest, FlagBeatsVariableBeatsFileBeatsDefault) {
 }
 
 TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
-  const std::map<std::string, std::string> settings = {{"listen", "unix:/tmp/x"},
-                                                       {"insecure", "true"},
-                                                       {"threads", "3"},
-                                                       {"store", "memory"},
-                                                       {"drain-timeout", "0.5"},
-                                                       {"log-level", "debug"},
-                                                       {"log-format", "json"},
-                                                       {"max-points-per-chunk", "11"},
-                                                       {"max-vertices-per-hull", "12"},
-                                                       {"max-hulls", "13"},
-                                                       {"max-pairs-per-batch", "14"},
-                                                       {"max-textbook-axes", "15"},
-                                                       {"max-message-bytes", "16"},
-                                                       {"tls-cert", "/c"},
-                                                       {"tls-key", "/k"},
-                                                       {"tls-client-ca", "/a"},
-                                                       {"tokens-file", "/t"}};
+  const std::map<std::string, std::string> settings = {
+      {"listen", "unix:/tmp/x"},   {"insecure", "true"},           {"threads", "3"},
+      {"store", "memory"},         {"drain-timeout", "0.5"},       {"log-level", "debug"},
+      {"log-format", "json"},      {"max-points-per-chunk", "11"}, {"max-vertices-per-hull", "12"},
+      {"max-hulls", "13"},         {"max-pairs-per-batch", "14"},  {"max-textbook-axes", "15"},
+      {"max-message-bytes", "16"}, {"data-dir", "/tmp/d"},         {"durability", "relaxed"},
+      {"memory-limit", "17"},      {"max-writers-per-hull", "18"}, {"tls-cert", "/c"},
+      {"tls-key", "/k"},           {"tls-client-ca", "/a"},        {"tokens-file", "/t"}};
   std::vector<std::string> flags;
   std::map<std::string, std::string> variables;
   std::string toml;
@@ -93,8 +84,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     std::string variable = "HULLD_";
     for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
     variables[variable] = value;
-    const bool is_text =
-        name == "listen" || name == "store" || name.starts_with("log") || value.starts_with("/");
+    const bool is_text = name == "listen" || name == "store" || name == "durability" ||
+                         name.starts_with("log") || value.starts_with("/");
     toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
   }
   const auto expect_all = [](const Config& config) {
@@ -110,6 +101,11 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
     EXPECT_EQ(config.limits.max_textbook_axes, 15);
     EXPECT_EQ(config.max_message_bytes, 16);
+    EXPECT_EQ(config.store, "memory");
+    EXPECT_EQ(config.data_dir, "/tmp/d");
+    EXPECT_EQ(config.durability, "relaxed");
+    EXPECT_EQ(config.limits.memory_limit, 17);
+    EXPECT_EQ(config.limits.max_writers_per_hull, 18);
     EXPECT_EQ(config.tls_cert, "/c");
     EXPECT_EQ(config.tls_key, "/k");
     EXPECT_EQ(config.tls_client_ca, "/a");
@@ -138,6 +134,15 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
 }
 
+TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {
+  EXPECT_EQ(Accepted({}).data_dir, "hulld-data");
+  environment_["HOME"] = "/home/me";
+  EXPECT_EQ(Accepted({}).data_dir, "/home/me/.local/state/hulld");
+  environment_["XDG_STATE_HOME"] = "/state";
+  EXPECT_EQ(Accepted({}).data_dir, "/state/hulld");
+  EXPECT_EQ(Accepted({"--data-dir", "here"}).data_dir, "here");
+}
+
 TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
   environment_["HULLD_TLS_CERT"] = "/c \"d\"";
   const std::vector<std::string> arguments = {"--max-hulls=7", "--insecure", "--check-config"};
@@ -156,11 +161,29 @@ TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
 TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
   const absl::StatusOr<CommandLine> help = Parse({"--help"});
   ASSERT_TRUE(help.ok());
-  for (const char* flag :
-       {"--listen", "--insecure", "--threads", "--store", "--drain-timeout", "--log-level",
-        "--log-format", "--max-points-per-chunk", "--max-vertices-per-hull", "--max-hulls",
-        "--max-pairs-per-batch", "--max-textbook-axes", "--max-message-bytes", "--config",
-        "--tls-cert", "--tls-key", "--tls-client-ca", "--tokens-file", "--check-config"}) {
+  for (const char* flag : {"--listen",
+                           "--insecure",
+                           "--threads",
+                           "--store",
+                           "--drain-timeout",
+                           "--log-level",
+                           "--log-format",
+                           "--max-points-per-chunk",
+                           "--max-vertices-per-hull",
+                           "--max-hulls",
+                           "--max-pairs-per-batch",
+                           "--max-textbook-axes",
+                           "--max-message-bytes",
+                           "--config",
+                           "--data-dir",
+                           "--durability",
+                           "--memory-limit",
+                           "--max-writers-per-hull",
+                           "--tls-cert",
+                           "--tls-key",
+                           "--tls-client-ca",
+                           "--tokens-file",
+                           "--check-config"}) {
     EXPECT_THAT(help->print, HasSubstr(flag));
   }
   EXPECT_THAT(help->print, HasSubstr("HULLD_MAX_HULLS"));
