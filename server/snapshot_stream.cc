@@ -13,12 +13,24 @@
 #include "server/store_keys.h"
 
 namespace hulld::server {
+namespace {
+
+// A snapshot holds everybody's hulls.
+absl::Status CheckSeesAll(const Caller& caller) {
+  if (caller.sees_all()) return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      absl::StrCat("token \"", caller.name, "\" is limited to \"", caller.prefix,
+                   "\", and a snapshot holds the whole store; use a token without a prefix"));
+}
+
+}  // namespace
 
 grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SnapshotStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Store& store,
     const Registry& registry, WorkerPool& readers) {
   auto* stream = new SnapshotStream(context, admission, readers);
-  const absl::Status begun = stream->call_.Begin();
+  absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) begun = CheckSeesAll(stream->call_.caller());
   if (begun.ok()) {
     readers.Submit([stream, &store, &registry] { stream->Open(store, registry); });
   } else {

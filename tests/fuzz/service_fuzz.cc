@@ -22,7 +22,7 @@ server::Config SmallConfig(const std::string& socket) {
   config.listen = "unix:" + socket;
   config.store = "memory";
   config.threads = 2;
-  config.max_message_bytes = 64 << 10;
+  config.limits.max_message_bytes = 64 << 10;
   config.limits.max_points_per_chunk = 64;
   config.limits.max_vertices_per_hull = 12;
   config.limits.max_hulls = 7;

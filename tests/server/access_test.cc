@@ -75,6 +75,17 @@ const std::map<std::string, CallRule>& Rules() {
                              ChunkMessage(1, Cube()).SerializeAsString()};
         },
         CallRule::kByStatus}},
+      {"hulld.v1.HullService.ReplaceHull",
+       {Permission::kWrite,
+        [](const std::string& hull_id) {
+          v1::ReplaceHullRequest open;
+          open.mutable_open()->set_hull_id(hull_id);
+          open.mutable_open()->set_create_if_absent(true);
+          v1::ReplaceHullRequest points;
+          for (const double number : Cube()) points.mutable_points()->add_xyz(number);
+          return std::vector{open.SerializeAsString(), points.SerializeAsString()};
+        },
+        CallRule::kByStatus}},
       {"hulld.v1.HullService.GetHull",
        {Permission::kRead, WithHullId<v1::GetHullRequest>, CallRule::kByStatus}},
       {"hulld.v1.HullService.GetHullMesh",
@@ -137,6 +148,9 @@ const std::map<std::string, CallRule>& Rules() {
         CallRule::kInReply}},
       {"hulld.v1.StatusService.GetStatus",
        {Permission::kRead, [](const std::string&) { return std::vector{std::string()}; },
+        CallRule::kNoHull}},
+      {"hulld.v1.MaintenanceService.SaveSnapshot",
+       {Permission::kAdmin, [](const std::string&) { return std::vector{std::string()}; },
         CallRule::kNoHull}},
   };
   return *rules;
@@ -334,6 +348,13 @@ TEST_F(Access, ListsShowWhatIsTheCallersAlone) {
     EXPECT_THAT(ListedBy("cell's secret", prefix), ElementsAre("cell-1/own")) << prefix;
   }
   EXPECT_THAT(ListedBy("cell's secret", "cell-1/x"), ElementsAre());
+}
+
+TEST_F(Access, TheStoreAsAWholeIsNotForThoseWithAPrefix) {
+  const grpc::Status status =
+      Do("hulld.v1.MaintenanceService.SaveSnapshot", "cell's secret", "").status;
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_THAT(status.error_message(), HasSubstr("\"cell-1/\""));
 }
 
 TEST_F(Access, SizesOfTheStoreAreNotForThoseWithAPrefix) {

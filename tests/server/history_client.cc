@@ -60,13 +60,17 @@ const Coordinates& HistoryCloud() {
   return cloud;
 }
 
-HistoryClient::HistoryClient(std::shared_ptr<grpc::Channel> channel, HullHistory& history,
+HistoryClient::HistoryClient(const std::shared_ptr<grpc::Channel>& channel, HullHistory& history,
                              std::string name, uint64_t seed)
-    : hulls_(v1::HullService::NewStub(channel)),
-      collisions_(v1::CollisionService::NewStub(channel)),
-      history_(history),
-      name_(std::move(name)),
-      random_(seed) {}
+    : history_(history), name_(std::move(name)), random_(seed) {
+  Connect(channel);
+}
+
+void HistoryClient::Connect(const std::shared_ptr<grpc::Channel>& channel) {
+  streams_.clear();
+  hulls_ = v1::HullService::NewStub(channel);
+  collisions_ = v1::CollisionService::NewStub(channel);
+}
 
 void HistoryClient::MakeProbe() {
   Appender appender(*hulls_, kProbeHull, "probe", true);
@@ -78,12 +82,20 @@ void HistoryClient::MakeProbe() {
 }
 
 bool HistoryClient::CallAtRandom(const std::string& hull_id) {
-  const int choice = Below(100);
+  return Below(100) < 45 ? ChangeAtRandom(hull_id) : ReadAtRandom(hull_id);
+}
+
+bool HistoryClient::ChangeAtRandom(const std::string& hull_id) {
+  const int choice = Below(45);
   if (choice < 5) return Create(hull_id, Below(2) == 0);
   if (choice < 8) return Delete(hull_id, Below(2) == 0);
-  if (choice < 45) return Append(hull_id);
-  if (choice < 65) return Get(hull_id);
-  if (choice < 80) return Mesh(hull_id);
+  return Append(hull_id);
+}
+
+bool HistoryClient::ReadAtRandom(const std::string& hull_id) {
+  const int choice = Below(55);
+  if (choice < 20) return Get(hull_id);
+  if (choice < 35) return Mesh(hull_id);
   return Probe(hull_id);
 }
 

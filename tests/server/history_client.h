@@ -26,14 +26,20 @@ const Coordinates& HistoryCloud();
 class HistoryClient {
  public:
   // name: its writer ID. The history must outlive this.
-  HistoryClient(std::shared_ptr<grpc::Channel> channel, HullHistory& history, std::string name,
-                uint64_t seed);
+  HistoryClient(const std::shared_ptr<grpc::Channel>& channel, HullHistory& history,
+                std::string name, uint64_t seed);
 
   // Makes kProbeHull; once per store.
   void MakeProbe();
 
-  // One call at random on this hull. False when the server was not there to answer.
+  // From now on calls go to another server, or the same one started again; open streams are gone.
+  void Connect(const std::shared_ptr<grpc::Channel>& channel);
+
+  // One call at random on this hull: any, or one that changes, or one that reads. False when the
+  // server was not there to answer.
   bool CallAtRandom(const std::string& hull_id);
+  bool ChangeAtRandom(const std::string& hull_id);
+  bool ReadAtRandom(const std::string& hull_id);
 
   bool Create(const std::string& hull_id, bool if_absent);
   // Opens a stream when none is open, and appends one chunk.

@@ -124,7 +124,8 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
   EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
-  EXPECT_GE(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 3);
+  // Quick pairs are answered where they arrive; what nobody has resolved yet waits for a thread.
+  EXPECT_GE(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
 }
 
 TEST_F(Observation, PairsOfBatchesScenesAndStreamsAreCountedByRung) {

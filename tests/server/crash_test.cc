@@ -1,0 +1,333 @@
+// hulld killed while clients call it, and started again on the same store, many times.
+
+#include <absl/strings/str_cat.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/appender.h"
+#include "client/client.h"
+#include "core/hull/hull_builder.h"
+#include "tests/server/history_client.h"
+#include "tests/server/hull_history.h"
+#include "tests/server/hulld_process.h"
+#include "tests/server/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+// How often the server is killed: HULLD_CRASHES in the environment, hundreds by hand.
+int Crashes() {
+  const char* given = std::getenv("HULLD_CRASHES");
+  if (given != nullptr) return std::atoi(given);
+#ifdef HULLD_SANITIZED
+  return 4;
+#else
+  return 12;
+#endif
+}
+
+uint64_t Seed() {
+  const char* given = std::getenv("HULLD_TEST_SEED");
+  return given != nullptr ? std::strtoull(given, nullptr, 10) : 0;
+}
+
+constexpr int kWriters = 8;
+constexpr int kReaders = 8;
+constexpr int kHulls = 5;
+
+// A directory that goes with this.
+class TemporaryDirectory {
+ public:
+  TemporaryDirectory() {
+    std::string name = (std::filesystem::temp_directory_path() / "hulld-crash-XXXXXX").string();
+    path_ = mkdtemp(name.data());
+  }
+  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+// A server that can be killed and started again, on a unix socket and a store of its own.
+class RestartableServer : public ::testing::Test {
+ protected:
+  std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
+
+  // A connection of client number `i` alone.
+  std::shared_ptr<grpc::Channel> Channel(int i) const {
+    grpc::ChannelArguments own;
+    own.SetInt("hulld.test.client", i);
+    return grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own);
+  }
+
+  void StartServer(const std::vector<std::string>& options = {}) {
+    std::vector<std::string> arguments = {"--listen", address(), "--store", "rocksdb", "--data-dir",
+                                          absl::StrCat(directory_.path(), "/store"),
+                                          // Nobody reads what it says while clients call.
+                                          "--log-level", "warn"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    server_ = std::make_unique<Process>(arguments);
+    const auto deadline = std::chrono::system_clock::now() + std::chrono::seconds(60);
+    ASSERT_TRUE(Channel(-1)->WaitForConnected(deadline)) << "hulld did not start";
+  }
+
+  const TemporaryDirectory directory_;
+  std::unique_ptr<Process> server_;
+};
+
+class Crash : public RestartableServer {
+ protected:
+  Crash() {
+    for (int i = 0; i < kWriters + kReaders; ++i) {
+      clients_.push_back(std::make_unique<HistoryClient>(
+          Channel(i), history_, absl::StrCat("client-", i), Seed() + static_cast<uint64_t>(i)));
+    }
+  }
+
+  // Clients call until the server is killed, which is when about `calls` more have been answered.
+  void CallUntilKilled(uint64_t calls) {
+    const uint64_t end = answered_ + calls;
+    std::vector<std::thread> threads;
+    for (int i = 0; i < kWriters + kReaders; ++i) {
+      threads.emplace_back([this, i, end] {
+        HistoryClient& client = *clients_[static_cast<size_t>(i)];
+        client.Connect(Channel(i));
+        std::mt19937_64 random(Seed() + end * 100 + static_cast<uint64_t>(i));
+        while (true) {
+          const std::string hull = absl::StrCat("crash/", random() % kHulls);
+          if (!(i < kWriters ? client.ChangeAtRandom(hull) : client.ReadAtRandom(hull))) return;
+          if (++answered_ == end) server_->Signal(SIGKILL);
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself";
+    history_.Settle();
+  }
+
+  void AuditAll() {
+    const auto stub = v1::HullService::NewStub(Channel(-1));
+    for (int i = 0; i < kHulls; ++i) {
+      grpc::ClientContext context;
+      v1::GetHullRequest request;
+      v1::GetHullResponse response;
+      request.set_hull_id(absl::StrCat("crash/", i));
+      request.set_audit(true);
+      const grpc::Status status = stub->GetHull(&context, request, &response);
+      if (status.error_code() == grpc::StatusCode::NOT_FOUND) continue;
+      ASSERT_TRUE(status.ok()) << status.error_message();
+      EXPECT_TRUE(response.audit().ok()) << response.audit().finding();
+      ++audited_;
+    }
+  }
+
+  HullHistory history_;
+  std::vector<std::unique_ptr<HistoryClient>> clients_;
+  std::atomic<uint64_t> answered_ = 0;
+  int audited_ = 0;
+};
+
+// Every call that was answered is there after the next start, exactly once, and what was not
+// answered is there wholly or not at all: the history over all lives of the store is linearizable.
+TEST_F(Crash, NothingAcknowledgedIsLostOverManyKills) {
+  RecordProperty("seed", std::to_string(Seed()));
+  std::mt19937_64 random(Seed());
+  const int crashes = Crashes();
+  for (int crash = 0; crash < crashes; ++crash) {
+    StartServer();
+    if (crash == 0) clients_[0]->Connect(Channel(0));
+    if (crash == 0) clients_[0]->MakeProbe();
+    AuditAll();
+    ASSERT_FALSE(HasFailure()) << "at start " << crash << ", seed " << Seed();
+    CallUntilKilled(20 + random() % 500);
+  }
+  StartServer();
+  AuditAll();
+  EXPECT_EQ(HistoryFault(history_), "") << "seed " << Seed();
+  size_t lost = 0;
+  for (const auto& [hull_id, operations] : history_.operations()) {
+    for (const Operation& operation : operations) {
+      lost += operation.outcome == Operation::Outcome::kUnknown;
+    }
+  }
+  std::printf("%d kills, %zu calls recorded, %zu of them unanswered, %d audits\n", crashes,
+              history_.size(), lost, audited_);
+  EXPECT_GT(history_.size(), static_cast<size_t>(crashes) * 20);
+  EXPECT_GT(lost, static_cast<size_t>(crashes));
+  EXPECT_GT(audited_, crashes);
+}
+
+// `count` blocks of points in a ball that grows from block to block, so that each changes the hull.
+std::vector<std::vector<Vector>> GrowingBall(int count, int points) {
+  std::mt19937_64 random(Seed() + 77);
+  std::uniform_real_distribution<double> coordinate(-1, 1);
+  std::vector<std::vector<Vector>> blocks(static_cast<size_t>(count));
+  for (size_t i = 0; i < blocks.size(); ++i) {
+    while (blocks[i].size() < static_cast<size_t>(points)) {
+      const Vector p(coordinate(random), coordinate(random), coordinate(random));
+      if (p.squaredNorm() <= 1) blocks[i].push_back(p * (1 + 0.01 * static_cast<double>(i)));
+    }
+  }
+  return blocks;
+}
+
+std::vector<double> Flat(std::span<const Vector> points) {
+  std::vector<double> xyz;
+  for (const Vector& p : points) xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
+  return xyz;
+}
+
+class Interrupted : public RestartableServer {
+ protected:
+  Client MakeClient() const {
+    ClientOptions options;
+    // Patient enough for any restart; the waits are short, so that little time is lost.
+    options.retry.max_attempts = 1000;
+    options.retry.initial_backoff = std::chrono::milliseconds(5);
+    options.retry.max_backoff = std::chrono::milliseconds(20);
+    options.timeout = std::chrono::minutes(2);
+    grpc::ChannelArguments own;
+    own.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
+    own.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5);
+    own.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
+    return Client(options,
+                  grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own));
+  }
+
+  // That the hull is the one of these points, to the last bit, and has been given them once each.
+  void ExpectHullOf(const std::string& hull_id, const std::vector<std::vector<Vector>>& blocks) {
+    HullBuilder builder;
+    uint64_t points = 0;
+    for (const std::vector<Vector>& block : blocks) {
+      ASSERT_TRUE(builder.Add(block).ok());
+      points += block.size();
+    }
+    const Client client = MakeClient();
+    const auto hull = client.GetHull(hull_id, true);
+    ASSERT_TRUE(hull.ok()) << hull.status();
+    EXPECT_TRUE(hull->audit().ok()) << hull->audit().finding();
+    EXPECT_EQ(hull->hull().counts().received(), points);
+    const auto mesh = client.GetHullMesh(hull_id);
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->xyz, Flat(builder.Snapshot().vertices()));
+  }
+};
+
+TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
+  const int kills = Crashes();
+  const std::vector<std::vector<Vector>> blocks = GrowingBall(20 * kills, 200);
+  StartServer();
+  std::atomic<size_t> sent = 0;
+  std::thread writer([&] {
+    const Client client = MakeClient();
+    AppendOptions options;
+    options.create_if_absent = true;
+    options.writer_id = "survivor";
+    auto appender = client.OpenAppend("interrupted/append", options);
+    ASSERT_TRUE(appender.ok()) << appender.status();
+    for (const std::vector<Vector>& block : blocks) {
+      v1::PointBlock message;
+      const std::vector<double> xyz = Flat(block);
+      message.mutable_xyz()->Assign(xyz.begin(), xyz.end());
+      const absl::Status appended = (*appender)->Append(std::move(message));
+      ASSERT_TRUE(appended.ok()) << appended;
+      ++sent;
+    }
+    const absl::Status finished = (*appender)->Finish();
+    EXPECT_TRUE(finished.ok()) << finished;
+    EXPECT_GE((*appender)->totals().reconnects, 1u);
+    std::printf("%d kills, %llu reconnects, %llu chunks recovered\n", kills,
+                static_cast<unsigned long long>((*appender)->totals().reconnects),
+                static_cast<unsigned long long>((*appender)->totals().chunks_recovered));
+  });
+  for (int kill = 1; kill <= kills; ++kill) {
+    // After a number of chunks and not a time; the last kill may come when all are sent.
+    while (sent < blocks.size() * static_cast<size_t>(kill) / static_cast<size_t>(kills + 1)) {
+      std::this_thread::yield();
+    }
+    server_->Signal(SIGKILL);
+    EXPECT_EQ(server_->Wait(), -1);
+    StartServer();
+  }
+  writer.join();
+  ExpectHullOf("interrupted/append", blocks);
+}
+
+// Clients that vanish in the middle of a stream: what the server has committed by then stands, and
+// the next client of that name goes on from there.
+TEST_F(Interrupted, ClientsThatVanishLeaveWholeChunks) {
+  const std::vector<std::vector<Vector>> blocks = GrowingBall(60, 300);
+  StartServer();
+  std::mt19937_64 random(Seed());
+  uint64_t committed = 0;
+  int vanished = 0;
+  while (committed < blocks.size()) {
+    const auto stub = v1::HullService::NewStub(Channel(0));
+    Appender appender(*stub, "interrupted/client", "ghost", true);
+    ASSERT_TRUE(appender.is_open());
+    EXPECT_GE(appender.opened().last_sequence(), committed);
+    committed = appender.opened().last_sequence();
+    EXPECT_EQ(appender.opened().hull().counts().received(), committed * 300);
+    // Sends without waiting for acks, and is gone.
+    const uint64_t end = std::min<uint64_t>(blocks.size(), committed + 1 + random() % 5);
+    for (uint64_t i = committed; i < end; ++i) {
+      ASSERT_TRUE(appender.Send(ChunkMessage(i + 1, Flat(blocks[i]))));
+    }
+    if (random() % 3 == 0) {
+      EXPECT_TRUE(appender.Finish().ok());
+    } else {
+      appender.Cancel();
+      ++vanished;
+    }
+  }
+  EXPECT_GT(vanished, 5);
+  ExpectHullOf("interrupted/client", blocks);
+}
+
+TEST_F(Interrupted, AServerStoppedInTheMiddleOfABatchEndsItAndItself) {
+  for (const int signal : {SIGTERM, SIGKILL}) {
+    StartServer({"--drain-timeout", "0.1"});
+    const Client client = MakeClient();
+    const auto stub = v1::CollisionService::NewStub(Channel(0));
+    {
+      const auto hulls = v1::HullService::NewStub(Channel(0));
+      Appender appender(*hulls, "interrupted/batch", "w", true);
+      ASSERT_TRUE(appender.Append(appender.opened().last_sequence() + 1, Sphere(400)));
+      ASSERT_TRUE(appender.Finish().ok());
+    }
+    v1::BatchCheckCollisionsRequest request;
+    // The slowest there is, so that it cannot be done before the signal.
+    request.set_method(v1::METHOD_TEXTBOOK_SAT);
+    *request.add_placements() = PlacementOf("interrupted/batch");
+    *request.add_placements() = PlacementOf("interrupted/batch", 0.5);
+    for (int i = 0; i < 100000; ++i) {
+      request.add_pairs(0);
+      request.add_pairs(1);
+    }
+    grpc::ClientContext context;
+    const auto reader = stub->BatchCheckCollisions(&context, request);
+    reader->WaitForInitialMetadata();
+    server_->Signal(signal);
+    v1::BatchCheckCollisionsResponse response;
+    while (reader->Read(&response)) {
+    }
+    EXPECT_FALSE(reader->Finish().ok());
+    EXPECT_EQ(server_->Wait(), signal == SIGTERM ? 0 : -1);
+  }
+}
+
+}  // namespace
+}  // namespace hulld::server
