@@ -43,6 +43,8 @@ class AppendConnection final
   bool ended();
   // The final status. Requires ended().
   grpc::Status Close();
+  // For what the server told beside the status. Requires that Close returned.
+  const grpc::ClientContext& context() const { return context_; }
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;

@@ -59,7 +59,7 @@ absl::StatusOr<v1::AppendOpened> Appender::Connect() {
   }
   v1::AppendPointsResponse response;
   if (!connection_->TakeResponse(&response)) {
-    absl::Status status = FromGrpcStatus(connection_->Close());
+    absl::Status status = FromGrpcStatus(connection_->Close(), connection_->context());
     if (status.ok()) status = absl::InternalError("the server ended the stream unopened");
     return status;
   }
@@ -158,7 +158,7 @@ absl::Status Appender::PumpUntil(size_t chunks, size_t bytes) {
         if (absl::Status status = TakeResponse(response); !status.ok()) return status;
         continue;
       }
-      absl::Status status = FromGrpcStatus(connection_->Close());
+      absl::Status status = FromGrpcStatus(connection_->Close(), connection_->context());
       if (status.ok())
         status = absl::InternalError("the server ended the stream before its last ack");
       if (status = Reconnect(std::move(status)); !status.ok()) return status;
@@ -224,8 +224,9 @@ absl::Status Appender::Finish() {
   }
   // Everything is acknowledged: that a server which drains, or is gone, did not say goodbye changes
   // nothing.
-  absl::Status status =
-      connection_->ended() ? FromGrpcStatus(connection_->Close()) : absl::OkStatus();
+  absl::Status status = connection_->ended()
+                            ? FromGrpcStatus(connection_->Close(), connection_->context())
+                            : absl::OkStatus();
   connection_ = nullptr;
   failed_ = absl::FailedPreconditionError("the append stream is finished");
   return absl::IsUnavailable(status) ? absl::OkStatus() : status;

@@ -107,7 +107,7 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     grpc::ClientContext context;
     context.set_deadline(deadline);
     response.Clear();
-    return FromGrpcStatus((stub->*method)(&context, request, &response));
+    return FromGrpcStatus((stub->*method)(&context, request, &response), context);
   };
   absl::Status status = retry ? CallWithRetries(options_.retry, deadline, attempt) : attempt();
   if (!status.ok()) return status;
@@ -198,7 +198,7 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(const v1::GetHullMeshRequest& reque
     while (part_status.ok() && reader->Read(&part)) part_status = AddPart(part, &mesh);
     if (!part_status.ok()) context.TryCancel();
     const grpc::Status end = reader->Finish();
-    return part_status.ok() ? FromGrpcStatus(end) : part_status;
+    return part_status.ok() ? FromGrpcStatus(end, context) : part_status;
   });
   if (status.ok()) status = CheckConsistent(mesh);
   if (!status.ok()) return status;
@@ -261,14 +261,14 @@ absl::Status Client::Receive(const Start& start,
       receiver_status = receive(response);
     }
     if (!receiver_status.ok()) context.TryCancel();
-    return FromGrpcStatus(reader->Finish());
+    return FromGrpcStatus(reader->Finish(), context);
   };
   absl::Status status;
   int failures = 0;
   do {
     status = attempt();
-  } while (absl::IsUnavailable(status) && !received &&
-           WaitBeforeRetry(options_.retry, ++failures, deadline));
+  } while (MayRetry(status) && !received &&
+           WaitBeforeRetry(options_.retry, ++failures, deadline, status));
   return receiver_status.ok() ? status : receiver_status;
 }
 

@@ -55,8 +55,9 @@ struct HullMesh {
 //
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
 // came. Calls that are safe to repeat (all but DeleteHull, and CreateHull without if_absent) are
-// retried after UNAVAILABLE as options.retry says. ValidateSecurity tells beforehand whether
-// options.security can work.
+// retried as options.retry says after UNAVAILABLE, and after RESOURCE_EXHAUSTED when the server
+// says when to come again. ValidateSecurity
+// tells beforehand whether options.security can work.
 class Client {
  public:
   explicit Client(ClientOptions options = {});

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <thread>
 
+#include "client/grpc_status.h"
+
 namespace hulld {
 
 std::chrono::milliseconds BackoffAfter(const RetryPolicy& policy, int failures) {
@@ -11,9 +13,17 @@ std::chrono::milliseconds BackoffAfter(const RetryPolicy& policy, int failures) 
   return std::min(backoff, policy.max_backoff);
 }
 
-bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline) {
+bool MayRetry(const absl::Status& status) {
+  return absl::IsUnavailable(status) ||
+         (absl::IsResourceExhausted(status) && RetryHintOf(status).has_value());
+}
+
+bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline,
+                     const absl::Status& status) {
   if (failures >= policy.max_attempts) return false;
-  const std::chrono::milliseconds backoff = BackoffAfter(policy, failures);
+  const std::chrono::milliseconds asked =
+      RetryHintOf(status).value_or(std::chrono::milliseconds(0));
+  const std::chrono::milliseconds backoff = std::max(BackoffAfter(policy, failures), asked);
   if (std::chrono::system_clock::now() + backoff >= deadline) return false;
   if (policy.wait) {
     policy.wait(backoff);
@@ -27,8 +37,8 @@ absl::Status CallWithRetries(const RetryPolicy& policy, Deadline deadline,
                              const std::function<absl::Status()>& attempt) {
   for (int failures = 0;;) {
     absl::Status status = attempt();
-    if (!absl::IsUnavailable(status)) return status;
-    if (!WaitBeforeRetry(policy, ++failures, deadline)) return status;
+    if (!MayRetry(status)) return status;
+    if (!WaitBeforeRetry(policy, ++failures, deadline, status)) return status;
   }
 }
 

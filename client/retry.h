@@ -10,8 +10,9 @@ namespace hulld {
 
 using Deadline = std::chrono::system_clock::time_point;
 
-// When a call that is safe to repeat is repeated: after UNAVAILABLE alone, which says that the
-// server was not reached or is draining. Waits double from initial_backoff to max_backoff.
+// When a call that is safe to repeat is repeated: after UNAVAILABLE, which says that the server was
+// not reached or is draining, and when the server has too much to do and says when to come again.
+// Waits double from initial_backoff to max_backoff, and are at least as long as the server asks.
 struct RetryPolicy {
   // Attempts in all; 1 turns retries off.
   int max_attempts = 4;
@@ -24,11 +25,15 @@ struct RetryPolicy {
 // The wait after `failures` >= 1 failed attempts.
 std::chrono::milliseconds BackoffAfter(const RetryPolicy& policy, int failures);
 
-// Waits as the policy says after `failures` failed attempts. False, without waiting, when the
-// attempts are used up or the wait would pass the deadline.
-bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline);
+// Whether a call that ended so may be repeated, if it is safe to repeat.
+bool MayRetry(const absl::Status& status);
 
-// Calls `attempt` until it returns something else than UNAVAILABLE, the attempts are used up, or
+// Waits as the policy says after `failures` failed attempts, the last of which ended with `status`.
+// False, without waiting, when the attempts are used up or the wait would pass the deadline.
+bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline,
+                     const absl::Status& status = absl::OkStatus());
+
+// Calls `attempt` until it returns something that may not be retried, the attempts are used up, or
 // the deadline is near. Returns the last attempt's status. `attempt` must be safe to repeat.
 absl::Status CallWithRetries(const RetryPolicy& policy, Deadline deadline,
                              const std::function<absl::Status()>& attempt);

@@ -1,8 +1,6 @@
 #include "server/append_stream.h"
 
-#include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
@@ -130,7 +128,9 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (!opened.ok()) return End(opened.status());
   session_ = opened->session;
-  if (session_->created_hull) spdlog::info("hull \"{}\" created", opened->hull.hull_id);
+  if (session_->created_hull) {
+    call_.Log(LogLevel::kInfo, "hull created", {{"hull", opened->hull.hull_id}});
+  }
   if (end_.has_value()) return;
   v1::AppendOpened* reply = next_reply_.emplace().mutable_opened();
   EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
@@ -148,8 +148,10 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   request_.Clear();
   ++unbuilt_;
   ++uncommitted_;
+  call_.AddPoints(chunk->points.size());
   const std::shared_ptr<AppendStream> self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
+  const auto arrival = std::chrono::steady_clock::now();
   registry_.Append(
       *session_, *std::move(chunk), [self] { return self->call_.ShouldStop(); },
       [self] {
@@ -157,9 +159,10 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
         --self->unbuilt_;
         self->Proceed();
       },
-      [self, sequence](const absl::StatusOr<ChunkResult>& result) {
+      [self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
         const std::lock_guard lock(self->mutex_);
         --self->uncommitted_;
+        if (result.ok()) self->call_.EndMessage(arrival);
         self->HandleResult(sequence, result);
         self->Proceed();
       });
@@ -170,6 +173,7 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
     const bool stopped = call_.ShouldStop();
     return EndAt(sequence, stopped ? call_.StopStatus() : result.status());
   }
+  call_.metrics().CountPoints(result->counts);
   if (finished_) return;
   if (!next_reply_.has_value()) next_reply_.emplace();
   // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
@@ -190,8 +194,7 @@ void AppendStream::End(const absl::Status& status) {
   if (end_.has_value()) return;
   end_ = status;
   if (!status.ok() && session_.has_value()) {
-    spdlog::debug("append by writer \"{}\" ended: {}", absl::CEscape(session_->writer_id),
-                  status.ToString());
+    call_.Log(LogLevel::kDebug, "append ended early", {{"writer", session_->writer_id}});
   }
 }
 

@@ -52,6 +52,10 @@ absl::Status BatchStream::Validate() {
                        registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
+  const absl::Status placements = ValidatePlacementCount(
+      request_.placements_size(), registry_.limits().max_placements, "the batch");
+  if (!placements.ok()) return placements;
+  call_.AddPairs(pair_count());
   return ValidatePairs(request_.pairs(), static_cast<size_t>(request_.placements_size()),
                        registry_.limits().max_pairs_per_batch, "the batch");
 }
@@ -131,6 +135,9 @@ absl::Status BatchStream::ComputeRelations(size_t end) {
   BatchColumns columns(std::move(head_), request_.wanted(), next_pair_);
   head_.Clear();
   columns.Add(*answers);
+  RungCounts counts;
+  for (const RelationAnswer& answer : *answers) counts.Add(answer.rung);
+  call_.metrics().CountPairs(counts);
   Send(columns, end);
   return absl::OkStatus();
 }
@@ -152,6 +159,7 @@ absl::Status BatchStream::ComputeSlice() {
   BatchColumns columns(std::move(head_), request_.wanted(), begin);
   head_.Clear();
   size_t answered = 0;
+  RungCounts counts;
   for (size_t i = begin; i < end; ++i) {
     const PlacedPair pair = PairAt(i);
     if (!IsAnswerable(pair)) {
@@ -162,11 +170,15 @@ absl::Status BatchStream::ComputeSlice() {
     const Hull& a = table_.placed()[pair.a].hull();
     const Hull& b = table_.placed()[pair.b].hull();
     if (answer.ok()) {
+      counts.Add(answer->rung);
       columns.Add(answer, a, b);
     } else {
-      columns.Add(NameQueryLimit(answer.status()), a, b);
+      const absl::Status status = NameQueryLimit(answer.status());
+      call_.CountLimit(status);
+      columns.Add(status, a, b);
     }
   }
+  call_.metrics().CountPairs(counts);
   Send(columns, end);
   return absl::OkStatus();
 }

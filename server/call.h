@@ -4,11 +4,16 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <optional>
+#include <string>
 
 #include "server/admission.h"
 #include "server/call_lifetime.h"
 #include "server/caller.h"
+#include "server/log.h"
 #include "server/rpc.h"
 
 namespace hulld::server {
@@ -26,6 +31,11 @@ class Call {
   Rpc rpc() const { return rpc_; }
   // Who calls. Requires that Begin succeeded.
   const Caller& caller() const { return caller_; }
+  // The client's (metadata x-request-id), or ours. The reply carries it, and so does all that is
+  // logged about the call.
+  const std::string& request_id() const { return request_id_; }
+  Metrics& metrics() const { return admission_.metrics(); }
+
   const CallLifetime& lifetime() const { return lifetime_; }
   bool ShouldStop() const { return lifetime_.ShouldStop(); }
   // Requires ShouldStop().
@@ -34,20 +44,46 @@ class Call {
 
   // Finds out who calls and lets the call in; it must be ended with the error if there is one.
   // UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate. UNAVAILABLE: the server
-  // drains.
+  // drains. RESOURCE_EXHAUSTED: a limit on calls.
   absl::Status Begin();
+
+  // Counts what the call asked for.
+  void AddPairs(uint64_t pairs) { pairs_.fetch_add(pairs, std::memory_order_relaxed); }
+  void AddPoints(uint64_t points) { points_.fetch_add(points, std::memory_order_relaxed); }
+
+  // A stream took up a message, and made its answer ready: messages are timed one by one, as the
+  // stream itself lasts as long as its client likes.
+  void BeginMessage();
+  void EndMessage() { EndMessage(message_arrival_); }
+  // The same where several messages are under way: `arrival` is that of the one.
+  void EndMessage(std::chrono::steady_clock::time_point arrival);
+
+  // Counts a limit that was met without ending the call, as by one pair of a batch.
+  void CountLimit(const absl::Status& status) const;
+
+  // Logs one line about this call.
+  void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
 
   // What the reactor is to finish with.
   grpc::Status End(const absl::Status& status);
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   // Fills caller_.
   absl::Status Authenticate();
+  std::string Client() const;
+  void LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const;
 
   grpc::CallbackServerContext& context_;
   Admission& admission_;
   const Rpc rpc_;
+  const Clock::time_point arrival_ = Clock::now();
+  std::string request_id_;
   CallLifetime lifetime_;
+  std::atomic<uint64_t> pairs_ = 0;
+  std::atomic<uint64_t> points_ = 0;
+  Clock::time_point message_arrival_;
   Caller caller_;
   // Taken by Begin, given back when the reactor goes.
   std::optional<Admission::Ticket> ticket_;

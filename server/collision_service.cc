@@ -90,7 +90,7 @@ bool IsQuick(const Resolved& resolved) {
   return true;
 }
 
-absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
+absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted, Metrics& metrics,
                     v1::CheckCollisionResponse* response) {
   const auto placed_a = PlacedHull::Make(query.a.snapshot->query_hull(), query.X_WA);
   if (!placed_a.ok()) return placed_a.status();
@@ -100,6 +100,9 @@ absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted,
   const Hull& b = placed_b->hull();
   const auto answer = hulld::CheckCollision(*placed_a, *placed_b, query.options);
   if (!answer.ok()) return NameQueryLimit(answer.status());
+  RungCounts counts;
+  counts.Add(answer->rung);
+  metrics.CountPairs(counts);
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
   if (wanted.analysis()) EncodeAnalysis(answer->analysis, a, b, response->mutable_analysis());
@@ -125,7 +128,9 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
       std::optional<Resolved> resolved = registry_.TryResolve(HullIds(*request));
       if (resolved.has_value() && IsQuick(*resolved)) {
         const absl::Status taken = TakeHulls(registry_, *std::move(resolved), &*query, response);
-        return call->End(taken.ok() ? Answer(*query, request->wanted(), response) : taken);
+        return call->End(taken.ok()
+                             ? Answer(*query, request->wanted(), call->call().metrics(), response)
+                             : taken);
       }
     }
     readers_.Submit([this, call, request, response, query = *std::move(query)]() mutable {
@@ -134,11 +139,11 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
                     &query, response);
       if (!taken.ok()) return call->End(taken);
       if (query.options.method != Method::kTextbookSat) {
-        return call->End(Answer(query, request->wanted(), response));
+        return call->End(Answer(query, request->wanted(), call->call().metrics(), response));
       }
       query.options.threads = executor_.threads();
       executor_.Submit([call, request, response, query = std::move(query)] {
-        call->End(Answer(query, request->wanted(), response));
+        call->End(Answer(query, request->wanted(), call->call().metrics(), response));
       });
     });
   });
@@ -146,17 +151,17 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
 
 grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* CollisionService::BatchCheckCollisions(
     grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest* request) {
-  return BatchStream::Start(*context, admission_, registry_, readers_, executor_, *request);
+  return BatchStream::Start(*context, admission_, registry_, long_readers_, executor_, *request);
 }
 
 grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
 CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, registry_, readers_);
+  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_);
 }
 
 grpc::ServerWriteReactor<v1::FindCollisionsResponse>* CollisionService::FindCollisions(
     grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) {
-  return SceneStream::Start(*context, admission_, registry_, readers_, executor_, *request);
+  return SceneStream::Start(*context, admission_, registry_, long_readers_, executor_, *request);
 }
 
 }  // namespace hulld::server

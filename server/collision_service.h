@@ -14,13 +14,18 @@ namespace hulld::server {
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
 // answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
 // of moderate size and ready; else by one of the `readers`, so that it never waits for a batch, and
-// so are the few pairs of a stream's step; TEXTBOOK_SAT, whose loop over axes is parallel, batches
-// and scenes go to the executor.
+// so are the few pairs of a stream's step; steps that take longer, and the placements of batches
+// and scenes, are the work of `long_readers`; TEXTBOOK_SAT, whose loop over axes is parallel,
+// batches and scenes that of the executor.
 class CollisionService : public v1::CollisionService::CallbackService {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
-                   Executor& executor)
-      : registry_(registry), admission_(admission), readers_(readers), executor_(executor) {}
+                   WorkerPool& long_readers, Executor& executor)
+      : registry_(registry),
+        admission_(admission),
+        readers_(readers),
+        long_readers_(long_readers),
+        executor_(executor) {}
 
   grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
                                            const v1::CheckCollisionRequest* request,
@@ -37,6 +42,7 @@ class CollisionService : public v1::CollisionService::CallbackService {
   Registry& registry_;
   Admission& admission_;
   WorkerPool& readers_;
+  WorkerPool& long_readers_;
   Executor& executor_;
 };
 

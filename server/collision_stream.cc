@@ -17,7 +17,9 @@
 namespace hulld::server {
 namespace {
 
-// After this long other calls get their turn on the thread.
+// A step that takes longer than this moves to the threads for long tasks, where other calls get
+// their turn after each slice.
+constexpr std::chrono::milliseconds kFirstSliceTime(2);
 constexpr std::chrono::milliseconds kSliceTime(20);
 // The clock is read once for so many pairs.
 constexpr size_t kPairsPerLook = 64;
@@ -42,9 +44,9 @@ absl::StatusOr<Pose> PoseAt(const v1::CollisionStreamUpdate& update, int i) {
 
 grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
 CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                       Registry& registry, WorkerPool& readers) {
+                       Registry& registry, WorkerPool& readers, WorkerPool& long_readers) {
   const std::shared_ptr<CollisionStream> stream(
-      new CollisionStream(context, admission, registry, readers));
+      new CollisionStream(context, admission, registry, readers, long_readers));
   stream->self_ = stream;
   const absl::Status begun = stream->call_.Begin();
   if (begun.ok()) {
@@ -63,8 +65,11 @@ void CollisionStream::ReadNext() {
 void CollisionStream::OnReadDone(bool ok) {
   // Without a message the client has said all, or is gone, or speaks another language.
   if (!ok) return End(WhyNotRead(request_));
+  call_.BeginMessage();
   if (IsQuick()) return Handle();
-  readers_.Submit([self = shared_from_this()] { self->Handle(); });
+  // The first message resolves hulls, and answers all pairs with cold caches.
+  WorkerPool& pool = open_ ? readers_ : long_readers_;
+  pool.Submit([self = shared_from_this()] { self->Handle(); });
 }
 
 void CollisionStream::OnWriteDone(bool ok) {
@@ -73,7 +78,7 @@ void CollisionStream::OnWriteDone(bool ok) {
   response_.Clear();
   response_bytes_ = 0;
   if (answered) return ReadNext();
-  readers_.Submit([self = shared_from_this()] { self->AnswerSlice(); });
+  long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
 }
 
 void CollisionStream::End(const absl::Status& status) {
@@ -109,7 +114,8 @@ void CollisionStream::Handle() {
   for (const uint32_t pair : asked_) is_asked_[pair] = false;
   table_.EncodeHeader(registry_.store(), response_.mutable_header());
   response_bytes_ = response_.ByteSizeLong();
-  AnswerSlice();
+  call_.AddPairs(asked_.size());
+  AnswerSlice(kFirstSliceTime);
 }
 
 absl::Status CollisionStream::HandleMessage() {
@@ -140,6 +146,9 @@ absl::Status CollisionStream::HandleOpen() {
   const absl::Status valid =
       ValidatePairs(open.pairs(), placements, registry_.limits().max_pairs_per_batch, "the stream");
   if (!valid.ok()) return Prefixed("open: ", valid);
+  const absl::Status few = ValidatePlacementCount(open.placements_size(),
+                                                  registry_.limits().max_placements, "the stream");
+  if (!few.ok()) return Prefixed("open: ", few);
   options_ = *std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
@@ -242,6 +251,7 @@ void CollisionStream::AddAnswer(uint32_t index) {
   const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
   absl::StatusOr<Answer> answer;
   if (answerable) answer = AnswerPair(pair);
+  if (answerable && answer.ok()) rungs_.Add(answer->rung);
   const v1::Relation relation =
       answerable && answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
   const bool changed = relation != pair.relation;
@@ -260,18 +270,20 @@ void CollisionStream::AddAnswer(uint32_t index) {
 }
 
 // Computes until the answer is complete, a message is full, or it is the turn of others.
-void CollisionStream::AnswerSlice() {
-  const auto end = std::chrono::steady_clock::now() + kSliceTime;
+void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
   while (next_asked_ < asked_.size()) {
     if (response_bytes_ >= Config::kReplyMessageBytes) break;
     AddAnswer(asked_[next_asked_++]);
     if (next_asked_ % kPairsPerLook != 0) continue;
     if (call_.ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
-      return readers_.Submit([self = shared_from_this()] { self->AnswerSlice(); });
+      return long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
     }
   }
+  call_.metrics().CountPairs(std::exchange(rungs_, {}));
   if (call_.ShouldStop()) return End(call_.StopStatus());
+  if (next_asked_ == asked_.size()) call_.EndMessage();
   response_.set_update(messages_);
   response_.set_last(next_asked_ == asked_.size());
   StartWrite(&response_);

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -32,7 +33,7 @@ class CollisionStream
  public:
   static grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers);
+      WorkerPool& readers, WorkerPool& long_readers);
 
  private:
   // What is kept of a pair from one answer to the next.
@@ -45,8 +46,11 @@ class CollisionStream
   };
 
   CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                  WorkerPool& readers)
-      : registry_(registry), readers_(readers), call_(context, admission, Rpc::kStreamCollisions) {}
+                  WorkerPool& readers, WorkerPool& long_readers)
+      : registry_(registry),
+        readers_(readers),
+        long_readers_(long_readers),
+        call_(context, admission, Rpc::kStreamCollisions) {}
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -65,10 +69,11 @@ class CollisionStream
   void AskAboutPairsOf(size_t placement);
   absl::StatusOr<Answer> AnswerPair(PairState& pair) const;
   void AddAnswer(uint32_t index);
-  void AnswerSlice();
+  void AnswerSlice(std::chrono::milliseconds time);
 
   Registry& registry_;
   WorkerPool& readers_;
+  WorkerPool& long_readers_;
   Call call_;
   // Keeps this alive until gRPC is done with it; a queued task holds another reference.
   std::shared_ptr<CollisionStream> self_;
@@ -93,6 +98,7 @@ class CollisionStream
   std::vector<uint32_t> asked_;
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;
+  RungCounts rungs_;
 };
 
 }  // namespace hulld::server

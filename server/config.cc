@@ -82,8 +82,9 @@ class Parser {
     } catch (const CLI::Error& error) {
       return absl::InvalidArgumentError(error.what());
     }
-    config_.drain_timeout =
-        std::chrono::milliseconds(static_cast<int64_t>(drain_timeout_seconds_ * 1000));
+    config_.drain_timeout = ToMilliseconds(drain_timeout_seconds_);
+    config_.limits.max_request_time = ToMilliseconds(max_request_seconds_);
+    config_.limits.slow_request = ToMilliseconds(slow_request_seconds_);
     result->config = config_;
     result->check = check_;
     result->settings = app_.config_to_str(/*default_also=*/true, /*write_description=*/false);
@@ -97,6 +98,14 @@ class Parser {
         ->envname(EnvironmentName(name))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
         ->capture_default_str();
+  }
+
+  static std::chrono::milliseconds ToMilliseconds(double seconds) {
+    return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+  }
+
+  static double ToSeconds(std::chrono::milliseconds time) {
+    return static_cast<double>(time.count()) / 1000;
   }
 
   void AddServing() {
@@ -113,6 +122,7 @@ class Parser {
     Add("drain-timeout", drain_timeout_seconds_,
         "Seconds that running calls may take after SIGTERM or SIGINT")
         ->check(CLI::Validator(CheckSeconds, ""));
+    AddObservation();
     Add("log-level", config_.log_level, "Least severe messages to log")
         ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
     Add("log-format", config_.log_format, "Log as text or as one JSON object per line")
@@ -129,6 +139,19 @@ class Parser {
         "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
         "outage of the machine can lose (relaxed)")
         ->check(CLI::IsMember({"sync", "relaxed"}));
+  }
+
+  void AddObservation() {
+    Add("metrics-address", config_.metrics_address,
+        "Where Prometheus reads metrics over HTTP (/metrics): host:port; empty: nowhere");
+    app_.add_flag("--metrics-insecure", config_.metrics_insecure,
+                  "Allow --metrics-address on addresses that other machines can reach, although "
+                  "metrics are neither encrypted nor authenticated")
+        ->envname(EnvironmentName("metrics-insecure"))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    Add("slow-request", slow_request_seconds_,
+        "Log requests that take longer than so many seconds; 0: none")
+        ->check(CLI::Validator(CheckSeconds, ""));
   }
 
   void AddGuard() {
@@ -164,8 +187,30 @@ class Parser {
         "Bytes of memory that hulls may hold; 0: half of what the machine or the control group "
         "has",
         kAny, 0);
-    AddLimit("max-message-bytes", config_.max_message_bytes, "Bytes of one message from a client",
+    AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
              kMaxGrpcMessageBytes);
+    AddLimit("max-points-per-hull", limits.max_points_per_hull,
+             "Points that one hull takes in its life", kAny);
+    AddLimit("max-placements", limits.max_placements,
+             "Placements of one batch, scene or stream of poses", kAny);
+    AddCallLimits();
+  }
+
+  void AddCallLimits() {
+    Limits& limits = config_.limits;
+    constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
+    AddLimit("max-calls", limits.max_calls, "Calls that run at a time, open streams included",
+             kAny);
+    AddLimit("max-waiting-calls", limits.max_waiting_calls,
+             "Calls that wait for a thread before others are refused", kAny);
+    AddLimit("max-streams-per-client", limits.max_streams_per_client,
+             "Streams of points or poses that one client has open", kAny);
+    AddLimit("max-concurrent-batches", limits.max_concurrent_batches,
+             "Batches and scenes that run at a time", kAny);
+    Add("max-request-time", max_request_seconds_,
+        "Seconds that one request may take; streams of points are exempt, streams of poses may "
+        "take so long per message; 0: unlimited")
+        ->check(CLI::Validator(CheckSeconds, ""));
   }
 
   // CLI::Range alone would take -1 for the largest number.
@@ -184,7 +229,9 @@ class Parser {
   CLI::App app_;
   Config config_;
   bool check_ = false;
-  double drain_timeout_seconds_ = static_cast<double>(Config().drain_timeout.count()) / 1000;
+  double drain_timeout_seconds_ = ToSeconds(Config().drain_timeout);
+  double max_request_seconds_ = ToSeconds(Limits().max_request_time);
+  double slow_request_seconds_ = ToSeconds(Limits().slow_request);
 };
 
 std::string DefaultDataDir(const Environment& environment) {

@@ -19,15 +19,34 @@ namespace hulld::server {
 
 // What one caller may ask for; the error that names a limit names its flag.
 struct Limits {
+  // Largest message taken from a client: holds max_points_per_chunk doubles and max_pairs_per_batch
+  // pairs at their defaults.
+  uint64_t max_message_bytes = 16 << 20;
   uint64_t max_points_per_chunk = 200'000;
+  // Points that one hull takes in its life; what a double counts exactly, which is no limit.
+  uint64_t max_points_per_hull = uint64_t{1} << 53;
   uint64_t max_vertices_per_hull = 1'000'000;
   uint64_t max_hulls = 100'000;
   uint64_t max_pairs_per_batch = 1'000'000;
+  // Of one batch, scene or stream; each takes about 500 bytes while it runs.
+  uint64_t max_placements = 200'000;
   uint64_t max_textbook_axes = 10'000'000;
   uint64_t max_writers_per_hull = 100'000;
   // Bytes that builders and snapshots may hold. 0: half of what the machine or the control group of
   // the process has.
   uint64_t memory_limit = 0;
+  // Calls that run, open streams included, and those of them that wait for a thread.
+  uint64_t max_calls = 4096;
+  uint64_t max_waiting_calls = 1024;
+  // Of AppendPoints, ReplaceHull and StreamCollisions. A client is a token or, without tokens, a
+  // peer address.
+  uint64_t max_streams_per_client = 256;
+  // BatchCheckCollisions and FindCollisions that run; they take turns.
+  uint64_t max_concurrent_batches = 32;
+  // Of one request, or one message of a stream of StreamCollisions; zero: unlimited.
+  std::chrono::milliseconds max_request_time{300'000};
+  // Requests that take longer are logged; zero: none.
+  std::chrono::milliseconds slow_request{1000};
 };
 
 // Every setting and default of the server.
@@ -61,9 +80,10 @@ struct Config {
   std::string log_level = "info";
   // text or json (one object per line).
   std::string log_format = "text";
-  // Largest message taken from a client: holds max_points_per_chunk doubles and max_pairs_per_batch
-  // pairs at their defaults.
-  uint64_t max_message_bytes = 16 << 20;
+  // "host:port" where Prometheus reads metrics over HTTP; empty: nowhere.
+  std::string metrics_address;
+  // Allows a metrics address that other machines can reach.
+  bool metrics_insecure = false;
   Limits limits;
 
   bool has_tls() const { return !tls_cert.empty() || !tls_key.empty() || !tls_client_ca.empty(); }

@@ -5,6 +5,7 @@
 
 #include <cstring>
 
+#include "server/limit_error.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
@@ -36,9 +37,8 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
   }
   const size_t count = coordinates.size() / 3;
   if (count > max_points) {
-    return absl::ResourceExhaustedError(absl::StrCat("message holds ", count,
-                                                     " points; the limit is ", max_points,
-                                                     " (--max-points-per-chunk)"));
+    return LimitExceeded(absl::StrCat("message holds ", count, " points"), max_points,
+                         "max-points-per-chunk");
   }
   return ToPoints(coordinates);
 }

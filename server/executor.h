@@ -2,6 +2,7 @@
 #define HULLD_SERVER_EXECUTOR_H_
 
 #include <functional>
+#include <optional>
 
 #include "server/worker_pool.h"
 
@@ -9,11 +10,13 @@ namespace hulld::server {
 
 // The one thread that opens OpenMP regions: OpenMP keeps a team of threads for each thread that
 // opens one, so a second opener would double the threads. Tasks run one after the other, each on
-// the whole team; long work comes in slices that queue again, so that calls take turns.
+// the whole team; long work comes in slices that queue again, so that calls take turns. The team
+// runs at a lower priority than all other threads, which bring what it works on and send what it
+// found, and answer single pairs meanwhile.
 class Executor {
  public:
-  // threads: of the team; 0: one per core.
-  explicit Executor(int threads);
+  // threads: of the team; 0: one per core. metrics: as for WorkerPool.
+  explicit Executor(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
 
   int threads() const { return threads_; }
   void Submit(std::function<void()> task) { opener_.Submit(std::move(task)); }

@@ -2,7 +2,6 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <utility>
 
@@ -52,14 +51,15 @@ grpc::ServerReadReactor<v1::ReplaceHullRequest>* HullService::ReplaceHull(
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
                                                const v1::GetHullRequest* request,
                                                v1::GetHullResponse* response) {
+  // An audit takes as long as the hull is large.
   return UnaryCall::AnswerOn(
-      readers_, *context, admission_, Rpc::kGetHull,
+      request->audit() ? long_readers_ : readers_, *context, admission_, Rpc::kGetHull,
       [this, request, response](const Call& call) { return Get(*request, call, response); });
 }
 
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
     grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) {
-  return MeshStream::Start(*context, admission_, registry_, readers_, *request);
+  return MeshStream::Start(*context, admission_, registry_, long_readers_, *request);
 }
 
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
@@ -85,7 +85,9 @@ void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullRes
                    [this, response, call](const absl::StatusOr<CreateResult>& created) {
                      if (!created.ok()) return call->End(created.status());
                      const HullRecord& hull = created->hull;
-                     if (created->created) spdlog::info("hull \"{}\" created", hull.hull_id);
+                     if (created->created) {
+                       call->call().Log(LogLevel::kInfo, "hull created", {{"hull", hull.hull_id}});
+                     }
                      EncodeHeader(registry_.store(), created->store_revision,
                                   response->mutable_header());
                      EncodeRecord(hull, response->mutable_hull());
@@ -146,13 +148,14 @@ void HullService::Delete(const v1::DeleteHullRequest& request, v1::DeleteHullRes
   }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-  registry_.Delete(request.hull_id(), if_revision,
-                   [this, &request, response, call](const absl::StatusOr<uint64_t>& revision) {
-                     if (!revision.ok()) return call->End(revision.status());
-                     spdlog::info("hull \"{}\" deleted", request.hull_id());
-                     EncodeHeader(registry_.store(), *revision, response->mutable_header());
-                     call->End(absl::OkStatus());
-                   });
+  registry_.Delete(
+      request.hull_id(), if_revision,
+      [this, &request, response, call](const absl::StatusOr<uint64_t>& revision) {
+        if (!revision.ok()) return call->End(revision.status());
+        call->call().Log(LogLevel::kInfo, "hull deleted", {{"hull", request.hull_id()}});
+        EncodeHeader(registry_.store(), *revision, response->mutable_header());
+        call->End(absl::OkStatus());
+      });
 }
 
 }  // namespace hulld::server

@@ -13,11 +13,16 @@
 namespace hulld::server {
 
 // hulld.v1.HullService: the contract in hull.proto over the registry. Calls that only look into
-// records are answered where they arrive; those that need a snapshot, on `readers`.
+// records are answered where they arrive; those that need a snapshot, on `readers`,
+// meshes and audits, which may take long, on `long_readers`.
 class HullService : public v1::HullService::CallbackService {
  public:
-  HullService(Registry& registry, Admission& admission, WorkerPool& readers)
-      : registry_(registry), admission_(admission), readers_(readers) {}
+  HullService(Registry& registry, Admission& admission, WorkerPool& readers,
+              WorkerPool& long_readers)
+      : registry_(registry),
+        admission_(admission),
+        readers_(readers),
+        long_readers_(long_readers) {}
 
   grpc::ServerUnaryReactor* CreateHull(grpc::CallbackServerContext* context,
                                        const v1::CreateHullRequest* request,
@@ -52,6 +57,7 @@ class HullService : public v1::HullService::CallbackService {
   Registry& registry_;
   Admission& admission_;
   WorkerPool& readers_;
+  WorkerPool& long_readers_;
 };
 
 }  // namespace hulld::server

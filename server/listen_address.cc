@@ -37,9 +37,9 @@ bool IsPort(const std::string& text) {
   return error == std::errc() && parsed == end && port >= 0 && port <= 65535;
 }
 
-absl::Status Malformed(const std::string& text, const char* why) {
-  return absl::InvalidArgumentError(absl::StrCat("--listen is \"", text, "\": ", why,
-                                                 "; give host:port, [v6]:port or unix:path"));
+absl::Status Malformed(const char* flag, const std::string& text, const char* why) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(flag, " is \"", text, "\": ", why, "; give host:port, [v6]:port or unix:path"));
 }
 
 // 0, or the errno of binding.
@@ -68,28 +68,28 @@ std::string ListenAddress::Format(int bound_port) const {
   return absl::StrCat(v6 ? "[" : "", host, v6 ? "]:" : ":", bound_port);
 }
 
-absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text) {
+absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const char* flag) {
   ListenAddress address;
   if (text.starts_with("unix:")) {
     address.path = text.substr(5);
     if (address.path.starts_with("//")) address.path = address.path.substr(2);
-    if (address.path.empty()) return Malformed(text, "the socket has no path");
+    if (address.path.empty()) return Malformed(flag, text, "the socket has no path");
     if (address.path.size() >= sizeof(sockaddr_un::sun_path)) {
-      return Malformed(text, "the path of a unix socket holds at most 107 characters");
+      return Malformed(flag, text, "the path of a unix socket holds at most 107 characters");
     }
     return address;
   }
   const size_t colon = text.rfind(':');
-  if (colon == std::string::npos) return Malformed(text, "the port is missing");
+  if (colon == std::string::npos) return Malformed(flag, text, "the port is missing");
   address.host = text.substr(0, colon);
   address.port = text.substr(colon + 1);
   if (address.host.starts_with("[") && address.host.ends_with("]")) {
     address.host = address.host.substr(1, address.host.size() - 2);
   } else if (address.host.find(':') != std::string::npos) {
-    return Malformed(text, "an IPv6 address stands in brackets");
+    return Malformed(flag, text, "an IPv6 address stands in brackets");
   }
-  if (address.host.empty()) return Malformed(text, "the host is missing");
-  if (!IsPort(address.port)) return Malformed(text, "the port is not a number up to 65535");
+  if (address.host.empty()) return Malformed(flag, text, "the host is missing");
+  if (!IsPort(address.port)) return Malformed(flag, text, "the port is not a number up to 65535");
   return address;
 }
 
@@ -116,7 +116,7 @@ absl::Status CheckSocketFree(const ListenAddress& address) {
                    ": another server does; stop it or choose another path with --listen"));
 }
 
-absl::Status ExplainBindFailure(const ListenAddress& address) {
+absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) {
   const std::string what = absl::StrCat(
       "cannot listen on ",
       address.is_unix() ? "unix:" + address.path : address.host + ":" + address.port, ": ");
@@ -130,23 +130,22 @@ absl::Status ExplainBindFailure(const ListenAddress& address) {
   addrinfo* found = nullptr;
   const int resolved = getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
   if (resolved != 0) {
-    return absl::UnavailableError(absl::StrCat(what, gai_strerror(resolved),
-                                               "; give an address of this machine to --listen"));
+    return absl::UnavailableError(
+        absl::StrCat(what, gai_strerror(resolved), "; give an address of this machine to ", flag));
   }
   int error = 0;
   for (const addrinfo* info = found; info != nullptr && error == 0; info = info->ai_next) {
     error = TryBind(*info);
   }
   freeaddrinfo(found);
-  const char* advice = "give an address of this machine to --listen";
+  const char* advice = "give an address of this machine to ";
   if (error == EADDRINUSE || error == 0) {
     return absl::UnavailableError(
-        absl::StrCat(what,
-                     "the port is taken; stop the other server or choose another port with "
-                     "--listen (port 0 picks a free one)"));
+        absl::StrCat(what, "the port is taken; stop the other server or choose another port with ",
+                     flag, " (port 0 picks a free one)"));
   }
-  if (error == EACCES) advice = "choose a port above 1023 with --listen";
-  return absl::UnavailableError(absl::StrCat(what, std::strerror(error), "; ", advice));
+  if (error == EACCES) advice = "choose a port above 1023 with ";
+  return absl::UnavailableError(absl::StrCat(what, std::strerror(error), "; ", advice, flag));
 }
 
 }  // namespace hulld::server

@@ -23,8 +23,10 @@ struct ListenAddress {
   std::string Format(int bound_port) const;
 };
 
-// Reads "host:port", "[v6]:port" or "unix:path". INVALID_ARGUMENT names --listen.
-absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text);
+// Reads "host:port", "[v6]:port" or "unix:path". INVALID_ARGUMENT names the flag
+// that the text was given to.
+absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text,
+                                                 const char* flag = "--listen");
 
 // INVALID_ARGUMENT when others can reach the address, which would be without TLS, and `insecure`
 // does not allow that.
@@ -34,7 +36,7 @@ absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool inse
 absl::Status CheckSocketFree(const ListenAddress& address);
 
 // Why the address could not be bound, by trying again: UNAVAILABLE with what to do.
-absl::Status ExplainBindFailure(const ListenAddress& address);
+absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag = "--listen");
 
 }  // namespace hulld::server
 

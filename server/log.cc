@@ -13,6 +13,46 @@
 namespace hulld::server {
 namespace {
 
+// Of the event that this thread is logging: spdlog's messages hold text alone, and its sinks run
+// where LogEvent is called.
+thread_local const LogFields* current_fields = nullptr;
+bool is_json = false;
+
+std::string FormatJson(const LogFields& fields) {
+  std::string text;
+  for (const LogField& field : fields) {
+    const char* const quote = field.is_number ? "" : "\"";
+    text += std::string(",\"") + field.name + "\":" + quote + JsonEscape(field.value) + quote;
+  }
+  return text;
+}
+
+// Quoted unless it is one word.
+std::string FormatText(const LogFields& fields) {
+  std::string text;
+  for (const LogField& field : fields) {
+    const bool word =
+        !field.value.empty() && field.value.find_first_of(" \"\\=\n\r\t") == std::string::npos;
+    const std::string escaped = JsonEscape(field.value);
+    text += std::string(" ") + field.name + "=" + (word ? escaped : "\"" + escaped + "\"");
+  }
+  return text;
+}
+
+spdlog::level::level_enum ToSpdlog(LogLevel level) {
+  switch (level) {
+    case LogLevel::kDebug:
+      return spdlog::level::debug;
+    case LogLevel::kInfo:
+      return spdlog::level::info;
+    case LogLevel::kWarn:
+      return spdlog::level::warn;
+    case LogLevel::kError:
+      return spdlog::level::err;
+  }
+  return spdlog::level::err;
+}
+
 class JsonFormatter : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
@@ -28,7 +68,8 @@ class JsonFormatter : public spdlog::formatter {
     const std::string line =
         "{\"time\":\"" + std::string(time) + "\",\"level\":\"" +
         std::string(level.data(), level.size()) + "\",\"message\":\"" +
-        JsonEscape(std::string(message.payload.data(), message.payload.size())) + "\"}\n";
+        JsonEscape(std::string(message.payload.data(), message.payload.size())) + "\"" +
+        (current_fields == nullptr ? "" : FormatJson(*current_fields)) + "}\n";
     out.append(line.data(), line.data() + line.size());
   }
 
@@ -93,10 +134,26 @@ std::string JsonEscape(const std::string& text) {
   return out;
 }
 
+LogField::LogField(const char* field, double number) : name(field), is_number(true) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f", number);
+  value = text;
+}
+
+bool IsLogged(LogLevel level) { return spdlog::should_log(ToSpdlog(level)); }
+
+void LogEvent(LogLevel level, const std::string& message, const LogFields& fields) {
+  if (!is_json) return spdlog::log(ToSpdlog(level), "{}{}", message, FormatText(fields));
+  current_fields = &fields;
+  spdlog::log(ToSpdlog(level), "{}", message);
+  current_fields = nullptr;
+}
+
 void SetUpLog(const std::string& level, const std::string& format) {
   auto logger =
       std::make_shared<spdlog::logger>("hulld", std::make_shared<spdlog::sinks::stderr_sink_mt>());
-  if (format == "json") {
+  is_json = format == "json";
+  if (is_json) {
     logger->set_formatter(std::make_unique<JsonFormatter>());
   } else {
     logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");

@@ -1,14 +1,39 @@
 #ifndef HULLD_SERVER_LOG_H_
 #define HULLD_SERVER_LOG_H_
 
+#include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace hulld::server {
 
 // Makes spdlog's default logger write to standard error, and sends gRPC's own messages there too.
 // level: debug, info, warn or error. format: text, or json for one JSON object per line with time
-// (UTC, RFC 3339), level and message.
+// (UTC, RFC 3339), level and message, and the fields of LogEvent.
 void SetUpLog(const std::string& level, const std::string& format);
+
+enum class LogLevel { kDebug, kInfo, kWarn, kError };
+
+// One fact of a line, as in code=NOT_FOUND.
+struct LogField {
+  LogField(const char* field, std::string text) : name(field), value(std::move(text)) {}
+  LogField(const char* field, uint64_t number)
+      : name(field), value(std::to_string(number)), is_number(true) {}
+  // Of milliseconds: to the microsecond.
+  LogField(const char* field, double number);
+
+  const char* name;
+  std::string value;
+  bool is_number = false;
+};
+using LogFields = std::vector<LogField>;
+
+bool IsLogged(LogLevel level);
+
+// Logs a message with fields: as " name=value" after it, quoted where spaces or quotes ask for it,
+// or as members of the JSON object.
+void LogEvent(LogLevel level, const std::string& message, const LogFields& fields);
 
 // `text` as the inside of a JSON string: quotes, backslashes and control characters escaped, bytes
 // that are not UTF-8 replaced by U+FFFD.

@@ -56,6 +56,9 @@ void LogStart(const Config& config, const Server& server) {
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
   LogStore(config);
   for (const std::string& warning : ExposureWarnings(config)) spdlog::warn("{}", warning);
+  if (!server.metrics_address().empty()) {
+    spdlog::info("metrics at http://{}/metrics", server.metrics_address());
+  }
   spdlog::info("listening on {}", server.address());
 }
 

@@ -77,8 +77,8 @@ absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
 
 void MeshStream::OnWriteDone(bool ok) {
   if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
-  if (!ok) return Finish(grpc::Status(grpc::StatusCode::CANCELLED, "the client is gone"));
-  if (!NextMessage()) return Finish(grpc::Status::OK);
+  if (!ok) return Finish(call_.End(absl::CancelledError("the client is gone")));
+  if (!NextMessage()) return Finish(call_.End(absl::OkStatus()));
   StartWrite(&message_);
 }
 

@@ -7,6 +7,7 @@
 
 #include "server/decode.h"
 #include "server/encode.h"
+#include "server/limit_error.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
@@ -117,6 +118,12 @@ void PlacementTable::EncodeHulls(
   }
 }
 
+absl::Status ValidatePlacementCount(int count, uint64_t max_placements, const char* what) {
+  if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
+  return LimitExceeded(absl::StrCat(what, " holds ", count, " placements"), max_placements,
+                       "max-placements");
+}
+
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
                            size_t placements, uint64_t max_pairs, const char* what) {
   if (pairs.size() % 2 != 0) {
@@ -125,8 +132,8 @@ absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pair
   }
   const auto count = static_cast<uint64_t>(pairs.size()) / 2;
   if (count > max_pairs) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        what, " holds ", count, " pairs; the limit is ", max_pairs, " (--max-pairs-per-batch)"));
+    return LimitExceeded(absl::StrCat(what, " holds ", count, " pairs"), max_pairs,
+                         "max-pairs-per-batch");
   }
   for (int i = 0; i < pairs.size(); ++i) {
     if (pairs[i] >= placements) {

@@ -72,8 +72,12 @@ class PlacementTable {
   std::vector<PlacedHull> placed_;
 };
 
+// RESOURCE_EXHAUSTED: more than max_placements (--max-placements). `what` holds them, as in "the
+// batch".
+absl::Status ValidatePlacementCount(int count, uint64_t max_placements, const char* what);
+
 // INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
-// max_pairs (--max-pairs-per-batch). `what` holds the pairs, as in "the batch".
+// max_pairs (--max-pairs-per-batch).
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
                            size_t placements, uint64_t max_pairs, const char* what);
 

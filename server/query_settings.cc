@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/decode.h"
+#include "server/limit_error.h"
 
 namespace hulld::server {
 namespace {
@@ -75,7 +76,7 @@ bool IsQuickToRelate(const Hull& hull) {
 
 absl::Status NameQueryLimit(const absl::Status& status) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
-  return absl::ResourceExhaustedError(absl::StrCat(status.message(), " (--max-textbook-axes)"));
+  return AtLimit(status, "max-textbook-axes");
 }
 
 }  // namespace hulld::server

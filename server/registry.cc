@@ -6,6 +6,7 @@
 
 #include <utility>
 
+#include "server/limit_error.h"
 #include "server/memory_limit.h"
 #include "server/registered_hull.h"
 #include "server/status_map.h"
@@ -146,9 +147,8 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
 void Registry::CreateNew(Locked& locked, const std::string& id,
                          const std::function<void(Locked&, const absl::Status&)>& done) {
   if (hulls_.size() >= limits_.max_hulls) {
-    return done(locked, absl::ResourceExhaustedError(
-                            absl::StrCat("the store holds ", hulls_.size(), " hulls; the limit is ",
-                                         limits_.max_hulls, " (--max-hulls)")));
+    return done(locked, LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
+                                      limits_.max_hulls, "max-hulls"));
   }
   Change change;
   change.revision = ++assigned_revision_;
@@ -231,9 +231,8 @@ void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<const Replace
     } else if (!replacement->create_if_absent) {
       refusal = HullNotFound(id);
     } else if (hulls_.size() >= limits_.max_hulls) {
-      refusal = absl::ResourceExhaustedError(absl::StrCat("the store holds ", hulls_.size(),
-                                                          " hulls; the limit is ",
-                                                          limits_.max_hulls, " (--max-hulls)"));
+      refusal = LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
+                              limits_.max_hulls, "max-hulls");
     }
   } else if (!former->quiet()) {
     former->exclusive.push_back(

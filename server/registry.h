@@ -224,9 +224,9 @@ class Registry {
   // sequences, a refusal possibly before what goes before it.
   // Refusals, which change nothing: FAILED_PRECONDITION: a gap in the sequence, or the hull is
   // gone; ABORTED: if_revision does not match; INVALID_ARGUMENT: a point is not finite;
-  // RESOURCE_EXHAUSTED: --max-vertices-per-hull, --max-writers-per-hull, --memory-limit, or the
-  // disk is full; UNAVAILABLE: the store cannot be written; DATA_LOSS: the store is damaged;
-  // CANCELLED: should_stop said so.
+  // RESOURCE_EXHAUSTED: --max-vertices-per-hull, --max-points-per-hull, --max-writers-per-hull,
+  // --memory-limit, or the disk is full; UNAVAILABLE: the store cannot be written; DATA_LOSS: the
+  // store is damaged; CANCELLED: should_stop said so.
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void()> on_built, Reply<ChunkResult> done);
 
@@ -265,6 +265,8 @@ class Registry {
   void Advance(Locked& locked, const HullPointer& hull);
 
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
+  void OpenSession(Locked& locked, const HullPointer& hull,
+                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
   absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
                                              const std::string& writer_id);
   void RunNextChunk(const HullPointer& hull);

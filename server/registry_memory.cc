@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "server/limit_error.h"
 #include "server/registered_hull.h"
 #include "server/registry.h"
 
@@ -228,9 +229,8 @@ void Registry::Evict(Locked& locked) {
 absl::Status Registry::CheckMemoryLocked(Locked& locked) {
   Evict(locked);
   if (cache_.bytes <= limits_.memory_limit) return absl::OkStatus();
-  return absl::ResourceExhaustedError(absl::StrCat("hulls in use hold ", cache_.bytes,
-                                                   " bytes of memory; the limit is ",
-                                                   limits_.memory_limit, " (--memory-limit)"));
+  return LimitExceeded(absl::StrCat("hulls in use hold ", cache_.bytes, " bytes of memory"),
+                       limits_.memory_limit, "memory-limit");
 }
 
 absl::Status Registry::CheckMemory() {

@@ -1,12 +1,12 @@
 #include "server/replace_stream.h"
 
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <utility>
 
 #include "server/decode.h"
 #include "server/encode.h"
+#include "server/limit_error.h"
 #include "server/status_map.h"
 #include "server/stream_message.h"
 
@@ -86,9 +86,8 @@ absl::Status ReplaceStream::Build() {
       *points,
       {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call_.ShouldStop(); }});
   if (absl::IsResourceExhausted(added.status())) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat(name, "the hull would hold too many vertices; the limit is ",
-                     limits.max_vertices_per_hull, " (--max-vertices-per-hull)"));
+    return LimitExceeded(name + "the hull would hold too many vertices",
+                         limits.max_vertices_per_hull, "max-vertices-per-hull");
   }
   if (!added.ok()) return Prefixed(name, added.status());
   PointCounts& counts = replacement_.counts;
@@ -102,7 +101,9 @@ absl::Status ReplaceStream::Build() {
 void ReplaceStream::Commit() {
   registry_.Replace(std::move(replacement_), [this](const absl::StatusOr<ReplaceResult>& result) {
     if (!result.ok()) return End(result.status());
-    spdlog::info("hull \"{}\" {}", result->hull.hull_id, result->created ? "created" : "replaced");
+    call_.Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
+              {{"hull", result->hull.hull_id}});
+    call_.metrics().CountPoints(result->hull.counts);
     EncodeHeader(registry_.store(), result->store_revision, response_->mutable_header());
     EncodeRecord(result->hull, response_->mutable_hull());
     response_->set_created(result->created);

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <set>
 #include <utility>
@@ -17,6 +18,8 @@ namespace {
 // How many messages may wait for the client, and how long for the next of them to leave.
 constexpr size_t kMostWaiting = 32;
 constexpr std::chrono::seconds kMostPatience(5);
+// How long a search may wait for its client in all: meanwhile it holds the executor.
+constexpr std::chrono::seconds kMostPatienceInAll(20);
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
@@ -84,11 +87,15 @@ absl::Status SceneStream::Open() {
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request_.wanted(), request_.tolerance(),
                        registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
+  const absl::Status placements = ValidatePlacementCount(
+      request_.placements_size(), registry_.limits().max_placements, "the scene");
+  if (!placements.ok()) return placements;
   if (absl::Status s = ValidateGroups(request_); !s.ok()) return s;
   ignored_groups_ = IgnoredGroups(request_);
   options_.ignored_groups = ignored_groups_;
   options_.groups = {request_.groups().data(), static_cast<size_t>(request_.groups_size())};
   if (request_.has_movers()) options_.movers = request_.movers();
+  patience_left_ = kMostPatienceInAll;
   options_.query = *std::move(options);
   options_.query.should_stop = [this] { return call_.ShouldStop() || too_slow_; };
   options_.threads = executor_.threads();
@@ -105,11 +112,14 @@ absl::Status SceneStream::Search() {
   const absl::StatusOr<SceneTotals> searched = hulld::FindCollisions(
       table_.placed(), options_, [this](std::span<const SceneAnswer> answers) { Take(answers); });
   if (too_slow_) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the client took no message for ", kMostPatience.count(), " s while ",
-                     kMostWaiting, " MiB waited; read faster or ask for less"));
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the client reads too slowly: the search waited for it for ", kMostPatience.count(),
+        " s at once or ", kMostPatienceInAll.count(), " s in all while ", kMostWaiting,
+        " MiB were ready; read faster or ask for less"));
   }
   if (!searched.ok()) return searched.status();
+  call_.AddPairs(searched->pairs);
+  call_.metrics().CountPairs({searched->by_rung});
   totals_.set_pairs(searched->pairs);
   totals_.set_candidates(searched->candidates);
   *filling_.mutable_totals() = totals_;
@@ -157,9 +167,13 @@ bool SceneStream::IsIdle() {
 // Queues what was filled; waits while too much is queued.
 void SceneStream::Send() {
   std::unique_lock lock(mutex_);
-  const bool room = sent_.wait_for(lock, kMostPatience, [this] {
+  const auto start = std::chrono::steady_clock::now();
+  const auto patience =
+      std::min<std::chrono::steady_clock::duration>(kMostPatience, patience_left_);
+  const bool room = sent_.wait_for(lock, patience, [this] {
     return ready_.size() < kMostWaiting || end_.has_value() || call_.ShouldStop();
   });
+  patience_left_ -= std::chrono::steady_clock::now() - start;
   if (!room) too_slow_ = true;
   ready_.push_back(std::exchange(filling_, {}));
   filling_bytes_ = 0;

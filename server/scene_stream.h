@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
@@ -72,6 +73,7 @@ class SceneStream : public grpc::ServerWriteReactor<v1::FindCollisionsResponse>,
   size_t filling_bytes_ = 0;
   v1::SceneTotals totals_;
   std::atomic<bool> too_slow_ = false;
+  std::chrono::steady_clock::duration patience_left_;
 
   std::mutex mutex_;
   std::condition_variable sent_;

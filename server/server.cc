@@ -28,21 +28,34 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   options.env = config.store_env;
   return RocksDbStore::Open(std::move(options));
 }
+// Long tasks give way to those of microseconds, but not as far as batches do.
+constexpr int kLongReadersNiceness = 1;
 
 }  // namespace
 
 Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
     : guard_(std::move(guard)),
+      admission_(config.limits, metrics_),
       store_(std::move(store)),
-      writers_(PoolThreads()),
+      writers_(PoolThreads(), metrics_.AddPool("writers")),
       registry_(*store_, config.limits, writers_),
-      readers_(PoolThreads()),
-      executor_(config.threads),
-      hull_service_(registry_, admission_, readers_),
-      collision_service_(registry_, admission_, readers_, executor_),
+      readers_(PoolThreads(), metrics_.AddPool("readers")),
+      long_readers_(PoolThreads(), metrics_.AddPool("long_readers"), kLongReadersNiceness),
+      executor_(config.threads, metrics_.AddPool("executor")),
+      hull_service_(registry_, admission_, readers_, long_readers_),
+      collision_service_(registry_, admission_, readers_, long_readers_, executor_),
       status_service_(registry_, admission_),
-      maintenance_service_(*store_, registry_, admission_, readers_) {
+      maintenance_service_(*store_, registry_, admission_, long_readers_) {
   admission_.SetAuthenticator(guard_->authenticator());
+  admission_.SetBacklog([this] { return readers_.waiting() + long_readers_.waiting(); });
+  AddSizesToMetrics();
+}
+
+void Server::AddSizesToMetrics() {
+  metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
+                    [this] { return static_cast<double>(registry_.Sizes().hull_count); });
+  metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
+                    [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
@@ -85,6 +98,11 @@ absl::Status Server::Listen(const Config& config) {
         v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()}) {
     health->SetServingStatus(service, true);
   }
+  if (config.metrics_address.empty()) return absl::OkStatus();
+  absl::StatusOr<std::unique_ptr<MetricsEndpoint>> endpoint =
+      MetricsEndpoint::Start(config.metrics_address, config.metrics_insecure, metrics_);
+  if (!endpoint.ok()) return endpoint.status();
+  metrics_endpoint_ = *std::move(endpoint);
   return absl::OkStatus();
 }
 

@@ -16,6 +16,7 @@
 #include "server/hull_service.h"
 #include "server/maintenance_service.h"
 #include "server/metrics.h"
+#include "server/metrics_endpoint.h"
 #include "server/registry.h"
 #include "server/status_service.h"
 #include "server/store.h"
@@ -38,6 +39,11 @@ class Server {
 
   // Where it listens, with the port that was chosen.
   const std::string& address() const { return address_; }
+  // Where Prometheus reads metrics; empty when nowhere.
+  std::string metrics_address() const {
+    return metrics_endpoint_ == nullptr ? "" : metrics_endpoint_->address();
+  }
+  const Metrics& metrics() const { return metrics_; }
 
   // Looks at the files of certificates and tokens now, rather than within the next interval.
   void ReloadFiles() { guard_->Reload(); }
@@ -52,6 +58,7 @@ class Server {
   Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store);
 
   absl::Status Listen(const Config& config);
+  void AddSizesToMetrics();
 
   const std::unique_ptr<Guard> guard_;
   // All others report to it.
@@ -59,11 +66,12 @@ class Server {
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
-  // Chunks, and everything else that may take longer than moving bytes. Two pools, so that readers
-  // never wait for writers.
+  // Chunks, and everything else that may take longer than moving bytes. Three pools, so that
+  // readers never wait for writers, nor those of microseconds for those of seconds.
   WorkerPool writers_;
   Registry registry_;
   WorkerPool readers_;
+  WorkerPool long_readers_;
   Executor executor_;
   HullService hull_service_;
   CollisionService collision_service_;
@@ -71,6 +79,8 @@ class Server {
   MaintenanceService maintenance_service_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
+  // Reads from all of the above.
+  std::unique_ptr<MetricsEndpoint> metrics_endpoint_;
 };
 
 }  // namespace hulld::server

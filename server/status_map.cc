@@ -1,5 +1,6 @@
 #include "server/status_map.h"
 
+#include <absl/strings/cord.h>
 #include <absl/strings/str_cat.h>
 
 namespace hulld::server {
@@ -52,7 +53,11 @@ grpc::Status ToGrpc(const absl::Status& status) {
 
 absl::Status Prefixed(const std::string& prefix, const absl::Status& status) {
   if (status.ok()) return status;
-  return absl::Status(status.code(), absl::StrCat(prefix, status.message()));
+  absl::Status prefixed(status.code(), absl::StrCat(prefix, status.message()));
+  status.ForEachPayload([&prefixed](absl::string_view type, const absl::Cord& payload) {
+    prefixed.SetPayload(type, payload);
+  });
+  return prefixed;
 }
 
 }  // namespace hulld::server

@@ -14,7 +14,7 @@ grpc::Status ToGrpc(const absl::Status& status);
 // The same for a code alone; also the google.rpc.Code of problems inside replies.
 grpc::StatusCode ToGrpc(absl::StatusCode code);
 
-// The status with `prefix` before its message; OK stays OK.
+// The status with `prefix` before its message and its payloads kept; OK stays OK.
 absl::Status Prefixed(const std::string& prefix, const absl::Status& status);
 
 }  // namespace hulld::server

@@ -32,6 +32,16 @@ grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* 
     message->set_max_hulls(limits.max_hulls);
     message->set_max_pairs_per_batch(limits.max_pairs_per_batch);
     message->set_max_textbook_axes(limits.max_textbook_axes);
+    message->set_max_message_bytes(limits.max_message_bytes);
+    message->set_max_points_per_hull(limits.max_points_per_hull);
+    message->set_max_placements(limits.max_placements);
+    message->set_max_calls(limits.max_calls);
+    message->set_max_waiting_calls(limits.max_waiting_calls);
+    message->set_max_streams_per_client(limits.max_streams_per_client);
+    message->set_max_concurrent_batches(limits.max_concurrent_batches);
+    if (limits.max_request_time > std::chrono::milliseconds::zero()) {
+      EncodeDuration(limits.max_request_time, message->mutable_max_request_time());
+    }
     return absl::OkStatus();
   });
 }

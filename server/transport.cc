@@ -8,7 +8,7 @@ void SetTransport(const Config& config, grpc::ServerBuilder& builder) {
   // A few bytes unpack to gigabytes, and do so before anything asks for their size.
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_DEFLATE, false);
   builder.SetCompressionAlgorithmSupportStatus(GRPC_COMPRESS_GZIP, false);
-  builder.SetMaxReceiveMessageSize(static_cast<int>(config.max_message_bytes));
+  builder.SetMaxReceiveMessageSize(static_cast<int>(config.limits.max_message_bytes));
 }
 
 }  // namespace hulld::server

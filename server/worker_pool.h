@@ -1,12 +1,18 @@
 #ifndef HULLD_SERVER_WORKER_POOL_H_
 #define HULLD_SERVER_WORKER_POOL_H_
 
+#include <atomic>
+#include <chrono>
 #include <condition_variable>
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
+
+#include "server/metrics.h"
 
 namespace hulld::server {
 
@@ -14,7 +20,11 @@ namespace hulld::server {
 // threads, which must stay free to move bytes; whatever may take longer than that runs here.
 class WorkerPool {
  public:
-  explicit WorkerPool(int threads);
+  // metrics: where to report what waits. niceness: added to that of the process, so that the system
+  // runs other threads first when there is too much to do; inherited by the threads that these
+  // start.
+  explicit WorkerPool(int threads, std::optional<PoolMetrics> metrics = std::nullopt,
+                      int niceness = 0);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
   // Runs what is queued, then ends.
@@ -22,12 +32,24 @@ class WorkerPool {
 
   void Submit(std::function<void()> task);
 
- private:
-  void Work();
+  // Tasks that wait for a thread.
+  size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
+ private:
+  struct Task {
+    std::function<void()> run;
+    std::chrono::steady_clock::time_point submitted;
+  };
+
+  void Work(int niceness);
+  // Requires the mutex.
+  void NoteWaiting();
+
+  std::optional<PoolMetrics> metrics_;
   std::mutex mutex_;
   std::condition_variable ready_;
-  std::deque<std::function<void()>> tasks_;
+  std::deque<Task> tasks_;
+  std::atomic<size_t> waiting_ = 0;
   bool ending_ = false;
   std::vector<std::thread> threads_;
 };

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "client/grpc_status.h"
 #include "client/hullctl/tls_diagnosis.h"
 
 namespace hulld {
@@ -58,7 +59,17 @@ std::string Explain(const absl::Status& status, const std::string& server,
                           message, ")");
     case absl::StatusCode::kInternal:
     case absl::StatusCode::kUnknown:
-      return absl::StrCat("hulld at ", server, " failed: ", message, "; see its log");
+    case absl::StatusCode::kDataLoss: {
+      const std::string id = RequestIdOf(status);
+      return absl::StrCat("hulld at ", server, " failed: ", message, "; see its log",
+                          id.empty() ? "" : " for request ", id);
+    }
+    case absl::StatusCode::kResourceExhausted:
+      // gRPC refuses these before the server can name its limit.
+      if (Contains(message, "Received message larger than max")) {
+        return WithHint(message, "the server's --max-message-bytes; send less at once");
+      }
+      return message;
     default:
       return message;
   }

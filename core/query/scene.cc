@@ -3,11 +3,11 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <atomic>
 #include <iterator>
 #include <limits>
 #include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -21,6 +21,14 @@ namespace {
 constexpr uint64_t kCandidatesPerSlice = 16384;
 constexpr uint32_t kFirstSlicePlacements = 16;
 constexpr uint32_t kMostSlicePlacements = 1024;
+
+// What the search of one placement counted.
+struct RungTally {
+  uint64_t candidates = 0;
+  decltype(SceneTotals::by_rung) by_rung = {};
+};
+static_assert(std::tuple_size_v<decltype(SceneTotals::by_rung)> ==
+              static_cast<size_t>(Rung::kExact) + 1);
 
 class SceneSearch {
  public:
@@ -47,21 +55,27 @@ class SceneSearch {
     SceneTotals totals;
     totals.pairs = CountPairs();
     std::vector<std::vector<SceneAnswer>> slice(kMostSlicePlacements);
+    std::vector<RungTally> slice_rungs(kMostSlicePlacements);
     uint32_t slice_placements = kFirstSlicePlacements;
     std::vector<SceneAnswer> answers;
     const uint32_t end = options_.movers ? std::min(*options_.movers, count) : count;
     for (uint32_t begin = 0, size = 0; begin < end; begin += size) {
       size = std::min(slice_placements, end - begin);
-      std::atomic<uint64_t> candidates = 0;
 #pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
       for (uint32_t i = 0; i < size; ++i) {
         slice[i].clear();
-        if (!Stopped()) candidates += Search(tree, begin + i, slice[i]);
+        slice_rungs[i] = {};
+        if (!Stopped()) Search(tree, begin + i, slice[i], slice_rungs[i]);
       }
       if (Stopped()) return absl::CancelledError("stopped in a scene");
       answers.clear();
+      uint64_t candidates = 0;
       for (uint32_t i = 0; i < size; ++i) {
         std::move(slice[i].begin(), slice[i].end(), std::back_inserter(answers));
+        candidates += slice_rungs[i].candidates;
+        for (size_t rung = 0; rung < totals.by_rung.size(); ++rung) {
+          totals.by_rung[rung] += slice_rungs[i].by_rung[rung];
+        }
       }
       totals.candidates += candidates;
       totals.found += answers.size();
@@ -102,8 +116,9 @@ class SceneSearch {
     return pairs;
   }
 
-  // Answers placement a with all after it; returns the number of candidates.
-  uint64_t Search(const BoxTree& tree, uint32_t a, std::vector<SceneAnswer>& answers) const {
+  // Answers placement a with all after it.
+  void Search(const BoxTree& tree, uint32_t a, std::vector<SceneAnswer>& answers,
+              RungTally& tally) const {
     Box box = boxes_[a];
     if (const double clearance = options_.query.clearance.value_or(0); clearance > 0) {
       // Rounded up, one unit in the last place being the most that the sums err.
@@ -119,16 +134,15 @@ class SceneSearch {
     std::vector<uint32_t> meeting;
     tree.AppendMeeting(box, a + 1, meeting);
     std::sort(meeting.begin(), meeting.end());
-    uint64_t candidates = 0;
     for (const uint32_t b : meeting) {
       if (IsIgnored(a, b)) continue;
-      ++candidates;
+      ++tally.candidates;
       absl::StatusOr<Answer> answer = Ask(a, b);
       if (absl::IsCancelled(answer.status())) break;
+      if (answer.ok()) ++tally.by_rung[static_cast<size_t>(answer->rung)];
       if (answer.ok() && !IsFound(*answer)) continue;
       answers.push_back({{a, b}, std::move(answer)});
     }
-    return candidates;
   }
 
   bool IsFound(const Answer& answer) const {

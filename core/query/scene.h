@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -46,6 +47,8 @@ struct SceneTotals {
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;
+  // Candidates by the rung that decided, in the order of Rung.
+  std::array<uint64_t, 4> by_rung = {};
 };
 
 // Which of all pairs of placements collide: a tree of bounding boxes leaves the pairs whose boxes

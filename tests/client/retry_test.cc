@@ -76,6 +76,18 @@ TEST(Retry, AWaitThatWouldPassTheDeadlineIsNotBegun) {
   EXPECT_THAT(waits, IsEmpty());
 }
 
+TEST(Retry, AServerThatSaysWhenIsAskedAgainThenAtTheEarliest) {
+  absl::Status full = absl::ResourceExhaustedError("full");
+  full.SetPayload("grpc-retry-pushback-ms", absl::Cord("1500"));
+  std::vector<milliseconds> waits;
+  EXPECT_EQ(CallWithRetries(Recording(&waits, 3), Far(), [&] { return full; }), full);
+  EXPECT_THAT(waits, ElementsAre(milliseconds(1500), milliseconds(1500)));
+  for (const char* no_hint : {"-1", "soon"}) {
+    full.SetPayload("grpc-retry-pushback-ms", absl::Cord(no_hint));
+    EXPECT_FALSE(MayRetry(full));
+  }
+}
+
 TEST(Retry, OneAttemptMeansNone) {
   std::vector<milliseconds> waits;
   EXPECT_FALSE(WaitBeforeRetry(Recording(&waits, 1), 1, Far()));

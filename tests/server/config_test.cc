@@ -68,14 +68,37 @@ TEST_F(ConfigTest, FlagBeatsVariableBeatsFileBeatsDefault) {
 }
 
 TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
-  const std::map<std::string, std::string> settings = {
-      {"listen", "unix:/tmp/x"},   {"insecure", "true"},           {"threads", "3"},
-      {"store", "memory"},         {"drain-timeout", "0.5"},       {"log-level", "debug"},
-      {"log-format", "json"},      {"max-points-per-chunk", "11"}, {"max-vertices-per-hull", "12"},
-      {"max-hulls", "13"},         {"max-pairs-per-batch", "14"},  {"max-textbook-axes", "15"},
-      {"max-message-bytes", "16"}, {"data-dir", "/tmp/d"},         {"durability", "relaxed"},
-      {"memory-limit", "17"},      {"max-writers-per-hull", "18"}, {"tls-cert", "/c"},
-      {"tls-key", "/k"},           {"tls-client-ca", "/a"},        {"tokens-file", "/t"}};
+  const std::map<std::string, std::string> settings = {{"listen", "unix:/tmp/x"},
+                                                       {"insecure", "true"},
+                                                       {"threads", "3"},
+                                                       {"store", "memory"},
+                                                       {"drain-timeout", "0.5"},
+                                                       {"log-level", "debug"},
+                                                       {"log-format", "json"},
+                                                       {"max-points-per-chunk", "11"},
+                                                       {"max-vertices-per-hull", "12"},
+                                                       {"max-hulls", "13"},
+                                                       {"max-pairs-per-batch", "14"},
+                                                       {"max-textbook-axes", "15"},
+                                                       {"max-message-bytes", "16"},
+                                                       {"max-points-per-hull", "27"},
+                                                       {"max-placements", "28"},
+                                                       {"max-calls", "19"},
+                                                       {"max-waiting-calls", "20"},
+                                                       {"max-streams-per-client", "21"},
+                                                       {"max-concurrent-batches", "22"},
+                                                       {"max-request-time", "2.5"},
+                                                       {"slow-request", "0.25"},
+                                                       {"metrics-address", "127.0.0.1:1"},
+                                                       {"metrics-insecure", "true"},
+                                                       {"data-dir", "/tmp/d"},
+                                                       {"durability", "relaxed"},
+                                                       {"memory-limit", "17"},
+                                                       {"max-writers-per-hull", "18"},
+                                                       {"tls-cert", "/c"},
+                                                       {"tls-key", "/k"},
+                                                       {"tls-client-ca", "/a"},
+                                                       {"tokens-file", "/t"}};
   std::vector<std::string> flags;
   std::map<std::string, std::string> variables;
   std::string toml;
@@ -84,8 +107,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     std::string variable = "HULLD_";
     for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
     variables[variable] = value;
-    const bool is_text = name == "listen" || name == "store" || name == "durability" ||
-                         name.starts_with("log") || value.starts_with("/");
+    const bool is_text = name == "listen" || name == "metrics-address" || name == "store" ||
+                         name == "durability" || name.starts_with("log") || value.starts_with("/");
     toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
   }
   const auto expect_all = [](const Config& config) {
@@ -100,12 +123,22 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_hulls, 13);
     EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
     EXPECT_EQ(config.limits.max_textbook_axes, 15);
-    EXPECT_EQ(config.max_message_bytes, 16);
     EXPECT_EQ(config.store, "memory");
     EXPECT_EQ(config.data_dir, "/tmp/d");
     EXPECT_EQ(config.durability, "relaxed");
     EXPECT_EQ(config.limits.memory_limit, 17);
     EXPECT_EQ(config.limits.max_writers_per_hull, 18);
+    EXPECT_EQ(config.limits.max_message_bytes, 16);
+    EXPECT_EQ(config.limits.max_points_per_hull, 27);
+    EXPECT_EQ(config.limits.max_placements, 28);
+    EXPECT_EQ(config.limits.max_calls, 19);
+    EXPECT_EQ(config.limits.max_waiting_calls, 20);
+    EXPECT_EQ(config.limits.max_streams_per_client, 21);
+    EXPECT_EQ(config.limits.max_concurrent_batches, 22);
+    EXPECT_EQ(config.limits.max_request_time, std::chrono::milliseconds(2500));
+    EXPECT_EQ(config.limits.slow_request, std::chrono::milliseconds(250));
+    EXPECT_EQ(config.metrics_address, "127.0.0.1:1");
+    EXPECT_TRUE(config.metrics_insecure);
     EXPECT_EQ(config.tls_cert, "/c");
     EXPECT_EQ(config.tls_key, "/k");
     EXPECT_EQ(config.tls_client_ca, "/a");
@@ -174,11 +207,21 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--max-pairs-per-batch",
                            "--max-textbook-axes",
                            "--max-message-bytes",
-                           "--config",
                            "--data-dir",
                            "--durability",
                            "--memory-limit",
                            "--max-writers-per-hull",
+                           "--max-points-per-hull",
+                           "--max-placements",
+                           "--max-calls",
+                           "--max-waiting-calls",
+                           "--max-streams-per-client",
+                           "--max-concurrent-batches",
+                           "--max-request-time",
+                           "--slow-request",
+                           "--metrics-address",
+                           "--metrics-insecure",
+                           "--config",
                            "--tls-cert",
                            "--tls-key",
                            "--tls-client-ca",

@@ -173,7 +173,7 @@ TEST_F(Lifecycle, ServesUnixSocketsAndDoesNotTakeThemOver) {
 
 TEST_F(Lifecycle, MessagesLargerThanTheLimitAreRefused) {
   Config config = TestConfig();
-  config.max_message_bytes = 1000;
+  config.limits.max_message_bytes = 1000;
   Restart(config);
   Create("h");
   Appender appender(*hulls_, "h", "w");

@@ -1,0 +1,274 @@
+// Limits on calls: each refuses with an error that names its flag, and is counted.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <prometheus/text_serializer.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/limit_error.h"
+#include "server/status_map.h"
+#include "tests/server/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+using BatchReader = std::unique_ptr<grpc::ClientReader<v1::BatchCheckCollisionsResponse>>;
+
+// The value of a key in trailing metadata; empty when it is not there.
+std::string Trailing(const grpc::ClientContext& context, const char* key) {
+  const auto& metadata = context.GetServerTrailingMetadata();
+  const auto found = metadata.find(key);
+  return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
+}
+
+class LimitsTest : public ServerTest {
+ protected:
+  uint64_t Hits(const std::string& limit) const {
+    const std::string text = prometheus::TextSerializer().Serialize(server_->metrics().Collect());
+    const std::string series = "hulld_limits_hit_total{limit=\"" + limit + "\"} ";
+    const size_t at = text.find(series);
+    return at == std::string::npos ? 0 : std::stoull(text.substr(at + series.size()));
+  }
+
+  void ExpectRefused(const grpc::Status& status, const std::string& limit) {
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
+    EXPECT_THAT(status.error_message(), HasSubstr("(--" + limit + ")"));
+    EXPECT_THAT(status.error_details(), HasSubstr("google.rpc.QuotaFailure"));
+    EXPECT_GE(Hits(limit), 1);
+  }
+
+  static void ExpectRetryHint(const grpc::ClientContext& context, const grpc::Status& status,
+                              const std::string& milliseconds) {
+    EXPECT_EQ(Trailing(context, "grpc-retry-pushback-ms"), milliseconds);
+    EXPECT_THAT(status.error_details(), HasSubstr("google.rpc.RetryInfo"));
+  }
+
+  // A batch that runs until it is cancelled: hours of work.
+  v1::BatchCheckCollisionsRequest LongBatch() {
+    v1::BatchCheckCollisionsRequest request;
+    request.set_method(v1::METHOD_TEXTBOOK_SAT);
+    *request.add_placements() = PlacementOf("ball");
+    *request.add_placements() = PlacementOf("ball", 0.5);
+    for (int i = 0; i < 100'000; ++i) {
+      request.add_pairs(0);
+      request.add_pairs(1);
+    }
+    return request;
+  }
+
+  // Starts it; once this returns, it runs.
+  BatchReader StartBatch(grpc::ClientContext* context,
+                         const v1::BatchCheckCollisionsRequest& request) {
+    BatchReader reader = collisions_->BatchCheckCollisions(context, request);
+    v1::BatchCheckCollisionsResponse part;
+    EXPECT_TRUE(reader->Read(&part));
+    return reader;
+  }
+
+  // Reads what is left; gRPC tells the status only after that.
+  static grpc::Status FinishBatch(grpc::ClientReader<v1::BatchCheckCollisionsResponse>& reader) {
+    v1::BatchCheckCollisionsResponse part;
+    while (reader.Read(&part)) {
+    }
+    return reader.Finish();
+  }
+
+  // Until no call runs.
+  bool WaitIdle() { return server_->WaitIdle(std::chrono::minutes(5)); }
+
+  grpc::Status GetHull(grpc::ClientContext* context) {
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id("ball");
+    return hulls_->GetHull(context, request, &response);
+  }
+};
+
+TEST_F(LimitsTest, StatusShowsEveryLimitEvenWhenTheServerIsFull) {
+  Config config = TestConfig();
+  config.limits.max_calls = 1;
+  Restart(config);
+  Put("ball", Sphere(100));
+  ASSERT_TRUE(WaitIdle());
+  Appender idle(*hulls_, "ball", "w");
+  ASSERT_TRUE(idle.is_open());
+  grpc::ClientContext refused_context;
+  const grpc::Status refused = GetHull(&refused_context);
+  ExpectRefused(refused, "max-calls");
+  ExpectRetryHint(refused_context, refused, "100");
+
+  grpc::ClientContext context;
+  v1::GetStatusResponse response;
+  ASSERT_TRUE(status_->GetStatus(&context, {}, &response).ok());
+  const v1::Limits& limits = response.limits();
+  EXPECT_EQ(limits.max_calls(), 1);
+  EXPECT_EQ(limits.max_waiting_calls(), 1024);
+  EXPECT_EQ(limits.max_streams_per_client(), 256);
+  EXPECT_EQ(limits.max_concurrent_batches(), 32);
+  EXPECT_EQ(limits.max_placements(), 200'000);
+  EXPECT_EQ(limits.max_points_per_hull(), uint64_t{1} << 53);
+  EXPECT_EQ(limits.max_message_bytes(), 16 << 20);
+  EXPECT_EQ(limits.max_request_time().seconds(), 300);
+
+  EXPECT_TRUE(idle.Finish().ok());
+  ASSERT_TRUE(WaitIdle());
+  grpc::ClientContext again;
+  EXPECT_TRUE(GetHull(&again).ok());
+}
+
+TEST_F(LimitsTest, AClientHasSoManyStreamsAndGetsThemBack) {
+  Config config = TestConfig();
+  config.limits.max_streams_per_client = 2;
+  Restart(config);
+  Put("ball", Cube());
+  ASSERT_TRUE(WaitIdle());
+  Appender first(*hulls_, "ball", "first");
+  Appender second(*hulls_, "ball", "second");
+  EXPECT_TRUE(first.is_open());
+  EXPECT_TRUE(second.is_open());
+  Appender third(*hulls_, "ball", "third");
+  EXPECT_FALSE(third.is_open());
+  ExpectRefused(third.Finish(), "max-streams-per-client");
+  grpc::ClientContext context;
+  EXPECT_TRUE(GetHull(&context).ok());
+  EXPECT_TRUE(first.Finish().ok());
+  EXPECT_TRUE(second.Finish().ok());
+  ASSERT_TRUE(WaitIdle());
+  Appender fourth(*hulls_, "ball", "fourth");
+  EXPECT_TRUE(fourth.is_open());
+}
+
+TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
+  Config config = TestConfig();
+  config.limits.max_concurrent_batches = 1;
+  Restart(config);
+  Put("ball", Sphere(100));
+  grpc::ClientContext running_context;
+  const BatchReader running = StartBatch(&running_context, LongBatch());
+
+  grpc::ClientContext batch_context;
+  const grpc::Status batch = collisions_->BatchCheckCollisions(&batch_context, {})->Finish();
+  ExpectRefused(batch, "max-concurrent-batches");
+  ExpectRetryHint(batch_context, batch, "1000");
+  grpc::ClientContext scene_context;
+  ExpectRefused(collisions_->FindCollisions(&scene_context, {})->Finish(),
+                "max-concurrent-batches");
+  EXPECT_EQ(Hits("max-concurrent-batches"), 2);
+  // Single pairs go on.
+  v1::CheckCollisionRequest pair;
+  *pair.mutable_a() = PlacementOf("ball");
+  *pair.mutable_b() = PlacementOf("ball", 0.5);
+  EXPECT_EQ(Check(pair).relation(), v1::RELATION_OVERLAPPING);
+
+  running_context.TryCancel();
+  EXPECT_FALSE(FinishBatch(*running).ok());
+  ASSERT_TRUE(WaitIdle());
+  grpc::ClientContext next_context;
+  EXPECT_TRUE(FinishBatch(*collisions_->BatchCheckCollisions(&next_context, {})).ok());
+}
+
+TEST_F(LimitsTest, ARequestEndsWhenItsTimeIsUp) {
+  Config config = TestConfig();
+  config.limits.max_request_time = std::chrono::milliseconds(50);
+  Restart(config);
+  Put("ball", Sphere(100));
+  grpc::ClientContext context;
+  ExpectRefused(FinishBatch(*collisions_->BatchCheckCollisions(&context, LongBatch())),
+                "max-request-time");
+}
+
+TEST_F(LimitsTest, ACallWhoseClientDoesNotReadLosesItsPlaceWhenItsTimeIsUp) {
+  Config config = TestConfig();
+  config.limits.max_request_time = std::chrono::seconds(2);
+  Restart(config);
+  Put("cube", Cube());
+  ASSERT_TRUE(WaitIdle());
+  // Some 72 MB, far more than gRPC's windows hold.
+  v1::BatchCheckCollisionsRequest request;
+  request.mutable_wanted()->set_separation(true);
+  request.mutable_wanted()->set_witness(true);
+  *request.add_placements() = PlacementOf("cube");
+  *request.add_placements() = PlacementOf("cube", 9);
+  for (int i = 0; i < 1'000'000; ++i) {
+    request.add_pairs(0);
+    request.add_pairs(1);
+  }
+  grpc::ClientContext context;
+  const BatchReader unread = StartBatch(&context, request);
+  EXPECT_TRUE(WaitIdle());
+  EXPECT_FALSE(FinishBatch(*unread).ok());
+}
+
+TEST_F(LimitsTest, PlacementsAndPointsPerHullAreBounded) {
+  Config config = TestConfig();
+  config.limits.max_placements = 2;
+  config.limits.max_points_per_hull = 10;
+  Restart(config);
+  Put("ball", Cube());
+  Appender appender(*hulls_, "ball", "w");
+  ASSERT_TRUE(appender.Append(1, {0, 0, 0, 1, 1, 1}).has_value());
+  EXPECT_FALSE(appender.Append(2, {0, 0, 0}).has_value());
+  const grpc::Status points = appender.Finish();
+  ExpectRefused(points, "max-points-per-hull");
+  EXPECT_THAT(points.error_message(), HasSubstr("chunk 2: hull \"ball\" has taken 10 points"));
+  EXPECT_EQ(Get("ball").hull().counts().received(), 10);
+
+  v1::BatchCheckCollisionsRequest batch;
+  v1::FindCollisionsRequest scene;
+  v1::StreamCollisionsRequest stream;
+  for (int i = 0; i < 3; ++i) {
+    *batch.add_placements() = PlacementOf("ball");
+    *scene.add_placements() = PlacementOf("ball");
+    *stream.mutable_open()->add_placements() = PlacementOf("ball");
+  }
+  grpc::ClientContext batch_context;
+  ExpectRefused(collisions_->BatchCheckCollisions(&batch_context, batch)->Finish(),
+                "max-placements");
+  grpc::ClientContext scene_context;
+  ExpectRefused(collisions_->FindCollisions(&scene_context, scene)->Finish(), "max-placements");
+  grpc::ClientContext stream_context;
+  const auto poses = collisions_->StreamCollisions(&stream_context);
+  ASSERT_TRUE(poses->Write(stream));
+  ExpectRefused(poses->Finish(), "max-placements");
+  EXPECT_EQ(Hits("max-placements"), 3);
+}
+
+TEST_F(LimitsTest, LimitsOfSinglePairsInABatchAreCountedToo) {
+  Config config = TestConfig();
+  config.limits.max_textbook_axes = 1;
+  Restart(config);
+  Put("ball", Cube());
+  grpc::ClientContext context;
+  v1::BatchCheckCollisionsRequest request;
+  request.set_method(v1::METHOD_TEXTBOOK_SAT);
+  *request.add_placements() = PlacementOf("ball");
+  *request.add_placements() = PlacementOf("ball", 0.5);
+  request.add_pairs(0);
+  request.add_pairs(1);
+  const auto reader = collisions_->BatchCheckCollisions(&context, request);
+  v1::BatchCheckCollisionsResponse part;
+  ASSERT_TRUE(reader->Read(&part));
+  ASSERT_EQ(part.pair_problems_size(), 1);
+  EXPECT_THAT(part.pair_problems(0).message(), HasSubstr("(--max-textbook-axes)"));
+  EXPECT_TRUE(FinishBatch(*reader).ok());
+  EXPECT_EQ(Hits("max-textbook-axes"), 1);
+}
+
+TEST(LimitError, KeepsItsLimitAndHintUnderAPrefix) {
+  const absl::Status status =
+      Prefixed("chunk 3: ", Overloaded("9 calls run", 9, "max-calls", std::chrono::seconds(2)));
+  EXPECT_EQ(status.message(), "chunk 3: 9 calls run; the limit is 9 (--max-calls)");
+  EXPECT_EQ(ExceededLimit(status), "max-calls");
+  EXPECT_EQ(RetryAfter(status), std::chrono::milliseconds(2000));
+  EXPECT_EQ(RetryAfter(LimitExceeded("9 hulls", 9, "max-hulls")), std::nullopt);
+  EXPECT_EQ(ExceededLimit(absl::ResourceExhaustedError("other")), std::nullopt);
+}
+
+}  // namespace
+}  // namespace hulld::server
