@@ -1,8 +1,10 @@
-// hulld over the wire against a server that does nothing with messages of the same sizes (the
-// floor), and against core in this process: in alternation, in one run.
+// hulld over the wire, with its store in memory and for points also on disk, against a server that
+// does nothing with messages of the same sizes (the floor), and against core in this process: in
+// alternation, in one run.
 //
 //   remote_benchmark [--out FILE.csv] [--suite NAME]... [--filter TEXT] [--rounds N] [--seconds S]
-//                    [--transport tcp|unix] [--hulld PROGRAM] [--hulld-flag=FLAG]...
+//                    [--transport tcp|unix] [--hulld PROGRAM] [--data FOLDER]
+//                    [--hulld-flag=FLAG]...
 //
 // Columns: what the workload counts a second; the time of one call; `of_floor`: per_second as a
 // multiple of the floor's, `p50_of_floor`: p50 as a multiple of the floor's, `of_in_process`:
@@ -16,9 +18,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
-#include <iostream>
-#include <memory>
+#include <optional>
 
 #include "tests/bench/csv_reporter.h"
 #include "tests/bench/remote_subject.h"
@@ -34,6 +36,7 @@ struct Arguments {
   int rounds = 5;
   double seconds = 0.5;
   std::string hulld = HULLD_PROGRAM;
+  std::string data = std::filesystem::temp_directory_path();
   std::vector<std::string> hulld_flags;
 };
 
@@ -120,25 +123,65 @@ class Report {
   std::ofstream file_;
 };
 
-void Run(const RemoteWorkload& workload, RemoteSubject& hulld, RemoteSubject& floor, int rounds,
+// subjects: the floor first.
+void Run(const RemoteWorkload& workload, const std::vector<RemoteSubject*>& subjects, int count,
          Report& report) {
-  Rounds of_hulld;
-  Rounds of_floor;
+  std::vector<Rounds> rounds(subjects.size());
   Rounds in_process;
   // The first round warms up.
-  for (int round = 0; round <= rounds; ++round) {
-    if (round == 1) of_hulld = of_floor = in_process = {};
-    Measure(floor, workload, of_floor);
-    Measure(hulld, workload, of_hulld);
+  for (int round = 0; round <= count; ++round) {
+    if (round == 1) {
+      rounds.assign(subjects.size(), {});
+      in_process = {};
+    }
+    for (size_t i = 0; i < subjects.size(); ++i) Measure(*subjects[i], workload, rounds[i]);
     if (workload.run_in_process) in_process.samples.push_back(workload.run_in_process());
   }
   const Rounds* core = in_process.samples.empty() ? nullptr : &in_process;
-  report.Write(workload, hulld.transport(), "hulld", of_hulld, &of_floor, core);
-  report.Write(workload, hulld.transport(), "floor", of_floor, nullptr, core);
+  const std::string& transport = subjects[0]->transport();
+  for (size_t i = 0; i < subjects.size(); ++i) {
+    const Rounds* floor = i == 0 ? nullptr : &rounds[0];
+    report.Write(workload, transport, subjects[i]->name(), rounds[i], floor, core);
+  }
   if (core != nullptr) {
-    report.Write(workload, hulld.transport(), "in process", in_process, nullptr, nullptr);
+    report.Write(workload, transport, "in process", in_process, nullptr, nullptr);
   }
 }
+
+// The servers of one transport, and the files that they leave behind.
+struct Servers {
+  Servers(const std::string& transport, const Arguments& arguments)
+      : folder(std::filesystem::path(arguments.data) /
+               ("remote_benchmark_" + std::to_string(getpid()))) {
+    std::filesystem::create_directories(folder);
+    const auto address = [&](const char* name) {
+      return transport == "tcp" ? "127.0.0.1:0" : "unix:" + (folder / name).string();
+    };
+    const auto command = [&](const char* name, const std::string& store) {
+      std::vector<std::string> words = {arguments.hulld, "--listen", address(name), store};
+      words.insert(words.end(), arguments.hulld_flags.begin(), arguments.hulld_flags.end());
+      return words;
+    };
+    floor.emplace("floor", transport,
+                  std::vector<std::string>{HULLD_FLOOR_PROGRAM, address("floor")});
+    hulld.emplace("hulld", transport, command("hulld", "--store=memory"));
+    durable.emplace("hulld durable", transport,
+                    command("durable", "--data-dir=" + (folder / "store").string()));
+  }
+  ~Servers() {
+    durable.reset();
+    hulld.reset();
+    floor.reset();
+    std::error_code ignored;
+    std::filesystem::remove_all(folder, ignored);
+  }
+
+  std::filesystem::path folder;
+  std::optional<RemoteSubject> floor;
+  std::optional<RemoteSubject> hulld;
+  // Keeps everything on disk.
+  std::optional<RemoteSubject> durable;
+};
 
 std::vector<RemoteWorkload> MakeWorkloads(const Arguments& arguments) {
   std::vector<RemoteWorkload> workloads;
@@ -174,29 +217,22 @@ int Main(int argc, char** argv) {
       ->check(CLI::Range(1, 1000));
   app.add_option("--seconds", arguments.seconds, "Of each round")->check(CLI::PositiveNumber);
   app.add_option("--hulld", arguments.hulld, "Another hulld, as of another version");
+  app.add_option("--data", arguments.data, "Folder to keep the durable store in meanwhile");
   app.add_option("--hulld-flag", arguments.hulld_flags,
-                 "Passed to hulld, as in --hulld-flag=--store=memory");
+                 "Passed to hulld, as in --hulld-flag=--threads=1");
   CLI11_PARSE(app, argc, argv);
 
   const std::vector<RemoteWorkload> workloads = MakeWorkloads(arguments);
   Report report(arguments.out);
   for (const std::string transport : {"tcp", "unix"}) {
     if (!arguments.transport.empty() && arguments.transport != transport) continue;
-    const std::string socket = "/tmp/remote_benchmark_" + std::to_string(getpid());
-    const auto address = [&](const std::string& name) {
-      return transport == "tcp" ? "127.0.0.1:0" : "unix:" + socket + "_" + name;
-    };
-    std::vector<std::string> command = {arguments.hulld, "--listen", address("hulld"),
-                                        "--store=memory"};
-    // These win.
-    command.insert(command.end(), arguments.hulld_flags.begin(), arguments.hulld_flags.end());
-    RemoteSubject hulld("hulld", transport, command);
-    RemoteSubject floor("floor", transport, {HULLD_FLOOR_PROGRAM, address("floor")});
+    Servers servers(transport, arguments);
     for (const RemoteWorkload& workload : workloads) {
-      Run(workload, hulld, floor, arguments.rounds, report);
+      std::vector<RemoteSubject*> subjects = {&*servers.floor, &*servers.hulld};
+      // What is only read is in memory either way.
+      if (workload.unit == "points") subjects.push_back(&*servers.durable);
+      Run(workload, subjects, arguments.rounds, report);
     }
-    unlink((socket + "_hulld").c_str());
-    unlink((socket + "_floor").c_str());
   }
   return 0;
 }

@@ -4,6 +4,7 @@
 #
 #   bash tests/bench/run_remote_benchmark.sh [MACHINE] [FLAG OF hulld...]
 #
+# TMPDIR: a folder on the disk that the durable store is to be measured on.
 # MACHINE names the file, as in remote_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by default.
 # ROUNDS (9) of which the median counts, of SECONDS_EACH (1) seconds each. HULLD_DATA: the folder with the links
 # of the UR5. Needs what docker/packages.txt lists under [build] and [bench]. Nothing else should
