@@ -9,6 +9,7 @@
 #include "server/encode.h"
 #include "server/random_id.h"
 #include "server/status_map.h"
+#include "server/stream_message.h"
 
 namespace hulld::server {
 namespace {
@@ -48,8 +49,8 @@ void AppendStream::OnReadDone(bool ok) {
     if (ok) {
       HandleMessage();
     } else {
-      // The client has said all, or is gone.
-      End(call_.ShouldStop() ? call_.StopStatus() : absl::OkStatus());
+      // The client has said all, or is gone, or speaks another language.
+      End(call_.ShouldStop() ? call_.StopStatus() : WhyNotRead(request_));
     }
   }
   Proceed();
@@ -193,6 +194,7 @@ void AppendStream::Proceed() {
   }
   if (!end_.has_value() && !reading_ && !applying_) {
     reading_ = true;
+    PrepareToRead(&request_);
     StartRead(&request_);
   }
 }

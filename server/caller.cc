@@ -60,7 +60,7 @@ absl::Status CheckPermission(const Caller& caller, Rpc rpc) {
 }
 
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field) {
-  if (absl::Status s = ValidateHullId(id, field); !s.ok()) return s;
+  if (absl::Status s = CheckHullIdSyntax(id, field); !s.ok()) return s;
   if (id.starts_with(caller.prefix)) return absl::OkStatus();
   return OutsidePrefix(caller, field, id);
 }

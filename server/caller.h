@@ -44,8 +44,8 @@ struct Caller {
 absl::Status CheckPermission(const Caller& caller, Rpc rpc);
 
 // Every hull ID of a request goes through here before anything is looked up by it. OK when `id` is
-// well-formed and the caller's. INVALID_ARGUMENT: as ValidateHullId. PERMISSION_DENIED: it is not
-// under the caller's prefix, whether or not such a hull exists.
+// well-formed and the caller's. INVALID_ARGUMENT: as CheckHullIdSyntax. PERMISSION_DENIED: it is
+// not under the caller's prefix, whether or not such a hull exists.
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field);
 
 // The prefix to list for a caller who asks for `prefix`: the narrower of the two. PERMISSION_DENIED

@@ -12,6 +12,7 @@
 #include "server/encode.h"
 #include "server/query_settings.h"
 #include "server/status_map.h"
+#include "server/stream_message.h"
 
 namespace hulld::server {
 namespace {
@@ -49,16 +50,21 @@ CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admissio
   stream->self_ = stream;
   const absl::Status begun = stream->call_.Begin();
   if (begun.ok()) {
-    stream->StartRead(&stream->request_);
+    stream->ReadNext();
   } else {
     stream->Finish(stream->call_.End(begun));
   }
   return stream.get();
 }
 
+void CollisionStream::ReadNext() {
+  PrepareToRead(&request_);
+  StartRead(&request_);
+}
+
 void CollisionStream::OnReadDone(bool ok) {
-  // Without a message the client has said all, or is gone.
-  if (!ok) return End(absl::OkStatus());
+  // Without a message the client has said all, or is gone, or speaks another language.
+  if (!ok) return End(WhyNotRead(request_));
   call_.BeginMessage();
   if (IsQuick()) return Handle();
   // The first message resolves hulls, and answers all pairs with cold caches.
@@ -71,7 +77,7 @@ void CollisionStream::OnWriteDone(bool ok) {
   const bool answered = response_.last();
   response_.Clear();
   response_bytes_ = 0;
-  if (answered) return StartRead(&request_);
+  if (answered) return ReadNext();
   long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
 }
 

@@ -57,6 +57,7 @@ class CollisionStream
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { self_.reset(); }
 
+  void ReadNext();
   void End(const absl::Status& status);
   bool IsQuick() const;
   void Handle();

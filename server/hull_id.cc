@@ -17,7 +17,7 @@ bool IsInner(char c) { return IsAlphanumeric(c) || c == '.' || c == '_' || c == 
 
 }  // namespace
 
-absl::Status ValidateHullId(const std::string& id, const std::string& field) {
+absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field) {
   if (id.empty()) return absl::InvalidArgumentError(absl::StrCat(field, " is empty; give an ID"));
   if (id.size() > Config::kMaxIdCharacters) {
     return absl::InvalidArgumentError(absl::StrCat(

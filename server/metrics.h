@@ -80,7 +80,7 @@ class Metrics : public prometheus::Collectable {
   void CountLimit(const std::string& limit);
   // hulld_auth_failures_total: the reason is one of few words, as in "unknown_token".
   void CountAuthFailure(const std::string& reason);
-  // hulld_points_total{outcome}, of one committed chunk.
+  // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of one committed chunk.
   void CountPoints(const PointCounts& counts);
   // hulld_pairs_total{rung}, hulld_exact_fallbacks_total.
   void CountPairs(const RungCounts& counts);

@@ -31,7 +31,7 @@ absl::StatusOr<std::string> DecodePageToken(const std::string& token, const std:
         "page_token belongs to another prefix; list with the prefix of the first page");
   }
   const std::string last_id = plain.substr(separator + 1);
-  if (!ValidateHullId(last_id, "page_token").ok() || !last_id.starts_with(prefix)) {
+  if (!CheckHullIdSyntax(last_id, "page_token").ok() || !last_id.starts_with(prefix)) {
     return absl::InvalidArgumentError(
         "page_token is malformed; pass next_page_token of the previous page, or none");
   }

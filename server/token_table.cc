@@ -20,8 +20,8 @@ constexpr size_t kMostNameCharacters = 64;
 constexpr char kHashScheme[] = "sha256:";
 
 bool IsName(const std::string& text) {
-  return !text.empty() && text.size() <= kMostNameCharacters && ValidateHullId(text, "name").ok() &&
-         text.find('/') == std::string::npos;
+  return !text.empty() && text.size() <= kMostNameCharacters &&
+         CheckHullIdSyntax(text, "name").ok() && text.find('/') == std::string::npos;
 }
 
 std::optional<Permission> ReadRole(const std::string& text) {
@@ -37,7 +37,7 @@ absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
     return absl::InvalidArgumentError(absl::StrCat(
         "the prefix \"", absl::CEscape(text), "\" does not end in \"/\"; \"*\" stands for all"));
   }
-  const absl::Status valid = ValidateHullId(text.substr(0, text.size() - 1), "the prefix");
+  const absl::Status valid = CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix");
   if (!valid.ok()) return valid;
   return text;
 }

@@ -1,7 +1,10 @@
 #!/bin/bash
 # Builds hulld and runs its tests, as continuous integration does: presets release and asan-ubsan.
 #
-#   bash tests/run.sh [--release-only] [--no-install]
+#   bash tests/run.sh [--release-only] [--tsan] [--fuzz] [--no-install]
+#
+# --tsan runs, instead, the tests of what uses threads under ThreadSanitizer (clang; preset tsan);
+# --fuzz runs each fuzzer for a fixed number of inputs under libFuzzer (clang; preset fuzz).
 #
 # On a bare Debian 12 it first installs what docker/packages.txt lists (as root); with everything
 # there it asks apt for nothing. Builds into build/. Ends with a summary; fails when any part did.
@@ -10,12 +13,15 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 2
 
 presets=(release asan-ubsan)
 install=yes
+sections=(build test models)
 for option in "$@"; do
   case $option in
     --release-only) presets=(release) ;;
+    --tsan) presets=(tsan) sections+=(tsan) ;;
+    --fuzz) presets=(fuzz) sections+=(fuzz) ;;
     --no-install) install=no ;;
     --help)
-      sed -n '2,7s/^# \{0,1\}//p' tests/run.sh
+      sed -n '2,10s/^# \{0,1\}//p' tests/run.sh
       exit 0
       ;;
     *)
@@ -60,7 +66,7 @@ by_memory=$((${available_kib:-1572864} / 1572864))
 ((jobs > by_memory)) && jobs=$((by_memory > 0 ? by_memory : 1))
 
 if [[ $install == yes ]]; then
-  run_part "packages" bash docker/packages.sh install build test models || exit 1
+  run_part "packages" bash docker/packages.sh install "${sections[@]}" || exit 1
 fi
 command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
 

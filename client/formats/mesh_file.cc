@@ -2,10 +2,10 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <charconv>
 #include <cmath>
 #include <limits>
 
+#include "client/formats/obj_face.h"
 #include "client/formats/off_reader.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
@@ -37,15 +37,13 @@ void AddPolygon(const std::vector<uint32_t>& corners, TriangleMesh* mesh) {
   }
 }
 
-// "7", "7/1", "7//3", "7/1/3"; negative numbers count back from the last vertex so far.
-bool ParseObjCorner(std::string_view token, size_t vertices, uint32_t* index) {
-  token = token.substr(0, token.find('/'));
+// The index among the vertices so far.
+bool FindObjVertex(std::string_view token, size_t vertices, uint32_t* index) {
   int64_t number = 0;
-  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), number);
-  if (error != std::errc() || end != token.data() + token.size()) return false;
+  if (!ParseObjCorner(token, &number)) return false;
   const int64_t count = static_cast<int64_t>(vertices);
   const int64_t found = number < 0 ? count + number : number - 1;
-  if (number == 0 || number < -count || found >= count) return false;
+  if (number < -count || found >= count) return false;
   *index = static_cast<uint32_t>(found);
   return true;
 }
@@ -64,11 +62,12 @@ absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh) {
     if (keyword != "f") continue;
     corners.clear();
     for (std::string_view token; !(token = NextToken(&rest)).empty();) {
-      if (!ParseObjCorner(token, mesh->vertices.size(), &corners.emplace_back())) {
+      if (!FindObjVertex(token, mesh->vertices.size(), &corners.emplace_back())) {
         return source->ErrorAtLine(
             absl::StrCat(Quoted(token), " names none of the ", mesh->vertices.size(), " vertices"));
       }
     }
+    if (corners.empty()) return source->ErrorAtLine("a face names no vertex");
     AddPolygon(corners, mesh);
   }
   return source->status();
@@ -85,9 +84,7 @@ absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {
   }
   std::vector<uint32_t> corners;
   for (uint64_t i = 0; i < reader.face_count(); ++i) {
-    if (!reader.NextContent(&content)) {
-      return source->Truncated(absl::StrCat("after ", i, " of ", reader.face_count(), " faces"));
-    }
+    if (absl::Status status = reader.NextFace(i, &content); !status.ok()) return status;
     uint64_t size = 0;
     bool ok = ParseUnsigned(NextToken(&content), &size);
     corners.clear();

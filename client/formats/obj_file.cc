@@ -1,5 +1,8 @@
+#include <absl/strings/str_cat.h>
+
 #include <string>
 
+#include "client/formats/obj_face.h"
 #include "client/formats/point_file.h"
 #include "client/formats/text_number.h"
 
@@ -8,6 +11,8 @@ namespace hulld {
 absl::Status ReadObj(ByteSource* source, PointCollector* points) {
   std::string_view line;
   std::string continued;
+  ObjFaceCheck faces;
+  uint64_t vertices = 0;
   while (source->ReadLine(&line)) {
     // A backslash at the end of a line continues it on the next.
     if (!line.empty() && line.back() == '\\') {
@@ -22,12 +27,23 @@ absl::Status ReadObj(ByteSource* source, PointCollector* points) {
       line = continued;
     }
     std::string_view rest = line;
-    if (NextToken(&rest) == "v") {
-      if (absl::Status status = AddTextPoint(*source, rest, points); !status.ok()) return status;
+    const std::string_view keyword = NextToken(&rest);
+    absl::Status status;
+    if (keyword == "v") {
+      status = AddTextPoint(*source, rest, points);
+      ++vertices;
+    } else if (keyword == "f") {
+      status = faces.Add(*source, rest, vertices);
     }
+    if (!status.ok()) return status;
     continued.clear();
   }
-  return source->status();
+  if (!source->status().ok()) return source->status();
+  if (vertices == 0) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        source->name(), ": holds no vertex: no line starts with v; is it an OBJ file?"));
+  }
+  return faces.Finish(*source, vertices);
 }
 
 }  // namespace hulld

@@ -52,6 +52,11 @@ absl::Status OffReader::NextVertex(uint64_t index, std::string_view* content) {
   return source_->Truncated(absl::StrCat("after ", index, " of ", vertex_count_, " vertices"));
 }
 
+absl::Status OffReader::NextFace(uint64_t index, std::string_view* content) {
+  if (NextContent(content)) return absl::OkStatus();
+  return source_->Truncated(absl::StrCat("after ", index, " of ", face_count_, " faces"));
+}
+
 absl::Status ReadOff(ByteSource* source, PointCollector* points) {
   OffReader reader(source);
   if (absl::Status status = reader.ReadHeader(); !status.ok()) return status;
@@ -60,6 +65,10 @@ absl::Status ReadOff(ByteSource* source, PointCollector* points) {
     absl::Status status = reader.NextVertex(i, &content);
     if (status.ok()) status = AddTextPoint(*source, content, points);
     if (!status.ok()) return status;
+  }
+  // Nobody wants the faces here, but a file that lacks some was cut short.
+  for (uint64_t i = 0; i < reader.face_count(); ++i) {
+    if (absl::Status status = reader.NextFace(i, &content); !status.ok()) return status;
   }
   return absl::OkStatus();
 }

@@ -23,6 +23,8 @@ class OffReader {
 
   // The line of the next vertex, the `index`-th.
   absl::Status NextVertex(uint64_t index, std::string_view* content);
+  // The same for faces, which come after all vertices.
+  absl::Status NextFace(uint64_t index, std::string_view* content);
 
   // The next line with something on it, comments cut off. False at the end.
   bool NextContent(std::string_view* content);

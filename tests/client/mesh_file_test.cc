@@ -32,6 +32,11 @@ TEST(MeshFile, ObjCornersMustNameVertices) {
   }
 }
 
+TEST(MeshFile, ObjFacesMustHaveCorners) {
+  const TempFile file("a.obj", "v 0 0 0\nf\n");
+  EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr(":2: a face names no vertex"));
+}
+
 TEST(MeshFile, OffFacesAreRead) {
   const TempFile file("a.off",
                       "OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2 9 9 9\n");

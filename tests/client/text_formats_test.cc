@@ -34,6 +34,22 @@ TEST(ObjFile, ErrorsNameFileAndLine) {
             "FILE:1: a point needs 3 coordinates, here are 2");
 }
 
+// After malformed.obj, malformed2.obj and empty.obj of assimp-testmodels, which were read as if
+// nothing were wrong with them.
+TEST(ObjFile, FacesOfABrokenFileAreErrors) {
+  const std::string vertices = "v 1 2 3\nv 4 5 6\n";
+  EXPECT_EQ(ReadText(vertices + "f 1 2\nf 1/7 3//1 2\n", PointFormat::kObj).error(),
+            "FILE:4: a face names vertex 3, but the file holds 2");
+  EXPECT_EQ(ReadText(vertices + "f 1 0 2\n", PointFormat::kObj).error(),
+            "FILE:3: \"0\" names no vertex; 2 came before");
+  EXPECT_THAT(ReadText(vertices + "f -1 -3\n", PointFormat::kObj).error(),
+              HasSubstr("FILE:3: \"-3\" names no vertex"));
+  EXPECT_EQ(ReadText(vertices + "f\n", PointFormat::kObj).error(),
+            "FILE:3: a face names no vertex");
+  EXPECT_EQ(ReadText("", PointFormat::kObj).error(),
+            "FILE: holds no vertex: no line starts with v; is it an OBJ file?");
+}
+
 TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {
   const PointsRead read =
       ReadText("1e-310 0.1 -1e308\n5e-324 9007199254740993 1e-400 extra 7\n", PointFormat::kXyz);
@@ -136,6 +152,9 @@ TEST(OffFile, ReadsTheVerticesItDeclares) {
       ReadText("OFF # head\n# note\n2 1 0\n\n1 2 3\n4 5 6\n3 0 1 1\n", PointFormat::kOff).xyz(),
       ElementsAre(1, 2, 3, 4, 5, 6));
   EXPECT_THAT(ReadText("OFF 1 0 0\n1 2 3\n", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
+  // After OFF/invalid.off of assimp-testmodels.
+  EXPECT_THAT(ReadText("OFF\n1 4\n1 2 3\n", PointFormat::kOff).error(),
+              HasSubstr("after 0 of 4 faces; is it complete?"));
   EXPECT_THAT(ReadText("STCNOFF\n1 0 0\n1 2 3 9 9 9 0 0 0 1 5 5\n", PointFormat::kOff).xyz(),
               ElementsAre(1, 2, 3));
 }
@@ -219,7 +238,7 @@ TEST(Formats, AreKnownByExtensionInAnyCase) {
 }
 
 TEST(Formats, EmptyFilesOfLooseFormatsHoldNoPoints) {
-  for (const PointFormat format : {PointFormat::kObj, PointFormat::kXyz, PointFormat::kCsv}) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
     const PointsRead read = ReadText("", format);
     EXPECT_TRUE(read.status.ok()) << read.status;
     EXPECT_THAT(read.blocks, IsEmpty());

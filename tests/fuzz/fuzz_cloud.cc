@@ -1,11 +1,12 @@
 #include "tests/fuzz/fuzz_cloud.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <utility>
+
+#include "tests/fuzz/byte_reader.h"
 
 namespace hulld::fuzz {
 namespace {
@@ -21,53 +22,6 @@ constexpr Magnitudes kChoices[] = {Magnitudes::kTame,   Magnitudes::kTame,   Mag
                                    Magnitudes::kTame,   Magnitudes::kCommon, Magnitudes::kCommon,
                                    Magnitudes::kCommon, Magnitudes::kAny};
 constexpr size_t kMostUnlikePoints = 120;
-
-// Bytes in order, zeros after their end.
-class ByteReader {
- public:
-  explicit ByteReader(std::span<const uint8_t> bytes) : rest_(bytes) {}
-
-  bool empty() const { return rest_.empty(); }
-  uint8_t Byte() {
-    if (rest_.empty()) return 0;
-    const uint8_t byte = rest_.front();
-    rest_ = rest_.subspan(1);
-    return byte;
-  }
-  // A number in [0, n).
-  size_t Below(size_t n) { return Byte() % n; }
-  // -4 ... 3.
-  double SmallInteger() { return static_cast<double>(Byte() % 8) - 4; }
-  // -128 ... 127.
-  double SignedByte() { return static_cast<double>(static_cast<int8_t>(Byte())); }
-  double Raw() {
-    uint64_t bits = 0;
-    for (int i = 0; i < 8; ++i) bits = bits << 8 | Byte();
-    return std::bit_cast<double>(bits);
-  }
-  // From the least subnormal to the largest power of two that leaves SignedByte finite.
-  double PowerOfTwo() {
-    constexpr int kExponents[] = {-1074, -1022, -700, -360, -307, -100, -3,
-                                  0,     3,     100,  326,  331,  700,  1016};
-    return std::ldexp(1.0, kExponents[Below(std::size(kExponents))]);
-  }
-
- private:
-  std::span<const uint8_t> rest_;
-};
-
-// A small generator for what one seed byte stands for.
-class Scatter {
- public:
-  explicit Scatter(uint32_t seed) : state_(seed * 2654435761u + 1) {}
-  double Between(int low, int high) {
-    state_ = state_ * 1664525u + 1013904223u;
-    return low + static_cast<int>((state_ >> 12) % static_cast<uint32_t>(high - low + 1));
-  }
-
- private:
-  uint32_t state_;
-};
 
 class Decoder {
  public:

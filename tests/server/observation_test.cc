@@ -124,7 +124,8 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
   EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
-  EXPECT_GE(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 3);
+  // The first one makes what queries need of the hull, which is no work for the thread of gRPC.
+  EXPECT_GE(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
 }
 
 TEST_F(Observation, PairsOfBatchesScenesAndStreamsAreCountedByRung) {

@@ -17,14 +17,14 @@ using ::testing::HasSubstr;
 
 TEST(HullId, SegmentsJoinedBySlashesAreAccepted) {
   for (const char* id : {"a", "A9", "arm/3", "a.b_c-d/0", "1/2/3"}) {
-    EXPECT_TRUE(ValidateHullId(id, "hull_id").ok()) << id;
+    EXPECT_TRUE(CheckHullIdSyntax(id, "hull_id").ok()) << id;
   }
-  EXPECT_TRUE(ValidateHullId(std::string(256, 'a'), "hull_id").ok());
+  EXPECT_TRUE(CheckHullIdSyntax(std::string(256, 'a'), "hull_id").ok());
 }
 
 TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
   const auto expect = [](const std::string& id, const std::string& what) {
-    const absl::Status status = ValidateHullId(id, "field");
+    const absl::Status status = CheckHullIdSyntax(id, "field");
     ASSERT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << id;
     EXPECT_THAT(std::string(status.message()), HasSubstr(what));
   };

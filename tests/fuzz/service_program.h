@@ -1,0 +1,95 @@
+#ifndef HULLD_TESTS_FUZZ_SERVICE_PROGRAM_H_
+#define HULLD_TESTS_FUZZ_SERVICE_PROGRAM_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/rpc.h"
+#include "tests/fuzz/byte_reader.h"
+#include "tests/fuzz/fuzz_message.h"
+#include "tests/fuzz/reply_check.h"
+#include "tests/fuzz/service_contract.h"
+#include "tests/fuzz/service_fuzz.h"
+
+namespace hulld::fuzz {
+
+// One run of one program: decodes and makes its calls, and checks what comes back.
+class ServiceProgram {
+ public:
+  ServiceProgram(ServiceFuzz& service, std::span<const uint8_t> program)
+      : service_(service), in_(program) {}
+
+  // The first finding, or nothing.
+  std::string Run();
+  // Whether the hulls that no program can name are as they were, and the server answers.
+  std::string CheckGuards();
+
+ private:
+  void Step();
+  void CreateHull();
+  void AppendPoints();
+  void GetHull();
+  void GetHullMesh();
+  void ListHulls();
+  void DeleteHull();
+  void CheckCollision();
+  void BatchCheckCollisions();
+  void StreamCollisions();
+  void FindCollisions();
+  void GetStatus();
+  void SendRaw();
+
+  MessageHints Hints() const { return {revision_, 1, 0}; }
+  // Gives the call its deadline, rarely one that has passed.
+  void Hurry(grpc::ClientContext& context, CallManner& manner);
+  void Note(std::string finding);
+  void Reach(const std::string& what) { ++service_.reached_[what]; }
+  // How a call ended; true when OK.
+  bool Ended(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
+  // A call that its client gives up may still change something: waits until all calls have ended.
+  void Settle();
+  void SeeHeader(const v1::ResponseHeader& header);
+  void SeeHull(const v1::HullInfo& hull);
+
+  // One unary call; true when it ended OK, its header checked.
+  template <typename Stub, typename Request, typename Response>
+  bool Call(server::Rpc rpc, Stub& stub,
+            grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+            const Request& request, Response* response);
+  // One server stream; `parts` holds all of it and true comes back when it was read to an OK end.
+  template <typename Stub, typename Request, typename Response>
+  bool ReadStream(server::Rpc rpc, Stub& stub,
+                  std::unique_ptr<grpc::ClientReader<Response>> (Stub::*method)(
+                      grpc::ClientContext*, const Request&),
+                  const Request& request, std::vector<Response>* parts);
+
+  // Careful calls, beside the program's own: they must end OK.
+  std::vector<double> VerticesOf(const std::string& hull_id);
+  void CheckCertificateOf(const v1::CheckCollisionRequest& asked,
+                          const v1::CheckCollisionResponse& answer);
+  std::vector<v1::Relation> AskBatch(const v1::BatchCheckCollisionsRequest& request);
+  void CompareSceneWithBatch(const v1::FindCollisionsRequest& request,
+                             std::span<const v1::FindCollisionsResponse> parts);
+
+  v1::AppendPointsRequest NextAppendMessage(bool first, uint64_t* sequence);
+  v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
+
+  ServiceFuzz& service_;
+  ByteReader in_;
+  std::string finding_;
+  // Of the hull that was last seen, and of each.
+  uint64_t revision_ = 0;
+  std::map<std::string, uint64_t> revisions_;
+  // Streams that nobody reads; they end with the program.
+  std::vector<std::shared_ptr<void>> idle_;
+};
+
+}  // namespace hulld::fuzz
+
+#endif  // HULLD_TESTS_FUZZ_SERVICE_PROGRAM_H_
