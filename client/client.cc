@@ -89,7 +89,8 @@ Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
       channel_(std::move(channel)),
       hulls_(v1::HullService::NewStub(channel_)),
       collisions_(v1::CollisionService::NewStub(channel_)),
-      status_(v1::StatusService::NewStub(channel_)) {}
+      status_(v1::StatusService::NewStub(channel_)),
+      maintenance_(v1::MaintenanceService::NewStub(channel_)) {}
 
 Deadline Client::NextDeadline() const {
   return std::chrono::system_clock::now() + options_.timeout;
@@ -131,6 +132,44 @@ absl::StatusOr<std::unique_ptr<Appender>> Client::OpenAppend(const std::string& 
       new Appender(hulls_, std::move(open), std::move(options), options_.timeout, options_.retry));
   if (absl::Status status = appender->OpenFirst(); !status.ok()) return status;
   return appender;
+}
+
+absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
+    const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed) const {
+  grpc::ClientContext context;
+  v1::ReplaceHullResponse response;
+  const auto writer = hulls_->ReplaceHull(&context, &response);
+  v1::ReplaceHullRequest request;
+  *request.mutable_open() = open;
+  // A write that fails means that the call has ended, and Finish says why.
+  bool writable = writer->Write(request);
+  const absl::Status fed = feed([&](const v1::PointBlock& points) {
+    *request.mutable_points() = points;
+    writable = writable && writer->Write(request);
+    return writable ? absl::OkStatus() : absl::CancelledError("the call has ended");
+  });
+  // Without this the server would take what it has for all.
+  if (!fed.ok() && writable) context.TryCancel();
+  writer->WritesDone();
+  const absl::Status status = FromGrpcStatus(writer->Finish());
+  if (!fed.ok() && writable) return fed;
+  if (!status.ok()) return status;
+  return response;
+}
+
+absl::Status Client::SaveSnapshot(
+    const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive) const {
+  grpc::ClientContext context;
+  const auto reader = maintenance_->SaveSnapshot(&context, v1::SaveSnapshotRequest());
+  v1::SaveSnapshotResponse part;
+  while (reader->Read(&part)) {
+    if (absl::Status status = receive(part); !status.ok()) {
+      context.TryCancel();
+      reader->Finish();
+      return status;
+    }
+  }
+  return FromGrpcStatus(reader->Finish());
 }
 
 absl::StatusOr<v1::GetHullResponse> Client::GetHull(const std::string& hull_id, bool audit) const {

@@ -19,6 +19,7 @@
 #include "client/retry.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
+#include "hulld/v1/maintenance.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
 
 namespace hulld {
@@ -69,6 +70,18 @@ class Client {
   // Opens a stream of chunks into a hull.
   absl::StatusOr<std::unique_ptr<Appender>> OpenAppend(const std::string& hull_id,
                                                        AppendOptions options = {}) const;
+
+  // Puts a new hull in the place of one: `feed` passes blocks of points to the sink it is given; an
+  // error of either ends the call and changes nothing. Not retried, and without a deadline while
+  // points are sent.
+  using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
+  absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
+      const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed) const;
+
+  // Passes each part of a snapshot of the store to `receive`, in order; an error of `receive` ends
+  // the call and is returned. Not retried, and without a deadline.
+  absl::Status SaveSnapshot(
+      const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
 
@@ -135,6 +148,7 @@ class Client {
   std::shared_ptr<v1::HullService::Stub> hulls_;
   std::shared_ptr<v1::CollisionService::Stub> collisions_;
   std::unique_ptr<v1::StatusService::Stub> status_;
+  std::unique_ptr<v1::MaintenanceService::Stub> maintenance_;
 };
 
 }  // namespace hulld

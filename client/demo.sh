@@ -63,7 +63,9 @@ start_server() {
   while (exec 3<>"/dev/tcp/127.0.0.1/$port") 2>/dev/null; do port=$((port + 1)); done
   address=127.0.0.1:$port
   heading "Starting hulld on $address"
-  "$build/server/hulld" --listen "$address" >"$work/hulld.log" 2>&1 &
+  # Afresh each time: the hulls of the last run would be there otherwise.
+  rm -rf "$work/data"
+  "$build/server/hulld" --listen "$address" --data-dir "$work/data" >"$work/hulld.log" 2>&1 &
   server_pid=$!
   for _ in {1..100}; do
     if ctl status >"$work/status" 2>&1; then

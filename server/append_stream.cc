@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "server/decode.h"
@@ -20,6 +21,10 @@ absl::Status ValidateWriterId(const std::string& writer_id) {
                                                  " bytes; the limit is ",
                                                  Config::kMaxIdCharacters));
 }
+
+// One chunk that is being built and one that is decoded meanwhile.
+constexpr int kMaxUnbuilt = 2;
+constexpr int kMaxUncommitted = 64;
 
 void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
   sums->set_received(sums->received() + counts.received);
@@ -83,7 +88,6 @@ void AppendStream::OnDone() {
 }
 
 void AppendStream::HandleMessage() {
-  call_.BeginMessage();
   switch (request_.message_case()) {
     case v1::AppendPointsRequest::kOpen:
       return HandleOpen(request_.open());
@@ -103,26 +107,36 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     return End(s);
   }
   if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return End(s);
-  const std::string writer_id = open.writer_id().empty() ? RandomId() : open.writer_id();
+  writer_id_ = open.writer_id().empty() ? RandomId() : open.writer_id();
+  opening_ = true;
   const std::weak_ptr<AppendStream> weak = weak_from_this();
-  absl::StatusOr<OpenResult> opened =
-      registry_.OpenAppend(open.hull_id(), writer_id, open.create_if_absent(), [weak] {
-        const std::shared_ptr<AppendStream> stream = weak.lock();
-        if (stream == nullptr) return;
-        const std::lock_guard lock(stream->mutex_);
-        stream->End(absl::FailedPreconditionError(
-            "the hull was deleted while the stream was open; create it and start again"));
-        stream->Proceed();
-      });
+  const auto on_gone = [weak](const absl::Status& reason) {
+    const std::shared_ptr<AppendStream> stream = weak.lock();
+    if (stream == nullptr) return;
+    const std::lock_guard lock(stream->mutex_);
+    stream->End(reason);
+    stream->Proceed();
+  };
+  registry_.OpenAppend(open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
+                       [self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
+                         const std::lock_guard lock(self->mutex_);
+                         self->opening_ = false;
+                         self->HandleOpened(opened);
+                         self->Proceed();
+                       });
+}
+
+void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (!opened.ok()) return End(opened.status());
-  session_ = std::move(opened->session);
+  session_ = opened->session;
   if (session_->created_hull) {
-    call_.Log(LogLevel::kInfo, "hull created", {{"hull", open.hull_id()}});
+    call_.Log(LogLevel::kInfo, "hull created", {{"hull", opened->hull.hull_id}});
   }
+  if (end_.has_value()) return;
   v1::AppendOpened* reply = next_reply_.emplace().mutable_opened();
   EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
-  reply->set_writer_id(writer_id);
+  reply->set_writer_id(writer_id_);
   reply->set_last_sequence(opened->last_sequence);
 }
 
@@ -133,15 +147,23 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
   if (!chunk.ok()) return End(chunk.status());
   request_.Clear();
-  applying_ = true;
+  ++unbuilt_;
+  ++uncommitted_;
   call_.AddPoints(chunk->points.size());
   const std::shared_ptr<AppendStream> self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
+  const auto arrival = std::chrono::steady_clock::now();
   registry_.Append(
       *session_, *std::move(chunk), [self] { return self->call_.ShouldStop(); },
-      [self, sequence](const absl::StatusOr<ChunkResult>& result) {
+      [self] {
         const std::lock_guard lock(self->mutex_);
-        self->applying_ = false;
+        --self->unbuilt_;
+        self->Proceed();
+      },
+      [self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
+        if (result.ok()) self->call_.EndMessage(arrival);
+        const std::lock_guard lock(self->mutex_);
+        --self->uncommitted_;
         self->HandleResult(sequence, result);
         self->Proceed();
       });
@@ -150,9 +172,8 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
 void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result) {
   if (!result.ok()) {
     const bool stopped = call_.ShouldStop();
-    return End(stopped ? call_.StopStatus() : result.status());
+    return EndAt(sequence, stopped ? call_.StopStatus() : result.status());
   }
-  call_.EndMessage();
   call_.metrics().CountPoints(result->counts);
   if (finished_) return;
   if (!next_reply_.has_value()) next_reply_.emplace();
@@ -178,6 +199,13 @@ void AppendStream::End(const absl::Status& status) {
   }
 }
 
+void AppendStream::EndAt(uint64_t sequence, const absl::Status& status) {
+  // The client may have said all before the chunk was refused.
+  if (end_.has_value() && (end_->ok() || end_sequence_ > sequence)) end_.reset();
+  if (!end_.has_value()) end_sequence_ = sequence;
+  End(status);
+}
+
 // Starts whatever may start now. Reading does not wait for writing, so that a client which sends
 // everything before it reads an ack is served too.
 void AppendStream::Proceed() {
@@ -187,12 +215,13 @@ void AppendStream::Proceed() {
     reply_in_flight_ = *std::move(next_reply_);
     next_reply_.reset();
     StartWrite(&reply_in_flight_);
-  } else if (!writing_ && end_.has_value() && !applying_) {
+  } else if (!writing_ && end_.has_value() && !opening_ && unbuilt_ == 0 && uncommitted_ == 0) {
     finished_ = true;
     Finish(call_.End(*end_));
     return;
   }
-  if (!end_.has_value() && !reading_ && !applying_) {
+  if (!end_.has_value() && !reading_ && !opening_ && unbuilt_ < kMaxUnbuilt &&
+      uncommitted_ < kMaxUncommitted) {
     reading_ = true;
     PrepareToRead(&request_);
     StartRead(&request_);

@@ -45,8 +45,9 @@ void BatchColumns::Add(std::span<const RelationAnswer> answers) {
     v1::BatchCheckCollisionsResponse* const message = MessageForNext();
     const size_t room = (Config::kReplyMessageBytes - bytes_ + kRelationBytes - 1) / kRelationBytes;
     const std::span<const RelationAnswer> part = answers.first(std::min(room, answers.size()));
-    message->mutable_relations()->Reserve(static_cast<int>(part.size()));
-    message->mutable_rungs()->Reserve(static_cast<int>(part.size()));
+    const int rows = message->relations_size() + static_cast<int>(part.size());
+    message->mutable_relations()->Reserve(rows);
+    message->mutable_rungs()->Reserve(rows);
     for (const RelationAnswer& answer : part) {
       message->mutable_relations()->AddAlreadyReserved(EncodeRelation(answer.relation));
       message->mutable_rungs()->AddAlreadyReserved(EncodeRung(answer.rung));

@@ -67,13 +67,10 @@ std::string Call::Client() const {
   return peer.substr(0, peer.rfind(':'));
 }
 
-void Call::BeginMessage() {
-  message_arrival_ = Clock::now();
-  if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(admission_.limits().max_request_time);
-}
+void Call::BeginMessage() { lifetime_.LimitTime(admission_.limits().max_request_time); }
 
-void Call::EndMessage() {
-  const Clock::duration duration = Clock::now() - message_arrival_;
+void Call::EndMessage(Clock::time_point arrival) {
+  const Clock::duration duration = Clock::now() - arrival;
   metrics().CountMessage(rpc_, duration);
   if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(std::chrono::milliseconds::zero());
   LogSlow(duration, absl::OkStatus(), "slow message");

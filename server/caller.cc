@@ -47,6 +47,8 @@ Permission PermissionFor(Rpc rpc) {
     case Rpc::kDeleteHull:
     case Rpc::kReplaceHull:
       return Permission::kWrite;
+    case Rpc::kSaveSnapshot:
+      return Permission::kAdmin;
   }
   return Permission::kAdmin;
 }

@@ -44,7 +44,9 @@ class Parser {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     app_.allow_config_extras(CLI::config_extras_mode::error);
     app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
-    app_.footer("Precedence: flag, environment variable, file, default.");
+    app_.footer(
+        "Precedence: flag, environment variable, file, default.\n"
+        "'hulld doctor --help' tells how to audit a store.");
   }
 
   // The arguments that stand for the variables that are set.
@@ -116,7 +118,7 @@ class Parser {
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
         ->check(CLI::Range(0, 1024));
-    Add("store", config_.store, "Where hulls live")->check(CLI::IsMember({"memory"}));
+    AddStore();
     Add("drain-timeout", drain_timeout_seconds_,
         "Seconds that running calls may take after SIGTERM or SIGINT")
         ->check(CLI::Validator(CheckSeconds, ""));
@@ -138,6 +140,18 @@ class Parser {
     Add("slow-request", slow_request_seconds_,
         "Log requests that take longer than so many seconds; 0: none")
         ->check(CLI::Validator(CheckSeconds, ""));
+  }
+
+  void AddStore() {
+    Add("store", config_.store, "Where hulls live: on disk, or in memory until the server ends")
+        ->check(CLI::IsMember({"rocksdb", "memory"}));
+    Add("data-dir", config_.data_dir,
+        "Directory of the store; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
+        "~/.local/state, or else ./hulld-data");
+    Add("durability", config_.durability,
+        "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
+        "outage of the machine can lose (relaxed)")
+        ->check(CLI::IsMember({"sync", "relaxed"}));
   }
 
   void AddGuard() {
@@ -166,6 +180,13 @@ class Parser {
              kAny);
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
              "Candidate axes of one pair under TEXTBOOK_SAT", kAny);
+    AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
+             "Writers whose sequences are kept for one hull", kAny);
+    AddLimit(
+        "memory-limit", limits.memory_limit,
+        "Bytes of memory that hulls may hold; 0: half of what the machine or the control group "
+        "has",
+        kAny, 0);
     AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
              kMaxGrpcMessageBytes);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,
@@ -194,13 +215,13 @@ class Parser {
 
   // CLI::Range alone would take -1 for the largest number.
   void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
-                uint64_t most) {
-    const auto check = [most](const std::string& text) -> std::string {
+                uint64_t most, uint64_t least = 1) {
+    const auto check = [most, least](const std::string& text) -> std::string {
       uint64_t number = 0;
       const char* end = text.data() + text.size();
       const auto [parsed, error] = std::from_chars(text.data(), end, number);
-      if (error == std::errc() && parsed == end && number >= 1 && number <= most) return "";
-      return absl::StrCat("\"", text, "\" is not a whole number from 1 to ", most);
+      if (error == std::errc() && parsed == end && number >= least && number <= most) return "";
+      return absl::StrCat("\"", text, "\" is not a whole number from ", least, " to ", most);
     };
     Add(name, value, description)->check(CLI::Validator(check, ""));
   }
@@ -212,6 +233,14 @@ class Parser {
   double max_request_seconds_ = ToSeconds(Limits().max_request_time);
   double slow_request_seconds_ = ToSeconds(Limits().slow_request);
 };
+
+std::string DefaultDataDir(const Environment& environment) {
+  const std::optional<std::string> state = environment("XDG_STATE_HOME");
+  if (state.has_value() && !state->empty()) return *state + "/hulld";
+  const std::optional<std::string> home = environment("HOME");
+  if (home.has_value() && !home->empty()) return *home + "/.local/state/hulld";
+  return "hulld-data";
+}
 
 absl::Status WithAdvice(const absl::Status& status, const char* where) {
   return absl::InvalidArgumentError(
@@ -245,6 +274,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   result = CommandLine();
   const absl::Status status = Parser().Parse(std::move(all), &result);
   if (!status.ok()) return WithAdvice(status, "");
+  if (result.config.data_dir.empty()) result.config.data_dir = DefaultDataDir(environment);
   return result;
 }
 

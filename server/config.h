@@ -11,6 +11,10 @@
 #include <string>
 #include <vector>
 
+namespace rocksdb {
+class Env;
+}
+
 namespace hulld::server {
 
 // What one caller may ask for; the error that names a limit names its flag.
@@ -39,6 +43,10 @@ struct Limits {
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
   std::chrono::milliseconds slow_request{1000};
+  uint64_t max_writers_per_hull = 100'000;
+  // Bytes that builders and snapshots may hold. 0: half of what the machine or the control group of
+  // the process has.
+  uint64_t memory_limit = 0;
 };
 
 // Every setting and default of the server.
@@ -56,8 +64,16 @@ struct Config {
   std::string tokens_file;
   // Threads of parallel queries; 0: one per core.
   int threads = 0;
-  // Where hulls live: "memory".
-  std::string store = "memory";
+  // Where hulls live: "rocksdb" or "memory".
+  std::string store = "rocksdb";
+  // The directory of a durable store. Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state, or
+  // else hulld-data where the server is started; ParseCommandLine puts that in its place.
+  std::string data_dir;
+  // What an acknowledged change survives: "sync" (on disk) or "relaxed" (written; synced within
+  // kRelaxedSyncInterval).
+  std::string durability = "sync";
+  // Of a durable store; null: the operating system's. For tests.
+  rocksdb::Env* store_env = nullptr;
   // How long running calls may take after SIGTERM before they are cancelled.
   std::chrono::milliseconds drain_timeout{10'000};
   // debug, info, warn or error.
@@ -74,6 +90,7 @@ struct Config {
 
   // How often the files of certificates and tokens are looked at.
   static constexpr std::chrono::milliseconds kReloadInterval{1000};
+  static constexpr std::chrono::milliseconds kRelaxedSyncInterval{500};
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;

@@ -27,6 +27,9 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
                                                      std::chrono::system_clock::time_point now) {
   std::vector<std::string> findings;
   if (absl::Status s = CheckListening(config); !s.ok()) return s;
+  if (config.store != "memory" && !config.data_dir.empty()) {
+    if (absl::Status s = CheckDataDir(config.data_dir); !s.ok()) return s;
+  }
   if (config.has_tls()) {
     const absl::StatusOr<TlsIdentity> identity = LoadTlsIdentity(config);
     if (!identity.ok()) return identity.status();

@@ -43,6 +43,8 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
   return ToPoints(coordinates);
 }
 
+}  // namespace
+
 absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points) {
   if (!block.xyz().empty() && !block.xyz_float().empty()) {
     return absl::InvalidArgumentError("points holds both xyz and xyz_float; use one of them");
@@ -52,8 +54,6 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, ui
   }
   return DecodePoints(block.xyz(), "points.xyz", max_points);
 }
-
-}  // namespace
 
 absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points) {
   if (message.sequence() == 0) {

@@ -17,6 +17,11 @@
 
 namespace hulld::server {
 
+// The points of a block; they may still hold NaN or infinity, which the builder finds.
+// INVALID_ARGUMENT: both fields of points set, or a number of coordinates that is no multiple of
+// three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
+absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points);
+
 // The chunk of a message; its points may still hold NaN or infinity, which the builder finds.
 // INVALID_ARGUMENT: sequence 0, both fields of points set, or a number of coordinates that is no
 // multiple of three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).

@@ -135,6 +135,10 @@ v1::Durability EncodeDurability(Durability durability) {
   switch (durability) {
     case Durability::kMemory:
       return v1::DURABILITY_MEMORY;
+    case Durability::kRelaxed:
+      return v1::DURABILITY_RELAXED;
+    case Durability::kSync:
+      return v1::DURABILITY_SYNC;
   }
   return v1::DURABILITY_UNSPECIFIED;
 }

@@ -11,6 +11,7 @@
 #include "server/encode.h"
 #include "server/mesh_stream.h"
 #include "server/page_token.h"
+#include "server/replace_stream.h"
 #include "server/unary_call.h"
 
 namespace hulld::server {
@@ -33,13 +34,18 @@ void EncodeBox(const Hull& hull, v1::GetHullResponse* response) {
 grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* context,
                                                   const v1::CreateHullRequest* request,
                                                   v1::CreateHullResponse* response) {
-  return UnaryCall::Answer(*context, admission_, Rpc::kCreateHull,
-                           [&](const Call& call) { return Create(*request, call, response); });
+  return UnaryCall::Start(*context, admission_, Rpc::kCreateHull,
+                          [&](UnaryCall* call) { Create(*request, response, call); });
 }
 
 grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>*
 HullService::AppendPoints(grpc::CallbackServerContext* context) {
   return AppendStream::Start(*context, admission_, registry_);
+}
+
+grpc::ServerReadReactor<v1::ReplaceHullRequest>* HullService::ReplaceHull(
+    grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) {
+  return ReplaceStream::Start(*context, admission_, registry_, long_readers_, response);
 }
 
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
@@ -66,25 +72,28 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
 grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
                                                   const v1::DeleteHullRequest* request,
                                                   v1::DeleteHullResponse* response) {
-  return UnaryCall::Answer(*context, admission_, Rpc::kDeleteHull,
-                           [&](const Call& call) { return Delete(*request, call, response); });
+  return UnaryCall::Start(*context, admission_, Rpc::kDeleteHull,
+                          [&](UnaryCall* call) { Delete(*request, response, call); });
 }
 
-absl::Status HullService::Create(const v1::CreateHullRequest& request, const Call& call,
-                                 v1::CreateHullResponse* response) {
-  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
-    return s;
+void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,
+                         UnaryCall* call) {
+  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return call->End(s);
   }
-  const absl::StatusOr<CreateResult> created =
-      registry_.Create(request.hull_id(), request.if_absent());
-  if (!created.ok()) return created.status();
-  if (created->created) {
-    call.Log(LogLevel::kInfo, "hull created", {{"hull", request.hull_id()}});
-  }
-  EncodeHeader(registry_.store(), created->store_revision, response->mutable_header());
-  EncodeRecord(created->hull, response->mutable_hull());
-  response->set_created(created->created);
-  return absl::OkStatus();
+  registry_.Create(request.hull_id(), request.if_absent(),
+                   [this, response, call](const absl::StatusOr<CreateResult>& created) {
+                     if (!created.ok()) return call->End(created.status());
+                     const HullRecord& hull = created->hull;
+                     if (created->created) {
+                       call->call().Log(LogLevel::kInfo, "hull created", {{"hull", hull.hull_id}});
+                     }
+                     EncodeHeader(registry_.store(), created->store_revision,
+                                  response->mutable_header());
+                     EncodeRecord(hull, response->mutable_hull());
+                     response->set_created(created->created);
+                     call->End(absl::OkStatus());
+                   });
 }
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
@@ -121,25 +130,32 @@ absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& 
   const HullPage page = registry_.List(
       *prefix, *after, request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
   EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
-  for (const HullRecord& record : page.hulls) EncodeRecord(record, response->add_hulls());
+  for (const ListedHull& hull : page.hulls) {
+    v1::HullInfo* info = response->add_hulls();
+    EncodeRecord(hull.record, info);
+    info->set_damaged(hull.damaged);
+  }
   if (page.more) {
-    response->set_next_page_token(EncodePageToken(*prefix, page.hulls.back().hull_id));
+    response->set_next_page_token(EncodePageToken(*prefix, page.hulls.back().record.hull_id));
   }
   return absl::OkStatus();
 }
 
-absl::Status HullService::Delete(const v1::DeleteHullRequest& request, const Call& call,
-                                 v1::DeleteHullResponse* response) {
-  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
-    return s;
+void HullService::Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
+                         UnaryCall* call) {
+  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return call->End(s);
   }
-  const absl::StatusOr<uint64_t> revision = registry_.Delete(
-      request.hull_id(),
-      request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt);
-  if (!revision.ok()) return revision.status();
-  call.Log(LogLevel::kInfo, "hull deleted", {{"hull", request.hull_id()}});
-  EncodeHeader(registry_.store(), *revision, response->mutable_header());
-  return absl::OkStatus();
+  const auto if_revision =
+      request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
+  registry_.Delete(
+      request.hull_id(), if_revision,
+      [this, &request, response, call](const absl::StatusOr<uint64_t>& revision) {
+        if (!revision.ok()) return call->End(revision.status());
+        call->call().Log(LogLevel::kInfo, "hull deleted", {{"hull", request.hull_id()}});
+        EncodeHeader(registry_.store(), *revision, response->mutable_header());
+        call->End(absl::OkStatus());
+      });
 }
 
 }  // namespace hulld::server

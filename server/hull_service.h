@@ -7,6 +7,7 @@
 #include "server/admission.h"
 #include "server/call.h"
 #include "server/registry.h"
+#include "server/unary_call.h"
 #include "server/worker_pool.h"
 
 namespace hulld::server {
@@ -28,6 +29,8 @@ class HullService : public v1::HullService::CallbackService {
                                        v1::CreateHullResponse* response) override;
   grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendPoints(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceHull(
+      grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) override;
   grpc::ServerUnaryReactor* GetHull(grpc::CallbackServerContext* context,
                                     const v1::GetHullRequest* request,
                                     v1::GetHullResponse* response) override;
@@ -41,14 +44,15 @@ class HullService : public v1::HullService::CallbackService {
                                        v1::DeleteHullResponse* response) override;
 
  private:
-  absl::Status Create(const v1::CreateHullRequest& request, const Call& call,
-                      v1::CreateHullResponse* response);
+  // Create and Delete end the call once the change is committed.
+  void Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,
+              UnaryCall* call);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
   absl::Status List(const v1::ListHullsRequest& request, const Call& call,
                     v1::ListHullsResponse* response);
-  absl::Status Delete(const v1::DeleteHullRequest& request, const Call& call,
-                      v1::DeleteHullResponse* response);
+  void Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
+              UnaryCall* call);
 
   Registry& registry_;
   Admission& admission_;

@@ -9,6 +9,7 @@
 
 #include "server/config.h"
 #include "server/config_check.h"
+#include "server/doctor.h"
 #include "server/log.h"
 #include "server/server.h"
 
@@ -23,6 +24,17 @@ sigset_t HandledSignals() {
   sigemptyset(&signals);
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, number);
   return signals;
+}
+
+void LogStore(const Config& config) {
+  if (config.store == "memory") {
+    spdlog::info("hulls live in memory and end with this process");
+  } else if (config.durability == "sync") {
+    spdlog::info("hulls live in {}; what is acknowledged is on disk", config.data_dir);
+  } else {
+    spdlog::info("hulls live in {}; what is acknowledged is on disk within {} ms", config.data_dir,
+                 Config::kRelaxedSyncInterval.count());
+  }
 }
 
 // Waits for SIGTERM or SIGINT, and looks at the files again at each SIGHUP until then.
@@ -42,7 +54,7 @@ void LogStart(const Config& config, const Server& server) {
       "per batch, {} textbook axes",
       HULLD_VERSION, config.store, limits.max_points_per_chunk, limits.max_vertices_per_hull,
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
-  if (config.store == "memory") spdlog::info("hulls live in memory and end with this process");
+  LogStore(config);
   for (const std::string& warning : ExposureWarnings(config)) spdlog::warn("{}", warning);
   if (!server.metrics_address().empty()) {
     spdlog::info("metrics at http://{}/metrics", server.metrics_address());
@@ -88,6 +100,9 @@ int Check(const CommandLine& command_line) {
 }
 
 int Main(const std::vector<std::string>& arguments) {
+  if (!arguments.empty() && arguments.front() == "doctor") {
+    return RunDoctor({arguments.begin() + 1, arguments.end()});
+  }
   const absl::StatusOr<CommandLine> command_line = ParseCommandLine(arguments, ProcessEnvironment);
   if (!command_line.ok()) {
     std::fprintf(stderr, "hulld: %s\n", std::string(command_line.status().message()).c_str());

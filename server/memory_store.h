@@ -2,6 +2,7 @@
 #define HULLD_SERVER_MEMORY_STORE_H_
 
 #include <string>
+#include <vector>
 
 #include "server/random_id.h"
 #include "server/store.h"
@@ -14,9 +15,28 @@ class MemoryStore : public Store {
   std::string kind() const override { return "memory"; }
   std::string id() const override { return id_; }
   Durability durability() const override { return Durability::kMemory; }
-  absl::Status Commit(const Change&) override { return absl::OkStatus(); }
+  bool keeps_hulls() const override { return false; }
+  uint64_t revision() const override { return 0; }
+  absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
+  absl::StatusOr<StoredHull> Find(const std::string&) override { return KeepsNothing(); }
+  absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
+    return KeepsNothing();
+  }
+  absl::StatusOr<uint64_t> LoadSequence(const HullRecord&, const std::string&) override {
+    return 0;
+  }
+  absl::Status Commit(std::span<const Change* const>) override { return absl::OkStatus(); }
+  absl::Status Recover() override { return absl::OkStatus(); }
+  absl::StatusOr<std::string> MakeCopy() override {
+    return absl::FailedPreconditionError(
+        "the store is memory (--store=memory), of which no snapshot can be saved");
+  }
 
  private:
+  static absl::Status KeepsNothing() {
+    return absl::NotFoundError("the store is memory, which keeps nothing to read back");
+  }
+
   const std::string id_ = RandomId();
 };
 

@@ -92,6 +92,10 @@ class Metrics : public prometheus::Collectable {
   // A gauge that is read whenever Prometheus asks. What `read` uses must outlive the exposition.
   void AddGauge(const std::string& name, const std::string& help, std::function<double()> read);
 
+  // Called before each exposition, to bring up to date what others count themselves. What it uses
+  // must outlive the exposition.
+  void AddRefresh(std::function<void()> refresh);
+
   // What Prometheus reads.
   std::vector<prometheus::MetricFamily> Collect() const override;
 

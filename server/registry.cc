@@ -2,408 +2,344 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
 
-#include <algorithm>
-#include <chrono>
-#include <deque>
-#include <unordered_map>
 #include <utility>
 
 #include "server/limit_error.h"
+#include "server/memory_limit.h"
+#include "server/registered_hull.h"
 #include "server/status_map.h"
 
 namespace hulld::server {
 
-struct Registry::PendingChunk {
-  AppendSession session;
-  Chunk chunk;
-  std::function<bool()> should_stop;
-  std::function<void(absl::StatusOr<ChunkResult>)> done;
-};
+std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
 
-struct RegisteredHull {
-  HullRecord record;
-  // Of record.revision; null when nobody has asked since the last change.
-  std::shared_ptr<const Snapshot> snapshot;
-  bool deleted = false;
-  // Not OK once a change that the builder holds could not be stored.
-  absl::Status failure;
-  // Last committed sequence by writer.
-  std::unordered_map<std::string, uint64_t> writers;
-  std::map<uint64_t, std::function<void()>> deletion_watches;
-
-  // Whoever set `busy` owns the builder, without the registry's mutex.
-  bool busy = false;
-  HullBuilder builder;
-  // Readers that need the builder; the next chunk waits for them.
-  int pins = 0;
-  std::condition_variable released;
-  std::deque<Registry::PendingChunk> pending;
-};
-
-namespace {
-
-// How soon a reader that waits for a chunk notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
-
-std::string Quoted(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
-
-absl::Status NotFound(const std::string& id) {
-  return absl::NotFoundError(absl::StrCat(Quoted(id), " not found; create it first"));
-}
-
-absl::Status Deleted(const HullRecord& record) {
-  return absl::FailedPreconditionError(
-      absl::StrCat(Quoted(record.hull_id),
-                   " was deleted while points were streamed into it; create it and start again"));
+absl::Status HullNotFound(const std::string& id) {
+  return absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first"));
 }
 
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {
-  return absl::AbortedError(absl::StrCat(Quoted(record.hull_id), " is at revision ",
+  return absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
                                          record.revision, ", not ", if_revision,
                                          " (if_revision); read it again, then retry"));
 }
 
-bool Stopped(const std::function<bool()>& should_stop) { return should_stop && should_stop(); }
+namespace {
 
-absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& record,
-                                const Chunk& chunk) {
-  if (!chunk.if_revision.has_value() || *chunk.if_revision == record.revision) {
-    return absl::OkStatus();
-  }
-  const bool untouched = record.revision == record.create_revision;
-  if (*chunk.if_revision == 0 && session.created_hull && untouched) return absl::OkStatus();
-  return RevisionMismatch(record, *chunk.if_revision);
+Limits WithMemoryLimit(Limits limits) {
+  if (limits.memory_limit == 0) limits.memory_limit = DefaultMemoryLimit();
+  return limits;
 }
 
-absl::Status CheckPointCount(const HullRecord& record, const Chunk& chunk, const Limits& limits) {
-  const uint64_t received = record.counts.received;
-  if (received <= limits.max_points_per_hull &&
-      chunk.points.size() <= limits.max_points_per_hull - received) {
-    return absl::OkStatus();
-  }
-  return LimitExceeded(absl::StrCat(Quoted(record.hull_id), " has taken ", received,
-                                    " points, and ", chunk.points.size(), " more came"),
-                       limits.max_points_per_hull, "max-points-per-hull");
-}
-
-void AddTo(PointCounts& sums, const PointCounts& counts) {
-  sums.received += counts.received;
-  sums.outside += counts.outside;
-  sums.duplicate += counts.duplicate;
-  sums.inside += counts.inside;
+absl::Status Gone(const std::string& id, const char* how) {
+  return absl::FailedPreconditionError(
+      absl::StrCat(QuotedHull(id), " was ", how,
+                   " while points were streamed into it; open the stream again and start anew"));
 }
 
 }  // namespace
 
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers)
-    : store_(store), limits_(limits), writers_(writers) {}
+    : store_(store), limits_(WithMemoryLimit(limits)), writers_(writers) {
+  cache_.limit_bytes = limits_.memory_limit;
+  committer_ = std::thread([this] { CommitQueued(); });
+}
+
+Registry::~Registry() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  commit_ready_.notify_all();
+  committer_.join();
+}
+
+absl::Status Registry::Load() {
+  Locked locked(mutex_);
+  revision_ = assigned_revision_ = store_.revision();
+  uint64_t damaged = 0;
+  const absl::Status status =
+      store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
+        if (stored.ok()) {
+          Insert(*stored);
+          return;
+        }
+        ++damaged;
+        spdlog::error("{}", std::string(stored.status().message()));
+        StoredHull nothing;
+        nothing.record.hull_id = id;
+        Insert(nothing)->damage = stored.status();
+        ++cache_.damaged;
+      });
+  if (damaged > 0) spdlog::error("{} of {} hulls are damaged", damaged, hulls_.size());
+  return status;
+}
 
 Registry::HullPointer Registry::Find(const std::string& id) const {
   const auto found = hulls_.find(id);
   return found == hulls_.end() ? nullptr : found->second;
 }
 
-absl::StatusOr<Registry::HullPointer> Registry::CreateLocked(const std::string& id) {
-  if (hulls_.size() >= limits_.max_hulls) {
-    return LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
-                         limits_.max_hulls, "max-hulls");
-  }
-  const uint64_t revision = revision_ + 1;
-  if (absl::Status s = store_.Commit(HullCreated{id, revision}); !s.ok()) return s;
-  revision_ = revision;
+Registry::HullPointer Registry::FindVisible(const std::string& id) const {
+  HullPointer hull = Find(id);
+  return hull != nullptr && hull->state == RegisteredHull::State::kPresent ? hull : nullptr;
+}
+
+Registry::HullPointer Registry::Insert(const StoredHull& stored) {
   auto hull = std::make_shared<RegisteredHull>();
-  hull->record.hull_id = id;
-  hull->record.create_revision = hull->record.revision = revision;
-  hull->snapshot = empty_snapshot_;
-  hulls_.emplace(id, hull);
+  hull->committed = hull->head = stored;
+  if (stored.record.vertex_count == 0) hull->snapshot = empty_snapshot_;
+  vertex_count_ += stored.record.vertex_count;
+  hulls_[stored.record.hull_id] = hull;
   return hull;
 }
 
-absl::StatusOr<CreateResult> Registry::Create(const std::string& id, bool if_absent) {
-  const Lock lock(mutex_);
-  if (const HullPointer existing = Find(id); existing != nullptr) {
-    if (if_absent) return CreateResult{revision_, existing->record, false};
-    return absl::AlreadyExistsError(
-        absl::StrCat(Quoted(id), " exists; delete it first, or set if_absent to use it"));
+// Takes a hull out of sight.
+void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason) {
+  hull->state = RegisteredHull::State::kGone;
+  vertex_count_ -= hull->committed.record.vertex_count;
+  hull->released.notify_all();
+  const auto found = hulls_.find(hull->committed.record.hull_id);
+  if (found != hulls_.end() && found->second == hull) hulls_.erase(found);
+  for (auto& [number, on_gone] : hull->watches) {
+    locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
   }
-  const absl::StatusOr<HullPointer> created = CreateLocked(id);
-  if (!created.ok()) return created.status();
-  return CreateResult{revision_, (*created)->record, true};
+  hull->watches.clear();
+  if (!hull->busy) locked.Discard(std::move(hull->builder));
+  locked.Discard(std::move(hull->snapshot));
+  hull->snapshot = nullptr;
+  Charge(locked, *hull);
 }
 
-absl::StatusOr<uint64_t> Registry::Delete(const std::string& id,
-                                          std::optional<uint64_t> if_revision) {
-  HullPointer hull;
-  std::map<uint64_t, std::function<void()>> watches;
-  uint64_t revision = 0;
-  {
-    const Lock lock(mutex_);
-    hull = Find(id);
-    if (hull == nullptr) return NotFound(id);
-    const HullRecord& record = hull->record;
-    if (if_revision.has_value() && *if_revision != record.revision) {
-      return RevisionMismatch(record, *if_revision);
-    }
-    revision = revision_ + 1;
-    const absl::Status stored =
-        store_.Commit(HullDeleted{record.hull_id, record.create_revision, revision});
-    if (!stored.ok()) return stored;
-    revision_ = revision;
-    vertex_count_ -= record.vertex_count;
-    hull->deleted = true;
-    hull->released.notify_all();
-    watches.swap(hull->deletion_watches);
-    hulls_.erase(id);
+void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
+  Locked locked(mutex_);
+  CreateLocked(locked, id, if_absent, done);
+}
+
+void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
+                            const Reply<CreateResult>& done) {
+  const HullPointer existing = Find(id);
+  if (existing != nullptr && existing->ending) {
+    existing->exclusive.push_back(
+        [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
+    return;
   }
-  for (const auto& [number, on_deleted] : watches) on_deleted();
-  return revision;
+  if (existing != nullptr) {
+    absl::StatusOr<CreateResult> result =
+        CreateResult{revision_, existing->committed.record, false};
+    if (!if_absent) {
+      result = absl::AlreadyExistsError(
+          absl::StrCat(QuotedHull(id), " exists; delete it first, or set if_absent to use it"));
+    } else if (!existing->damage.ok()) {
+      result = existing->damage;
+    }
+    locked.Afterwards([done, result] { done(result); });
+    return;
+  }
+  CreateNew(locked, id, [this, id, done](Locked& later, const absl::Status& status) {
+    absl::StatusOr<CreateResult> result = ErrorOrEmpty<CreateResult>(status);
+    if (status.ok()) result = CreateResult{revision_, Find(id)->committed.record, true};
+    later.Afterwards([done, result] { done(result); });
+  });
+}
+
+// Requires that there is no such hull.
+void Registry::CreateNew(Locked& locked, const std::string& id,
+                         const std::function<void(Locked&, const absl::Status&)>& done) {
+  if (hulls_.size() >= limits_.max_hulls) {
+    return done(locked, LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
+                                      limits_.max_hulls, "max-hulls"));
+  }
+  Change change;
+  change.revision = ++assigned_revision_;
+  change.hull.record.hull_id = id;
+  change.hull.record.create_revision = change.hull.record.revision = change.revision;
+  const HullPointer hull = Insert(change.hull);
+  hull->state = RegisteredHull::State::kCreating;
+  hull->ending = true;
+  ++creating_;
+  Submit(hull, std::move(change), [this, hull, done](Locked& later, const absl::Status& status) {
+    --creating_;
+    hull->ending = false;
+    if (status.ok()) {
+      hull->state = RegisteredHull::State::kPresent;
+      revision_ = hull->committed.record.revision;
+    } else {
+      Forget(later, hull, status);
+    }
+    done(later, status);
+  });
+}
+
+void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
+                      Reply<uint64_t> done) {
+  Locked locked(mutex_);
+  DeleteLocked(locked, id, if_revision, done);
+}
+
+void Registry::DeleteLocked(Locked& locked, const std::string& id,
+                            std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
+  const HullPointer hull = Find(id);
+  absl::Status refusal;
+  if (hull == nullptr) {
+    refusal = HullNotFound(id);
+  } else if (!hull->quiet()) {
+    hull->exclusive.push_back(
+        [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
+    return;
+  } else if (if_revision.has_value() && *if_revision != hull->committed.record.revision) {
+    refusal = RevisionMismatch(hull->committed.record, *if_revision);
+  }
+  if (!refusal.ok()) {
+    locked.Afterwards([done, refusal] { done(refusal); });
+    return;
+  }
+  Change change;
+  change.hull = hull->committed;
+  change.revision = ++assigned_revision_;
+  change.deleted = true;
+  change.former_layout = hull->committed.layout;
+  hull->ending = true;
+  Submit(
+      hull, std::move(change),
+      [this, hull, done, revision = assigned_revision_](Locked& later, const absl::Status& status) {
+        hull->ending = false;
+        absl::StatusOr<uint64_t> result = ErrorOrEmpty<uint64_t>(status);
+        if (status.ok()) {
+          result = revision_ = revision;
+          Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
+        }
+        later.Afterwards([done, result] { done(result); });
+      });
+}
+
+void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
+  Locked locked(mutex_);
+  ReplaceLocked(locked, std::make_shared<const Replacement>(std::move(replacement)), done);
+}
+
+void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<const Replacement>& replacement,
+                             const Reply<ReplaceResult>& done) {
+  const std::string& id = replacement->hull_id;
+  const std::optional<uint64_t>& if_revision = replacement->if_revision;
+  const HullPointer former = Find(id);
+  absl::Status refusal;
+  if (former == nullptr) {
+    if (if_revision.value_or(0) != 0) {
+      refusal = absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
+                                                "revision ", *if_revision, " (if_revision)"));
+    } else if (!replacement->create_if_absent) {
+      refusal = HullNotFound(id);
+    } else if (hulls_.size() >= limits_.max_hulls) {
+      refusal = LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
+                              limits_.max_hulls, "max-hulls");
+    }
+  } else if (!former->quiet()) {
+    former->exclusive.push_back(
+        [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+    return;
+  } else if (if_revision.has_value() && *if_revision != former->committed.record.revision) {
+    refusal = RevisionMismatch(former->committed.record, *if_revision);
+  }
+  if (!refusal.ok()) {
+    locked.Afterwards([done, refusal] { done(refusal); });
+    return;
+  }
+  CommitReplacement(locked, former, replacement, done);
+}
+
+// former: null when there is none.
+void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
+                                 const std::shared_ptr<const Replacement>& replacement,
+                                 const Reply<ReplaceResult>& done) {
+  const HullBuilder& builder = *replacement->builder;
+  Change change;
+  change.revision = ++assigned_revision_;
+  HullRecord& record = change.hull.record;
+  record.hull_id = replacement->hull_id;
+  record.create_revision = record.revision = change.revision;
+  record.dimension = builder.dimension();
+  record.vertex_count = builder.vertex_count();
+  record.counts = replacement->counts;
+  if (former != nullptr) change.replaced = former->committed;
+  if (store_.keeps_hulls() && record.vertex_count > 0) {
+    change.vertex_change = VertexChange::kReplaced;
+    change.vertices = builder.Vertices();
+    change.hull.layout = {record.revision, record.vertex_count, 0, 0};
+  }
+  // The new incarnation is unknown to others until it takes the place of the former.
+  auto hull = std::make_shared<RegisteredHull>();
+  hull->committed = hull->head = change.hull;
+  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement->builder));
+  hull->builder_bytes = hull->builder->MemoryBytes();
+  if (record.vertex_count == 0) hull->snapshot = empty_snapshot_;
+  if (former == nullptr) {
+    hull->state = RegisteredHull::State::kCreating;
+    hull->ending = true;
+    hulls_[record.hull_id] = hull;
+    ++creating_;
+  } else {
+    former->ending = true;
+  }
+  const HullPointer submitted = former == nullptr ? hull : former;
+  Submit(submitted, std::move(change),
+         [this, hull, former, done](Locked& later, const absl::Status& status) {
+           absl::StatusOr<ReplaceResult> result = ErrorOrEmpty<ReplaceResult>(status);
+           const std::string id = hull->committed.record.hull_id;
+           if (former == nullptr) --creating_;
+           (former == nullptr ? hull : former)->ending = false;
+           if (status.ok()) {
+             if (former != nullptr) Forget(later, former, Gone(id, "replaced"));
+             hull->state = RegisteredHull::State::kPresent;
+             hulls_[id] = hull;
+             vertex_count_ += hull->committed.record.vertex_count;
+             revision_ = hull->committed.record.revision;
+             Charge(later, *hull);
+             Evict(later);
+             result = ReplaceResult{revision_, hull->committed.record, former == nullptr};
+           } else if (former == nullptr) {
+             vertex_count_ += hull->committed.record.vertex_count;
+             Forget(later, hull, status);
+           }
+           later.Afterwards([done, result] { done(result); });
+         });
+  (void)locked;
 }
 
 HullPage Registry::List(const std::string& prefix, const std::string& after,
                         size_t page_size) const {
   HullPage page;
-  const Lock lock(mutex_);
+  const std::lock_guard lock(mutex_);
   page.store_revision = revision_;
   auto next = after.empty() ? hulls_.lower_bound(prefix) : hulls_.upper_bound(after);
   for (; next != hulls_.end() && next->first.starts_with(prefix); ++next) {
+    const RegisteredHull& hull = *next->second;
+    if (hull.state != RegisteredHull::State::kPresent) continue;
     if (page.hulls.size() == page_size) {
       page.more = true;
       break;
     }
-    page.hulls.push_back(next->second->record);
+    page.hulls.push_back({hull.committed.record, !hull.damage.ok()});
   }
   return page;
 }
 
 RegistrySizes Registry::Sizes() const {
-  const Lock lock(mutex_);
-  return {revision_, hulls_.size(), vertex_count_};
+  const std::lock_guard lock(mutex_);
+  return {revision_, hulls_.size() - creating_, vertex_count_};
 }
 
-void Registry::Unpin(const HullPointer& hull) {
-  if (--hull->pins == 0) StartNextChunk(hull);
+CacheStatistics Registry::Cache() const {
+  const std::lock_guard lock(mutex_);
+  return cache_;
 }
 
-void Registry::MakeSnapshot(Lock& lock, RegisteredHull& hull,
-                            const std::function<bool()>& should_stop) {
-  const auto ready = [&] { return !hull.busy || hull.deleted || hull.snapshot != nullptr; };
-  while (!hull.released.wait_for(lock, kCancellationPoll, ready)) {
-    if (Stopped(should_stop)) return;
-  }
-  if (hull.busy || hull.deleted || hull.snapshot != nullptr) return;
-  hull.busy = true;
-  lock.unlock();
-  auto snapshot = std::make_shared<const Snapshot>(hull.builder.Snapshot());
-  lock.lock();
-  hull.snapshot = std::move(snapshot);
-  hull.busy = false;
-  hull.released.notify_all();
-}
-
-// Requires the lock and that every snapshot is current.
-Resolved Registry::View(std::span<const std::string> ids,
-                        std::span<const HullPointer> hulls) const {
-  Resolved resolved;
-  resolved.store_revision = revision_;
-  resolved.hulls.reserve(ids.size());
-  for (size_t i = 0; i < ids.size(); ++i) {
-    if (hulls[i] == nullptr) {
-      resolved.hulls.emplace_back(NotFound(ids[i]));
-    } else if (!hulls[i]->failure.ok()) {
-      resolved.hulls.emplace_back(hulls[i]->failure);
-    } else {
-      resolved.hulls.emplace_back(HullView{hulls[i]->record, hulls[i]->snapshot});
-    }
-  }
-  return resolved;
-}
-
-std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids) {
-  std::vector<HullPointer> hulls(ids.size());
-  const Lock lock(mutex_);
-  for (size_t i = 0; i < ids.size(); ++i) {
-    hulls[i] = Find(ids[i]);
-    const bool missing = hulls[i] != nullptr && hulls[i]->snapshot == nullptr;
-    if (missing && hulls[i]->failure.ok()) return std::nullopt;
-  }
-  return View(ids, hulls);
-}
-
-// Optimistic first: take what is current, and make the snapshots that are missing. Should a writer
-// have changed one of the hulls meanwhile, hold back the writers of all of them and try again; the
-// chunks in progress then are the last ones to wait for.
-absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
-                                           const std::function<bool()>& should_stop) {
-  std::vector<HullPointer> hulls(ids.size());
-  std::vector<HullPointer> pinned;
-  Lock lock(mutex_);
-  const auto pin = [&](const HullPointer& hull) {
-    ++hull->pins;
-    pinned.push_back(hull);
-  };
-  bool stopped = false;
-  for (int attempt = 0; !stopped; ++attempt) {
-    bool all_current = true;
-    for (size_t i = 0; i < ids.size(); ++i) {
-      if (hulls[i] == nullptr || hulls[i]->deleted) hulls[i] = Find(ids[i]);
-      const HullPointer& hull = hulls[i];
-      if (hull == nullptr) continue;
-      const bool stale = hull->snapshot == nullptr && hull->failure.ok();
-      if (stale || attempt == 1) pin(hull);
-      all_current = all_current && !stale;
-    }
-    if (all_current) break;
-    for (size_t i = 0; i < ids.size() && !stopped; ++i) {
-      if (hulls[i] != nullptr) MakeSnapshot(lock, *hulls[i], should_stop);
-      stopped = Stopped(should_stop);
-    }
-  }
-  Resolved resolved;
-  if (!stopped) resolved = View(ids, hulls);
-  for (const HullPointer& hull : pinned) Unpin(hull);
-  if (stopped) return absl::CancelledError("the call was cancelled");
-  return resolved;
-}
-
-absl::StatusOr<std::pair<uint64_t, HullView>> Registry::Resolve(
-    const std::string& id, const std::function<bool()>& should_stop) {
-  absl::StatusOr<Resolved> resolved = Resolve(std::span(&id, 1), should_stop);
-  if (!resolved.ok()) return resolved.status();
-  absl::StatusOr<HullView>& hull = resolved->hulls.front();
-  if (!hull.ok()) return hull.status();
-  return std::pair(resolved->store_revision, *std::move(hull));
-}
-
-absl::StatusOr<OpenResult> Registry::OpenAppend(const std::string& id, const std::string& writer_id,
-                                                bool create_if_absent,
-                                                std::function<void()> on_deleted) {
-  const Lock lock(mutex_);
-  OpenResult result;
-  HullPointer hull = Find(id);
-  if (hull == nullptr) {
-    if (!create_if_absent) return NotFound(id);
-    absl::StatusOr<HullPointer> created = CreateLocked(id);
-    if (!created.ok()) return created.status();
-    hull = *std::move(created);
-    result.session.created_hull = true;
-  }
-  if (!hull->failure.ok()) return hull->failure;
-  const auto writer = hull->writers.find(writer_id);
-  if (writer != hull->writers.end()) result.last_sequence = writer->second;
-  hull->deletion_watches.emplace(++last_watch_, std::move(on_deleted));
-  result.store_revision = revision_;
-  result.hull = hull->record;
-  result.session.deletion_watch = last_watch_;
-  result.session.writer_id = writer_id;
-  result.session.hull = std::move(hull);
-  return result;
-}
-
-void Registry::CloseAppend(const AppendSession& session) {
-  const Lock lock(mutex_);
-  session.hull->deletion_watches.erase(session.deletion_watch);
-}
-
-void Registry::Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
-                      std::function<void(absl::StatusOr<ChunkResult>)> done) {
-  const Lock lock(mutex_);
-  session.hull->pending.push_back(
-      {session, std::move(chunk), std::move(should_stop), std::move(done)});
-  StartNextChunk(session.hull);
-}
-
-void Registry::StartNextChunk(const HullPointer& hull) {
-  if (hull->busy || hull->pins > 0 || hull->pending.empty()) return;
-  hull->busy = true;
-  writers_.Submit([this, hull] { RunNextChunk(hull); });
-}
-
-void Registry::RunNextChunk(const HullPointer& hull) {
-  std::shared_ptr<const Snapshot> stale;  // goes after the lock
-  Lock lock(mutex_);
-  const PendingChunk pending = std::move(hull->pending.front());
-  hull->pending.pop_front();
-  absl::StatusOr<ChunkResult> result = Apply(lock, *hull, pending, &stale);
-  hull->busy = false;
-  hull->released.notify_all();
-  StartNextChunk(hull);
-  lock.unlock();
-  pending.done(std::move(result));
-}
-
-// Entered and left with the lock held; requires that the builder is owned.
-absl::StatusOr<ChunkResult> Registry::Apply(Lock& lock, RegisteredHull& hull,
-                                            const PendingChunk& pending,
-                                            std::shared_ptr<const Snapshot>* stale) {
-  const Chunk& chunk = pending.chunk;
-  const std::string name = absl::StrCat("chunk ", chunk.sequence, ": ");
-  if (hull.deleted) return Prefixed(name, Deleted(hull.record));
-  if (!hull.failure.ok()) return hull.failure;
-
-  const auto writer = hull.writers.find(pending.session.writer_id);
-  const uint64_t last = writer == hull.writers.end() ? 0 : writer->second;
-  if (chunk.sequence <= last) {
-    return ChunkResult{revision_, true, hull.record.revision, hull.record.vertex_count, {}};
-  }
-  if (chunk.sequence != last + 1) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(name, "the expected sequence is ", last + 1,
-                     "; open the stream again and continue after its last_sequence"));
-  }
-  absl::Status allowed = CheckChunkRevision(pending.session, hull.record, chunk);
-  if (!allowed.ok()) return Prefixed(name, allowed);
-  allowed = CheckPointCount(hull.record, chunk, limits_);
-  if (!allowed.ok()) return Prefixed(name, allowed);
-
-  lock.unlock();
-  absl::StatusOr<PointCounts> added = absl::CancelledError("the call was cancelled");
-  if (!Stopped(pending.should_stop)) {
-    added = hull.builder.Add(
-        chunk.points, {static_cast<size_t>(limits_.max_vertices_per_hull), pending.should_stop});
-  }
-  lock.lock();
-
-  if (added.status().code() == absl::StatusCode::kResourceExhausted) {
-    return LimitExceeded(
-        absl::StrCat(name, Quoted(hull.record.hull_id), " would hold too many vertices"),
-        limits_.max_vertices_per_hull, "max-vertices-per-hull");
-  }
-  if (!added.ok()) return Prefixed(name, added.status());
-  if (hull.deleted) return Prefixed(name, Deleted(hull.record));
-  absl::Status committed = CommitChunk(hull, pending, *added, stale);
-  if (!committed.ok()) return committed;
-  return ChunkResult{revision_, false, hull.record.revision, hull.record.vertex_count, *added};
-}
-
-absl::Status Registry::CommitChunk(RegisteredHull& hull, const PendingChunk& pending,
-                                   const PointCounts& counts,
-                                   std::shared_ptr<const Snapshot>* stale) {
-  HullRecord& record = hull.record;
-  const Chunk& chunk = pending.chunk;
-  const bool changed = counts.outside > 0;
-  const uint64_t revision = changed ? revision_ + 1 : record.revision;
-  const absl::Status stored =
-      store_.Commit(ChunkApplied{record.hull_id, record.create_revision, revision,
-                                 pending.session.writer_id, chunk.sequence, chunk.points, counts});
-  if (!stored.ok()) {
-    // The builder already holds points that nobody may see.
-    hull.failure = Prefixed(
-        absl::StrCat(Quoted(record.hull_id), " cannot be used: a change could not be stored: "),
-        stored);
-    return hull.failure;
-  }
-  hull.writers[pending.session.writer_id] = chunk.sequence;
-  AddTo(record.counts, counts);
-  if (!changed) return absl::OkStatus();
-  const uint64_t vertex_count = hull.builder.vertex_count();
-  revision_ = record.revision = revision;
-  vertex_count_ += vertex_count - record.vertex_count;
-  record.vertex_count = vertex_count;
-  record.dimension = hull.builder.dimension();
-  *stale = std::move(hull.snapshot);
-  hull.snapshot = nullptr;
-  return absl::OkStatus();
+CommitStatistics Registry::Commits() const {
+  const std::lock_guard lock(mutex_);
+  CommitStatistics commits = commits_;
+  commits.failing = store_failed_;
+  return commits;
 }
 
 }  // namespace hulld::server

@@ -28,6 +28,8 @@ const char* RpcName(Rpc rpc) {
       return "GetStatus";
     case Rpc::kReplaceHull:
       return "ReplaceHull";
+    case Rpc::kSaveSnapshot:
+      return "SaveSnapshot";
   }
   return "unknown";
 }

@@ -10,6 +10,7 @@
 
 #include "server/listen_address.h"
 #include "server/memory_store.h"
+#include "server/rocksdb_store.h"
 #include "server/transport.h"
 
 namespace hulld::server {
@@ -20,13 +21,22 @@ int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_co
 
 // Long tasks give way to those of microseconds, but not as far as batches do.
 constexpr int kLongReadersNiceness = 1;
+absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
+  if (config.store == "memory") return std::make_unique<MemoryStore>();
+  RocksDbOptions options;
+  options.data_dir = config.data_dir;
+  options.durability = config.durability == "sync" ? Durability::kSync : Durability::kRelaxed;
+  options.sync_interval = Config::kRelaxedSyncInterval;
+  options.env = config.store_env;
+  return RocksDbStore::Open(std::move(options));
+}
 
 }  // namespace
 
-Server::Server(const Config& config, std::unique_ptr<Guard> guard)
+Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
     : guard_(std::move(guard)),
       admission_(config.limits, metrics_),
-      store_(std::make_unique<MemoryStore>()),
+      store_(std::move(store)),
       writers_(PoolThreads(), metrics_.AddPool("writers")),
       registry_(*store_, config.limits, writers_),
       readers_(PoolThreads(), metrics_.AddPool("readers")),
@@ -34,13 +44,30 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard)
       executor_(config.threads, metrics_.AddPool("executor")),
       hull_service_(registry_, admission_, readers_, long_readers_),
       collision_service_(registry_, admission_, readers_, long_readers_, executor_),
-      status_service_(registry_, admission_) {
+      status_service_(registry_, admission_),
+      maintenance_service_(*store_, registry_, admission_, long_readers_) {
   admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this] { return readers_.waiting() + long_readers_.waiting(); });
   AddSizesToMetrics();
 }
 
 void Server::AddSizesToMetrics() {
+  registry_.SetMetrics(metrics_.store());
+  metrics_.AddRefresh([this] {
+    const auto advance = [](prometheus::Counter& counter, uint64_t now) {
+      const double passed = static_cast<double>(now) - counter.Value();
+      if (passed > 0) counter.Increment(passed);
+    };
+    const StoreMetrics& store = metrics_.store();
+    const CacheStatistics cache = registry_.Cache();
+    advance(store.cache_hits, cache.hits);
+    advance(store.cache_misses, cache.misses);
+    advance(store.cache_evictions, cache.evictions);
+    advance(store.damaged_records, cache.damaged);
+    store.cache_bytes.Set(static_cast<double>(cache.bytes));
+    store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
+    store.read_only.Set(registry_.Commits().failing ? 1 : 0);
+  });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().hull_count); });
   metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
@@ -50,7 +77,10 @@ void Server::AddSizesToMetrics() {
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
   absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
   if (!guard.ok()) return guard.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(guard)));
+  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config);
+  if (!store.ok()) return store.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
+  if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }
@@ -72,6 +102,7 @@ absl::Status Server::Listen(const Config& config) {
   builder.RegisterService(&hull_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
+  builder.RegisterService(&maintenance_service_);
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr || (port == 0 && !address->is_unix())) {
     return ExplainBindFailure(*address);
@@ -80,7 +111,7 @@ absl::Status Server::Listen(const Config& config) {
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
   for (const char* service :
        {v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
-        v1::StatusService::service_full_name()}) {
+        v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()}) {
     health->SetServingStatus(service, true);
   }
   if (config.metrics_address.empty()) return absl::OkStatus();

@@ -14,6 +14,7 @@
 #include "server/executor.h"
 #include "server/guard.h"
 #include "server/hull_service.h"
+#include "server/maintenance_service.h"
 #include "server/metrics.h"
 #include "server/metrics_endpoint.h"
 #include "server/registry.h"
@@ -26,9 +27,9 @@ namespace hulld::server {
 // A running server: store -> registry -> services -> gRPC.
 class Server {
  public:
-  // Listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs TLS or --insecure,
-  // or a file of certificates or tokens is wrong.
-  // UNAVAILABLE: the address cannot be bound.
+  // Opens the store and listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs
+  // TLS or --insecure, or a file of certificates or tokens is wrong. UNAVAILABLE: the address
+  // cannot be bound. Errors of RocksDbStore::Open.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config);
 
   Server(const Server&) = delete;
@@ -54,7 +55,7 @@ class Server {
   bool WaitIdle(std::chrono::milliseconds timeout);
 
  private:
-  Server(const Config& config, std::unique_ptr<Guard> guard);
+  Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store);
 
   absl::Status Listen(const Config& config);
   void AddSizesToMetrics();
@@ -75,6 +76,7 @@ class Server {
   HullService hull_service_;
   CollisionService collision_service_;
   StatusService status_service_;
+  MaintenanceService maintenance_service_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
   // Reads from all of the above.

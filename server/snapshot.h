@@ -2,6 +2,7 @@
 #define HULLD_SERVER_SNAPSHOT_H_
 
 #include <atomic>
+#include <cstddef>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -23,18 +24,24 @@ class Snapshot {
   const QueryHull& query_hull() const {
     std::call_once(query_hull_once_, [this] {
       query_hull_.emplace(hull_);
-      has_query_hull_.store(true, std::memory_order_release);
+      query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
     });
     return *query_hull_;
   }
   // Whether query_hull() would only return.
-  bool has_query_hull() const { return has_query_hull_.load(std::memory_order_acquire); }
+  bool has_query_hull() const { return query_hull_bytes_.load(std::memory_order_acquire) > 0; }
+
+  // What it holds in memory by now.
+  size_t MemoryBytes() const {
+    return sizeof(*this) + hull_.MemoryBytes() + query_hull_bytes_.load(std::memory_order_relaxed);
+  }
 
  private:
   const Hull hull_;
   mutable std::once_flag query_hull_once_;
   mutable std::optional<QueryHull> query_hull_;
-  mutable std::atomic<bool> has_query_hull_ = false;
+  // Above 0 once it is made.
+  mutable std::atomic<size_t> query_hull_bytes_ = 0;
 };
 
 }  // namespace hulld::server

@@ -1,14 +1,12 @@
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 
-#include "client/formats/point_file.h"
 #include "client/hullctl/commands.h"
 #include "client/hullctl/json.h"
-#include "client/hullctl/number_option.h"
+#include "client/hullctl/point_input.h"
 #include "client/hullctl/progress_bar.h"
 #include "client/hullctl/table.h"
 
@@ -17,55 +15,11 @@ namespace {
 
 struct AppendArguments {
   std::string hull_id;
-  std::vector<std::string> files;
+  PointInput input;
   bool create = false;
-  bool skip_nonfinite = false;
   bool resume = false;
   std::string writer;
-  std::string format;
-  uint64_t chunk_points = 0;
 };
-
-v1::PointBlock ToProto(const PointBlock& block) {
-  v1::PointBlock points;
-  points.mutable_xyz()->Add(block.xyz.begin(), block.xyz.end());
-  points.mutable_xyz_float()->Add(block.xyz_float.begin(), block.xyz_float.end());
-  return points;
-}
-
-absl::StatusOr<PointFormat> FormatOf(const std::string& path, const std::string& named) {
-  if (!named.empty()) return PointFormatFromName(named);
-  if (path == "-") return PointFormat::kXyz;
-  return PointFormatOfPath(path);
-}
-
-// Checked before anything is sent, so that a mistyped name changes nothing.
-absl::StatusOr<std::vector<ReadRequest>> PlanReads(const AppendArguments& arguments,
-                                                   uint64_t* total_bytes) {
-  std::vector<ReadRequest> plan;
-  *total_bytes = 0;
-  bool known = true;
-  for (const std::string& path : arguments.files) {
-    const absl::StatusOr<PointFormat> format = FormatOf(path, arguments.format);
-    if (!format.ok()) return format.status();
-    struct stat info = {};
-    if (path != "-" && stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode)) {
-      *total_bytes += static_cast<uint64_t>(info.st_size);
-    } else {
-      known = false;
-    }
-    // A pipe is opened once only: its writer would see it closed.
-    if (path != "-" && !S_ISFIFO(info.st_mode)) {
-      if (auto source = ByteSource::Open(path); !source.ok()) return source.status();
-    }
-    ReadRequest request{path, *format, {}, {}};
-    request.options.points_per_block = arguments.chunk_points;
-    request.options.skip_nonfinite = arguments.skip_nonfinite;
-    plan.push_back(std::move(request));
-  }
-  if (!known) *total_bytes = 0;
-  return plan;
-}
 
 // Reads files into one stream.
 class FileAppender {
@@ -180,7 +134,7 @@ void PrintAppendedBefore(const Invocation& run, const Appender& appender) {
 
 ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
   uint64_t total_bytes = 0;
-  auto plan = PlanReads(arguments, &total_bytes);
+  auto plan = PlanReads(arguments.input, &total_bytes);
   if (!plan.ok()) return run.FailUsage(plan.status());
   AppendOptions options;
   options.writer_id = arguments.writer;
@@ -220,18 +174,8 @@ void AddAppendCommand(CLI::App* app, Invocation* invocation) {
   auto arguments = std::make_shared<AppendArguments>();
   CLI::App* command = app->add_subcommand("append", "Add the points of files to a hull");
   command->add_option("ID", arguments->hull_id, "Name of the hull")->required();
-  command->add_option("FILE", arguments->files, "Files of points; - is standard input")->required();
+  AddPointInput(command, &arguments->input);
   command->add_flag("--create", arguments->create, "Create the hull when it does not exist");
-  command->add_flag("--skip-nonfinite", arguments->skip_nonfinite,
-                    "Leave out and count points with a coordinate that is NaN or infinite");
-  command
-      ->add_option("--format", arguments->format,
-                   "Format of the files (default: by extension; standard input: xyz)")
-      ->check(CLI::IsMember(PointFormatNames()))
-      ->type_name("FORMAT");
-  AddNumberOption(command, "--chunk-points", 1, uint64_t{100} << 20,
-                  "Points per message (default: about 1 MiB)",
-                  [arguments](uint64_t number) { arguments->chunk_points = number; });
   CLI::Option* writer =
       command->add_option("--writer", arguments->writer, "Name to write under (default: random)")
           ->type_name("NAME");

@@ -11,6 +11,8 @@ namespace hulld {
 // arguments must outlive the action.
 void AddCreateCommand(CLI::App* app, Invocation* invocation);
 void AddAppendCommand(CLI::App* app, Invocation* invocation);
+void AddReplaceCommand(CLI::App* app, Invocation* invocation);
+void AddSnapshotCommand(CLI::App* app, Invocation* invocation);
 void AddGetCommand(CLI::App* app, Invocation* invocation);
 void AddListCommand(CLI::App* app, Invocation* invocation);
 void AddDeleteCommand(CLI::App* app, Invocation* invocation);

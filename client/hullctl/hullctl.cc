@@ -48,6 +48,7 @@ void AddGlobalOptions(CLI::App* app, Invocation* invocation) {
 void AddCommands(CLI::App* app, Invocation* invocation) {
   AddCreateCommand(app, invocation);
   AddAppendCommand(app, invocation);
+  AddReplaceCommand(app, invocation);
   AddGetCommand(app, invocation);
   AddListCommand(app, invocation);
   AddDeleteCommand(app, invocation);
@@ -59,6 +60,7 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddVerifyCommand(app, invocation);
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
+  AddSnapshotCommand(app, invocation);
   AddBenchCommand(app, invocation);
   AddPictureCommand(app, invocation);
   AddTokenCommand(app, invocation);

@@ -99,7 +99,7 @@ void Merge(LoadResult&& part, LoadResult* sum) {
 
 uint64_t LoadResult::failed() const {
   uint64_t sum = 0;
-  for (const auto& [code, failures] : this->failures) sum += failures.count;
+  for (const auto& [code, each] : failures) sum += each.count;
   return sum;
 }
 

@@ -246,6 +246,10 @@ int HullBuilder::dimension() const { return state_->dimension(); }
 
 size_t HullBuilder::vertex_count() const { return state_->vertices().size(); }
 
+std::vector<Vector> HullBuilder::Vertices() const { return state_->vertices().Vertices(); }
+
+std::vector<Vector> HullBuilder::NewVertices() const { return state_->vertices().NewVertices(); }
+
 size_t HullBuilder::MemoryBytes() const { return sizeof(*this) + state_->MemoryBytes(); }
 
 uint64_t HullBuilder::housekeeping_steps() const { return state_->housekeeping_steps(); }

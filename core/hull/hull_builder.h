@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/hull/hull.h"
 
@@ -61,6 +62,13 @@ class HullBuilder {
 
   int dimension() const;
   size_t vertex_count() const;
+
+  // The vertices, in no particular order: adding them to an empty builder gives the same hull.
+  // Cost: O(V).
+  std::vector<Vector> Vertices() const;
+  // Those that the last successful Add brought, as many as its counts call outside: adding them to
+  // the builder's former state gives the same hull. Cost: O(points of that block).
+  std::vector<Vector> NewVertices() const;
 
   // What the builder holds in memory, by capacities, in bytes. Below 300 a vertex from 1000
   // vertices on; inside points are not kept. Cost: O(1) from dimension 3 on.

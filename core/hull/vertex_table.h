@@ -22,6 +22,7 @@ class VertexTable {
     ++block_;
     outside_ = 0;
     duplicate_ = 0;
+    added_.clear();
   }
   uint64_t outside() const { return outside_; }
   uint64_t duplicate() const { return duplicate_; }
@@ -43,6 +44,7 @@ class VertexTable {
     }
     max_abs_coordinate_ = std::max(max_abs_coordinate_, point.cwiseAbs().maxCoeff());
     ++outside_;
+    added_.push_back(id);
     return id;
   }
 
@@ -54,10 +56,11 @@ class VertexTable {
   }
 
   void Remove(VertexId id) {
-    const Counts& counts = counts_[id];
+    Counts& counts = counts_[id];
     if (counts.block == block_) {
       duplicate_ -= counts.duplicates;
       if (counts.is_new) --outside_;
+      counts.is_new = false;
     }
     free_.push_back(id);
   }
@@ -66,6 +69,7 @@ class VertexTable {
   // of points meanwhile. A thread may remove and count only vertices that no other one does.
   struct Zone {
     std::vector<VertexId> free;
+    std::vector<VertexId> added;
     VertexId next = 0;
     VertexId end = 0;
     int64_t outside = 0;
@@ -93,6 +97,7 @@ class VertexTable {
     points_[id] = given + Vector::Zero();
     counts_[id] = {block_, 0, true};
     ++zone.outside;
+    zone.added.push_back(id);
     return id;
   }
   void CountDuplicate(VertexId id, Zone& zone) {
@@ -102,10 +107,11 @@ class VertexTable {
     ++zone.duplicate;
   }
   void Remove(VertexId id, Zone& zone) {
-    const Counts& counts = counts_[id];
+    Counts& counts = counts_[id];
     if (counts.block == block_) {
       zone.duplicate -= counts.duplicates;
       if (counts.is_new) --zone.outside;
+      counts.is_new = false;
     }
     zone.free.push_back(id);
   }
@@ -113,6 +119,7 @@ class VertexTable {
   void RemoveZone(const Zone& zone) {
     for (VertexId id = zone.next; id < zone.end; ++id) free_.push_back(id);
     for (const VertexId id : zone.free) free_.push_back(id);
+    added_.insert(added_.end(), zone.added.begin(), zone.added.end());
     outside_ = static_cast<uint64_t>(static_cast<int64_t>(outside_) + zone.outside);
     duplicate_ = static_cast<uint64_t>(static_cast<int64_t>(duplicate_) + zone.duplicate);
   }
@@ -121,12 +128,38 @@ class VertexTable {
   }
 
   const Vector& operator[](VertexId id) const { return points_[id]; }
+  // The vertices that the current block added and that live.
+  // Cost: O(points of the block that were vertices at any time).
+  std::vector<Vector> NewVertices() const {
+    std::vector<VertexId> ids = added_;
+    std::erase_if(
+        ids, [this](VertexId id) { return counts_[id].block != block_ || !counts_[id].is_new; });
+    // An ID comes twice where one vertex of the block took the place of another.
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    std::vector<Vector> vertices;
+    vertices.reserve(ids.size());
+    for (const VertexId id : ids) vertices.push_back(points_[id]);
+    return vertices;
+  }
+  // All that live. Cost: O(id_bound()).
+  std::vector<Vector> Vertices() const {
+    std::vector<bool> lives(id_bound(), true);
+    for (size_t i = 0; i < free_.size(); ++i) lives[free_[i]] = false;
+    std::vector<Vector> vertices;
+    vertices.reserve(size());
+    for (VertexId id = 0; id < id_bound(); ++id) {
+      if (lives[id]) vertices.push_back(points_[id]);
+    }
+    return vertices;
+  }
   // Vertices that live.
   size_t size() const { return points_.size() - free_.size(); }
   // IDs lie below this.
   size_t id_bound() const { return points_.size(); }
   size_t MemoryBytes() const {
-    return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes();
+    return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes() +
+           added_.capacity() * sizeof(VertexId);
   }
   // At least the largest absolute coordinate of all vertices that ever lived.
   double max_abs_coordinate() const { return max_abs_coordinate_; }
@@ -142,6 +175,8 @@ class VertexTable {
   ChunkedVector<Vector> points_;
   ChunkedVector<Counts> counts_;
   ChunkedVector<VertexId> free_;
+  // By the current block; some of them are gone again.
+  std::vector<VertexId> added_;
   double max_abs_coordinate_ = 0;
   uint64_t block_ = 0;
   uint64_t outside_ = 0;

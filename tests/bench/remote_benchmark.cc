@@ -186,7 +186,9 @@ int Main(int argc, char** argv) {
     const auto address = [&](const std::string& name) {
       return transport == "tcp" ? "127.0.0.1:0" : "unix:" + socket + "_" + name;
     };
-    std::vector<std::string> command = {arguments.hulld, "--listen", address("hulld")};
+    std::vector<std::string> command = {arguments.hulld, "--listen", address("hulld"),
+                                        "--store=memory"};
+    // These win.
     command.insert(command.end(), arguments.hulld_flags.begin(), arguments.hulld_flags.end());
     RemoteSubject hulld("hulld", transport, command);
     RemoteSubject floor("floor", transport, {HULLD_FLOOR_PROGRAM, address("floor")});

@@ -61,7 +61,9 @@ TEST(LatencyHistogram, RowsHoldEverythingOnce) {
   uint64_t sum = 0;
   for (size_t i = 0; i < rows.size(); ++i) {
     sum += rows[i].count;
-    if (i > 0) EXPECT_EQ(rows[i].from, rows[i - 1].to);
+    if (i > 0) {
+      EXPECT_EQ(rows[i].from, rows[i - 1].to);
+    }
   }
   EXPECT_EQ(sum, histogram.count());
 }

@@ -26,6 +26,7 @@ class MalformedMessage : public testing::Test {
   void SetUp() override {
     server::Config config;
     config.listen = "127.0.0.1:0";
+    config.store = "memory";
     auto started = server::Server::Start(config);
     ASSERT_TRUE(started.ok()) << started.status().ToString();
     server_ = *std::move(started);

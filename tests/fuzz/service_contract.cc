@@ -30,6 +30,8 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kCheckCollision:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
+    case Rpc::kSaveSnapshot:
+      return {grpc::FAILED_PRECONDITION};
     case Rpc::kGetStatus:
       return {};
   }

@@ -20,6 +20,7 @@ namespace {
 server::Config SmallConfig(const std::string& socket) {
   server::Config config;
   config.listen = "unix:" + socket;
+  config.store = "memory";
   config.threads = 2;
   config.limits.max_message_bytes = 64 << 10;
   config.limits.max_points_per_chunk = 64;

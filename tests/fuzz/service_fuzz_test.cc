@@ -13,10 +13,11 @@ namespace hulld::fuzz {
 namespace {
 
 // The fuzzer's target without the fuzzer: as many programs on every run, from a fixed seed.
+constexpr int kAllPrograms = 400;
 #ifdef HULLD_SANITIZED
 constexpr int kPrograms = 120;
 #else
-constexpr int kPrograms = 400;
+constexpr int kPrograms = kAllPrograms;
 #endif
 
 std::vector<uint8_t> RandomProgram(Random& random) {
@@ -92,8 +93,12 @@ TEST(ServiceFuzz, RandomProgramsOfCallsPassEveryCheck) {
   }
   // The programs reach what they are for.
   for (const Goal& goal : kGoals) {
+    // The first programs alone need not reach what is rare.
+    if (kPrograms < kAllPrograms && goal.times < 5) continue;
     const auto reached = service.reached().find(goal.what);
-    EXPECT_GE(reached == service.reached().end() ? 0 : reached->second, goal.times) << goal.what;
+    EXPECT_GE(reached == service.reached().end() ? 0 : reached->second,
+              goal.times * kPrograms / kAllPrograms)
+        << goal.what;
   }
   for (const auto& [what, times] : service.reached()) {
     RecordProperty(what, times);

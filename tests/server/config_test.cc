@@ -91,7 +91,10 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"slow-request", "0.25"},
                                                        {"metrics-address", "127.0.0.1:1"},
                                                        {"metrics-insecure", "true"},
-
+                                                       {"data-dir", "/tmp/d"},
+                                                       {"durability", "relaxed"},
+                                                       {"memory-limit", "23"},
+                                                       {"max-writers-per-hull", "24"},
                                                        {"tls-cert", "/c"},
                                                        {"tls-key", "/k"},
                                                        {"tls-client-ca", "/a"},
@@ -105,7 +108,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     for (const char c : name) variable.push_back(c == '-' ? '_' : static_cast<char>(toupper(c)));
     variables[variable] = value;
     const bool is_text = name == "listen" || name == "metrics-address" || name == "store" ||
-                         name.starts_with("log") || value.starts_with("/");
+                         name == "durability" || name.starts_with("log") || value.starts_with("/");
     toml += name + " = " + (is_text ? "\"" + value + "\"" : value) + "\n";
   }
   const auto expect_all = [](const Config& config) {
@@ -131,6 +134,11 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.slow_request, std::chrono::milliseconds(250));
     EXPECT_EQ(config.metrics_address, "127.0.0.1:1");
     EXPECT_TRUE(config.metrics_insecure);
+    EXPECT_EQ(config.store, "memory");
+    EXPECT_EQ(config.data_dir, "/tmp/d");
+    EXPECT_EQ(config.durability, "relaxed");
+    EXPECT_EQ(config.limits.memory_limit, 23);
+    EXPECT_EQ(config.limits.max_writers_per_hull, 24);
     EXPECT_EQ(config.tls_cert, "/c");
     EXPECT_EQ(config.tls_key, "/k");
     EXPECT_EQ(config.tls_client_ca, "/a");
@@ -157,6 +165,15 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--config", WriteFile("max-hull = 3\n")}, "max-hull");
   environment_["HULLD_MAX_HULLS"] = "many";
   ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
+}
+
+TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {
+  EXPECT_EQ(Accepted({}).data_dir, "hulld-data");
+  environment_["HOME"] = "/home/me";
+  EXPECT_EQ(Accepted({}).data_dir, "/home/me/.local/state/hulld");
+  environment_["XDG_STATE_HOME"] = "/state";
+  EXPECT_EQ(Accepted({}).data_dir, "/state/hulld");
+  EXPECT_EQ(Accepted({"--data-dir", "here"}).data_dir, "here");
 }
 
 TEST_F(ConfigTest, SettingsAreAFileThatGivesTheSameSettings) {
@@ -201,6 +218,10 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--metrics-address",
                            "--metrics-insecure",
                            "--config",
+                           "--data-dir",
+                           "--durability",
+                           "--memory-limit",
+                           "--max-writers-per-hull",
                            "--tls-cert",
                            "--tls-key",
                            "--tls-client-ca",

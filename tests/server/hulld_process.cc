@@ -4,6 +4,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cstdlib>
+
 namespace hulld::server {
 
 Process::Process(std::vector<std::string> arguments) {
@@ -18,6 +20,8 @@ Process::Process(std::vector<std::string> arguments) {
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);
+    // Unless the arguments say otherwise: tests leave nothing behind.
+    setenv("HULLD_STORE", "memory", 0);
     execv(HULLD_PROGRAM, argv.data());
     _exit(127);
   }

@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 class HulldProcess : public ::testing::TestWithParam<int> {};
 
 TEST_P(HulldProcess, ServesOnTheLoggedAddressAndEndsCleanlyOnASignal) {
-  Process hulld({"--listen", "127.0.0.1:0", "--log-format", "json"});
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0", "--log-format", "json"});
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   ASSERT_THAT(address, HasSubstr("127.0.0.1:"));
   const auto stub =
@@ -41,21 +41,21 @@ TEST_P(HulldProcess, ServesOnTheLoggedAddressAndEndsCleanlyOnASignal) {
 INSTANTIATE_TEST_SUITE_P(Signals, HulldProcess, ::testing::Values(SIGTERM, SIGINT));
 
 TEST(HulldProgram, ATakenPortAndAWrongFlagEndItWithAnError) {
-  Process first({"--listen", "127.0.0.1:0"});
+  Process first({"--store", "memory", "--listen", "127.0.0.1:0"});
   const std::string address = AddressIn(first.ReadLineWith("listening on "));
-  Process second({"--listen", address});
+  Process second({"--store", "memory", "--listen", address});
   EXPECT_NE(second.ReadLineWith("the port is taken"), "");
   EXPECT_EQ(second.Wait(), 1);
   Process third({"--max-hulls", "none"});
   EXPECT_NE(third.ReadLineWith("--max-hulls"), "");
   EXPECT_EQ(third.Wait(), 2);
-  Process fourth({"--listen", "0.0.0.0:0"});
+  Process fourth({"--store", "memory", "--listen", "0.0.0.0:0"});
   EXPECT_NE(fourth.ReadLineWith("--insecure"), "");
   EXPECT_EQ(fourth.Wait(), 1);
 }
 
 TEST(HulldProgram, AnIdleStreamDoesNotOutliveTheDrainTimeout) {
-  Process hulld({"--listen", "127.0.0.1:0", "--drain-timeout", "0.05"});
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0", "--drain-timeout", "0.05"});
   const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
   const auto stub =
       v1::HullService::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));

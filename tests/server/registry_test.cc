@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <future>
 
 #include "server/memory_store.h"
@@ -10,38 +11,51 @@
 namespace hulld::server {
 namespace {
 
-using ::testing::HasSubstr;
-
-// Refuses chunks once told to.
-class FullStore : public MemoryStore {
+// Counts batches, and refuses them once told to.
+class CountingStore : public MemoryStore {
  public:
-  absl::Status Commit(const Change& change) override {
-    if (full && std::holds_alternative<ChunkApplied>(change)) {
-      return absl::ResourceExhaustedError("no space left");
-    }
-    ++commits;
+  absl::Status Commit(std::span<const Change* const> changes) override {
+    commits += static_cast<int>(changes.size());
     return absl::OkStatus();
   }
-  bool full = false;
-  int commits = 0;
+  std::atomic<int> commits = 0;
 };
 
 class RegistryTest : public ::testing::Test {
  protected:
-  absl::StatusOr<ChunkResult> Append(const AppendSession& session, uint64_t sequence,
-                                     std::vector<Vector> points,
-                                     std::function<bool()> should_stop = {}) {
-    std::promise<absl::StatusOr<ChunkResult>> promise;
-    registry_.Append(session, {sequence, std::move(points), std::nullopt}, std::move(should_stop),
-                     [&](absl::StatusOr<ChunkResult> result) { promise.set_value(result); });
+  // Waits for the reply of one call.
+  template <typename T, typename Call>
+  static absl::StatusOr<T> Wait(const Call& call) {
+    std::promise<absl::StatusOr<T>> promise;
+    call([&](absl::StatusOr<T> result) { promise.set_value(std::move(result)); });
     return promise.get_future().get();
   }
 
-  AppendSession Open(const std::string& id) {
-    return registry_.OpenAppend(id, "w", true, [] {})->session;
+  absl::StatusOr<ChunkResult> Append(const AppendSession& session, uint64_t sequence,
+                                     std::vector<Vector> points,
+                                     std::function<bool()> should_stop = {}) {
+    return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+      registry_.Append(session, {sequence, std::move(points), std::nullopt}, std::move(should_stop),
+                       {}, std::move(done));
+    });
   }
 
-  FullStore store_;
+  absl::StatusOr<OpenResult> OpenAppend(
+      const std::string& id, const std::string& writer, std::function<void()> on_gone = [] {}) {
+    return Wait<OpenResult>([&](Reply<OpenResult> done) {
+      registry_.OpenAppend(
+          id, writer, true, [on_gone](const absl::Status&) { on_gone(); }, std::move(done));
+    });
+  }
+
+  AppendSession Open(const std::string& id) { return OpenAppend(id, "w")->session; }
+
+  absl::StatusOr<uint64_t> Delete(const std::string& id) {
+    return Wait<uint64_t>(
+        [&](Reply<uint64_t> done) { registry_.Delete(id, std::nullopt, std::move(done)); });
+  }
+
+  CountingStore store_;
   WorkerPool writers_{2};
   Registry registry_{store_, Limits(), writers_};
 };
@@ -125,48 +139,66 @@ TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
   EXPECT_TRUE(asked);
 }
 
-TEST_F(RegistryTest, AChunkInProgressWhenItsHullIsDeletedIsRefused) {
+TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   const AppendSession session = Open("h");
   std::vector<Vector> points;
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
-  bool deleted = false;
+  std::promise<absl::StatusOr<uint64_t>> deleted;
+  std::promise<absl::StatusOr<ChunkResult>> next;
+  bool asked = false;
   const auto result = Append(session, 1, std::move(points), [&] {
-    if (!std::exchange(deleted, true)) {
-      EXPECT_TRUE(registry_.Delete("h", std::nullopt).ok());
-      EXPECT_TRUE(registry_.Create("h", false).ok());
+    if (!std::exchange(asked, true)) {
+      registry_.Delete("h", std::nullopt,
+                       [&](absl::StatusOr<uint64_t> reply) { deleted.set_value(reply); });
+      registry_.Append(session, {2, {{0, 1, 0}}, std::nullopt}, {}, {},
+                       [&](absl::StatusOr<ChunkResult> reply) { next.set_value(reply); });
+      EXPECT_EQ(registry_.List("", "", 10).hulls.size(), 1);
     }
     return false;
   });
-  EXPECT_EQ(result.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_EQ(registry_.Resolve("h", {})->second.record.vertex_count, 0);
+  EXPECT_TRUE(result.ok());
+  EXPECT_TRUE(deleted.get_future().get().ok());
+  EXPECT_EQ(next.get_future().get().status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(registry_.Sizes().vertex_count, 0);
+  EXPECT_EQ(registry_.Sizes().hull_count, 0);
 }
 
 TEST_F(RegistryTest, AWatchIsCalledOnceOnDeletionAndNotAfterClosing) {
-  int closed = 0;
-  int open = 0;
-  const auto first = registry_.OpenAppend("h", "1", true, [&] { ++closed; });
-  const auto second = registry_.OpenAppend("h", "2", false, [&] { ++open; });
+  std::atomic<int> closed = 0;
+  std::atomic<int> open = 0;
+  const auto first = OpenAppend("h", "1", [&] { ++closed; });
+  const auto second = OpenAppend("h", "2", [&] { ++open; });
   registry_.CloseAppend(first->session);
-  ASSERT_TRUE(registry_.Delete("h", std::nullopt).ok());
+  ASSERT_TRUE(Delete("h").ok());
   EXPECT_EQ(closed, 0);
   EXPECT_EQ(open, 1);
   registry_.CloseAppend(second->session);
 }
 
-TEST_F(RegistryTest, TheStoreSeesEveryChangeAndCanRefuseIt) {
+TEST_F(RegistryTest, TheStoreSeesEveryChange) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
   EXPECT_EQ(store_.commits, 2);
-  const uint64_t revision = registry_.Sizes().store_revision;
-  store_.full = true;
-  const auto refused = Append(session, 2, {{1, 0, 0}});
-  EXPECT_EQ(refused.status().code(), absl::StatusCode::kResourceExhausted);
-  EXPECT_THAT(std::string(refused.status().message()), HasSubstr("no space left"));
-  // Nobody sees the points that were not stored.
-  EXPECT_FALSE(registry_.Resolve("h", {}).ok());
-  EXPECT_EQ(registry_.Sizes().store_revision, revision);
-  EXPECT_TRUE(registry_.Delete("h", std::nullopt).ok());
+  ASSERT_TRUE(Append(session, 2, {{0, 0, 0}}).ok());
+  EXPECT_EQ(store_.commits, 3);
+  EXPECT_EQ(registry_.Sizes().store_revision, 2);
+  EXPECT_EQ(registry_.Commits().changes, 3);
+}
+
+TEST_F(RegistryTest, ChunksOfOneSessionAreAnsweredInOrderThoughTheyOverlap) {
+  const AppendSession session = Open("h");
+  constexpr uint64_t kChunks = 500;
+  std::vector<uint64_t> revisions;
+  std::promise<void> all;
+  for (uint64_t i = 1; i <= kChunks; ++i) {
+    registry_.Append(session, {i, {{static_cast<double>(i), 0, 0}}, std::nullopt}, {}, {},
+                     [&](absl::StatusOr<ChunkResult> result) {
+                       revisions.push_back(result.ok() ? result->hull_revision : 0);
+                       if (revisions.size() == kChunks) all.set_value();
+                     });
+  }
+  all.get_future().wait();
+  for (uint64_t i = 0; i < kChunks; ++i) EXPECT_EQ(revisions[i], i + 2);
 }
 
 TEST_F(RegistryTest, ResolvesManyHullsAtOneRevision) {

@@ -57,6 +57,7 @@ Config ServerTest::TestConfig() {
   Config config;
   config.listen = "127.0.0.1:0";
   config.threads = 2;
+  config.store = "memory";
   return config;
 }
 

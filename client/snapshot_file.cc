@@ -1,0 +1,234 @@
+#include "client/snapshot_file.h"
+
+#include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+namespace hulld {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kFirstLine[] = "hulld snapshot 1\n";
+constexpr size_t kFirstLineBytes = sizeof kFirstLine - 1;
+// Above any part; a larger size can only be damage.
+constexpr uint32_t kMaxPartBytes = 64 << 20;
+
+uint32_t Checksum(const std::string& bytes) {
+  return static_cast<uint32_t>(
+      crc32_z(0, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
+}
+
+absl::Status Damaged(const std::string& what) {
+  return absl::InvalidArgumentError(absl::StrCat("the snapshot is damaged: ", what));
+}
+
+// Relative, and without parts that lead upwards.
+bool IsInside(const std::string& path) {
+  const fs::path parts(path);
+  if (path.empty() || parts.is_absolute()) return false;
+  for (const fs::path& part : parts) {
+    if (part == ".." || part == "." || part.empty()) return false;
+  }
+  return true;
+}
+
+bool SyncPath(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool synced = fsync(fd) == 0;
+  return close(fd) == 0 && synced;
+}
+
+void AppendNumber(uint32_t number, std::string* bytes) {
+  for (int i = 0; i < 4; ++i) bytes->push_back(static_cast<char>(number >> (8 * i)));
+}
+
+bool ReadNumber(std::istream& file, uint32_t* number) {
+  unsigned char bytes[4];
+  if (!file.read(reinterpret_cast<char*>(bytes), sizeof bytes)) return false;
+  *number = 0;
+  for (int i = 3; i >= 0; --i) *number = *number << 8 | bytes[i];
+  return true;
+}
+
+absl::StatusOr<v1::SaveSnapshotResponse> ReadPart(std::istream& file) {
+  uint32_t size = 0;
+  uint32_t checksum = 0;
+  if (!ReadNumber(file, &size) || !ReadNumber(file, &checksum)) {
+    return Damaged("it is cut short: its end is missing");
+  }
+  if (size > kMaxPartBytes) return Damaged("a part has an impossible size");
+  std::string bytes(size, '\0');
+  if (!file.read(bytes.data(), size)) return Damaged("it is cut short: its end is missing");
+  v1::SaveSnapshotResponse part;
+  if (Checksum(bytes) != checksum || !part.ParseFromString(bytes)) {
+    return Damaged("the checksum of a part does not match");
+  }
+  return part;
+}
+
+// Writes the files below `directory`.
+absl::Status WritePieces(std::istream& file, const std::string& directory, SnapshotCheck* check) {
+  const auto cannot_write = [](const fs::path& path) {
+    return absl::UnavailableError(absl::StrCat("cannot write ", path.string()));
+  };
+  while (!check->complete()) {
+    const absl::StatusOr<v1::SaveSnapshotResponse> part = ReadPart(file);
+    if (!part.ok()) return part.status();
+    if (absl::Status s = check->Take(*part); !s.ok()) return s;
+    if (!part->has_piece()) continue;
+    const v1::SnapshotPiece& piece = part->piece();
+    const fs::path path = fs::path(directory) / piece.path();
+    std::error_code error;
+    fs::create_directories(path.parent_path(), error);
+    std::ofstream out(path, piece.offset() == 0 ? std::ios::binary | std::ios::trunc
+                                                : std::ios::binary | std::ios::app);
+    out << piece.data();
+    out.close();
+    if (error || !out || !SyncPath(path.string())) return cannot_write(path);
+    if (!SyncPath(path.parent_path().string())) return cannot_write(path.parent_path());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status SnapshotCheck::Take(const v1::SaveSnapshotResponse& part) {
+  if (complete_) return Damaged("something follows its end");
+  if (!begun_ && !part.has_begin()) return Damaged("its beginning is missing");
+  switch (part.part_case()) {
+    case v1::SaveSnapshotResponse::kBegin:
+      if (std::exchange(begun_, true)) return Damaged("it begins twice");
+      begin_ = part.begin();
+      return absl::OkStatus();
+    case v1::SaveSnapshotResponse::kPiece:
+      return TakePiece(part.piece());
+    case v1::SaveSnapshotResponse::kEnd: {
+      const v1::SnapshotEnd& end = part.end();
+      if (end.file_count() != totals_.file_count() || end.piece_count() != totals_.piece_count() ||
+          end.byte_count() != totals_.byte_count()) {
+        return Damaged("pieces are missing");
+      }
+      complete_ = true;
+      return absl::OkStatus();
+    }
+    case v1::SaveSnapshotResponse::PART_NOT_SET:
+      break;
+  }
+  return Damaged("it holds a part of an unknown kind");
+}
+
+absl::Status SnapshotCheck::TakePiece(const v1::SnapshotPiece& piece) {
+  if (piece.offset() == 0) {
+    if (!IsInside(piece.path())) return Damaged("a file's path leads out of the directory");
+    path_ = piece.path();
+    file_bytes_ = 0;
+    totals_.set_file_count(totals_.file_count() + 1);
+  }
+  if (piece.path() != path_ || piece.offset() != file_bytes_) {
+    return Damaged(absl::StrCat("a piece of ", piece.path(), " is missing"));
+  }
+  if (Checksum(piece.data()) != piece.crc32()) {
+    return Damaged(absl::StrCat("the checksum of a piece of ", piece.path(), " does not match"));
+  }
+  file_bytes_ += piece.data().size();
+  totals_.set_piece_count(totals_.piece_count() + 1);
+  totals_.set_byte_count(totals_.byte_count() + piece.data().size());
+  return absl::OkStatus();
+}
+
+SnapshotWriter::SnapshotWriter(std::string path)
+    : path_(std::move(path)), partial_path_(path_ + ".partial") {}
+
+SnapshotWriter::~SnapshotWriter() {
+  std::error_code error;
+  if (opened_) fs::remove(partial_path_, error);
+}
+
+absl::Status SnapshotWriter::Open() {
+  std::error_code error;
+  if (fs::exists(path_, error)) {
+    return absl::InvalidArgumentError(absl::StrCat(path_, " exists; name another file"));
+  }
+  file_.open(partial_path_, std::ios::binary | std::ios::trunc);
+  file_ << kFirstLine;
+  if (!file_) return absl::InvalidArgumentError(absl::StrCat("cannot write ", partial_path_));
+  opened_ = true;
+  return absl::OkStatus();
+}
+
+absl::Status SnapshotWriter::Write(const v1::SaveSnapshotResponse& part) {
+  if (absl::Status s = check_.Take(part); !s.ok()) return s;
+  const std::string bytes = part.SerializeAsString();
+  std::string head;
+  AppendNumber(static_cast<uint32_t>(bytes.size()), &head);
+  AppendNumber(Checksum(bytes), &head);
+  file_ << head << bytes;
+  if (file_) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("cannot write ", partial_path_, "; is the disk full?"));
+}
+
+absl::Status SnapshotWriter::Finish() {
+  if (!check_.complete()) return Damaged("it is cut short: its end is missing");
+  file_.close();
+  std::error_code error;
+  if (!file_ || !SyncPath(partial_path_)) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", partial_path_));
+  }
+  fs::rename(partial_path_, path_, error);
+  if (error) return absl::InvalidArgumentError(absl::StrCat(path_, ": ", error.message()));
+  opened_ = false;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
+                                              const std::string& directory) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return absl::InvalidArgumentError(absl::StrCat("cannot open ", path));
+  std::string line(kFirstLineBytes, '\0');
+  file.read(line.data(), static_cast<std::streamsize>(line.size()));
+  if (line != kFirstLine) {
+    return absl::InvalidArgumentError(absl::StrCat(path, " is no snapshot of hulld"));
+  }
+  std::error_code error;
+  if (fs::exists(directory, error) && !fs::is_empty(directory, error)) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(directory, " is there and not empty; name a new directory"));
+  }
+  // Beside its place, to which it is moved once it is whole.
+  const std::string partial = (fs::path(directory) / ".").parent_path().string() + ".restoring";
+  fs::remove_all(partial, error);
+  fs::create_directories(partial, error);
+  if (error) {
+    return absl::UnavailableError(absl::StrCat("cannot make ", partial, ": ", error.message()));
+  }
+  SnapshotCheck check;
+  absl::Status status = WritePieces(file, partial, &check);
+  if (status.ok() && file.peek() != std::ifstream::traits_type::eof()) {
+    status = Damaged("something follows its end");
+  }
+  if (status.ok()) {
+    fs::remove(directory, error);
+    fs::rename(partial, directory, error);
+    if (error) {
+      status = absl::UnavailableError(
+          absl::StrCat("cannot move ", partial, " to ", directory, ": ", error.message()));
+    }
+  }
+  if (!status.ok()) {
+    fs::remove_all(partial, error);
+    return status;
+  }
+  SyncPath(fs::absolute(directory, error).parent_path().string());
+  return check;
+}
+
+}  // namespace hulld

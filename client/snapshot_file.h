@@ -1,0 +1,73 @@
+#ifndef HULLD_CLIENT_SNAPSHOT_FILE_H_
+#define HULLD_CLIENT_SNAPSHOT_FILE_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <fstream>
+#include <string>
+
+#include "hulld/v1/maintenance.pb.h"
+
+namespace hulld {
+
+// A snapshot of a store in one file: a line that says what it is, then the parts of SaveSnapshot,
+// each after its size and the CRC-32 of its bytes (32 bits each, little endian). The part `end` is
+// the last, so that a file that was cut short is found out.
+
+// Checks that parts make up a whole snapshot, in their order.
+class SnapshotCheck {
+ public:
+  // INVALID_ARGUMENT: the part is damaged, out of place, or has a path that leads elsewhere.
+  absl::Status Take(const v1::SaveSnapshotResponse& part);
+  // Whether `end` came.
+  bool complete() const { return complete_; }
+  // Of what came so far; all of the snapshot once it is complete.
+  const v1::SnapshotBegin& begin() const { return begin_; }
+  const v1::SnapshotEnd& totals() const { return totals_; }
+
+ private:
+  absl::Status TakePiece(const v1::SnapshotPiece& piece);
+
+  bool begun_ = false;
+  bool complete_ = false;
+  v1::SnapshotBegin begin_;
+  v1::SnapshotEnd totals_;
+  std::string path_;
+  uint64_t file_bytes_ = 0;
+};
+
+// Writes a snapshot to a file that must not exist, piece by piece; it gets its name only when it is
+// complete and on disk.
+class SnapshotWriter {
+ public:
+  explicit SnapshotWriter(std::string path);
+  // Removes what is not complete.
+  ~SnapshotWriter();
+  SnapshotWriter(const SnapshotWriter&) = delete;
+  SnapshotWriter& operator=(const SnapshotWriter&) = delete;
+
+  absl::Status Open();
+  absl::Status Write(const v1::SaveSnapshotResponse& part);
+  // INVALID_ARGUMENT: the snapshot is not complete, or the file cannot be written.
+  absl::Status Finish();
+  const SnapshotCheck& check() const { return check_; }
+
+ private:
+  const std::string path_;
+  const std::string partial_path_;
+  bool opened_ = false;
+  std::ofstream file_;
+  SnapshotCheck check_;
+};
+
+// Makes a data directory of a snapshot: all of it, or nothing. Returns what the snapshot said of
+// itself. INVALID_ARGUMENT: the file is no snapshot, is damaged or cut short; FAILED_PRECONDITION:
+// the directory is there and not empty; UNAVAILABLE: it cannot be written.
+absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
+                                              const std::string& directory);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_SNAPSHOT_FILE_H_

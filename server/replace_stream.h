@@ -1,0 +1,56 @@
+#ifndef HULLD_SERVER_REPLACE_STREAM_H_
+#define HULLD_SERVER_REPLACE_STREAM_H_
+
+#include <absl/status/status.h>
+#include <grpcpp/grpcpp.h>
+
+#include <cstdint>
+#include <memory>
+
+#include "core/hull/hull_builder.h"
+#include "hulld/v1/hull.pb.h"
+#include "server/call.h"
+#include "server/registry.h"
+#include "server/worker_pool.h"
+
+namespace hulld::server {
+
+// One ReplaceHull call: builds a hull apart, message by message on a worker thread, and hands it to
+// the registry when the client has said all. One step follows the other, so that nothing needs a
+// lock: a read, or the building of what was read. It owns itself until gRPC is done with it.
+class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
+ public:
+  static grpc::ServerReadReactor<v1::ReplaceHullRequest>* Start(
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      WorkerPool& workers, v1::ReplaceHullResponse* response);
+
+ private:
+  ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+                WorkerPool& workers, v1::ReplaceHullResponse* response)
+      : registry_(registry),
+        workers_(workers),
+        response_(response),
+        call_(context, admission, Rpc::kReplaceHull) {}
+
+  void OnReadDone(bool ok) override;
+  void OnCancel() override { call_.Cancel(); }
+  void OnDone() override { delete this; }
+
+  void Read();
+  absl::Status HandleOpen(const v1::ReplaceOpen& open);
+  absl::Status Build();
+  void Commit();
+  void End(const absl::Status& status);
+
+  Registry& registry_;
+  WorkerPool& workers_;
+  v1::ReplaceHullResponse* response_;
+  Call call_;
+  v1::ReplaceHullRequest request_;
+  Replacement replacement_;
+  uint64_t messages_ = 0;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REPLACE_STREAM_H_

@@ -1,0 +1,114 @@
+#ifndef HULLD_SERVER_ROCKSDB_STORE_H_
+#define HULLD_SERVER_ROCKSDB_STORE_H_
+
+#include <absl/status/statusor.h>
+#include <rocksdb/db.h>
+#include <rocksdb/env.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <shared_mutex>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/log_file_system.h"
+#include "server/store.h"
+
+namespace hulld::server {
+
+struct RocksDbOptions {
+  // Made when it does not exist.
+  std::string data_dir;
+  // kSync or kRelaxed.
+  Durability durability = Durability::kSync;
+  // Relaxed: how often what was written is synced.
+  std::chrono::milliseconds sync_interval{500};
+  // Looks without touching: nothing can be committed, and another process may have it open.
+  bool read_only = false;
+  // Null: the file system.
+  rocksdb::Env* env = nullptr;
+};
+
+// Keeps hulls in a RocksDB database under <data-dir>/rocksdb. See store_keys.h for what is in it.
+//
+// A batch of changes is one write to the log, synced once, before it is acknowledged. What is read
+// is checked twice: by the checksums of RocksDB's blocks, and by our own of each value, which name
+// the hull that is damaged.
+class RocksDbStore : public Store {
+ public:
+  // INVALID_ARGUMENT: no directory; FAILED_PRECONDITION: another process has it open, or a newer
+  // hulld wrote it; DATA_LOSS: its log or its files are damaged; NOT_FOUND: read_only, and there is
+  // none; UNAVAILABLE: the file system refuses.
+  static absl::StatusOr<std::unique_ptr<RocksDbStore>> Open(RocksDbOptions options);
+
+  ~RocksDbStore() override;
+
+  std::string kind() const override { return "rocksdb"; }
+  std::string id() const override { return id_; }
+  Durability durability() const override { return options_.durability; }
+  bool keeps_hulls() const override { return true; }
+  uint64_t revision() const override { return revision_; }
+  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
+  absl::StatusOr<StoredHull> Find(const std::string& hull_id) override;
+  absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
+  absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
+                                        const std::string& writer_id) override;
+  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Recover() override;
+
+  // Hard links in <data-dir>/copy-..., in the layout of a data directory.
+  absl::StatusOr<std::string> MakeCopy() override;
+
+  const std::string& data_dir() const { return options_.data_dir; }
+  // RocksDB's own, for tests that damage what is kept.
+  rocksdb::DB& db() { return *db_; }
+
+ private:
+  explicit RocksDbStore(RocksDbOptions options);
+
+  rocksdb::Options DbOptions() const;
+  absl::Status OpenDb();
+  absl::Status ReadMeta();
+  absl::Status InitializeMeta();
+  absl::StatusOr<std::string> Read(const std::string& key);
+  absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
+  absl::Status ScanRange(
+      const std::string& begin, const std::string& end,
+      const std::function<absl::Status(std::string_view, std::string_view)>& visit);
+  absl::Status LoadBase(const StoredHull& hull, std::vector<Vector>* vertices);
+  absl::Status LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices);
+  absl::Status Probe();
+  absl::Status Reopen();
+  absl::Status SyncLog();
+  void SyncAtIntervals();
+
+  const RocksDbOptions options_;
+  std::shared_ptr<LogFileSystem> files_;
+  std::unique_ptr<rocksdb::Env> env_;
+  std::string id_;
+  uint64_t revision_ = 0;
+
+  // Held shared by whoever uses db_, alone by Reopen.
+  mutable std::shared_mutex db_mutex_;
+  std::unique_ptr<rocksdb::DB> db_;
+
+  // Held by whoever writes the log or syncs it.
+  std::mutex log_mutex_;
+  // Once writing the log failed it must not be touched again: only reading goes on, until Recover
+  // opens the database anew.
+  absl::Status failure_;
+
+  std::mutex sync_mutex_;
+  std::condition_variable sync_wake_;
+  bool ending_ = false;
+  std::thread syncer_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_ROCKSDB_STORE_H_

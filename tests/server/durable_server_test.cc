@@ -1,0 +1,198 @@
+// A server on a durable store, over the contract: restarts, replacement, snapshots, the doctor.
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "client/client.h"
+#include "client/snapshot_file.h"
+#include "server/doctor.h"
+#include "tests/server/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class DurableServer : public ServerTest {
+ protected:
+  DurableServer() {
+    std::string name = ::testing::TempDir() + "hulld_server_XXXXXX";
+    directory_ = mkdtemp(name.data());
+  }
+  ~DurableServer() override { std::filesystem::remove_all(directory_); }
+
+  Config DurableConfig(const std::string& name = "data") {
+    Config config = TestConfig();
+    config.store = "rocksdb";
+    config.data_dir = directory_ + "/" + name;
+    return config;
+  }
+  void SetUp() override { Restart(DurableConfig()); }
+
+  Client MakeClient() {
+    ClientOptions options;
+    options.server = server_->address();
+    return Client(options);
+  }
+  absl::StatusOr<v1::ReplaceHullResponse> Replace(const v1::ReplaceOpen& open,
+                                                  const Coordinates& xyz) {
+    return MakeClient().ReplaceHull(open, [&](const Client::PointSink& sink) {
+      v1::PointBlock block;
+      block.mutable_xyz()->Assign(xyz.begin(), xyz.end());
+      return sink(block);
+    });
+  }
+
+  std::string directory_;
+};
+
+TEST_F(DurableServer, AcksSayThatTheChunkIsOnDisk) {
+  Appender appender(*hulls_, "h", "w", true);
+  EXPECT_EQ(appender.Append(1, Cube())->durability(), v1::DURABILITY_SYNC);
+  EXPECT_TRUE(appender.Finish().ok());
+  Config relaxed = DurableConfig();
+  relaxed.durability = "relaxed";
+  Restart(relaxed);
+  Appender next(*hulls_, "h", "w");
+  EXPECT_EQ(next.opened().last_sequence(), 1);
+  EXPECT_EQ(next.Append(2, {3, 3, 3})->durability(), v1::DURABILITY_RELAXED);
+}
+
+TEST_F(DurableServer, ARestartKeepsWhatWasAcked) {
+  Put("a/sphere", Sphere(300));
+  Put("cube", Cube());
+  const v1::GetHullResponse before = Get("a/sphere");
+  Restart(DurableConfig());
+  const v1::GetHullResponse after = Get("a/sphere");
+  EXPECT_EQ(after.SerializeAsString(), before.SerializeAsString());
+  v1::CheckCollisionRequest request;
+  *request.mutable_a() = PlacementOf("a/sphere");
+  *request.mutable_b() = PlacementOf("cube", 5, 0, 0);
+  EXPECT_EQ(Check(request).relation(), v1::RELATION_SEPARATED);
+}
+
+TEST_F(DurableServer, AReplacementIsSeenAsAWhole) {
+  Put("h", Sphere(100));
+  const uint64_t revision = Get("h").hull().revision();
+  v1::ReplaceOpen open;
+  open.set_hull_id("h");
+  open.set_if_revision(revision);
+  const auto replaced = Replace(open, Cube());
+  ASSERT_TRUE(replaced.ok()) << replaced.status();
+  EXPECT_FALSE(replaced->created());
+  EXPECT_EQ(replaced->durability(), v1::DURABILITY_SYNC);
+  EXPECT_EQ(Get("h").hull().SerializeAsString(), replaced->hull().SerializeAsString());
+  EXPECT_EQ(Replace(open, Cube()).status().code(), absl::StatusCode::kAborted);
+  Restart(DurableConfig());
+  EXPECT_EQ(Get("h").hull().vertex_count(), 8);
+  EXPECT_EQ(Get("h").hull().counts().received(), 8);
+}
+
+TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
+  Put("h", Sphere(100));
+  const std::string before = Get("h").hull().SerializeAsString();
+  v1::ReplaceOpen open;
+  open.set_hull_id("h");
+  const auto nan = Replace(open, {0, 0, std::nan("")});
+  EXPECT_EQ(nan.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(nan.status().message()), HasSubstr("message 2: points[0].z is NaN"));
+  const auto broken = MakeClient().ReplaceHull(open, [&](const Client::PointSink& sink) {
+    v1::PointBlock block;
+    for (const double x : Cube()) block.add_xyz(x);
+    EXPECT_TRUE(sink(block).ok());
+    return absl::InvalidArgumentError("the file ends early");
+  });
+  EXPECT_THAT(std::string(broken.status().message()), HasSubstr("the file ends early"));
+  EXPECT_EQ(Get("h").hull().SerializeAsString(), before);
+  open.set_hull_id("none");
+  EXPECT_EQ(Replace(open, Cube()).status().code(), absl::StatusCode::kNotFound);
+  open.set_create_if_absent(true);
+  EXPECT_TRUE(Replace(open, Cube())->created());
+}
+
+TEST_F(DurableServer, ReplacingEndsTheStreamsThatAppend) {
+  Appender appender(*hulls_, "h", "w", true);
+  ASSERT_TRUE(appender.Append(1, Sphere(50)).has_value());
+  v1::ReplaceOpen open;
+  open.set_hull_id("h");
+  ASSERT_TRUE(Replace(open, Cube()).ok());
+  EXPECT_FALSE(appender.ReadAck().has_value());
+  const grpc::Status status = appender.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_THAT(status.error_message(), HasSubstr("was replaced"));
+  Appender again(*hulls_, "h", "w");
+  EXPECT_EQ(again.opened().last_sequence(), 0);
+}
+
+TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
+  Put("sphere", Sphere(300));
+  const std::string before = Get("sphere").SerializeAsString();
+  const std::string file = directory_ + "/snapshot";
+  SnapshotWriter writer(file);
+  ASSERT_TRUE(writer.Open().ok());
+  const absl::Status saved = MakeClient().SaveSnapshot(
+      [&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); });
+  ASSERT_TRUE(saved.ok()) << saved;
+  ASSERT_TRUE(writer.Finish().ok());
+  // The server goes on, and what comes later is not in the snapshot.
+  ASSERT_TRUE(Delete("sphere").ok());
+  const auto restored = RestoreSnapshot(file, directory_ + "/restored");
+  ASSERT_TRUE(restored.ok()) << restored.status();
+  EXPECT_EQ(RestoreSnapshot(file, directory_ + "/restored").status().code(),
+            absl::StatusCode::kFailedPrecondition);
+  Restart(DurableConfig("restored"));
+  EXPECT_EQ(Get("sphere").SerializeAsString(), before);
+}
+
+TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
+  Put("sphere", Sphere(300));
+  const std::string file = directory_ + "/snapshot";
+  SnapshotWriter writer(file);
+  ASSERT_TRUE(writer.Open().ok());
+  ASSERT_TRUE(
+      MakeClient()
+          .SaveSnapshot([&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); })
+          .ok());
+  ASSERT_TRUE(writer.Finish().ok());
+  const auto size = std::filesystem::file_size(file);
+  const std::string copy = directory_ + "/copy";
+  for (const uintmax_t at : {uintmax_t{20}, size / 3, size / 2, size - 3}) {
+    std::filesystem::copy_file(file, copy, std::filesystem::copy_options::overwrite_existing);
+    std::fstream bytes(copy, std::ios::in | std::ios::out | std::ios::binary);
+    bytes.seekg(static_cast<std::streamoff>(at));
+    const char flipped = static_cast<char>(bytes.get() ^ 1);
+    bytes.seekp(static_cast<std::streamoff>(at));
+    bytes.put(flipped);
+    bytes.close();
+    EXPECT_FALSE(RestoreSnapshot(copy, directory_ + "/restored").ok()) << at;
+    std::filesystem::resize_file(copy, at);
+    EXPECT_FALSE(RestoreSnapshot(copy, directory_ + "/restored").ok()) << at;
+    EXPECT_FALSE(std::filesystem::exists(directory_ + "/restored"));
+  }
+}
+
+TEST_F(DurableServer, TheDoctorLooksAtAStoreThatNobodyHasOpen) {
+  Put("sphere", Sphere(300));
+  Put("cube", Cube());
+  TearDown();
+  EXPECT_EQ(RunDoctor({"--data-dir", directory_ + "/data"}), 0);
+  EXPECT_EQ(RunDoctor({"--data-dir", directory_ + "/data", "--json"}), 0);
+  EXPECT_EQ(RunDoctor({"--data-dir", directory_ + "/none"}), 2);
+  EXPECT_EQ(RunDoctor({}), 2);
+}
+
+TEST_F(ServerTest, AStoreInMemoryHasNoSnapshot) {
+  grpc::ClientContext context;
+  const auto stub = v1::MaintenanceService::NewStub(channel_);
+  const auto reader = stub->SaveSnapshot(&context, v1::SaveSnapshotRequest());
+  v1::SaveSnapshotResponse part;
+  EXPECT_FALSE(reader->Read(&part));
+  const grpc::Status status = reader->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_THAT(status.error_message(), HasSubstr("--store=memory"));
+}
+
+}  // namespace
+}  // namespace hulld::server
