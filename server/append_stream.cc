@@ -3,7 +3,6 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "server/decode.h"
@@ -161,9 +160,9 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
         self->Proceed();
       },
       [self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
-        if (result.ok()) self->call_.EndMessage(arrival);
         const std::lock_guard lock(self->mutex_);
         --self->uncommitted_;
+        if (result.ok()) self->call_.EndMessage(arrival);
         self->HandleResult(sequence, result);
         self->Proceed();
       });

@@ -67,7 +67,10 @@ std::string Call::Client() const {
   return peer.substr(0, peer.rfind(':'));
 }
 
-void Call::BeginMessage() { lifetime_.LimitTime(admission_.limits().max_request_time); }
+void Call::BeginMessage() {
+  message_arrival_ = Clock::now();
+  if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(admission_.limits().max_request_time);
+}
 
 void Call::EndMessage(Clock::time_point arrival) {
   const Clock::duration duration = Clock::now() - arrival;

@@ -51,10 +51,11 @@ class Call {
   void AddPairs(uint64_t pairs) { pairs_.fetch_add(pairs, std::memory_order_relaxed); }
   void AddPoints(uint64_t points) { points_.fetch_add(points, std::memory_order_relaxed); }
 
-  // A stream took up a message of StreamCollisions, which has its own --max-request-time.
+  // A stream took up a message, and made its answer ready: messages are timed one by one, as the
+  // stream itself lasts as long as its client likes.
   void BeginMessage();
-  // The answer to the message that arrived at `arrival` is ready. Messages are timed one by one, as
-  // the stream itself lasts as long as its client likes.
+  void EndMessage() { EndMessage(message_arrival_); }
+  // The same where several messages are under way: `arrival` is that of the one.
   void EndMessage(std::chrono::steady_clock::time_point arrival);
 
   // Counts a limit that was met without ending the call, as by one pair of a batch.
@@ -82,6 +83,7 @@ class Call {
   CallLifetime lifetime_;
   std::atomic<uint64_t> pairs_ = 0;
   std::atomic<uint64_t> points_ = 0;
+  Clock::time_point message_arrival_;
   Caller caller_;
   // Taken by Begin, given back when the reactor goes.
   std::optional<Admission::Ticket> ticket_;

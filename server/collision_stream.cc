@@ -65,7 +65,6 @@ void CollisionStream::ReadNext() {
 void CollisionStream::OnReadDone(bool ok) {
   // Without a message the client has said all, or is gone, or speaks another language.
   if (!ok) return End(WhyNotRead(request_));
-  arrival_ = std::chrono::steady_clock::now();
   call_.BeginMessage();
   if (IsQuick()) return Handle();
   // The first message resolves hulls, and answers all pairs with cold caches.
@@ -284,7 +283,7 @@ void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
   }
   call_.metrics().CountPairs(std::exchange(rungs_, {}));
   if (call_.ShouldStop()) return End(call_.StopStatus());
-  if (next_asked_ == asked_.size()) call_.EndMessage(arrival_);
+  if (next_asked_ == asked_.size()) call_.EndMessage();
   response_.set_update(messages_);
   response_.set_last(next_asked_ == asked_.size());
   StartWrite(&response_);

@@ -99,7 +99,6 @@ class CollisionStream
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;
   RungCounts rungs_;
-  std::chrono::steady_clock::time_point arrival_;
 };
 
 }  // namespace hulld::server

@@ -129,6 +129,18 @@ class Parser {
         ->check(CLI::IsMember({"text", "json"}));
   }
 
+  void AddStore() {
+    Add("store", config_.store, "Where hulls live: on disk, or in memory until the server ends")
+        ->check(CLI::IsMember({"rocksdb", "memory"}));
+    Add("data-dir", config_.data_dir,
+        "Directory of the store; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
+        "~/.local/state, or else ./hulld-data");
+    Add("durability", config_.durability,
+        "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
+        "outage of the machine can lose (relaxed)")
+        ->check(CLI::IsMember({"sync", "relaxed"}));
+  }
+
   void AddObservation() {
     Add("metrics-address", config_.metrics_address,
         "Where Prometheus reads metrics over HTTP (/metrics): host:port; empty: nowhere");
@@ -140,18 +152,6 @@ class Parser {
     Add("slow-request", slow_request_seconds_,
         "Log requests that take longer than so many seconds; 0: none")
         ->check(CLI::Validator(CheckSeconds, ""));
-  }
-
-  void AddStore() {
-    Add("store", config_.store, "Where hulls live: on disk, or in memory until the server ends")
-        ->check(CLI::IsMember({"rocksdb", "memory"}));
-    Add("data-dir", config_.data_dir,
-        "Directory of the store; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
-        "~/.local/state, or else ./hulld-data");
-    Add("durability", config_.durability,
-        "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
-        "outage of the machine can lose (relaxed)")
-        ->check(CLI::IsMember({"sync", "relaxed"}));
   }
 
   void AddGuard() {

@@ -31,6 +31,10 @@ struct Limits {
   // Of one batch, scene or stream; each takes about 500 bytes while it runs.
   uint64_t max_placements = 200'000;
   uint64_t max_textbook_axes = 10'000'000;
+  uint64_t max_writers_per_hull = 100'000;
+  // Bytes that builders and snapshots may hold. 0: half of what the machine or the control group of
+  // the process has.
+  uint64_t memory_limit = 0;
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
@@ -43,10 +47,6 @@ struct Limits {
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
   std::chrono::milliseconds slow_request{1000};
-  uint64_t max_writers_per_hull = 100'000;
-  // Bytes that builders and snapshots may hold. 0: half of what the machine or the control group of
-  // the process has.
-  uint64_t memory_limit = 0;
 };
 
 // Every setting and default of the server.

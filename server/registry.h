@@ -272,6 +272,8 @@ class Registry {
   void Advance(Locked& locked, const HullPointer& hull);
 
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
+  void OpenSession(Locked& locked, const HullPointer& hull,
+                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
   absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
                                              const std::string& writer_id);
   void RunNextChunk(const HullPointer& hull);

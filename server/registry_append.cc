@@ -19,10 +19,10 @@ absl::Status GoneWhileStreaming(const HullRecord& record) {
 }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
-  return AtLimit(absl::ResourceExhaustedError(absl::StrCat(
-                     QuotedHull(hull.record.hull_id), " was written by ", hull.writer_count,
-                     " writers; append under an earlier writer_id; the limit is ", limit)),
-                 "max-writers-per-hull");
+  return LimitExceeded(
+      absl::StrCat(QuotedHull(hull.record.hull_id), " was written by ", hull.writer_count,
+                   " writers, so append under an earlier writer_id"),
+      limit, "max-writers-per-hull");
 }
 
 absl::Status CheckPointCount(const HullRecord& record, const Chunk& chunk, const Limits& limits) {
@@ -81,11 +81,14 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   const HullPointer hull = Find(request->hull_id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(HullNotFound(request->hull_id));
+    // The session opens at the very moment of the creation: the hull may be gone right after.
     return CreateNew(locked, request->hull_id,
-                     [request, retry](Locked& later, const absl::Status& status) {
-                       request->created_hull = status.ok();
-                       if (status.ok()) return retry(later, status);
-                       later.Afterwards([request, status] { request->done(status); });
+                     [this, request](Locked& later, const absl::Status& status) {
+                       if (!status.ok()) {
+                         return later.Afterwards([request, status] { request->done(status); });
+                       }
+                       request->created_hull = true;
+                       OpenSession(later, Find(request->hull_id), request, 0);
                      });
   }
   if (hull->ending) {
@@ -99,11 +102,16 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   if (*last == 0 && hull->head.writer_count >= limits_.max_writers_per_hull) {
     return refuse(TooManyWriters(hull->head, limits_.max_writers_per_hull));
   }
+  OpenSession(locked, hull, request, *last);
+}
+
+void Registry::OpenSession(Locked& locked, const HullPointer& hull,
+                           const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
   result.store_revision = revision_;
   result.hull = hull->committed.record;
-  result.last_sequence = *last;
+  result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_};
   locked.Afterwards([request, result] { request->done(result); });
 }
@@ -189,7 +197,7 @@ absl::Status Registry::CheckChunk(Locked& locked, RegisteredHull& hull, const Pe
   if (absl::Status s = CheckChunkRevision(pending.session, hull.head.record, chunk); !s.ok()) {
     return s;
   }
-  if (absl::Status s = CheckPointCount(hull.head.record, chunk, limits_); !s.ok()) return s;
+  if (absl::Status s = CheckPointCount(hull.head.record, pending.chunk, limits_); !s.ok()) return s;
   return CheckMemoryLocked(locked);
 }
 

@@ -94,7 +94,7 @@ absl::Status ReplaceStream::Build() {
       *points,
       {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call_.ShouldStop(); }});
   if (absl::IsResourceExhausted(added.status())) {
-    return LimitExceeded(absl::StrCat(name, "the hull would hold too many vertices"),
+    return LimitExceeded(name + "the hull would hold too many vertices",
                          limits.max_vertices_per_hull, "max-vertices-per-hull");
   }
   if (!added.ok()) return Prefixed(name, added.status());
@@ -109,9 +109,9 @@ absl::Status ReplaceStream::Build() {
 void ReplaceStream::Commit() {
   registry_.Replace(std::move(replacement_), [this](const absl::StatusOr<ReplaceResult>& result) {
     if (!result.ok()) return End(result.status());
-    call_.metrics().CountPoints(result->hull.counts);
     call_.Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
               {{"hull", result->hull.hull_id}});
+    call_.metrics().CountPoints(result->hull.counts);
     EncodeHeader(registry_.store(), result->store_revision, response_->mutable_header());
     EncodeRecord(result->hull, response_->mutable_hull());
     response_->set_created(result->created);

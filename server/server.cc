@@ -19,8 +19,6 @@ namespace {
 // At least two, so that one long task does not hold up all others.
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
-// Long tasks give way to those of microseconds, but not as far as batches do.
-constexpr int kLongReadersNiceness = 1;
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   if (config.store == "memory") return std::make_unique<MemoryStore>();
   RocksDbOptions options;
@@ -30,6 +28,8 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   options.env = config.store_env;
   return RocksDbStore::Open(std::move(options));
 }
+// Long tasks give way to those of microseconds, but not as far as batches do.
+constexpr int kLongReadersNiceness = 1;
 
 }  // namespace
 

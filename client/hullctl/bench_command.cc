@@ -262,8 +262,7 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
     PrintTable(arguments, result, run.out);
   }
   if (!deleted.ok()) {
-    run.err << "hullctl: hulls of the load may be left: see 'hullctl list --prefix " << prefix
-            << "'\n";
+    run.err << "hullctl: hulls of the load may be left: see 'hullctl list " << prefix << "'\n";
     return run.Fail(deleted);
   }
   if (!created.ok() && !interrupted) return run.Fail(created);

@@ -314,7 +314,7 @@ TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
         << mode;
     EXPECT_EQ(ran.err, "") << mode;
   }
-  EXPECT_EQ(Ask({"list"}).out, Ask({"list", "--prefix", "cube"}).out);
+  EXPECT_EQ(Ask({"list"}).out, Ask({"list", "cube"}).out);
 }
 
 TEST_F(HullctlOnServer, LoadCountsItemsInJson) {

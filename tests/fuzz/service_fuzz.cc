@@ -24,8 +24,8 @@ server::Config SmallConfig(const std::string& socket) {
   config.threads = 2;
   config.limits.max_message_bytes = 64 << 10;
   config.limits.max_points_per_chunk = 64;
-  config.limits.max_vertices_per_hull = 24;
-  config.limits.max_hulls = 9;
+  config.limits.max_vertices_per_hull = 12;
+  config.limits.max_hulls = 7;
   config.limits.max_pairs_per_batch = 60;
   config.limits.max_textbook_axes = 100;
   return config;

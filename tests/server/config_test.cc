@@ -81,8 +81,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"max-pairs-per-batch", "14"},
                                                        {"max-textbook-axes", "15"},
                                                        {"max-message-bytes", "16"},
-                                                       {"max-points-per-hull", "17"},
-                                                       {"max-placements", "18"},
+                                                       {"max-points-per-hull", "27"},
+                                                       {"max-placements", "28"},
                                                        {"max-calls", "19"},
                                                        {"max-waiting-calls", "20"},
                                                        {"max-streams-per-client", "21"},
@@ -93,8 +93,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"metrics-insecure", "true"},
                                                        {"data-dir", "/tmp/d"},
                                                        {"durability", "relaxed"},
-                                                       {"memory-limit", "23"},
-                                                       {"max-writers-per-hull", "24"},
+                                                       {"memory-limit", "17"},
+                                                       {"max-writers-per-hull", "18"},
                                                        {"tls-cert", "/c"},
                                                        {"tls-key", "/k"},
                                                        {"tls-client-ca", "/a"},
@@ -123,9 +123,14 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_hulls, 13);
     EXPECT_EQ(config.limits.max_pairs_per_batch, 14);
     EXPECT_EQ(config.limits.max_textbook_axes, 15);
+    EXPECT_EQ(config.store, "memory");
+    EXPECT_EQ(config.data_dir, "/tmp/d");
+    EXPECT_EQ(config.durability, "relaxed");
+    EXPECT_EQ(config.limits.memory_limit, 17);
+    EXPECT_EQ(config.limits.max_writers_per_hull, 18);
     EXPECT_EQ(config.limits.max_message_bytes, 16);
-    EXPECT_EQ(config.limits.max_points_per_hull, 17);
-    EXPECT_EQ(config.limits.max_placements, 18);
+    EXPECT_EQ(config.limits.max_points_per_hull, 27);
+    EXPECT_EQ(config.limits.max_placements, 28);
     EXPECT_EQ(config.limits.max_calls, 19);
     EXPECT_EQ(config.limits.max_waiting_calls, 20);
     EXPECT_EQ(config.limits.max_streams_per_client, 21);
@@ -134,11 +139,6 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.slow_request, std::chrono::milliseconds(250));
     EXPECT_EQ(config.metrics_address, "127.0.0.1:1");
     EXPECT_TRUE(config.metrics_insecure);
-    EXPECT_EQ(config.store, "memory");
-    EXPECT_EQ(config.data_dir, "/tmp/d");
-    EXPECT_EQ(config.durability, "relaxed");
-    EXPECT_EQ(config.limits.memory_limit, 23);
-    EXPECT_EQ(config.limits.max_writers_per_hull, 24);
     EXPECT_EQ(config.tls_cert, "/c");
     EXPECT_EQ(config.tls_key, "/k");
     EXPECT_EQ(config.tls_client_ca, "/a");
@@ -207,6 +207,10 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--max-pairs-per-batch",
                            "--max-textbook-axes",
                            "--max-message-bytes",
+                           "--data-dir",
+                           "--durability",
+                           "--memory-limit",
+                           "--max-writers-per-hull",
                            "--max-points-per-hull",
                            "--max-placements",
                            "--max-calls",
@@ -218,10 +222,6 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--metrics-address",
                            "--metrics-insecure",
                            "--config",
-                           "--data-dir",
-                           "--durability",
-                           "--memory-limit",
-                           "--max-writers-per-hull",
                            "--tls-cert",
                            "--tls-key",
                            "--tls-client-ca",
