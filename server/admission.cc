@@ -32,11 +32,11 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kFindCollisions:
       return CallKind::kBatch;
     case Rpc::kGetHullMesh:
-    case Rpc::kSaveSnapshot:
       return CallKind::kDownload;
     case Rpc::kAppendPoints:
     case Rpc::kReplaceHull:
     case Rpc::kStreamCollisions:
+    case Rpc::kSaveSnapshot:
       return CallKind::kStream;
   }
   return CallKind::kUnary;

@@ -30,7 +30,7 @@ enum class CallKind {
   kBatch,
   // One request, an answer of many messages.
   kDownload,
-  // Lasts as long as its client likes: --max-streams-per-client.
+  // Lasts as long as its client or the size of the store demands: --max-streams-per-client.
   kStream,
 };
 

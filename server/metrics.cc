@@ -215,6 +215,11 @@ void Metrics::AddGauge(const std::string& name, const std::string& help,
   refresh_.push_back([&gauge, read = std::move(read)] { gauge.Set(read()); });
 }
 
+void Metrics::AddRefresh(std::function<void()> refresh) {
+  const std::lock_guard lock(refresh_mutex_);
+  refresh_.push_back(std::move(refresh));
+}
+
 std::vector<prometheus::MetricFamily> Metrics::Collect() const {
   {
     const std::lock_guard lock(refresh_mutex_);

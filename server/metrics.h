@@ -80,7 +80,7 @@ class Metrics : public prometheus::Collectable {
   void CountLimit(const std::string& limit);
   // hulld_auth_failures_total: the reason is one of few words, as in "unknown_token".
   void CountAuthFailure(const std::string& reason);
-  // hulld_points_total{outcome}, of one committed chunk.
+  // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of one committed chunk.
   void CountPoints(const PointCounts& counts);
   // hulld_pairs_total{rung}, hulld_exact_fallbacks_total.
   void CountPairs(const RungCounts& counts);
@@ -91,6 +91,10 @@ class Metrics : public prometheus::Collectable {
 
   // A gauge that is read whenever Prometheus asks. What `read` uses must outlive the exposition.
   void AddGauge(const std::string& name, const std::string& help, std::function<double()> read);
+
+  // Called before each exposition, to bring up to date what others count themselves. What it uses
+  // must outlive the exposition.
+  void AddRefresh(std::function<void()> refresh);
 
   // What Prometheus reads.
   std::vector<prometheus::MetricFamily> Collect() const override;

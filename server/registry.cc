@@ -70,6 +70,7 @@ absl::Status Registry::Load() {
         StoredHull nothing;
         nothing.record.hull_id = id;
         Insert(nothing)->damage = stored.status();
+        ++cache_.damaged;
       });
   if (damaged > 0) spdlog::error("{} of {} hulls are damaged", damaged, hulls_.size());
   return status;
@@ -336,7 +337,9 @@ CacheStatistics Registry::Cache() const {
 
 CommitStatistics Registry::Commits() const {
   const std::lock_guard lock(mutex_);
-  return commits_;
+  CommitStatistics commits = commits_;
+  commits.failing = store_failed_;
+  return commits;
 }
 
 }  // namespace hulld::server

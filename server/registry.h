@@ -19,6 +19,7 @@
 #include "core/hull/hull_builder.h"
 #include "server/config.h"
 #include "server/hull_record.h"
+#include "server/metrics.h"
 #include "server/snapshot.h"
 #include "server/store.h"
 #include "server/worker_pool.h"
@@ -93,6 +94,8 @@ struct CacheStatistics {
   uint64_t loads = 0;
   // Builders and snapshots dropped to stay within the limit.
   uint64_t evictions = 0;
+  // Hulls found damaged in the store.
+  uint64_t damaged = 0;
 };
 
 // How changes reached the store so far.
@@ -100,6 +103,8 @@ struct CommitStatistics {
   uint64_t batches = 0;
   uint64_t changes = 0;
   uint64_t failed_batches = 0;
+  // The last batch failed.
+  bool failing = false;
 };
 
 // One chunk of a writer.
@@ -195,6 +200,8 @@ class Registry {
   RegistrySizes Sizes() const;
   CacheStatistics Cache() const;
   CommitStatistics Commits() const;
+  // Where each batch is timed and counted; set before the first change, and outlives this.
+  void SetMetrics(StoreMetrics& metrics) { metrics_ = &metrics; }
   // RESOURCE_EXHAUSTED: --memory-limit, although all that can be dropped was.
   absl::Status CheckMemory();
 
@@ -289,6 +296,7 @@ class Registry {
   absl::Status CheckMemoryLocked(Locked& locked);
 
   Store& store_;
+  StoreMetrics* metrics_ = nullptr;
   // With the memory limit in force.
   const Limits limits_;
   WorkerPool& writers_;

@@ -252,7 +252,10 @@ absl::StatusOr<Change> Registry::Build(Locked& locked, const HullPointer& hull,
   hull->builder = std::move(builder);
   hull->builder_bytes = builder_bytes;
   const std::string& id = hull->head.record.hull_id;
-  if (absl::IsDataLoss(added.status())) hull->damage = added.status();
+  if (absl::IsDataLoss(added.status())) {
+    hull->damage = added.status();
+    ++cache_.damaged;
+  }
   if (absl::IsResourceExhausted(added.status())) {
     return LimitExceeded(absl::StrCat(name, QuotedHull(id), " would hold too many vertices"),
                          limits_.max_vertices_per_hull, "max-vertices-per-hull");

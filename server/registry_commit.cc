@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "server/registered_hull.h"
@@ -86,7 +87,14 @@ absl::Status Registry::CommitBatch(Locked& locked, const std::vector<PendingComm
   locked.Unlock();
   absl::Status status;
   if (recover) status = store_.Recover();
+  const auto start = std::chrono::steady_clock::now();
   if (status.ok()) status = store_.Commit(changes);
+  if (metrics_ != nullptr) {
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    metrics_->commit_seconds.Observe(taken.count());
+    metrics_->commit_changes.Observe(static_cast<double>(changes.size()));
+    if (!status.ok()) metrics_->write_failures.Increment();
+  }
   locked.Lock();
   if (status.ok()) store_failed_ = false;
   return status;

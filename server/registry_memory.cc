@@ -12,6 +12,9 @@
 namespace hulld::server {
 namespace {
 
+// When hulls in use may have come to rest.
+constexpr std::chrono::milliseconds kRetryMemory(1000);
+
 // How soon a reader that waits for a chunk notices that its call was cancelled.
 constexpr std::chrono::milliseconds kCancellationPoll(20);
 
@@ -88,7 +91,10 @@ absl::Status Registry::MakeSnapshot(Locked& locked, RegisteredHull& hull,
     }
     hull.builder_bytes = hull.builder == nullptr ? 0 : builder_bytes;
     hull.snapshot = std::move(snapshot);
-    if (absl::IsDataLoss(status)) hull.damage = status;
+    if (absl::IsDataLoss(status)) {
+      hull.damage = status;
+      ++cache_.damaged;
+    }
   }
   Charge(locked, hull);
   hull.released.notify_all();
@@ -229,8 +235,8 @@ void Registry::Evict(Locked& locked) {
 absl::Status Registry::CheckMemoryLocked(Locked& locked) {
   Evict(locked);
   if (cache_.bytes <= limits_.memory_limit) return absl::OkStatus();
-  return LimitExceeded(absl::StrCat("hulls in use hold ", cache_.bytes, " bytes of memory"),
-                       limits_.memory_limit, "memory-limit");
+  return Overloaded(absl::StrCat("hulls in use hold ", cache_.bytes, " bytes of memory"),
+                    limits_.memory_limit, "memory-limit", kRetryMemory);
 }
 
 absl::Status Registry::CheckMemory() {

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <chrono>
 #include <utility>
 
 #include "server/decode.h"
@@ -53,9 +54,10 @@ void ReplaceStream::OnReadDone(bool ok) {
       if (!opened) {
         return End(absl::InvalidArgumentError("the first message must be open, not points"));
       }
-      workers_.Submit([this] {
+      workers_.Submit([this, arrival = std::chrono::steady_clock::now()] {
         const absl::Status built = Build();
         if (!built.ok()) return End(call_.ShouldStop() ? call_.StopStatus() : built);
+        call_.EndMessage(arrival);
         Read();
       });
       return;
@@ -81,6 +83,12 @@ absl::Status ReplaceStream::Build() {
   const absl::StatusOr<std::vector<Vector>> points =
       DecodePoints(request_.points(), limits.max_points_per_chunk);
   if (!points.ok()) return Prefixed(name, points.status());
+  call_.AddPoints(points->size());
+  const uint64_t received = replacement_.counts.received + points->size();
+  if (received > limits.max_points_per_hull) {
+    return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
+                         limits.max_points_per_hull, "max-points-per-hull");
+  }
   if (absl::Status s = registry_.CheckMemory(); !s.ok()) return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,

@@ -52,6 +52,22 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
 }
 
 void Server::AddSizesToMetrics() {
+  registry_.SetMetrics(metrics_.store());
+  metrics_.AddRefresh([this] {
+    const auto advance = [](prometheus::Counter& counter, uint64_t now) {
+      const double passed = static_cast<double>(now) - counter.Value();
+      if (passed > 0) counter.Increment(passed);
+    };
+    const StoreMetrics& store = metrics_.store();
+    const CacheStatistics cache = registry_.Cache();
+    advance(store.cache_hits, cache.hits);
+    advance(store.cache_misses, cache.misses);
+    advance(store.cache_evictions, cache.evictions);
+    advance(store.damaged_records, cache.damaged);
+    store.cache_bytes.Set(static_cast<double>(cache.bytes));
+    store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
+    store.read_only.Set(registry_.Commits().failing ? 1 : 0);
+  });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().hull_count); });
   metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",

@@ -32,6 +32,8 @@ grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* 
     message->set_max_hulls(limits.max_hulls);
     message->set_max_pairs_per_batch(limits.max_pairs_per_batch);
     message->set_max_textbook_axes(limits.max_textbook_axes);
+    message->set_max_writers_per_hull(limits.max_writers_per_hull);
+    message->set_memory_limit_bytes(limits.memory_limit);
     message->set_max_message_bytes(limits.max_message_bytes);
     message->set_max_points_per_hull(limits.max_points_per_hull);
     message->set_max_placements(limits.max_placements);

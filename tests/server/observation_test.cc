@@ -124,8 +124,22 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
   EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
   EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
-  // Quick pairs are answered where they arrive; what nobody has resolved yet waits for a thread.
+  // The first one makes what queries need of the hull, which is no work for the thread of gRPC.
   EXPECT_GE(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
+}
+
+TEST_F(Observation, TheStoreAndItsCacheReport) {
+  Put("a", Cube());
+  Check(PairRequest("a", "a", 50));
+  Check(PairRequest("a", "a", 50));
+  EXPECT_EQ(Metric("hulld_store_commit_duration_seconds_count"), 2);
+  EXPECT_EQ(Metric("hulld_store_commit_changes_sum"), 2);
+  EXPECT_EQ(Metric("hulld_store_failures_total{operation=\"write\"}"), 0);
+  EXPECT_EQ(Metric("hulld_store_read_only"), 0);
+  EXPECT_GE(Metric("hulld_cache_lookups_total{result=\"miss\"}"), 1);
+  EXPECT_GE(Metric("hulld_cache_lookups_total{result=\"hit\"}"), 1);
+  EXPECT_GT(Metric("hulld_cache_bytes"), 0);
+  EXPECT_GT(Metric("hulld_cache_limit_bytes"), Metric("hulld_cache_bytes"));
 }
 
 TEST_F(Observation, PairsOfBatchesScenesAndStreamsAreCountedByRung) {
