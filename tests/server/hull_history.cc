@@ -89,15 +89,17 @@ bool Create(State& state, const Operation& operation) {
   return true;
 }
 
+// Whether the condition may have failed. A lost answer leaves open which revision it is.
 bool Mismatch(const State& state, const Operation& operation) {
   if (!operation.if_revision) return false;
-  // A lost answer leaves open which revision it is.
-  return state.revision_known && *operation.if_revision != state.revision;
+  return !state.revision_known || *operation.if_revision != state.revision;
 }
 
+// Whether the condition may have held.
 bool Match(const State& state, const Operation& operation) {
-  return !operation.if_revision || !state.revision_known ||
-         *operation.if_revision == state.revision;
+  if (!operation.if_revision) return true;
+  return state.revision_known ? *operation.if_revision == state.revision
+                              : *operation.if_revision > state.revision;
 }
 
 bool SameCounts(const State& state, const Operation& operation) {
@@ -231,6 +233,9 @@ std::string Describe(const Operation& operation) {
   return text;
 }
 
+// How many operations before those that cannot be explained a fault shows.
+constexpr size_t kReported = 40;
+
 // Depth-first search for an order, over the operations sorted by invocation.
 class OrderSearch {
  public:
@@ -251,6 +256,11 @@ class OrderSearch {
                      " answers; the hull was then ", best_state_.Key(), "; none of these follows:");
     for (const size_t i : best_candidates_) {
       absl::StrAppend(&fault, "\n  ", Describe(operations_[i]));
+    }
+    absl::StrAppend(&fault, "\nbefore them, in the order of their calls:");
+    const size_t end = best_candidates_.empty() ? operations_.size() : best_candidates_.front();
+    for (size_t i = end > kReported ? end - kReported : 0; i < end; ++i) {
+      absl::StrAppend(&fault, "\n  ", best_done_[i] ? "" : "(left out) ", Describe(operations_[i]));
     }
     return fault;
   }
@@ -305,10 +315,11 @@ class OrderSearch {
     bool found = false;
     if (seen_.insert(Key(state)).second) {
       const std::vector<size_t> candidates = Candidates(latest);
-      if (count >= best_count_) {
+      if (count > best_count_ || best_done_.empty()) {
         best_count_ = count;
         best_state_ = state;
         best_candidates_ = candidates;
+        best_done_ = done_;
       }
       for (const size_t i : candidates) {
         State next = state;
@@ -335,6 +346,7 @@ class OrderSearch {
   size_t best_count_ = 0;
   State best_state_;
   std::vector<size_t> best_candidates_;
+  std::vector<bool> best_done_;
 };
 
 // What is wrong with the store's revisions across all hulls.

@@ -78,6 +78,16 @@ TEST(LinearizabilityCheck, AChangeWithoutAnAnswerMayOrMayNotHaveHappened) {
             "");
 }
 
+TEST(LinearizabilityCheck, AConditionMayFailBecauseOfAChangeWithoutAnAnswer) {
+  Operation lost = AppendAt(3, 4, 0, 5, 1);
+  lost.outcome = Outcome::kUnknown;
+  Operation refused = Answered(Kind::kDelete, 5, 6, 0);
+  refused.outcome = Outcome::kAborted;
+  refused.if_revision = 1;
+  EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), lost, refused, ProbeAt(7, 8, 4, 5, true)}), "");
+  EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), lost, refused, ProbeAt(7, 8, 1, 5, false)}), "");
+}
+
 TEST(LinearizabilityCheck, WhatAnEndedServerDidNotAnswerCannotHappenLater) {
   Operation lost = AppendAt(3, UINT64_MAX, 0, 5, 1);
   lost.outcome = Outcome::kUnknown;
