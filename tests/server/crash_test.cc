@@ -231,11 +231,13 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
   const std::vector<std::vector<Vector>> blocks = GrowingBall(20 * kills, 200);
   StartServer();
   std::atomic<size_t> sent = 0;
-  std::thread writer([&] {
+  const auto write = [&] {
     const Client client = MakeClient();
     AppendOptions options;
     options.create_if_absent = true;
     options.writer_id = "survivor";
+    // Few, so that most kills meet chunks on their way.
+    options.max_in_flight_chunks = 4;
     auto appender = client.OpenAppend("interrupted/append", options);
     ASSERT_TRUE(appender.ok()) << appender.status();
     for (const std::vector<Vector>& block : blocks) {
@@ -245,6 +247,7 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
       const absl::Status appended = (*appender)->Append(std::move(message));
       ASSERT_TRUE(appended.ok()) << appended;
       ++sent;
+      sent.notify_all();
     }
     const absl::Status finished = (*appender)->Finish();
     EXPECT_TRUE(finished.ok()) << finished;
@@ -252,12 +255,18 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
     std::printf("%d kills, %llu reconnects, %llu chunks recovered\n", kills,
                 static_cast<unsigned long long>((*appender)->totals().reconnects),
                 static_cast<unsigned long long>((*appender)->totals().chunks_recovered));
+  };
+  std::thread writer([&] {
+    write();
+    // Whatever came of it: nobody is to wait for more.
+    sent = blocks.size();
+    sent.notify_all();
   });
   for (int kill = 1; kill <= kills; ++kill) {
     // After a number of chunks and not a time; the last kill may come when all are sent.
-    while (sent < blocks.size() * static_cast<size_t>(kill) / static_cast<size_t>(kills + 1)) {
-      std::this_thread::yield();
-    }
+    const size_t enough =
+        blocks.size() * static_cast<size_t>(kill) / static_cast<size_t>(kills + 1);
+    for (size_t now = sent; now < enough; now = sent) sent.wait(now);
     server_->Signal(SIGKILL);
     EXPECT_EQ(server_->Wait(), -1);
     StartServer();
