@@ -148,8 +148,13 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
     writable = writable && writer->Write(request);
     return writable ? absl::OkStatus() : absl::CancelledError("the call has ended");
   });
-  // Without this the server would take what it has for all.
-  if (!fed.ok() && writable) context.TryCancel();
+  if (fed.ok() && writable) {
+    // Says that nothing is missing.
+    request.mutable_points()->Clear();
+    writer->Write(request);
+  } else if (writable) {
+    context.TryCancel();
+  }
   writer->WritesDone();
   const absl::Status status = FromGrpcStatus(writer->Finish());
   if (!fed.ok() && writable) return fed;

@@ -36,8 +36,13 @@ void ReplaceStream::OnReadDone(bool ok) {
   const bool opened = replacement_.builder != nullptr;
   if (!ok) {
     if (absl::Status s = WhyNotRead(request_); !s.ok()) return End(s);
-    // The client has said all.
-    if (opened) return Commit();
+    // Only the empty block tells a client that has said all from one that is gone.
+    if (opened && complete_) return Commit();
+    if (opened) {
+      return End(absl::InvalidArgumentError(
+          "the stream ended without an empty block of points, which says that nothing is missing; "
+          "the hull is as it was"));
+    }
     return End(absl::InvalidArgumentError("the stream ended before its first message, open"));
   }
   ++messages_;
@@ -54,6 +59,8 @@ void ReplaceStream::OnReadDone(bool ok) {
       if (!opened) {
         return End(absl::InvalidArgumentError("the first message must be open, not points"));
       }
+      complete_ = request_.points().xyz().empty() && request_.points().xyz_float().empty();
+      if (complete_) return Read();
       workers_.Submit([this, arrival = std::chrono::steady_clock::now()] {
         const absl::Status built = Build();
         if (!built.ok()) return End(call_.ShouldStop() ? call_.StopStatus() : built);

@@ -49,6 +49,8 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
   v1::ReplaceHullRequest request_;
   Replacement replacement_;
   uint64_t messages_ = 0;
+  // The last message was an empty block.
+  bool complete_ = false;
 };
 
 }  // namespace hulld::server

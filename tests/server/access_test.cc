@@ -83,7 +83,10 @@ const std::map<std::string, CallRule>& Rules() {
           open.mutable_open()->set_create_if_absent(true);
           v1::ReplaceHullRequest points;
           for (const double number : Cube()) points.mutable_points()->add_xyz(number);
-          return std::vector{open.SerializeAsString(), points.SerializeAsString()};
+          v1::ReplaceHullRequest end;
+          end.mutable_points();
+          return std::vector{open.SerializeAsString(), points.SerializeAsString(),
+                             end.SerializeAsString()};
         },
         CallRule::kByStatus}},
       {"hulld.v1.HullService.GetHull",

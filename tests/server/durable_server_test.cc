@@ -106,6 +106,18 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
   });
   EXPECT_THAT(std::string(broken.status().message()), HasSubstr("the file ends early"));
   EXPECT_EQ(Get("h").hull().SerializeAsString(), before);
+  // A stream that is cut off looks like one that its client has ended, but for the last message.
+  grpc::ClientContext context;
+  v1::ReplaceHullResponse response;
+  const auto writer = hulls_->ReplaceHull(&context, &response);
+  v1::ReplaceHullRequest request;
+  *request.mutable_open() = open;
+  ASSERT_TRUE(writer->Write(request));
+  for (const double x : Cube()) request.mutable_points()->add_xyz(x);
+  ASSERT_TRUE(writer->Write(request));
+  writer->WritesDone();
+  EXPECT_EQ(writer->Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(Get("h").hull().SerializeAsString(), before);
   open.set_hull_id("none");
   EXPECT_EQ(Replace(open, Cube()).status().code(), absl::StatusCode::kNotFound);
   open.set_create_if_absent(true);
