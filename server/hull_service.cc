@@ -110,7 +110,9 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   response->set_facet_count(view.snapshot->hull().facet_count());
   EncodeBox(view.snapshot->hull(), response);
   if (request.audit()) {
-    const absl::Status finding = AuditHull(view.snapshot->hull());
+    const absl::Status finding =
+        AuditHull(view.snapshot->hull(), [&call] { return call.ShouldStop(); });
+    if (absl::IsCancelled(finding)) return finding;
     response->mutable_audit()->set_ok(finding.ok());
     if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
   }

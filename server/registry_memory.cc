@@ -73,11 +73,15 @@ absl::Status Registry::MakeSnapshot(Locked& locked, RegisteredHull& hull,
     status = loaded.status();
     if (loaded.ok()) builder = *std::move(loaded);
   }
-  if (builder != nullptr) snapshot = std::make_shared<const Snapshot>(builder->Snapshot());
+  if (builder != nullptr) {
+    absl::StatusOr<Hull> made = builder->Snapshot(should_stop);
+    if (made.ok()) snapshot = std::make_shared<const Snapshot>(*std::move(made));
+    status = made.status();
+  }
   const size_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
   locked.Lock();
 
-  if (load && status.ok()) ++cache_.loads;
+  if (load && builder != nullptr) ++cache_.loads;
   hull.busy = false;
   if (hull.reverts != reverts || hull.state == RegisteredHull::State::kGone) {
     locked.Discard(std::move(builder));

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/hull/stop_poll.h"
 #include "core/numeric/integer.h"
 
 namespace hulld {
@@ -23,13 +24,18 @@ struct IntegerPoints {
 
 constexpr int kAboveAllExponents = 1024;
 
-IntegerPoints ToIntegers(std::span<const Vector> points, std::span<const Vector> also = {}) {
+// Incomplete when stopped.
+IntegerPoints ToIntegers(std::span<const Vector> points, std::span<const Vector> also,
+                         StopPoll& poll) {
   int exponent = kAboveAllExponents;
   for (const Vector& p : points) exponent = LowestBitExponent(p, exponent);
   for (const Vector& p : also) exponent = LowestBitExponent(p, exponent);
   IntegerPoints result{exponent, {}};
   result.points.reserve(points.size());
-  for (const Vector& p : points) result.points.push_back(ToInteger(p, exponent));
+  for (const Vector& p : points) {
+    if (poll.Step()) break;
+    result.points.push_back(ToInteger(p, exponent));
+  }
   return result;
 }
 
@@ -37,6 +43,8 @@ template <typename... Parts>
 absl::Status Finding(const Parts&... parts) {
   return absl::InternalError(absl::StrCat(parts...));
 }
+
+absl::Status Stopped() { return absl::CancelledError("stopped in an audit"); }
 
 absl::Status CheckVertices(const Hull& hull) {
   const std::span<const Vector> v = hull.vertices();
@@ -59,7 +67,7 @@ IntegerVector NormalOf(const std::vector<IntegerVector>& v, std::span<const uint
 }
 
 absl::Status CheckFacet(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet,
-                        size_t index) {
+                        size_t index, StopPoll& poll) {
   const size_t n = facet.size();
   if (n < 3) return Finding("facet ", index, " has fewer than three vertices");
   for (const uint32_t u : facet) {
@@ -70,6 +78,7 @@ absl::Status CheckFacet(const std::vector<IntegerVector>& v, std::span<const uin
   }
   const IntegerVector normal = NormalOf(v, facet);
   for (size_t i = 0; i < n; ++i) {
+    if (poll.Step()) return Stopped();
     const IntegerVector& a = v[facet[i]];
     const IntegerVector& b = v[facet[(i + 1) % n]];
     const IntegerVector& c = v[facet[(i + 2) % n]];
@@ -88,12 +97,13 @@ absl::Status CheckFacet(const std::vector<IntegerVector>& v, std::span<const uin
 // A directed edge and the facet to its left.
 using FacetByEdge = std::map<std::pair<uint32_t, uint32_t>, size_t>;
 
-absl::StatusOr<FacetByEdge> CheckManifold(const Hull& hull) {
+absl::StatusOr<FacetByEdge> CheckManifold(const Hull& hull, StopPoll& poll) {
   FacetByEdge left;
   std::vector<Edge> edges;
   for (size_t f = 0; f < hull.facet_count(); ++f) {
     const std::span<const uint32_t> facet = hull.facet(f);
     for (size_t i = 0; i < facet.size(); ++i) {
+      if (poll.Step()) return Stopped();
       const uint32_t tail = facet[i];
       const uint32_t head = facet[(i + 1) % facet.size()];
       if (!left.emplace(std::pair(tail, head), f).second) {
@@ -103,6 +113,7 @@ absl::StatusOr<FacetByEdge> CheckManifold(const Hull& hull) {
     }
   }
   for (const auto& [edge, facet] : left) {
+    if (poll.Step()) return Stopped();
     if (!left.contains({edge.second, edge.first})) {
       return Finding("edge ", edge.first, "-", edge.second, " bounds one facet only");
     }
@@ -114,7 +125,7 @@ absl::StatusOr<FacetByEdge> CheckManifold(const Hull& hull) {
   return left;
 }
 
-absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left) {
+absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left, StopPoll& poll) {
   std::vector<size_t> parent(hull.facet_count());
   std::iota(parent.begin(), parent.end(), size_t{0});
   const auto root = [&](size_t f) {
@@ -122,6 +133,7 @@ absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left) {
     return f;
   };
   for (const auto& [edge, facet] : left) {
+    if (poll.Step()) return Stopped();
     parent[root(facet)] = root(left.at({edge.second, edge.first}));
   }
   std::vector<char> used(hull.vertices().size(), 0);
@@ -141,8 +153,9 @@ absl::Status CheckConnected(const Hull& hull, const FacetByEdge& left) {
 
 // Every facet's neighbour across an edge bends strictly inwards.
 absl::Status CheckLocalConvexity(const std::vector<IntegerVector>& v, const Hull& hull,
-                                 const FacetByEdge& left) {
+                                 const FacetByEdge& left, StopPoll& poll) {
   for (const auto& [edge, f] : left) {
+    if (poll.Step()) return Stopped();
     const std::span<const uint32_t> other = hull.facet(left.at({edge.second, edge.first}));
     const size_t tail = std::find(other.begin(), other.end(), edge.first) - other.begin();
     const IntegerVector& beyond = v[other[(tail + 1) % other.size()]];
@@ -156,7 +169,8 @@ absl::Status CheckLocalConvexity(const std::vector<IntegerVector>& v, const Hull
 // A closed surface that is locally convex is convex when a point lies below all its facets and a
 // ray from there meets it once. Coordinates are multiplied by the number of vertices, so that their
 // mean is an integer.
-absl::Status CheckGlobalConvexity(const std::vector<IntegerVector>& v, const Hull& hull) {
+absl::Status CheckGlobalConvexity(const std::vector<IntegerVector>& v, const Hull& hull,
+                                  StopPoll& poll) {
   const Integer count = v.size();
   IntegerVector mean = {0, 0, 0};
   for (const IntegerVector& p : v) mean = mean + p;
@@ -171,6 +185,7 @@ absl::Status CheckGlobalConvexity(const std::vector<IntegerVector>& v, const Hul
     }
     bool pierced = true;
     for (size_t i = 0; i < facet.size() && pierced; ++i) {
+      if (poll.Step()) return Stopped();
       const IntegerVector side =
           Cross(from_mean(facet[i]), from_mean(facet[(i + 1) % facet.size()]));
       pierced = Sign(Dot(side, ray)) >= 0;
@@ -180,28 +195,28 @@ absl::Status CheckGlobalConvexity(const std::vector<IntegerVector>& v, const Hul
   return absl::OkStatus();
 }
 
-absl::Status AuditSolid(const std::vector<IntegerVector>& v, const Hull& hull) {
+absl::Status AuditSolid(const std::vector<IntegerVector>& v, const Hull& hull, StopPoll& poll) {
   for (size_t f = 0; f < hull.facet_count(); ++f) {
-    if (absl::Status s = CheckFacet(v, hull.facet(f), f); !s.ok()) return s;
+    if (absl::Status s = CheckFacet(v, hull.facet(f), f, poll); !s.ok()) return s;
     if (f > 0 && !std::lexicographical_compare(hull.facet(f - 1).begin(), hull.facet(f - 1).end(),
                                                hull.facet(f).begin(), hull.facet(f).end())) {
       return Finding("facets ", f - 1, " and ", f, " are out of order");
     }
   }
   if (hull.facet_count() < 4) return Finding("a solid has at least four facets");
-  const absl::StatusOr<FacetByEdge> left = CheckManifold(hull);
+  const absl::StatusOr<FacetByEdge> left = CheckManifold(hull, poll);
   if (!left.ok()) return left.status();
-  if (absl::Status s = CheckConnected(hull, *left); !s.ok()) return s;
-  if (absl::Status s = CheckLocalConvexity(v, hull, *left); !s.ok()) return s;
-  return CheckGlobalConvexity(v, hull);
+  if (absl::Status s = CheckConnected(hull, *left, poll); !s.ok()) return s;
+  if (absl::Status s = CheckLocalConvexity(v, hull, *left, poll); !s.ok()) return s;
+  return CheckGlobalConvexity(v, hull, poll);
 }
 
-absl::Status AuditPolygon(const std::vector<IntegerVector>& v, const Hull& hull) {
+absl::Status AuditPolygon(const std::vector<IntegerVector>& v, const Hull& hull, StopPoll& poll) {
   if (hull.facet_count() != 1 || hull.facet(0).size() != v.size()) {
     return Finding("a polygon has one facet, with all vertices");
   }
   const std::span<const uint32_t> facet = hull.facet(0);
-  if (absl::Status s = CheckFacet(v, facet, 0); !s.ok()) return s;
+  if (absl::Status s = CheckFacet(v, facet, 0, poll); !s.ok()) return s;
   if (facet[1] > facet.back()) return Finding("the polygon is not the canonical way round");
   std::vector<Edge> edges;
   for (size_t i = 0; i < facet.size(); ++i) {
@@ -292,15 +307,20 @@ bool FlatContains(const std::vector<IntegerVector>& v, const Hull& hull, const I
 
 }  // namespace
 
-absl::Status AuditHull(const Hull& hull) {
+absl::Status AuditHull(const Hull& hull, const std::function<bool()>& should_stop) {
   if (absl::Status s = CheckVertices(hull); !s.ok()) return s;
   if (hull.dimension() < 2) return AuditEnds(hull);
-  const IntegerPoints v = ToIntegers(hull.vertices());
-  return hull.dimension() == 2 ? AuditPolygon(v.points, hull) : AuditSolid(v.points, hull);
+  StopPoll poll(should_stop);
+  const IntegerPoints v = ToIntegers(hull.vertices(), {}, poll);
+  if (poll.stopped()) return Stopped();
+  return hull.dimension() == 2 ? AuditPolygon(v.points, hull, poll)
+                               : AuditSolid(v.points, hull, poll);
 }
 
 absl::Status AuditContainment(const Hull& hull, std::span<const Vector> points) {
-  const IntegerPoints v = ToIntegers(hull.vertices(), points);
+  static const std::function<bool()> kNeverStop;
+  StopPoll poll(kNeverStop);
+  const IntegerPoints v = ToIntegers(hull.vertices(), points, poll);
   if (hull.dimension() == 3) return SolidContainment(v, hull, points);
   for (size_t i = 0; i < points.size(); ++i) {
     if (!FlatContains(v.points, hull, ToInteger(points[i], v.exponent))) {

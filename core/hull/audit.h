@@ -3,6 +3,7 @@
 
 #include <absl/status/status.h>
 
+#include <functional>
 #include <span>
 
 #include "core/hull/hull.h"
@@ -13,8 +14,9 @@ namespace hulld {
 // canonical coordinates and order, that every vertex is used, planar strictly convex facets, a
 // closed manifold with V - E + F = 2, strict local convexity at every edge, and global convexity
 // (Mehlhorn et al. 1996, Checking Geometric Programs). OK, or INTERNAL with the first finding.
+// CANCELLED when should_stop, which may be empty, said so; it is polled every 1024 steps.
 // Cost: O(V) exact operations, about 10 us each.
-absl::Status AuditHull(const Hull& hull);
+absl::Status AuditHull(const Hull& hull, const std::function<bool()>& should_stop = {});
 
 // Checks that every point is in the closed hull. OK, or INTERNAL naming the first point that is
 // not. Cost: O(n F).

@@ -88,9 +88,11 @@ std::vector<uint32_t> LoopOf(std::vector<Boundary> boundary) {
   return loop;
 }
 
-std::vector<char> FlatEdges(const VertexTable& vertices, const Surface& surface) {
+// Incomplete when stopped.
+std::vector<char> FlatEdges(const VertexTable& vertices, const Surface& surface, StopPoll& poll) {
   std::vector<char> is_flat(3 * surface.id_bound(), 0);
   surface.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
+    if (poll.Step()) return;
     for (int i = 0; i < 3; ++i) {
       const TriangleId other = t.neighbours[i];
       if (other < id) continue;
@@ -135,16 +137,19 @@ Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> lo
   return Hull(2, std::move(ranking.points), {0, n}, std::move(facet), std::move(edges));
 }
 
-Hull SnapshotOf(const VertexTable& vertices, const Surface& surface) {
+std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface,
+                               StopPoll& poll) {
+  const std::vector<char> is_flat = FlatEdges(vertices, surface, poll);
+  if (poll.stopped()) return std::nullopt;
   Ranking ranking = Rank(vertices, VerticesOf(vertices, surface));
-  const std::vector<char> is_flat = FlatEdges(vertices, surface);
 
   std::vector<std::vector<uint32_t>> facets;
   std::vector<char> visited(surface.id_bound(), 0);
   surface.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) {
-    if (!visited[id])
-      facets.push_back(LoopOf(CollectFacet(surface, ranking, is_flat, id, visited)));
+    if (poll.Step() || visited[id]) return;
+    facets.push_back(LoopOf(CollectFacet(surface, ranking, is_flat, id, visited)));
   });
+  if (poll.stopped()) return std::nullopt;
   std::sort(facets.begin(), facets.end());
 
   size_t corners = 0;

@@ -1,9 +1,11 @@
 #ifndef HULLD_CORE_HULL_CANONICAL_SNAPSHOT_H_
 #define HULLD_CORE_HULL_CANONICAL_SNAPSHOT_H_
 
+#include <optional>
 #include <span>
 
 #include "core/hull/hull.h"
+#include "core/hull/stop_poll.h"
 #include "core/hull/surface.h"
 #include "core/hull/vertex_table.h"
 
@@ -11,13 +13,13 @@ namespace hulld {
 
 // Turn the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles merged
 // exactly, facets and edges sorted. Cost: O(V log V), and one exact sign for each edge of a
-// surface.
+// surface; that of a surface is stopped by the poll, and nullopt then.
 
 // At most two vertices, in lexicographic order.
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);
 // A strictly convex polygon, its vertices in order, either way round.
 Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop);
-Hull SnapshotOf(const VertexTable& vertices, const Surface& surface);
+std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface, StopPoll& poll);
 
 }  // namespace hulld
 

@@ -13,6 +13,7 @@
 #include "core/hull/block_insertion.h"
 #include "core/hull/canonical_snapshot.h"
 #include "core/hull/polygon_boundary.h"
+#include "core/hull/stop_poll.h"
 #include "core/hull/surface.h"
 #include "core/hull/vertex_table.h"
 #include "core/numeric/orientation.h"
@@ -149,8 +150,9 @@ class HullBuilder::State {
   }
   uint64_t housekeeping_steps() const { return surface_ ? surface_->work() : 0; }
 
-  Hull Snapshot() const {
-    if (surface_) return SnapshotOf(vertices_, *surface_);
+  // nullopt when stopped.
+  std::optional<Hull> Snapshot(StopPoll& poll) const {
+    if (surface_) return SnapshotOf(vertices_, *surface_, poll);
     if (polygon_) return SnapshotOfPolygon(vertices_, polygon_->Loop());
     return SnapshotOfEnds(vertices_, ends_);
   }
@@ -254,6 +256,17 @@ size_t HullBuilder::MemoryBytes() const { return sizeof(*this) + state_->MemoryB
 
 uint64_t HullBuilder::housekeeping_steps() const { return state_->housekeeping_steps(); }
 
-Hull HullBuilder::Snapshot() const { return state_->Snapshot(); }
+Hull HullBuilder::Snapshot() const {
+  static const std::function<bool()> kNeverStop;
+  StopPoll poll(kNeverStop);
+  return *state_->Snapshot(poll);
+}
+
+absl::StatusOr<Hull> HullBuilder::Snapshot(const std::function<bool()>& should_stop) const {
+  StopPoll poll(should_stop);
+  std::optional<Hull> snapshot = state_->Snapshot(poll);
+  if (!snapshot.has_value()) return absl::CancelledError("stopped while making a snapshot");
+  return *std::move(snapshot);
+}
 
 }  // namespace hulld

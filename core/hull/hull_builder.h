@@ -80,6 +80,9 @@ class HullBuilder {
   // The canonical snapshot of all points added so far. Cost: O(V log V), exact coplanarity tests at
   // every ridge.
   Hull Snapshot() const;
+  // The same, but CANCELLED when should_stop, which may be empty, said so. It is polled every 1024
+  // triangles, twice over; sorting what they made is not interrupted.
+  absl::StatusOr<Hull> Snapshot(const std::function<bool()>& should_stop) const;
 
  private:
   class State;

@@ -53,6 +53,34 @@ void ExpectFound(const Parts& parts, const char* what) {
   EXPECT_EQ(status.code(), absl::StatusCode::kInternal) << what;
 }
 
+// What an audit of `hull` is when should_stop is first true at its poll number `last`; 0: never.
+absl::Status AuditUntil(const Hull& hull, int last, int* polls) {
+  *polls = 0;
+  return AuditHull(hull, [last, polls] { return ++*polls == last; });
+}
+
+TEST(Audit, StopsWheneverItIsToldTo) {
+  Random random(41);
+  const Hull solid = BuildHull(RandomOnSphere(random, 4000, 2));
+  std::vector<Vector> circle;
+  for (int i = -3000; i <= 3000; ++i) circle.emplace_back(i, i * i, 0);
+  for (const Hull& hull : {solid, BuildHull(circle)}) {
+    int polls = 0;
+    EXPECT_TRUE(AuditUntil(hull, 0, &polls).ok());
+    // Every vertex and every corner of a facet is a step at least.
+    size_t steps = hull.vertices().size();
+    for (size_t f = 0; f < hull.facet_count(); ++f) steps += hull.facet(f).size();
+    EXPECT_GE(static_cast<size_t>(polls), steps / 1024);
+    const int all = polls;
+    for (int last = 1; last <= all; last += 1 + all / 16) {
+      const absl::Status status = AuditUntil(hull, last, &polls);
+      EXPECT_EQ(status.code(), absl::StatusCode::kCancelled) << status;
+      // Told once, it does not ask again.
+      EXPECT_EQ(polls, last);
+    }
+  }
+}
+
 TEST(Audit, PassesTheUnitCube) {
   const absl::Status status = AuditHull(Cube().Assemble());
   EXPECT_TRUE(status.ok()) << status;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <set>
 #include <string>
@@ -424,6 +425,88 @@ TEST(HullBuilder, CancellationChangesNothingWheneverItComes) {
   ASSERT_TRUE(builder.Add(block, limits).ok());
   EXPECT_GT(polls, 2);
   EXPECT_TRUE(SameBits(builder.Snapshot(), BuildHull(Concatenated(first, block))));
+}
+
+TEST(HullBuilder, ASnapshotStopsWheneverItIsToldTo) {
+  Random random(112);
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(RandomOnSphere(random, 20000, 2)).ok());
+  const Hull hull = builder.Snapshot();
+  int polls = 0;
+  const absl::StatusOr<Hull> whole = builder.Snapshot([&] { return ++polls < 0; });
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_TRUE(SameBits(*whole, hull));
+  // Two passes over 2 V - 4 triangles.
+  EXPECT_EQ(polls, 2 * (2 * 20000 - 4) / 1024);
+  for (int last = 1; last <= polls; ++last) {
+    int asked = 0;
+    const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });
+    EXPECT_EQ(stopped.status().code(), absl::StatusCode::kCancelled) << stopped.status();
+    // Told once, it does not ask again.
+    EXPECT_EQ(asked, last);
+  }
+  EXPECT_TRUE(SameBits(builder.Snapshot(), hull));
+}
+
+std::set<std::tuple<double, double, double>> SetOf(std::span<const Vector> points) {
+  std::set<std::tuple<double, double, double>> set;
+  for (const Vector& p : points) set.emplace(p.x() + 0.0, p.y() + 0.0, p.z() + 0.0);
+  return set;
+}
+
+TEST(HullBuilder, NewVerticesAreThoseThatTheLastBlockBrought) {
+  const uint64_t seed = TestSeed(113);
+  Random random(seed);
+  size_t brought = 0;
+  size_t replaced = 0;
+  size_t nothing_new = 0;
+  for (int round = 0; round < kRounds / 6; ++round) {
+    HullBuilder builder;
+    EXPECT_TRUE(builder.NewVertices().empty());
+    for (int block = 0; block < 6; ++block) {
+      const std::vector<Vector> points = DegeneratePoints(random);
+      HullBuilder former = builder;
+      const auto before = SetOf(builder.Vertices());
+      const PointCounts counts = builder.Add(points).value();
+      const std::vector<Vector> fresh = builder.NewVertices();
+      ASSERT_EQ(fresh.size(), counts.outside) << "seed " << seed << " round " << round;
+      // Each once, and neither a former one nor one that is missing.
+      const auto after = SetOf(builder.Vertices());
+      std::set<std::tuple<double, double, double>> expected;
+      std::set_difference(after.begin(), after.end(), before.begin(), before.end(),
+                          std::inserter(expected, expected.end()));
+      ASSERT_EQ(SetOf(fresh), expected) << "seed " << seed << " round " << round;
+      ASSERT_TRUE(former.Add(fresh).ok());
+      ASSERT_TRUE(SameBits(former.Snapshot(), builder.Snapshot()))
+          << "seed " << seed << " round " << round;
+      brought += fresh.size();
+      replaced += !fresh.empty() && after.size() < before.size() + fresh.size();
+      nothing_new += !before.empty() && !points.empty() && fresh.empty();
+    }
+  }
+  EXPECT_GT(brought, 500u);
+  EXPECT_GT(replaced, 100u);
+  EXPECT_GT(nothing_new, 50u);
+}
+
+TEST(HullBuilder, NewVerticesOutliveABlockThatIsRefused) {
+  Random random(114);
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(RandomInBall(random, 100, 1)).ok());
+  const auto first = SetOf(builder.NewVertices());
+  const std::vector<Vector> more = RandomOnSphere(random, 5000, 2);
+  AddLimits limits;
+  limits.max_vertices = 500;
+  EXPECT_TRUE(absl::IsResourceExhausted(builder.Add(more, limits).status()));
+  EXPECT_EQ(SetOf(builder.NewVertices()), first);
+  limits = {};
+  limits.should_stop = [] { return true; };
+  EXPECT_TRUE(absl::IsCancelled(builder.Add(more, limits).status()));
+  EXPECT_EQ(SetOf(builder.NewVertices()), first);
+  EXPECT_FALSE(builder.Add(std::vector{Vector(kNan, 0, 0)}).ok());
+  EXPECT_EQ(SetOf(builder.NewVertices()), first);
+  ASSERT_TRUE(builder.Add({}).ok());
+  EXPECT_TRUE(builder.NewVertices().empty());
 }
 
 TEST(HullBuilder, CopiesGoTheirOwnWays) {

@@ -203,6 +203,24 @@ TEST_F(Observation, EveryReplyCarriesARequestId) {
   EXPECT_EQ(ask(std::string(128, 'x')), std::string(128, 'x'));
 }
 
+TEST_F(Observation, AnAuditThatNobodyWaitsForEndsUnfinished) {
+  Put("ball", Sphere(50'000));
+  // Makes the snapshot, so that an audit is all that is left to do.
+  Get("ball");
+  grpc::ClientContext context;
+  // A fraction of what the audit takes, however fast the machine.
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(20));
+  v1::GetHullRequest request;
+  v1::GetHullResponse response;
+  request.set_hull_id("ball");
+  request.set_audit(true);
+  const grpc::Status status = hulls_->GetHull(&context, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  // The client says so by itself: here it is the server that did.
+  EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"GetHull\"}"), 1);
+}
+
 TEST_F(Observation, ErrorsNameTheRequestInTheirDetails) {
   grpc::ClientContext context;
   context.AddMetadata("x-request-id", "lost-1");

@@ -139,6 +139,25 @@ TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
   EXPECT_TRUE(asked);
 }
 
+TEST_F(RegistryTest, AReaderThatMakesASnapshotCanBeCancelled) {
+  std::vector<Vector> points;
+  for (int i = -50; i <= 50; ++i) {
+    for (int j = -50; j <= 50; ++j) points.emplace_back(i, j, i * i + j * j);
+  }
+  ASSERT_TRUE(Append(Open("h"), 1, points).ok());
+  int stopped = 0;
+  for (const int last : {1, 2, 20}) {
+    int polls = 0;
+    stopped += absl::IsCancelled(registry_.Resolve("h", [&] { return ++polls >= last; }).status());
+    // Once more than it was told to stop, when the work has ended.
+    EXPECT_EQ(polls, last + 1);
+  }
+  EXPECT_EQ(stopped, 3);
+  const auto made = registry_.Resolve("h", {});
+  ASSERT_TRUE(made.ok()) << made.status();
+  EXPECT_EQ(made->second.snapshot->hull().vertices().size(), points.size());
+}
+
 TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
   const AppendSession session = Open("h");
   std::vector<Vector> points;
