@@ -135,8 +135,10 @@ absl::StatusOr<std::unique_ptr<Appender>> Client::OpenAppend(const std::string& 
 }
 
 absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
-    const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed) const {
+    const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
+    std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
+  if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
   v1::ReplaceHullResponse response;
   const auto writer = hulls_->ReplaceHull(&context, &response);
   v1::ReplaceHullRequest request;
@@ -163,8 +165,10 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
 }
 
 absl::Status Client::SaveSnapshot(
-    const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive) const {
+    const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive,
+    std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
+  if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
   const auto reader = maintenance_->SaveSnapshot(&context, v1::SaveSnapshotRequest());
   v1::SaveSnapshotResponse part;
   while (reader->Read(&part)) {

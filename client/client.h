@@ -72,16 +72,18 @@ class Client {
                                                        AppendOptions options = {}) const;
 
   // Puts a new hull in the place of one: `feed` passes blocks of points to the sink it is given; an
-  // error of either ends the call and changes nothing. Not retried, and without a deadline while
-  // points are sent.
+  // error of either ends the call and changes nothing. Not retried. It takes as long as the points
+  // are many, so that options.timeout does not bound it: `timeout` does, all of it, when given.
   using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
   absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
-      const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed) const;
+      const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
+      std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   // Passes each part of a snapshot of the store to `receive`, in order; an error of `receive` ends
-  // the call and is returned. Not retried, and without a deadline.
+  // the call and is returned. Not retried; `timeout` as above.
   absl::Status SaveSnapshot(
-      const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive) const;
+      const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive,
+      std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
 

@@ -34,8 +34,10 @@ void AddGlobalOptions(CLI::App* app, Invocation* invocation) {
            const auto timeout = ParseDuration(text);
            if (!timeout.ok()) throw CLI::ValidationError("--timeout", Message(timeout.status()));
            invocation->timeout = *timeout;
+           invocation->given_timeout = *timeout;
          },
-         "How long to wait for an answer, such as 500ms or 2m (default 30s)")
+         "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
+         "'snapshot save' take the time that they need unless it is given)")
       ->type_name("TIME");
   app->add_option_function<std::string>(
          "--output", [invocation](const std::string& kind) { invocation->json = kind == "json"; },

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <functional>
+#include <optional>
 #include <ostream>
 #include <string>
 
@@ -24,6 +25,8 @@ struct Invocation {
 
   std::string server = kDefaultServer;
   std::chrono::milliseconds timeout{30000};
+  // What --timeout said, if anything: a bound of what takes as long as the data is large.
+  std::optional<std::chrono::milliseconds> given_timeout;
   bool json = false;
   ConnectionSecurity security;
 

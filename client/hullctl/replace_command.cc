@@ -67,7 +67,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
     }
     return absl::OkStatus();
   };
-  const auto response = run.MakeClient().ReplaceHull(open, feed);
+  const auto response = run.MakeClient().ReplaceHull(open, feed, run.given_timeout);
   bar.Clear();
   if (!file_error.ok()) return run.FailUsage(file_error);
   if (!response.ok()) return run.Fail(response.status());
@@ -87,6 +87,10 @@ void AddReplaceCommand(CLI::App* app, Invocation* invocation) {
   AddNumberOption(command, "--if-revision", 0, std::numeric_limits<uint64_t>::max(),
                   "Only if the hull is at this revision; 0: only if it does not exist",
                   [arguments](uint64_t number) { arguments->if_revision = number; });
+  command->footer(
+      "However long that takes, unless --timeout is given, which then bounds all of it. A call "
+      "that\n"
+      "ends early leaves the hull as it was, or, when all points were sent, may have replaced it.");
   command->callback([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
 }
 

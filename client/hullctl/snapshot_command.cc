@@ -41,11 +41,12 @@ ExitCode Save(const Invocation& run, const SnapshotArguments& arguments) {
   SnapshotWriter writer(arguments.file);
   if (absl::Status s = writer.Open(); !s.ok()) return run.FailUsage(s);
   absl::Status file_error;
-  const absl::Status called =
-      run.MakeClient().SaveSnapshot([&](const v1::SaveSnapshotResponse& part) {
+  const absl::Status called = run.MakeClient().SaveSnapshot(
+      [&](const v1::SaveSnapshotResponse& part) {
         file_error = writer.Write(part);
         return file_error;
-      });
+      },
+      run.given_timeout);
   if (!file_error.ok()) return run.FailUsage(file_error);
   if (!called.ok()) return run.Fail(called);
   if (absl::Status s = writer.Finish(); !s.ok()) return run.FailUsage(s);
@@ -68,6 +69,9 @@ void AddSnapshotCommand(CLI::App* app, Invocation* invocation) {
   command->require_subcommand(1);
   CLI::App* save = command->add_subcommand("save", "Save a snapshot while hulld goes on serving");
   save->add_option("FILE", arguments->file, "File to make")->required();
+  save->footer(
+      "However long that takes, unless --timeout is given, which then bounds all of it. What ends\n"
+      "early leaves no file.");
   save->callback([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
   CLI::App* restore =
       command->add_subcommand("restore", "Make a data directory of a snapshot, for a new hulld");

@@ -124,6 +124,26 @@ TEST_F(DurableServer, AReplacementThatFailsChangesNothing) {
   EXPECT_TRUE(Replace(open, Cube())->created());
 }
 
+// They take as long as the data is large: a client's patience with other calls is not meant.
+TEST_F(DurableServer, ReplacingAndSavingHaveADeadlineOnlyWhereOneIsGiven) {
+  Put("h", Cube());
+  // No call can be in time.
+  constexpr std::chrono::milliseconds kPassed = std::chrono::hours(-1);
+  ClientOptions options;
+  options.server = server_->address();
+  options.timeout = kPassed;
+  const Client client(options);
+  v1::ReplaceOpen open;
+  open.set_hull_id("h");
+  const auto feed = [](const Client::PointSink&) { return absl::OkStatus(); };
+  const auto receive = [](const v1::SaveSnapshotResponse&) { return absl::OkStatus(); };
+  EXPECT_TRUE(absl::IsDeadlineExceeded(client.GetStatus().status()));
+  EXPECT_TRUE(absl::IsDeadlineExceeded(client.ReplaceHull(open, feed, kPassed).status()));
+  EXPECT_TRUE(absl::IsDeadlineExceeded(client.SaveSnapshot(receive, kPassed)));
+  EXPECT_TRUE(client.ReplaceHull(open, feed).ok());
+  EXPECT_TRUE(client.SaveSnapshot(receive).ok());
+}
+
 TEST_F(DurableServer, ReplacingEndsTheStreamsThatAppend) {
   Appender appender(*hulls_, "h", "w", true);
   ASSERT_TRUE(appender.Append(1, Sphere(50)).has_value());
