@@ -60,15 +60,22 @@ absl::Status BatchStream::Validate() {
                        registry_.limits().max_pairs_per_batch, "the batch");
 }
 
-// Fills table_ and head_, and sets relations_suffice_.
+// Fills table_, and sets relations_suffice_.
 absl::Status BatchStream::ResolvePlacements() {
   table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
-  table_.EncodeHeader(registry_.store(), head_.mutable_header());
-  table_.EncodeHulls(head_.mutable_hulls(), head_.mutable_placement_problems());
   relations_suffice_ = options_.method == Method::kCertifiedSearch &&
                        IsRelationOnly(request_.wanted()) && table_.all_answerable();
   return absl::OkStatus();
+}
+
+void BatchStream::QueueHead() {
+  table_.EncodeHeader(registry_.store(), head_.mutable_header());
+  size_t next = 0;
+  while ((next = table_.EncodeHulls(next, head_.mutable_hulls(),
+                                    head_.mutable_placement_problems())) < table_.size()) {
+    ready_.push_back(std::exchange(head_, {}));
+  }
 }
 
 void BatchStream::Open() {
@@ -80,9 +87,12 @@ void BatchStream::Open() {
   slice_pairs_ = kFirstSlicePairs;
   if (!status.ok()) {
     end_ = status;
-  } else if (pair_count() == 0) {
-    ready_.push_back(std::move(head_));
-    end_ = absl::OkStatus();
+  } else {
+    QueueHead();
+    if (pair_count() == 0) {
+      ready_.push_back(std::move(head_));
+      end_ = absl::OkStatus();
+    }
   }
   Proceed();
 }

@@ -51,6 +51,9 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
 
   absl::Status Validate();
   absl::Status ResolvePlacements();
+  // Requires the mutex: leaves the last piece of the table of hulls in head_, for the first
+  // answers.
+  void QueueHead();
   void Open();
   PlacedPair PairAt(size_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;

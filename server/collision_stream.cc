@@ -217,7 +217,7 @@ absl::Status CollisionStream::Refresh() {
     // The vertices that a cache names are those of the hull before.
     for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) pairs_[pairs_of_[k]].cache = {};
   }
-  table_.EncodeHulls(response_.mutable_hulls(), response_.mutable_placement_problems());
+  next_hull_ = 0;
   return absl::OkStatus();
 }
 
@@ -269,8 +269,20 @@ void CollisionStream::AddAnswer(uint32_t index) {
                                        table_.placed()[pair.b].hull(), wanted_, position, columns);
 }
 
+void CollisionStream::Send(bool last) {
+  response_.set_update(messages_);
+  response_.set_last(last);
+  StartWrite(&response_);
+}
+
 // Computes until the answer is complete, a message is full, or it is the turn of others.
 void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
+  if (next_hull_ < table_.size()) {
+    next_hull_ = table_.EncodeHulls(next_hull_, response_.mutable_hulls(),
+                                    response_.mutable_placement_problems());
+    if (next_hull_ < table_.size()) return Send(false);
+    response_bytes_ = response_.ByteSizeLong();
+  }
   const auto end = std::chrono::steady_clock::now() + time;
   while (next_asked_ < asked_.size()) {
     if (response_bytes_ >= Config::kReplyMessageBytes) break;
@@ -284,9 +296,7 @@ void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
   call_.metrics().CountPairs(std::exchange(rungs_, {}));
   if (call_.ShouldStop()) return End(call_.StopStatus());
   if (next_asked_ == asked_.size()) call_.EndMessage();
-  response_.set_update(messages_);
-  response_.set_last(next_asked_ == asked_.size());
-  StartWrite(&response_);
+  Send(next_asked_ == asked_.size());
 }
 
 }  // namespace hulld::server

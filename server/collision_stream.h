@@ -70,6 +70,7 @@ class CollisionStream
   absl::StatusOr<Answer> AnswerPair(PairState& pair) const;
   void AddAnswer(uint32_t index);
   void AnswerSlice(std::chrono::milliseconds time);
+  void Send(bool last);
 
   Registry& registry_;
   WorkerPool& readers_;
@@ -89,6 +90,8 @@ class CollisionStream
   v1::Wanted wanted_;
   QueryOptions options_;
   PlacementTable table_;
+  // The first placement whose hull is still to be told; table_.size() when none is.
+  size_t next_hull_ = 0;
   std::vector<PairState> pairs_;
   // The pairs of placement i: pairs_of_[pairs_begin_[i]] up to pairs_begin_[i + 1].
   std::vector<uint32_t> pairs_of_;

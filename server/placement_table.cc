@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/config.h"
 #include "server/decode.h"
 #include "server/encode.h"
 #include "server/limit_error.h"
@@ -12,6 +13,9 @@
 
 namespace hulld::server {
 namespace {
+
+// Tag and length of an entry within its message.
+constexpr size_t kEntryBytes = 4;
 
 // Stands in for the hull of placements that cannot be answered for.
 const QueryHull& NoHull() {
@@ -101,21 +105,27 @@ void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header
   server::EncodeHeader(store, store_revision_, header);
 }
 
-void PlacementTable::EncodeHulls(
-    google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
+size_t PlacementTable::EncodeHulls(
+    size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
     google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const {
-  for (size_t i = 0; i < entries_.size(); ++i) {
+  size_t bytes = 0;
+  size_t i = first;
+  for (; i < entries_.size() && bytes < Config::kReplyMessageBytes; ++i) {
     v1::HullVersion* const version = hulls->Add();
     const absl::Status& status = problem(i);
+    bytes += kEntryBytes;
     if (status.ok()) {
       EncodeVersion(hulls_[*entries_[i].hull]->record, version);
+      bytes += version->ByteSizeLong();
       continue;
     }
     v1::PlacementProblem* const encoded = problems->Add();
     encoded->set_placement(static_cast<uint32_t>(i));
     encoded->set_code(ToGrpc(status.code()));
     encoded->set_message(std::string(status.message()));
+    bytes += kEntryBytes + encoded->ByteSizeLong();
   }
+  return i;
 }
 
 absl::Status ValidatePlacementCount(int count, uint64_t max_placements, const char* what) {

@@ -47,9 +47,10 @@ class PlacementTable {
 
   // The store's revision of the last Resolve.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
-  // A version per placement, and the problems.
-  void EncodeHulls(google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
-                   google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
+  // A version per placement from `first` on, and their problems, as many as fill a message; returns
+  // where the next message goes on, which is size() after the last.
+  size_t EncodeHulls(size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
+                     google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
 
  private:
   struct Entry {

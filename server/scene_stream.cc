@@ -101,10 +101,21 @@ absl::Status SceneStream::Open() {
   options_.threads = executor_.threads();
   table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
-  table_.EncodeHeader(registry_.store(), filling_.mutable_header());
-  table_.EncodeHulls(filling_.mutable_hulls(), filling_.mutable_placement_problems());
-  Send();
+  QueueHead();
   return absl::OkStatus();
+}
+
+// Without waiting for the client: this is a reader's thread.
+void SceneStream::QueueHead() {
+  const std::lock_guard lock(mutex_);
+  table_.EncodeHeader(registry_.store(), filling_.mutable_header());
+  size_t next = 0;
+  do {
+    next =
+        table_.EncodeHulls(next, filling_.mutable_hulls(), filling_.mutable_placement_problems());
+    ready_.push_back(std::exchange(filling_, {}));
+  } while (next < table_.size());
+  Proceed();
 }
 
 absl::Status SceneStream::Search() {

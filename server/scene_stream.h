@@ -49,6 +49,7 @@ class SceneStream : public grpc::ServerWriteReactor<v1::FindCollisionsResponse>,
   void OnDone() override { self_.reset(); }
 
   absl::Status Open();
+  void QueueHead();
   absl::Status Search();
   void Take(std::span<const SceneAnswer> answers);
   void Count(v1::Relation relation);

@@ -87,10 +87,8 @@ class BatchRun {
 
   absl::Status Take(const v1::BatchCheckCollisionsResponse& part, size_t begin, size_t end,
                     size_t* next) {
-    if (part.has_header()) {
-      *head_.mutable_header() = part.header();
-      *head_.mutable_hulls() = part.hulls();
-    }
+    if (part.has_header()) *head_.mutable_header() = part.header();
+    head_.mutable_hulls()->MergeFrom(part.hulls());
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       placement_problems_[problem.placement()] = {problem.code(), problem.message()};
     }

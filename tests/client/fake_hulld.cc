@@ -248,6 +248,9 @@ class FakeHulld::Collisions final : public v1::CollisionService::Service {
       problem.set_code(grpc::StatusCode::NOT_FOUND);
       problem.set_message("hull \"" + placement.hull_id() + "\" not found");
     }
+    // As where the table of hulls is long: the answers begin in another message.
+    writer->Write(response);
+    response.Clear();
     for (int i = 0; i < request->pairs_size(); i += 2) {
       const bool failed = bad[request->pairs(i)] || bad[request->pairs(i + 1)];
       response.add_relations(failed ? v1::RELATION_UNSPECIFIED : v1::RELATION_TOUCHING);

@@ -5,12 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
+#include <vector>
 
 #include "tests/server/test_server.h"
 
 namespace hulld::server {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class BatchCall : public ServerTest {
@@ -92,6 +95,146 @@ class BatchCall : public ServerTest {
     return request;
   }
 };
+
+// The table of the hulls of 20000 placements with long names is more than 5 MB; no client need take
+// a message above 4 MiB, and this one does not.
+class LongTable : public BatchCall {
+ protected:
+  static constexpr int kPlacements = 20'000;
+
+  void SetUp() override {
+    BatchCall::SetUp();
+    Put(there_, Cube());
+  }
+
+  template <typename Request>
+  void AddPlacements(Request* request) const {
+    for (int i = 0; i < kPlacements; ++i) {
+      *request->add_placements() = PlacementOf(i % 3 == 0 ? missing_ : there_, 2.0 * i);
+    }
+  }
+
+  // Whether the pieces together are the table, each of them of moderate size.
+  template <typename Response>
+  void CheckTable(const std::vector<Response>& parts) const {
+    int placement = 0;
+    uint32_t problem = 0;
+    int with_hulls = 0;
+    for (const Response& part : parts) {
+      EXPECT_LT(part.ByteSizeLong(), size_t{5} << 18);
+      EXPECT_EQ(part.has_header(), &part == &parts.front());
+      with_hulls += part.hulls_size() > 0;
+      for (const v1::HullVersion& hull : part.hulls()) {
+        ASSERT_EQ(hull.hull_id(), placement % 3 == 0 ? "" : there_) << placement;
+        ++placement;
+      }
+      for (const v1::PlacementProblem& found : part.placement_problems()) {
+        ASSERT_EQ(found.placement(), problem);
+        ASSERT_LT(found.placement(), static_cast<uint32_t>(placement));
+        problem += 3;
+      }
+    }
+    EXPECT_EQ(placement, kPlacements);
+    EXPECT_EQ(problem, (kPlacements + 2) / 3 * 3);
+    EXPECT_GT(with_hulls, 4);
+  }
+
+  const std::string there_ = std::string(250, 't');
+  const std::string missing_ = std::string(250, 'm');
+};
+
+TEST_F(LongTable, OfABatchComesInPieces) {
+  for (const bool any_pair : {false, true}) {
+    v1::BatchCheckCollisionsRequest request;
+    AddPlacements(&request);
+    if (any_pair) {
+      AddPair(&request, 1, 2);
+      AddPair(&request, 0, kPlacements - 1);
+      AddPair(&request, kPlacements - 1, kPlacements - 1);
+    }
+    grpc::ClientContext context;
+    const auto stream = collisions_->BatchCheckCollisions(&context, request);
+    std::vector<v1::BatchCheckCollisionsResponse> parts;
+    v1::BatchCheckCollisionsResponse part;
+    std::vector<int> relations;
+    while (stream->Read(&part)) {
+      EXPECT_EQ(part.first_pair(), relations.size());
+      relations.insert(relations.end(), part.relations().begin(), part.relations().end());
+      parts.push_back(part);
+    }
+    const grpc::Status status = stream->Finish();
+    ASSERT_TRUE(status.ok()) << status.error_message();
+    CheckTable(parts);
+    if (!any_pair) continue;
+    EXPECT_THAT(relations, ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_UNSPECIFIED,
+                                       v1::RELATION_OVERLAPPING));
+  }
+}
+
+TEST_F(LongTable, OfASceneComesInPieces) {
+  v1::FindCollisionsRequest request;
+  AddPlacements(&request);
+  // The second placement against all others.
+  request.set_movers(2);
+  request.mutable_wanted()->set_clearance(1);
+  grpc::ClientContext context;
+  const auto stream = collisions_->FindCollisions(&context, request);
+  std::vector<v1::FindCollisionsResponse> parts;
+  v1::FindCollisionsResponse part;
+  std::vector<uint32_t> pairs;
+  int hulls = 0;
+  while (stream->Read(&part)) {
+    hulls += part.hulls_size();
+    if (part.pairs_size() > 0) {
+      EXPECT_EQ(hulls, kPlacements);
+    }
+    pairs.insert(pairs.end(), part.pairs().begin(), part.pairs().end());
+    parts.push_back(part);
+  }
+  const grpc::Status status = stream->Finish();
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  CheckTable(parts);
+  EXPECT_THAT(pairs, ElementsAre(1, 2));
+  EXPECT_TRUE(parts.back().has_totals());
+}
+
+TEST_F(LongTable, OfAStreamComesInPieces) {
+  grpc::ClientContext context;
+  const auto stream = collisions_->StreamCollisions(&context);
+  v1::StreamCollisionsRequest request;
+  AddPlacements(request.mutable_open());
+  request.mutable_open()->add_pairs(1);
+  request.mutable_open()->add_pairs(2);
+  // To open, and to tell the hulls anew.
+  for (uint64_t message = 0; message < 2; ++message) {
+    ASSERT_TRUE(stream->Write(request));
+    std::vector<v1::StreamCollisionsResponse> parts;
+    std::vector<int> relations;
+    v1::StreamCollisionsResponse part;
+    do {
+      ASSERT_TRUE(stream->Read(&part)) << stream->Finish().error_message();
+      EXPECT_EQ(part.update(), message);
+      relations.insert(relations.end(), part.columns().relations().begin(),
+                       part.columns().relations().end());
+      parts.push_back(part);
+    } while (!part.last());
+    CheckTable(parts);
+    if (message == 0) {
+      EXPECT_THAT(relations, ElementsAre(v1::RELATION_SEPARATED));
+    }
+    request.mutable_update()->set_refresh_hulls(true);
+  }
+  // Without that there is no table.
+  request.mutable_update()->set_refresh_hulls(false);
+  ASSERT_TRUE(stream->Write(request));
+  v1::StreamCollisionsResponse part;
+  ASSERT_TRUE(stream->Read(&part));
+  EXPECT_TRUE(part.last());
+  EXPECT_EQ(part.hulls_size(), 0);
+  stream->WritesDone();
+  EXPECT_FALSE(stream->Read(&part));
+  EXPECT_TRUE(stream->Finish().ok());
+}
 
 TEST_F(BatchCall, EqualsSingleChecksPairByPair) {
   Put("cube", Cube());
