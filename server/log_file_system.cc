@@ -8,10 +8,44 @@ using rocksdb::IODebugContext;
 using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 
-class LogFileSystem::Log : public rocksdb::FSWritableFileOwnerWrapper {
+// Any file that is written; its syncs are watched.
+class LogFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
+ public:
+  File(LogFileSystem& system, std::unique_ptr<rocksdb::FSWritableFile> file)
+      : FSWritableFileOwnerWrapper(std::move(file)), system_(system) {}
+
+  IOStatus Sync(const IOOptions& options, IODebugContext* debug) override {
+    return system_.NoteSync(FSWritableFileOwnerWrapper::Sync(options, debug));
+  }
+  IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
+    return system_.NoteSync(FSWritableFileOwnerWrapper::Fsync(options, debug));
+  }
+
+ protected:
+  LogFileSystem& system_;
+};
+
+class LogFileSystem::Directory : public rocksdb::FSDirectoryWrapper {
+ public:
+  Directory(LogFileSystem& system, std::unique_ptr<rocksdb::FSDirectory> directory)
+      : FSDirectoryWrapper(std::move(directory)), system_(system) {}
+
+  IOStatus Fsync(const IOOptions& options, IODebugContext* debug) override {
+    return system_.NoteSync(FSDirectoryWrapper::Fsync(options, debug));
+  }
+  IOStatus FsyncWithDirOptions(const IOOptions& options, IODebugContext* debug,
+                               const rocksdb::DirFsyncOptions& directory) override {
+    return system_.NoteSync(FSDirectoryWrapper::FsyncWithDirOptions(options, debug, directory));
+  }
+
+ private:
+  LogFileSystem& system_;
+};
+
+class LogFileSystem::Log : public File {
  public:
   Log(LogFileSystem& system, std::string name, std::unique_ptr<rocksdb::FSWritableFile> file)
-      : FSWritableFileOwnerWrapper(std::move(file)), system_(system), name_(std::move(name)) {}
+      : File(system, std::move(file)), name_(std::move(name)) {}
 
   IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
                   IODebugContext* debug) override {
@@ -32,9 +66,13 @@ class LogFileSystem::Log : public rocksdb::FSWritableFileOwnerWrapper {
     return status;
   }
 
-  LogFileSystem& system_;
   const std::string name_;
 };
+
+IOStatus LogFileSystem::NoteSync(const IOStatus& status) {
+  if (!status.ok()) ++failed_syncs_;
+  return status;
+}
 
 void LogFileSystem::Commit() {
   const std::lock_guard lock(mutex_);
@@ -61,7 +99,9 @@ IOStatus LogFileSystem::NewWritableFile(const std::string& name,
                                         std::unique_ptr<rocksdb::FSWritableFile>* result,
                                         IODebugContext* debug) {
   const IOStatus opened = FileSystemWrapper::NewWritableFile(name, options, result, debug);
-  if (!opened.ok() || !name.starts_with(directory_ + "/") || !name.ends_with(".log")) {
+  if (!opened.ok()) return opened;
+  if (!name.starts_with(directory_ + "/") || !name.ends_with(".log")) {
+    *result = std::make_unique<File>(*this, std::move(*result));
     return opened;
   }
   {
@@ -69,6 +109,14 @@ IOStatus LogFileSystem::NewWritableFile(const std::string& name,
     logs_[name] = {};
   }
   *result = std::make_unique<Log>(*this, name, std::move(*result));
+  return opened;
+}
+
+IOStatus LogFileSystem::NewDirectory(const std::string& name, const IOOptions& options,
+                                     std::unique_ptr<rocksdb::FSDirectory>* result,
+                                     IODebugContext* debug) {
+  const IOStatus opened = FileSystemWrapper::NewDirectory(name, options, result, debug);
+  if (opened.ok()) *result = std::make_unique<Directory>(*this, std::move(*result));
   return opened;
 }
 

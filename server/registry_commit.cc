@@ -93,7 +93,6 @@ absl::Status Registry::CommitBatch(Locked& locked, const std::vector<PendingComm
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
     metrics_->commit_seconds.Observe(taken.count());
     metrics_->commit_changes.Observe(static_cast<double>(changes.size()));
-    if (!status.ok()) metrics_->write_failures.Increment();
   }
   locked.Lock();
   if (status.ok()) store_failed_ = false;

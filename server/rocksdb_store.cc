@@ -223,6 +223,23 @@ absl::Status RocksDbStore::OpenDb() {
   return absl::OkStatus();
 }
 
+// RocksDB's errors do not say whether it was a sync that failed, or when.
+void RocksDbStore::CountWriteFailure() {
+  const uint64_t failed_syncs = files_->failed_syncs();
+  const bool is_sync = seen_failed_syncs_.exchange(failed_syncs) != failed_syncs;
+  ++(is_sync ? sync_failures_ : write_failures_);
+}
+
+absl::Status RocksDbStore::WriteFailed(const rocksdb::Status& status) {
+  CountWriteFailure();
+  return WriteError(status, options_.data_dir);
+}
+
+absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
+  if (!status.IsCorruption()) ++read_failures_;
+  return ReadError(status, "cannot read");
+}
+
 absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> format = ReadNumber(kFormatKey);
   if (absl::IsNotFound(format.status())) {
@@ -262,7 +279,10 @@ absl::StatusOr<std::string> RocksDbStore::Read(const std::string& key) {
   rocksdb::Status status;
   {
     const std::shared_lock lock(db_mutex_);
-    if (db_ == nullptr) return CannotBeRead(options_.data_dir);
+    if (db_ == nullptr) {
+      ++read_failures_;
+      return CannotBeRead(options_.data_dir);
+    }
     status = db_->Get(rocksdb::ReadOptions(), key, &sealed);
     // A block's checksum speaks for many values; our own tells whether this one is among the
     // damaged.
@@ -273,7 +293,7 @@ absl::StatusOr<std::string> RocksDbStore::Read(const std::string& key) {
     }
   }
   if (status.IsNotFound()) return absl::NotFoundError("the store holds no such key");
-  if (!status.ok()) return ReadError(status, "cannot read");
+  if (!status.ok()) return ReadFailed(status);
   const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
   if (!value.ok()) return value.status();
   return std::string(*value);
@@ -290,7 +310,10 @@ absl::Status RocksDbStore::ScanRange(
     const std::string& begin, const std::string& end,
     const std::function<absl::Status(std::string_view, std::string_view)>& visit) {
   const std::shared_lock lock(db_mutex_);
-  if (db_ == nullptr) return CannotBeRead(options_.data_dir);
+  if (db_ == nullptr) {
+    ++read_failures_;
+    return CannotBeRead(options_.data_dir);
+  }
   std::string next = begin;
   const rocksdb::Slice upper_bound(end);
   // As in Read: after damage to a block go on from the last key without the blocks' checksums.
@@ -307,7 +330,7 @@ absl::Status RocksDbStore::ScanRange(
     }
     if (iterator->status().ok()) return absl::OkStatus();
     if (!iterator->status().IsCorruption() || !verify) {
-      return ReadError(iterator->status(), "cannot read");
+      return ReadFailed(iterator->status());
     }
   }
   return absl::OkStatus();
@@ -418,7 +441,7 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   if (status.ok()) {
     files_->Commit();
   } else {
-    failure_ = WriteError(status, options_.data_dir);
+    failure_ = WriteFailed(status);
   }
   return failure_;
 }
@@ -439,7 +462,7 @@ absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
   if (status.ok()) status = checkpoint->CreateCheckpoint(DatabaseDirectory(directory));
   if (status.ok()) return directory;
   std::filesystem::remove_all(directory, error);
-  return WriteError(status, options_.data_dir);
+  return WriteFailed(status);
 }
 
 absl::Status RocksDbStore::Recover() {
@@ -461,7 +484,7 @@ absl::Status RocksDbStore::Probe() {
   if (status.ok()) status = file->Close();
   file = nullptr;
   env_->DeleteFile(path).PermitUncheckedError();
-  return status.ok() ? absl::OkStatus() : WriteError(status, options_.data_dir);
+  return status.ok() ? absl::OkStatus() : WriteFailed(status);
 }
 
 // RocksDB can resume by itself after some errors, but not after those of its log. Should opening
@@ -472,9 +495,10 @@ absl::Status RocksDbStore::Reopen() {
   db_ = nullptr;
   absl::Status opened;
   if (const rocksdb::Status cut = files_->CutUncommitted(); !cut.ok()) {
-    opened = WriteError(cut, options_.data_dir);
+    opened = WriteFailed(cut);
   } else {
     opened = OpenDb();
+    if (!opened.ok()) CountWriteFailure();
   }
   if (opened.ok()) {
     failure_ = absl::OkStatus();
@@ -499,7 +523,7 @@ absl::Status RocksDbStore::SyncLog() {
   if (!failure_.ok() || db_ == nullptr) return failure_;
   const rocksdb::Status status = db_->SyncWAL();
   if (!status.ok() && !status.IsNotSupported()) {
-    failure_ = WriteError(status, options_.data_dir);
+    failure_ = WriteFailed(status);
     spdlog::error("{}", std::string(failure_.message()));
   }
   return failure_;

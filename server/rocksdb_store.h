@@ -5,6 +5,7 @@
 #include <rocksdb/db.h>
 #include <rocksdb/env.h>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -60,6 +61,11 @@ class RocksDbStore : public Store {
                                         const std::string& writer_id) override;
   absl::Status Commit(std::span<const Change* const> changes) override;
   absl::Status Recover() override;
+  StoreFailures failures() const override {
+    return {write_failures_.load(std::memory_order_relaxed),
+            sync_failures_.load(std::memory_order_relaxed),
+            read_failures_.load(std::memory_order_relaxed)};
+  }
 
   // Hard links in <data-dir>/copy-..., in the layout of a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
@@ -73,6 +79,11 @@ class RocksDbStore : public Store {
 
   rocksdb::Options DbOptions() const;
   absl::Status OpenDb();
+  // As one of a sync when one failed since the last that was counted.
+  void CountWriteFailure();
+  // Counts a failure, and says what it means.
+  absl::Status WriteFailed(const rocksdb::Status& status);
+  absl::Status ReadFailed(const rocksdb::Status& status);
   absl::Status ReadMeta();
   absl::Status InitializeMeta();
   absl::StatusOr<std::string> Read(const std::string& key);
@@ -102,6 +113,11 @@ class RocksDbStore : public Store {
   // Once writing the log failed it must not be touched again: only reading goes on, until Recover
   // opens the database anew.
   absl::Status failure_;
+
+  std::atomic<uint64_t> seen_failed_syncs_ = 0;
+  std::atomic<uint64_t> write_failures_ = 0;
+  std::atomic<uint64_t> sync_failures_ = 0;
+  std::atomic<uint64_t> read_failures_ = 0;
 
   std::mutex sync_mutex_;
   std::condition_variable sync_wake_;

@@ -64,6 +64,10 @@ void Server::AddSizesToMetrics() {
     advance(store.cache_misses, cache.misses);
     advance(store.cache_evictions, cache.evictions);
     advance(store.damaged_records, cache.damaged);
+    const StoreFailures failures = store_->failures();
+    advance(store.write_failures, failures.write);
+    advance(store.sync_failures, failures.sync);
+    advance(store.read_failures, failures.read);
     store.cache_bytes.Set(static_cast<double>(cache.bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
     store.read_only.Set(registry_.Commits().failing ? 1 : 0);

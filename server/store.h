@@ -58,6 +58,15 @@ struct Change {
 // of it is damaged.
 using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<StoredHull>)>;
 
+// Operations that failed so far, each counted once, by what the system refused.
+struct StoreFailures {
+  // Writing, and opening anew after an error.
+  uint64_t write = 0;
+  uint64_t sync = 0;
+  // What could not be read; what was read and is damaged is not among them.
+  uint64_t read = 0;
+};
+
 // Where changes are kept, beside the registry that serves them. Reading is for any thread.
 class Store {
  public:
@@ -89,6 +98,8 @@ class Store {
   virtual absl::Status Commit(std::span<const Change* const> changes) = 0;
   // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
   virtual absl::Status Recover() = 0;
+
+  virtual StoreFailures failures() const { return {}; }
 
   // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
   // directory: whoever asked removes that. FAILED_PRECONDITION: nothing is kept.

@@ -1,19 +1,25 @@
 // A server on a durable store, over the contract: restarts, replacement, snapshots, the doctor.
 
 #include <gmock/gmock.h>
+#include <prometheus/text_serializer.h>
+#include <rocksdb/env.h>
 
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "client/client.h"
 #include "client/snapshot_file.h"
 #include "server/doctor.h"
+#include "tests/server/faulty_file_system.h"
 #include "tests/server/test_server.h"
 
 namespace hulld::server {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
 
 class DurableServer : public ServerTest {
  protected:
@@ -47,6 +53,46 @@ class DurableServer : public ServerTest {
 
   std::string directory_;
 };
+
+TEST_F(DurableServer, FailuresOfTheStoreShowInMetrics) {
+  const auto files = std::make_shared<FaultyFileSystem>();
+  const std::unique_ptr<rocksdb::Env> env = rocksdb::NewCompositeEnv(files);
+  Config config = DurableConfig("faulty");
+  config.store_env = env.get();
+  Restart(config);
+  // More than the block that holds the records, which is read when the store is opened.
+  Put("h", Sphere(1000));
+  Restart(config);
+  const auto failures = [this] {
+    std::istringstream lines(prometheus::TextSerializer().Serialize(server_->metrics().Collect()));
+    std::vector<std::string> found;
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with("hulld_store_failures_total{")) found.push_back(line.substr(27));
+    }
+    return found;
+  };
+  EXPECT_THAT(failures(), UnorderedElementsAre("operation=\"write\"} 0", "operation=\"sync\"} 0",
+                                               "operation=\"read\"} 0"));
+  files->SetFault(FaultyFileSystem::Fault::kReadError);
+  grpc::ClientContext context;
+  v1::GetHullRequest request;
+  v1::GetHullResponse response;
+  request.set_hull_id("h");
+  EXPECT_EQ(hulls_->GetHull(&context, request, &response).error_code(),
+            grpc::StatusCode::UNAVAILABLE);
+  EXPECT_THAT(failures(), Contains("operation=\"read\"} 1"));
+  files->SetFault(FaultyFileSystem::Fault::kSyncError);
+  EXPECT_EQ(Delete("h").error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_THAT(failures(), UnorderedElementsAre("operation=\"write\"} 0", "operation=\"sync\"} 1",
+                                               "operation=\"read\"} 1"));
+  files->SetFault(FaultyFileSystem::Fault::kIoError);
+  EXPECT_EQ(Delete("h").error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_THAT(failures(), Contains("operation=\"write\"} 1"));
+  files->SetFault(FaultyFileSystem::Fault::kNone);
+  EXPECT_TRUE(Delete("h").ok());
+  // Before the file system goes.
+  TearDown();
+}
 
 TEST_F(DurableServer, AcksSayThatTheChunkIsOnDisk) {
   Appender appender(*hulls_, "h", "w", true);

@@ -83,6 +83,24 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   const std::string name_;
 };
 
+class FaultyFileSystem::Table : public rocksdb::FSRandomAccessFileOwnerWrapper {
+ public:
+  Table(FaultyFileSystem& system, std::unique_ptr<rocksdb::FSRandomAccessFile> file)
+      : FSRandomAccessFileOwnerWrapper(std::move(file)), system_(system) {}
+
+  IOStatus Read(uint64_t offset, size_t n, const IOOptions& options, rocksdb::Slice* result,
+                char* scratch, IODebugContext* debug) const override {
+    {
+      const std::lock_guard lock(system_.state_mutex_);
+      if (system_.fault_ == Fault::kReadError) return IOStatus::IOError("Input/output error");
+    }
+    return FSRandomAccessFileOwnerWrapper::Read(offset, n, options, result, scratch, debug);
+  }
+
+ private:
+  FaultyFileSystem& system_;
+};
+
 class FaultyFileSystem::Directory : public rocksdb::FSDirectory {
  public:
   Directory(FaultyFileSystem& system, std::string name) : system_(system), name_(std::move(name)) {}
@@ -115,6 +133,17 @@ int64_t FaultyFileSystem::syncs() const {
   return syncs_;
 }
 
+IOStatus FaultyFileSystem::NewRandomAccessFile(const std::string& name,
+                                               const rocksdb::FileOptions& options,
+                                               std::unique_ptr<rocksdb::FSRandomAccessFile>* result,
+                                               IODebugContext* debug) {
+  const IOStatus opened = FileSystemWrapper::NewRandomAccessFile(name, options, result, debug);
+  if (opened.ok() && name.ends_with(".sst")) {
+    *result = std::make_unique<Table>(*this, std::move(*result));
+  }
+  return opened;
+}
+
 IOStatus FaultyFileSystem::Error(bool is_sync) const {
   switch (fault_) {
     case Fault::kNone:
@@ -127,6 +156,8 @@ IOStatus FaultyFileSystem::Error(bool is_sync) const {
       return IOStatus::IOError("Read-only file system");
     case Fault::kSyncError:
       return is_sync ? IOStatus::IOError("Input/output error while syncing") : IOStatus::OK();
+    case Fault::kReadError:
+      return IOStatus::OK();
   }
   return IOStatus::OK();
 }

@@ -29,6 +29,8 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
     kReadOnly,
     // Writes work, syncs fail.
     kSyncError,
+    // Reading tables fails, which are the files that end in .sst; the rest works.
+    kReadError,
   };
 
   FaultyFileSystem() : FileSystemWrapper(rocksdb::FileSystem::Default()) {}
@@ -46,6 +48,10 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,
                                     std::unique_ptr<rocksdb::FSWritableFile>* result,
                                     rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus NewRandomAccessFile(const std::string& name,
+                                        const rocksdb::FileOptions& options,
+                                        std::unique_ptr<rocksdb::FSRandomAccessFile>* result,
+                                        rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus NewDirectory(const std::string& name, const rocksdb::IOOptions& options,
                                  std::unique_ptr<rocksdb::FSDirectory>* result,
                                  rocksdb::IODebugContext* debug) override;
@@ -57,6 +63,7 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
 
  private:
   class File;
+  class Table;
   class Directory;
 
   struct Written {

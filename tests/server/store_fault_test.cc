@@ -82,6 +82,64 @@ TEST_F(StoreFault, WhatCannotBeSyncedIsNotAcked) {
   ExpectRefusedThenWell(Fault::kSyncError, absl::StatusCode::kUnavailable, "syncing");
 }
 
+TEST_F(StoreFault, FailuresAreCountedByWhatFailed) {
+  struct Expected {
+    Fault fault;
+    uint64_t write;
+    uint64_t sync;
+  };
+  for (const Expected& expected :
+       {Expected{Fault::kIoError, 1, 0}, {Fault::kNoSpace, 1, 0}, {Fault::kSyncError, 0, 1}}) {
+    // A new store, which has nothing to compact in the background.
+    hulls_ = nullptr;
+    std::filesystem::remove_all(directory_ + "/data");
+    Start();
+    ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+    EXPECT_EQ(hulls_->store().failures().write, 0);
+    files_->SetFault(expected.fault);
+    // The second attempt is to recover the store first.
+    for (uint64_t attempt = 1; attempt <= 2; ++attempt) {
+      EXPECT_FALSE(hulls_->Create("new").ok());
+      const StoreFailures failures = hulls_->store().failures();
+      EXPECT_EQ(failures.write, expected.write * attempt);
+      EXPECT_EQ(failures.sync, expected.sync * attempt);
+      EXPECT_EQ(failures.read, 0);
+    }
+    files_->SetFault(Fault::kNone);
+    ASSERT_TRUE(hulls_->Create("new").ok());
+    ASSERT_TRUE(hulls_->Delete("new").ok());
+    EXPECT_EQ(hulls_->store().failures().write, expected.write * 2);
+  }
+}
+
+TEST_F(StoreFault, SyncsThatFailLaterAreCounted) {
+  durability_ = Durability::kRelaxed;
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kSyncError);
+  // Bounded by the time limit of the test alone.
+  while (hulls_->store().failures().sync == 0) std::this_thread::yield();
+  EXPECT_EQ(hulls_->store().failures().write, 0);
+  files_->SetFault(Fault::kNone);
+}
+
+TEST_F(StoreFault, WhatCannotBeReadIsCounted) {
+  Start();
+  // More than the block that holds the records, which is read when the store is opened.
+  ASSERT_TRUE(hulls_->Put("h", SpherePoints(1000)).ok());
+  Start();
+  files_->SetFault(Fault::kReadError);
+  for (uint64_t attempt = 1; attempt <= 2; ++attempt) {
+    EXPECT_EQ(hulls_->View("h").status().code(), absl::StatusCode::kUnavailable);
+    EXPECT_EQ(hulls_->store().failures().read, attempt);
+  }
+  files_->SetFault(Fault::kNone);
+  EXPECT_EQ(hulls_->View("h")->record.vertex_count, 1000);
+  EXPECT_EQ(hulls_->store().failures().read, 2);
+  EXPECT_EQ(hulls_->store().failures().write, 0);
+  EXPECT_EQ(hulls_->registry().Cache().damaged, 0);
+}
+
 TEST_F(StoreFault, EachBatchIsSyncedBeforeItIsAcked) {
   Start();
   const AppendSession session = hulls_->Open("h")->session;
