@@ -32,8 +32,9 @@ struct Limits {
   uint64_t max_placements = 200'000;
   uint64_t max_textbook_axes = 10'000'000;
   uint64_t max_writers_per_hull = 100'000;
-  // Bytes that builders and snapshots may hold. 0: half of what the machine or the control group of
-  // the process has.
+  // Bytes that builders and snapshots may hold, those of replacements under way too, and points
+  // that wait to be built or stored; beside messages of calls and the store's own buffers. 0: half
+  // of what the machine or the control group of the process has.
   uint64_t memory_limit = 0;
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;

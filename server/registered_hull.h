@@ -59,6 +59,8 @@ struct Registry::PendingChunk {
   std::function<bool()> should_stop;
   std::function<void()> on_built;
   Reply<ChunkResult> done;
+  // What the cache counts for its points.
+  uint64_t charged_bytes = 0;
 };
 
 // A change on its way to the store.
@@ -66,6 +68,8 @@ struct Registry::PendingCommit {
   Change change;
   HullPointer hull;
   Finish finish;
+  // What the cache counts for its vertices.
+  uint64_t charged_bytes = 0;
 };
 
 struct Registry::OpenRequest {

@@ -83,7 +83,8 @@ struct RegistrySizes {
 
 // What the registry holds of hulls in memory, and how that served so far.
 struct CacheStatistics {
-  // Builders and snapshots.
+  // Builders and snapshots; points that wait to be built, and vertices that wait for the store; and
+  // what calls hold of hulls that are not there yet (MemoryCharge).
   uint64_t bytes = 0;
   uint64_t limit_bytes = 0;
   // Hulls that a reader asked for and whose snapshot was there.
@@ -144,6 +145,25 @@ struct OpenResult {
 
 template <typename T>
 using Reply = std::function<void(absl::StatusOr<T>)>;
+
+class Registry;
+
+// What a call holds of a hull that the registry does not know yet, counted against --memory-limit
+// until this goes. Not thread-safe; the registry must outlive it.
+class MemoryCharge {
+ public:
+  explicit MemoryCharge(Registry& registry) : registry_(registry) {}
+  MemoryCharge(const MemoryCharge&) = delete;
+  MemoryCharge& operator=(const MemoryCharge&) = delete;
+  ~MemoryCharge() { Set(0); }
+
+  // What it holds now.
+  void Set(uint64_t bytes);
+
+ private:
+  Registry& registry_;
+  uint64_t bytes_ = 0;
+};
 
 // Keeps hulls by ID: for each its record, and, while it is in use or memory allows, a builder and
 // the snapshot that the first reader after a change asked for. What is not in memory is read back
@@ -243,6 +263,7 @@ class Registry {
   struct PendingCommit;
   struct OpenRequest;
   friend struct RegisteredHull;
+  friend class MemoryCharge;
   using HullPointer = std::shared_ptr<RegisteredHull>;
   // Called with the mutex held once a change is committed or refused.
   using Finish = std::function<void(Locked&, const absl::Status&)>;

@@ -144,8 +144,10 @@ void Registry::CloseAppend(const AppendSession& session) {
 void Registry::Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
                       std::function<void()> on_built, Reply<ChunkResult> done) {
   Locked locked(mutex_);
-  session.hull->chunks.push_back(
-      {session, std::move(chunk), std::move(should_stop), std::move(on_built), std::move(done)});
+  const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
+  cache_.bytes += bytes;
+  session.hull->chunks.push_back({session, std::move(chunk), std::move(should_stop),
+                                  std::move(on_built), std::move(done), bytes});
   Advance(locked, session.hull);
 }
 
@@ -157,6 +159,8 @@ void Registry::RunNextChunk(const HullPointer& hull) {
   PointCounts counts;
   if (pending.on_built) locked.Afterwards(pending.on_built);
   absl::StatusOr<Change> change = Build(locked, hull, pending, &already, &counts);
+  pending.chunk.points = {};
+  cache_.bytes -= pending.charged_bytes;
   if (change.ok()) {
     SubmitChunk(hull, pending, *std::move(change), counts);
   } else {

@@ -29,7 +29,9 @@ bool IsRepeatedOrConditional(const RegisteredHull& hull, const AppendSession& se
 // Queues a change that follows all changes of its hull submitted before.
 void Registry::Submit(const HullPointer& hull, Change change, Finish finish) {
   ++hull->in_flight;
-  queue_.push_back({std::move(change), hull, std::move(finish)});
+  const uint64_t bytes = change.vertices.capacity() * sizeof(Vector);
+  cache_.bytes += bytes;
+  queue_.push_back({std::move(change), hull, std::move(finish), bytes});
   commit_ready_.notify_one();
 }
 
@@ -67,6 +69,7 @@ void Registry::CommitQueued() {
       commits_.changes += batch.size();
       for (PendingCommit& pending : batch) {
         --pending.hull->in_flight;
+        cache_.bytes -= pending.charged_bytes;
         pending.finish(locked, absl::OkStatus());
       }
       Evict(locked);
@@ -110,6 +113,7 @@ void Registry::RefuseQueued(Locked& locked, std::vector<PendingCommit>& batch,
   queue_.clear();
   for (PendingCommit& pending : batch) {
     --pending.hull->in_flight;
+    cache_.bytes -= pending.charged_bytes;
     Revert(locked, *pending.hull);
   }
   for (PendingCommit& pending : batch) pending.finish(locked, cause);

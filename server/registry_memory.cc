@@ -239,8 +239,16 @@ void Registry::Evict(Locked& locked) {
 absl::Status Registry::CheckMemoryLocked(Locked& locked) {
   Evict(locked);
   if (cache_.bytes <= limits_.memory_limit) return absl::OkStatus();
-  return Overloaded(absl::StrCat("hulls in use hold ", cache_.bytes, " bytes of memory"),
+  return Overloaded(absl::StrCat("hulls in use, and points on their way to them, hold ",
+                                 cache_.bytes, " bytes of memory"),
                     limits_.memory_limit, "memory-limit", kRetryMemory);
+}
+
+void MemoryCharge::Set(uint64_t bytes) {
+  if (bytes == bytes_) return;
+  const std::lock_guard lock(registry_.mutex_);
+  registry_.cache_.bytes += bytes - bytes_;
+  bytes_ = bytes;
 }
 
 absl::Status Registry::CheckMemory() {

@@ -105,6 +105,7 @@ absl::Status ReplaceStream::Build() {
                          limits.max_vertices_per_hull, "max-vertices-per-hull");
   }
   if (!added.ok()) return Prefixed(name, added.status());
+  charge_.Set(replacement_.builder->MemoryBytes());
   PointCounts& counts = replacement_.counts;
   counts.received += added->received;
   counts.outside += added->outside;
@@ -115,6 +116,8 @@ absl::Status ReplaceStream::Build() {
 
 void ReplaceStream::Commit() {
   registry_.Replace(std::move(replacement_), [this](const absl::StatusOr<ReplaceResult>& result) {
+    // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
+    charge_.Set(0);
     if (!result.ok()) return End(result.status());
     call_.Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
               {{"hull", result->hull.hull_id}});

@@ -30,7 +30,8 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
       : registry_(registry),
         workers_(workers),
         response_(response),
-        call_(context, admission, Rpc::kReplaceHull) {}
+        call_(context, admission, Rpc::kReplaceHull),
+        charge_(registry) {}
 
   void OnReadDone(bool ok) override;
   void OnCancel() override { call_.Cancel(); }
@@ -46,6 +47,8 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
   WorkerPool& workers_;
   v1::ReplaceHullResponse* response_;
   Call call_;
+  // Of the builder, until the registry has it. Goes before the call, which keeps the server alive.
+  MemoryCharge charge_;
   v1::ReplaceHullRequest request_;
   Replacement replacement_;
   uint64_t messages_ = 0;

@@ -6,7 +6,9 @@
 
 #include <chrono>
 #include <memory>
+#include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "server/limit_error.h"
@@ -171,6 +173,46 @@ TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
   ASSERT_TRUE(WaitIdle());
   grpc::ClientContext next_context;
   EXPECT_TRUE(FinishBatch(*collisions_->BatchCheckCollisions(&next_context, {})).ok());
+}
+
+// What a replacement has built so far is memory like that of any hull.
+TEST_F(LimitsTest, AReplacementUnderWayCountsAgainstTheMemoryLimit) {
+  Config config = TestConfig();
+  config.limits.memory_limit = 1 << 20;
+  Restart(config);
+  const auto cache_bytes = [this] {
+    std::istringstream lines(prometheus::TextSerializer().Serialize(server_->metrics().Collect()));
+    const std::string name = "hulld_cache_bytes ";
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with(name)) return std::stod(line.substr(name.size()));
+    }
+    return -1.0;
+  };
+  grpc::ClientContext context;
+  v1::ReplaceHullResponse response;
+  const auto writer = hulls_->ReplaceHull(&context, &response);
+  v1::ReplaceHullRequest request;
+  request.mutable_open()->set_hull_id("big");
+  request.mutable_open()->set_create_if_absent(true);
+  ASSERT_TRUE(writer->Write(request));
+  const Coordinates sphere = Sphere(10'000);
+  request.mutable_points()->mutable_xyz()->Assign(sphere.begin(), sphere.end());
+  ASSERT_TRUE(writer->Write(request));
+  // Bounded by the time limit of the test alone.
+  while (cache_bytes() < 1 << 20) std::this_thread::yield();
+  Create("other");
+  const auto append = [this] {
+    Appender appender(*hulls_, "other", "w");
+    appender.Append(1, Cube());
+    return appender.Finish();
+  };
+  ExpectRefused(append(), "memory-limit");
+  // Of itself, too.
+  writer->Write(request);
+  ExpectRefused(writer->Finish(), "memory-limit");
+  ASSERT_TRUE(WaitIdle());
+  EXPECT_EQ(cache_bytes(), 0);
+  EXPECT_TRUE(append().ok());
 }
 
 TEST_F(LimitsTest, ARequestEndsWhenItsTimeIsUp) {

@@ -1,7 +1,9 @@
 // Memory as a cache of the store.
 
 #include <atomic>
+#include <future>
 #include <thread>
+#include <utility>
 
 #include "server/memory_store.h"
 #include "tests/server/store_fixture.h"
@@ -120,6 +122,100 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   EXPECT_EQ(second.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("--memory-limit"));
   EXPECT_EQ(registry.Resolve("first", {})->second.snapshot->hull().vertices().size(), 1000);
+}
+
+// Points that wait for their turn, and what they are once they are built.
+TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Registry registry(store, Limits(), writers);
+  const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+    registry.OpenAppend(
+        "h", "w", true, [](const absl::Status&) {}, std::move(done));
+  });
+  std::vector<Vector> line;
+  for (int i = 0; i < 20'000; ++i) line.emplace_back(i, 0, 0);
+  const uint64_t line_bytes = line.size() * sizeof(Vector);
+  const std::vector<Vector> waiting(3000, Vector(1, 2, 3));
+  std::promise<absl::StatusOr<ChunkResult>> next;
+  bool asked = false;
+  // While the first chunk is built.
+  const auto should_stop = [&] {
+    if (std::exchange(asked, true)) return false;
+    const uint64_t before = registry.Cache().bytes;
+    EXPECT_EQ(before, line_bytes);
+    registry.Append(opened->session, {2, waiting, std::nullopt}, {}, {},
+                    [&](absl::StatusOr<ChunkResult> result) { next.set_value(std::move(result)); });
+    EXPECT_EQ(registry.Cache().bytes, before + waiting.size() * sizeof(Vector));
+    return false;
+  };
+  const auto first = DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+    registry.Append(opened->session, {1, line, std::nullopt}, should_stop, {}, std::move(done));
+  });
+  EXPECT_TRUE(first.ok());
+  EXPECT_TRUE(asked);
+  EXPECT_TRUE(next.get_future().get().ok());
+  // The builder is left, and nothing of the points.
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(line).ok());
+  ASSERT_TRUE(builder.Add(waiting).ok());
+  EXPECT_EQ(registry.Cache().bytes, builder.MemoryBytes());
+}
+
+TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Limits limits;
+  limits.memory_limit = 10'000;
+  Registry registry(store, limits, writers);
+  const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+    registry.OpenAppend(
+        "h", "w", true, [](const absl::Status&) {}, std::move(done));
+  });
+  const auto append = [&](size_t points) {
+    return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+      registry.Append(opened->session, {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {},
+                      {}, std::move(done));
+    });
+  };
+  EXPECT_EQ(append(1000).status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(registry.Cache().bytes, 0);
+  EXPECT_TRUE(append(100).ok());
+}
+
+TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Limits limits;
+  limits.memory_limit = 100'000;
+  Registry registry(store, limits, writers);
+  {
+    MemoryCharge charge(registry);
+    charge.Set(100'000);
+    EXPECT_TRUE(registry.CheckMemory().ok());
+    charge.Set(100'001);
+    EXPECT_EQ(registry.CheckMemory().code(), absl::StatusCode::kResourceExhausted);
+    charge.Set(60'000);
+    EXPECT_TRUE(registry.CheckMemory().ok());
+    EXPECT_EQ(registry.Cache().bytes, 60'000);
+    MemoryCharge other(registry);
+    other.Set(60'000);
+    EXPECT_THAT(std::string(registry.CheckMemory().message()), HasSubstr("--memory-limit"));
+  }
+  EXPECT_EQ(registry.Cache().bytes, 0);
+  EXPECT_TRUE(registry.CheckMemory().ok());
+}
+
+TEST_F(RegistryMemory, AReplacementCountsWhileItIsStoredAndAsAHullAfterwards) {
+  Start();
+  Replacement replacement;
+  replacement.hull_id = "h";
+  replacement.create_if_absent = true;
+  replacement.builder = std::make_shared<HullBuilder>();
+  replacement.counts = *replacement.builder->Add(SpherePoints(1000));
+  const uint64_t bytes = replacement.builder->MemoryBytes();
+  ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
+  EXPECT_EQ(hulls_->registry().Cache().bytes, bytes);
 }
 
 }  // namespace
