@@ -1,5 +1,6 @@
 #include "server/log.h"
 
+#include <google/protobuf/stubs/logging.h>
 #include <grpc/support/log.h>
 #include <spdlog/formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
@@ -9,6 +10,7 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
+#include <utility>
 
 namespace hulld::server {
 namespace {
@@ -78,6 +80,21 @@ class JsonFormatter : public spdlog::formatter {
   }
 };
 
+// Both budgets live as long as the process: libraries log while it ends, too.
+LineBudget& BudgetOf(const char* library) {
+  static auto* const grpc = new LineBudget(kLibraryLines, std::chrono::minutes(1));
+  static auto* const protobuf = new LineBudget(kLibraryLines, std::chrono::minutes(1));
+  return library[0] == 'g' ? *grpc : *protobuf;
+}
+
+void LogForLibrary(const char* library, spdlog::level::level_enum level, const std::string& text) {
+  if (!spdlog::should_log(level)) return;
+  const std::optional<uint64_t> left_out = BudgetOf(library).Spend(LineBudget::Clock::now());
+  if (!left_out.has_value()) return;
+  if (*left_out == 0) return spdlog::log(level, "{}: {}", library, text);
+  spdlog::log(level, "{}: {} (and {} lines left out before)", library, text, *left_out);
+}
+
 spdlog::level::level_enum LevelOf(gpr_log_severity severity) {
   switch (severity) {
     case GPR_LOG_SEVERITY_DEBUG:
@@ -90,7 +107,20 @@ spdlog::level::level_enum LevelOf(gpr_log_severity severity) {
 }
 
 void LogForGrpc(gpr_log_func_args* arguments) {
-  spdlog::log(LevelOf(arguments->severity), "grpc: {}", arguments->message);
+  LogForLibrary("grpc", LevelOf(arguments->severity), arguments->message);
+}
+
+// What it calls errors are mostly those of clients. After a fatal one it ends the process itself.
+void LogForProtobuf(google::protobuf::LogLevel level, const char* file, int line,
+                    const std::string& message) {
+  if (level == google::protobuf::LOGLEVEL_FATAL) {
+    spdlog::critical("protobuf: {} ({}:{})", message, file, line);
+    return;
+  }
+  LogForLibrary(
+      "protobuf",
+      level == google::protobuf::LOGLEVEL_INFO ? spdlog::level::debug : spdlog::level::warn,
+      message);
 }
 
 // Length of the UTF-8 character that starts at text[at]; 0 when there is none.
@@ -140,6 +170,25 @@ LogField::LogField(const char* field, double number) : name(field), is_number(tr
   value = text;
 }
 
+std::optional<uint64_t> LineBudget::Spend(Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  if (!begin_.has_value() || now - *begin_ >= stretch_) {
+    begin_ = now;
+    spent_ = 0;
+  }
+  if (spent_ == lines_) {
+    ++left_out_;
+    return std::nullopt;
+  }
+  ++spent_;
+  return std::exchange(left_out_, 0);
+}
+
+void RouteLibraryLogs() {
+  gpr_set_log_function(LogForGrpc);
+  google::protobuf::SetLogHandler(LogForProtobuf);
+}
+
 bool IsLogged(LogLevel level) { return spdlog::should_log(ToSpdlog(level)); }
 
 void LogEvent(LogLevel level, const std::string& message, const LogFields& fields) {
@@ -161,7 +210,7 @@ void SetUpLog(const std::string& level, const std::string& format) {
   logger->set_level(spdlog::level::from_str(level));
   logger->flush_on(spdlog::level::debug);
   spdlog::set_default_logger(std::move(logger));
-  gpr_set_log_function(LogForGrpc);
+  RouteLibraryLogs();
 }
 
 }  // namespace hulld::server

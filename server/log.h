@@ -1,17 +1,46 @@
 #ifndef HULLD_SERVER_LOG_H_
 #define HULLD_SERVER_LOG_H_
 
+#include <chrono>
 #include <cstdint>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace hulld::server {
 
-// Makes spdlog's default logger write to standard error, and sends gRPC's own messages there too.
+// Makes spdlog's default logger write to standard error, and gRPC and protobuf to that logger.
 // level: debug, info, warn or error. format: text, or json for one JSON object per line with time
 // (UTC, RFC 3339), level and message, and the fields of LogEvent.
 void SetUpLog(const std::string& level, const std::string& format);
+
+// How many lines may be written in each stretch of time: clients that send malformed messages make
+// libraries log a line for each. Thread-safe.
+class LineBudget {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  LineBudget(int lines, Clock::duration stretch) : lines_(lines), stretch_(stretch) {}
+
+  // Whether a line may be written at `now`; if so, how many before it might not since the last that
+  // might.
+  std::optional<uint64_t> Spend(Clock::time_point now);
+
+ private:
+  const int lines_;
+  const Clock::duration stretch_;
+  std::mutex mutex_;
+  std::optional<Clock::time_point> begin_;
+  int spent_ = 0;
+  uint64_t left_out_ = 0;
+};
+
+// Sends what gRPC and protobuf log to spdlog's default logger, each within a budget of
+// kLibraryLines a minute. For the whole process; before any other thread logs.
+inline constexpr int kLibraryLines = 20;
+void RouteLibraryLogs();
 
 enum class LogLevel { kDebug, kInfo, kWarn, kError };
 

@@ -11,7 +11,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <future>
 #include <memory>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -259,6 +262,46 @@ class CapturedLog {
   const std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
   std::ostringstream text_;
 };
+
+TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
+  const LineBudget::Clock::time_point start{};
+  LineBudget budget(2, std::chrono::seconds(10));
+  EXPECT_EQ(budget.Spend(start), 0);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(9)), 0);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(9)), std::nullopt);
+  EXPECT_EQ(budget.Spend(start + std::chrono::milliseconds(9999)), std::nullopt);
+  // The next stretch begins with its first line, however late that is.
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(15)), 2);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(24)), 0);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(24)), std::nullopt);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(25)), 1);
+}
+
+// A name that is not UTF-8, of which protobuf would tell standard error in full, every time.
+TEST_F(Observation, MalformedMessagesDoNotFloodTheLog) {
+  const CapturedLog log;
+  RouteLibraryLogs();
+  constexpr int kMessages = 10 * kLibraryLines;
+  const std::string bad_name = "\x0a\x02\xc3\x28";
+  const grpc::Slice slice(bad_name);
+  const grpc::ByteBuffer request(&slice, 1);
+  testing::internal::CaptureStderr();
+  for (int i = 0; i < kMessages; ++i) {
+    grpc::GenericStub stub(channel_);
+    grpc::ClientContext context;
+    grpc::ByteBuffer response;
+    std::promise<grpc::Status> finished;
+    stub.UnaryCall(&context, "/hulld.v1.HullService/GetHull", grpc::StubOptions(), &request,
+                   &response, [&](grpc::Status status) { finished.set_value(std::move(status)); });
+    EXPECT_FALSE(finished.get_future().get().ok());
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  const std::string text = log.text();
+  EXPECT_THAT(text, HasSubstr("warning protobuf: String field 'hulld.v1.GetHullRequest.hull_id'"));
+  size_t lines = 0;
+  for (size_t at = 0; (at = text.find("protobuf: ", at)) != std::string::npos; ++at) ++lines;
+  EXPECT_LE(lines, size_t{kLibraryLines});
+}
 
 TEST_F(Observation, LogLinesAboutACallNameItsRequest) {
   const CapturedLog log;
