@@ -52,6 +52,10 @@ absl::Status BatchStream::Validate() {
                        registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
+  options_.should_stop = [this] {
+    Executor::GiveWay();
+    return call_.ShouldStop();
+  };
   const absl::Status placements = ValidatePlacementCount(
       request_.placements_size(), registry_.limits().max_placements, "the batch");
   if (!placements.ok()) return placements;

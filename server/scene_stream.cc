@@ -97,7 +97,10 @@ absl::Status SceneStream::Open() {
   if (request_.has_movers()) options_.movers = request_.movers();
   patience_left_ = kMostPatienceInAll;
   options_.query = *std::move(options);
-  options_.query.should_stop = [this] { return call_.ShouldStop() || too_slow_; };
+  options_.query.should_stop = [this] {
+    Executor::GiveWay();
+    return call_.ShouldStop() || too_slow_;
+  };
   options_.threads = executor_.threads();
   table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
