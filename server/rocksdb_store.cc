@@ -2,11 +2,13 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <fcntl.h>
 #include <rocksdb/cache.h>
 #include <rocksdb/table.h>
 #include <rocksdb/utilities/checkpoint.h>
 #include <rocksdb/write_batch.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <utility>
@@ -23,6 +25,9 @@ std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "
 // Of the directories that MakeCopy makes.
 constexpr char kCopyPrefix[] = "copy-";
 
+// 'hullctl snapshot restore' leaves a file of this name in the directory that it makes.
+constexpr char kRestoredMark[] = "/restored";
+
 // What a server that was killed left behind.
 void RemoveCopies(const std::string& data_dir) {
   std::error_code error;
@@ -31,6 +36,13 @@ void RemoveCopies(const std::string& data_dir) {
       std::filesystem::remove_all(entry.path(), error);
     }
   }
+}
+
+bool SyncDirectory(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool synced = fsync(fd) == 0;
+  return close(fd) == 0 && synced;
 }
 
 std::string_view View(const rocksdb::Slice& slice) { return {slice.data(), slice.size()}; }
@@ -242,7 +254,7 @@ absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> revision = ReadNumber(kRevisionKey);
   if (!revision.ok()) return Prefixed("the store's revision: ", revision.status());
   revision_ = *revision;
-  return absl::OkStatus();
+  return options_.read_only ? absl::OkStatus() : LeaveFormerStore();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {
@@ -251,9 +263,31 @@ absl::Status RocksDbStore::InitializeMeta() {
   PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
   PutSealed(batch, kStoreIdKey, id_);
   PutSealed(batch, kRevisionKey, EncodeNumber(0));
+  return WriteMeta(&batch);
+}
+
+// Before anything else is served or written, and the mark goes last: a start that was interrupted
+// is repeated by the next.
+absl::Status RocksDbStore::LeaveFormerStore() {
+  const std::string mark = options_.data_dir + kRestoredMark;
+  std::error_code error;
+  if (!std::filesystem::exists(mark, error)) return absl::OkStatus();
+  const std::string former_id = std::exchange(id_, RandomId());
+  rocksdb::WriteBatch batch;
+  PutSealed(batch, kStoreIdKey, id_);
+  if (absl::Status s = WriteMeta(&batch); !s.ok()) return s;
+  if (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir)) {
+    return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
+  }
+  spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
+               revision_, id_);
+  return absl::OkStatus();
+}
+
+absl::Status RocksDbStore::WriteMeta(rocksdb::WriteBatch* batch) {
   rocksdb::WriteOptions options;
   options.sync = true;
-  const rocksdb::Status status = db_->Write(options, &batch);
+  const rocksdb::Status status = db_->Write(options, batch);
   return status.ok() ? absl::OkStatus() : WriteError(status, options_.data_dir);
 }
 

@@ -75,6 +75,9 @@ class RocksDbStore : public Store {
   absl::Status OpenDb();
   absl::Status ReadMeta();
   absl::Status InitializeMeta();
+  // A store that was made of a snapshot takes an ID of its own.
+  absl::Status LeaveFormerStore();
+  absl::Status WriteMeta(rocksdb::WriteBatch* batch);
   absl::StatusOr<std::string> Read(const std::string& key);
   absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
   absl::Status ScanRange(
