@@ -81,7 +81,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
   if (status.IsCorruption()) {
     return absl::DataLossError(absl::StrCat(
         "--data-dir ", data_dir, " is damaged (", cause,
-        "); restore a snapshot into another directory, or look what is left with 'hulld doctor'"));
+        "); restore a snapshot into another directory, or see 'hulld doctor --cut-log'"));
   }
   if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
     return absl::NotFoundError(
@@ -205,7 +205,9 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.paranoid_checks = true;
   // A record cut short at the end of the log was never acknowledged; anything else is damage that
   // must not pass in silence.
-  options.wal_recovery_mode = rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
+  options.wal_recovery_mode = options_.cut_log
+                                  ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
+                                  : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
   // Coordinates do not compress, and what is not compressed can be read around damage.
   options.compression = rocksdb::kNoCompression;
   options.write_buffer_size = 16 << 20;
@@ -254,7 +256,8 @@ absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> revision = ReadNumber(kRevisionKey);
   if (!revision.ok()) return Prefixed("the store's revision: ", revision.status());
   revision_ = *revision;
-  return options_.read_only ? absl::OkStatus() : LeaveFormerStore();
+  if (options_.read_only) return absl::OkStatus();
+  return options_.cut_log ? TakeNewId() : LeaveFormerStore();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {
@@ -272,16 +275,21 @@ absl::Status RocksDbStore::LeaveFormerStore() {
   const std::string mark = options_.data_dir + kRestoredMark;
   std::error_code error;
   if (!std::filesystem::exists(mark, error)) return absl::OkStatus();
-  const std::string former_id = std::exchange(id_, RandomId());
-  rocksdb::WriteBatch batch;
-  PutSealed(batch, kStoreIdKey, id_);
-  if (absl::Status s = WriteMeta(&batch); !s.ok()) return s;
+  const std::string former_id = id_;
+  if (absl::Status s = TakeNewId(); !s.ok()) return s;
   if (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir)) {
     return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
   }
   spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
                revision_, id_);
   return absl::OkStatus();
+}
+
+absl::Status RocksDbStore::TakeNewId() {
+  id_ = RandomId();
+  rocksdb::WriteBatch batch;
+  PutSealed(batch, kStoreIdKey, id_);
+  return WriteMeta(&batch);
 }
 
 absl::Status RocksDbStore::WriteMeta(rocksdb::WriteBatch* batch) {

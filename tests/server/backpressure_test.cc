@@ -14,7 +14,8 @@
 #include "tests/server/test_server.h"
 
 #ifdef HULLD_SANITIZED
-#include <sanitizer/allocator_interface.h>
+// Of every sanitizer's runtime; GCC 12 comes without its header.
+extern "C" size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
 namespace hulld::server {
