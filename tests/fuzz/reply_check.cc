@@ -326,6 +326,28 @@ std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsRe
   return relations;
 }
 
+void ReplaceCheck::Sent(const v1::ReplaceHullRequest& request) {
+  const bool opens = request.has_open();
+  if (opens == opened_ || (!opens && !request.has_points())) well_formed_ = false;
+  if (opens && !opened_) hull_id_ = request.open().hull_id();
+  opened_ = opened_ || opens;
+  const v1::PointBlock& block = request.points();
+  ends_ = request.has_points() && block.xyz().empty() && block.xyz_float().empty();
+  points_ += static_cast<uint64_t>(block.xyz_size() + block.xyz_float_size()) / 3;
+}
+
+std::string ReplaceCheck::EndedOk(const v1::ReplaceHullResponse& response) const {
+  if (!is_whole()) return "a stream that is not whole replaced a hull";
+  const v1::HullInfo& hull = response.hull();
+  if (hull.hull_id() != hull_id_) return "another hull was replaced";
+  if (hull.create_revision() != hull.revision()) return "a replacement is no new incarnation";
+  if (hull.counts().received() != points_) {
+    return absl::StrCat("a hull of ", points_, " points has received ", hull.counts().received());
+  }
+  if (response.durability() == v1::DURABILITY_UNSPECIFIED) return "a replacement's durability";
+  return CheckHullInfo(hull);
+}
+
 void AppendCheck::Sent(const v1::AppendPointsRequest& request) {
   if (!request.has_chunk()) return;
   const v1::PointBlock& points = request.chunk().points();
@@ -338,6 +360,7 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
     if (!response.has_opened()) return "an append stream does not start with `opened`";
     open_ = true;
     opened_ = response.opened();
+    hull_ = opened_.hull();
     revision_ = opened_.hull().revision();
     if (opened_.writer_id().empty()) return "the server chose no writer";
     return CheckHullInfo(opened_.hull());
@@ -355,6 +378,13 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
   if (ack.hull_revision() < revision_) return "the revision of a hull fell";
   revision_ = ack.hull_revision();
   received_ += ack.counts().received();
+  hull_.set_revision(ack.hull_revision());
+  hull_.set_vertex_count(ack.vertex_count());
+  v1::PointCounts& sums = *hull_.mutable_counts();
+  sums.set_received(sums.received() + ack.counts().received());
+  sums.set_outside(sums.outside() + ack.counts().outside());
+  sums.set_duplicate(sums.duplicate() + ack.counts().duplicate());
+  sums.set_inside(sums.inside() + ack.counts().inside());
   return CheckCounts(ack.counts());
 }
 
