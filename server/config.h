@@ -38,8 +38,8 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull and StreamCollisions. A client is a token or, without tokens, a
-  // peer address.
+  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveSnapshot. A client is a token or,
+  // without tokens, a peer address.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns.
   uint64_t max_concurrent_batches = 32;
