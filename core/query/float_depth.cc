@@ -65,7 +65,7 @@ class Expansion {
  private:
   using Entry = std::pair<double, uint32_t>;  // a facet by its distance
 
-  Corner At(VertexPair pair) const { return {pair_.Difference(pair) * per_unit_, pair}; }
+  Corner At(VertexPair pair) const { return {per_unit_ * pair_.Difference(pair), pair}; }
 
   double HighOf(const FloatPair::Support& farthest) const {
     return farthest.value + kReachErrorFactor * pair_.size();

@@ -39,7 +39,7 @@ class Walk {
       }
       if (farthest.certain) bounds_.low = std::max(bounds_.low, LowOf(farthest));
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
-      corners_[count_++] = {pair_.Difference(farthest.pair) * per_unit_, farthest.pair};
+      corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
       const NearestPart part = Nearest();
       // In exact arithmetic every step is nearer.
       if (count_ == 0 || !Accept(part)) break;

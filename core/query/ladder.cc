@@ -13,10 +13,11 @@ namespace {
 
 // Whether spheres round the hulls show that they are separated; then along n.
 bool SpheresSeparate(const FloatPair& pair, Vector* n) {
-  *n = -pair.CenterDifference();
+  const PlainVector towards_b = -pair.CenterDifference();
+  *n = towards_b;
   const double reach = pair.a().query_hull().radius() + pair.b().query_hull().radius() +
                        kSphereErrorFactor * pair.size();
-  return n->squaredNorm() > reach * reach * kSphereSquareRoundUp;
+  return SquaredNorm(towards_b) > reach * reach * kSphereSquareRoundUp;
 }
 
 Relation RelationOf(FloatVerdict verdict) {
