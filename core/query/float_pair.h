@@ -65,6 +65,13 @@ class FloatPair {
   PlainVector CenterDifference() const {
     return PlainVector(a_->rotated_center()) - (PlainVector(b_->rotated_center()) + offset_);
   }
+  // What is known of A along n_W as seen from its centre, and of B against it.
+  CenterBounds::Bounds CenterBoundsA(const PlainVector& n_W) const {
+    return a_->query_hull().center_bounds().Along(InA(n_W));
+  }
+  CenterBounds::Bounds CenterBoundsB(const PlainVector& n_W) const {
+    return b_->query_hull().center_bounds().Along(-InB(n_W));
+  }
   // The difference of the means of the hulls' inner vertices, within the same bound.
   Vector InnerDifference() const { return InnerPoint(*a_) - (InnerPoint(*b_) + Vector(offset_)); }
 

@@ -1,6 +1,7 @@
 #include "core/query/ladder.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
@@ -11,13 +12,30 @@
 namespace hulld {
 namespace {
 
-// Whether spheres round the hulls show that they are separated; then along n.
-bool SpheresSeparate(const FloatPair& pair, Vector* n) {
-  const PlainVector towards_b = -pair.CenterDifference();
-  *n = towards_b;
+// Whether spheres round the hulls show that they are separated; then along n, which leads from A's
+// centre to B's.
+bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
   const double reach = pair.a().query_hull().radius() + pair.b().query_hull().radius() +
                        kSphereErrorFactor * pair.size();
-  return SquaredNorm(towards_b) > reach * reach * kSphereSquareRoundUp;
+  return SquaredNorm(n) > reach * reach * kSphereSquareRoundUp;
+}
+
+// What the hulls' bounds about their centres show along n, which leads from A's centre to B's: that
+// n separates them, or that the segment between the centres is covered by their insides.
+std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n) {
+  const double largest = LargestComponent(n);
+  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return std::nullopt;
+  // Where one is unknown, no comparison holds.
+  const CenterBounds::Bounds a = pair.CenterBoundsA(n);
+  const CenterBounds::Bounds b = pair.CenterBoundsB(n);
+  if (a.support + b.support + kCenterSupportFactor * largest * pair.size() < SquaredNorm(n)) {
+    return Relation::kSeparated;
+  }
+  const double error = kCenterGaugeFactor * pair.size();
+  const double gauge_a = a.gauge + error * pair.a().query_hull().center_bounds().largest_gauge();
+  const double gauge_b = b.gauge + error * pair.b().query_hull().center_bounds().largest_gauge();
+  if (gauge_a * gauge_b * kCenterProductRoundUp < gauge_a + gauge_b) return Relation::kOverlapping;
+  return std::nullopt;
 }
 
 Relation RelationOf(FloatVerdict verdict) {
@@ -56,11 +74,12 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 }  // namespace
 
 absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
-                                const std::function<bool()>& should_stop) {
+                                Purpose purpose, const std::function<bool()>& should_stop) {
   Decision decision;
   if (pair.usable()) {
-    if (Vector n; SpheresSeparate(pair, &n)) {
-      decision.axis = n;
+    const PlainVector n = -pair.CenterDifference();
+    if (SpheresSeparate(pair, n)) {
+      decision.axis = Vector(n);
       return decision;
     }
     if (cache != nullptr) {
@@ -68,6 +87,13 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
       decision.directions_tried += found.directions_tried;
       if (found.verdict != FloatVerdict::kUndecided) {
         Accept(found, Rung::kCached, decision);
+        return decision;
+      }
+    }
+    if (purpose == Purpose::kRelation) {
+      if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n)) {
+        decision.relation = *relation;
+        if (*relation == Relation::kSeparated) decision.axis = Vector(n);
         return decision;
       }
     }
