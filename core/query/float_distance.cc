@@ -35,7 +35,7 @@ class Walk {
       // Flat parts of A - B make it dear to be certain; that is put off until it may end the walk.
       if (!farthest.certain &&
           (goal_.Met(LowOf(farthest), bounds_.high) || Contains(farthest.pair))) {
-        farthest = pair_.CertainFarthest(n);
+        farthest = pair_.CertainFarthest(n, farthest);
       }
       if (farthest.certain) bounds_.low = std::max(bounds_.low, LowOf(farthest));
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;

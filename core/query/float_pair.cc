@@ -10,10 +10,13 @@ FloatPair::Support FloatPair::Farthest(const PlainVector& n_W) const {
   return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), a.certain && b.certain};
 }
 
-FloatPair::Support FloatPair::CertainFarthest(const PlainVector& n_W) const {
+FloatPair::Support FloatPair::CertainFarthest(const PlainVector& n_W, const Support& found) const {
+  if (found.certain) return found;
   const double blur = kSupportBlurFactor * LargestComponent(n_W) * size_;
-  const SupportMap::Support a = a_->query_hull().support().CertainFarthest(InA(n_W), blur);
-  const SupportMap::Support b = b_->query_hull().support().CertainFarthest(-InB(n_W), blur);
+  const SupportMap::Support a =
+      a_->query_hull().support().CertainFarthest(InA(n_W), blur, found.pair.a);
+  const SupportMap::Support b =
+      b_->query_hull().support().CertainFarthest(-InB(n_W), blur, found.pair.b);
   return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), true};
 }
 

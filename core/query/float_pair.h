@@ -42,8 +42,12 @@ class FloatPair {
   };
   // A vertex of A far along n_W, and of B far against it.
   Support Farthest(const PlainVector& n_W) const;
+  // The farthest, from what Farthest(n_W) found.
+  Support CertainFarthest(const PlainVector& n_W, const Support& found) const;
   // The farthest.
-  Support CertainFarthest(const PlainVector& n_W) const;
+  Support CertainFarthest(const PlainVector& n_W) const {
+    return CertainFarthest(n_W, Farthest(n_W));
+  }
   // How far a certain value may be from the true maximum. Requires the largest component of n_W
   // between kDirectionMin and kDirectionMax.
   double SupportError(const PlainVector& n_W) const {

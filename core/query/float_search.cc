@@ -278,7 +278,7 @@ class FloatSearch {
     FloatPair::Support farthest = pair_.Farthest(n);
     const double error = kSupportErrorFactor * largest * pair_.size();
     if (farthest.value < -error) {
-      if (!farthest.certain) farthest = pair_.CertainFarthest(n);
+      farthest = pair_.CertainFarthest(n, farthest);
       if (farthest.value < -error) return EndSeparated(n);
     }
     const PlainVector along = n;
@@ -316,7 +316,7 @@ class FloatSearch {
   bool IsWithinTolerance(const PlainVector& n, FloatPair::Support farthest, double error) {
     const double length = Norm(n);
     if (farthest.value < tolerance_ * length) {
-      if (!farthest.certain) farthest = pair_.CertainFarthest(n);
+      farthest = pair_.CertainFarthest(n, farthest);
       reach_ = std::min(reach_, std::max(0.0, farthest.value + error) / length);
     }
     nearest_ = std::min(nearest_, Norm(simplex_.NearPoint()));
@@ -347,7 +347,7 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
     ++result.directions_tried;
     const double error = pair.SupportError(n);
     FloatPair::Support farthest = pair.Farthest(n);
-    if (farthest.value < -error && !farthest.certain) farthest = pair.CertainFarthest(n);
+    if (farthest.value < -error) farthest = pair.CertainFarthest(n, farthest);
     if (farthest.value < -error) {
       result.verdict = FloatVerdict::kSeparated;
       result.axis = n;

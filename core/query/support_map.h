@@ -48,8 +48,12 @@ class SupportMap {
 
   // The farthest: `value` is within `blur` of the largest computed value.
   Support CertainFarthest(const PlainVector& n, double blur) const {
-    const Support found = Farthest(n);
-    return found.certain ? found : MakeCertain(found, n, blur);
+    return CertainFarthest(n, blur, Farthest(n).vertex);
+  }
+  // The same, from what Farthest(n) found.
+  Support CertainFarthest(const PlainVector& n, double blur, uint32_t found) const {
+    const Support from{found, ValueOf(found, n), cells_.empty()};
+    return from.certain ? from : MakeCertain(from, n, blur);
   }
 
   // All vertices whose computed value is within `slack` of the largest, ascending. Requires slack
