@@ -2,14 +2,6 @@
 
 namespace hulld {
 
-// The values are those that the support maps found in the hulls' own frames, so that the bound on
-// the maximum holds for them.
-FloatPair::Support FloatPair::Farthest(const PlainVector& n_W) const {
-  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W));
-  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W));
-  return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), a.certain && b.certain};
-}
-
 FloatPair::Support FloatPair::CertainFarthest(const PlainVector& n_W, const Support& found) const {
   if (found.certain) return found;
   const double blur = kSupportBlurFactor * LargestComponent(n_W) * size_;

@@ -106,6 +106,14 @@ class FloatPair {
   bool usable_;
 };
 
+// In the header, as it is the step of every search. The values are those that the support maps
+// found in the hulls' own frames, so that the bound on the maximum holds for them.
+inline FloatPair::Support FloatPair::Farthest(const PlainVector& n_W) const {
+  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W));
+  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W));
+  return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), a.certain && b.certain};
+}
+
 }  // namespace hulld
 
 #endif  // HULLD_CORE_QUERY_FLOAT_PAIR_H_
