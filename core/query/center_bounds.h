@@ -36,16 +36,26 @@ class CenterBounds {
     double support = std::numeric_limits<double>::quiet_NaN();
     double gauge = std::numeric_limits<double>::quiet_NaN();
   };
-  // Upper bounds of h(n) and g(n), but for errors of the hull's coordinates and of n (see
-  // kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h). Requires the
-  // largest component of n positive, and n in the range of FloatPair's directions.
+  // Where a direction is among the corners; nowhere where there are none.
+  class Place;
+  // Requires the largest component of n positive, and n in the range of FloatPair's directions.
+  Place PlaceOf(const PlainVector& n) const;
+  // Upper bounds of h(n) and g(n) for the n of a place, but for errors of the hull's coordinates
+  // and of n (see kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h).
+  Bounds At(const Place& place) const;
   Bounds Along(const PlainVector& n) const;
+  // About the outward normal of the hull where the ray from c along the n of a place leaves it,
+  // longer where the hull is narrow. Without a gauge, and for hulls of few facets, of which this
+  // says little: zero.
+  PlainVector NormalAt(const Place& place) const;
   // At least g(d) for all d with components of at most 1; infinite where unknown.
   double largest_gauge() const { return largest_gauge_; }
 
   size_t MemoryBytes() const { return corners_.capacity() * sizeof(Corner); }
 
  private:
+  // With fewer cells along a side of a face no normal is guessed. Observed: it does not pay.
+  static constexpr uint32_t kLeastGuessingSide = 4;
   // Of directions whose largest component is 1: the support function in units, the gauge per unit.
   struct Corner {
     float support;
@@ -66,37 +76,93 @@ class CenterBounds {
   double largest_gauge_ = std::numeric_limits<double>::infinity();
 };
 
-inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
-  if (corners_.empty()) return {};
+class CenterBounds::Place {
+ private:
+  friend class CenterBounds;
+  double largest = 0;     // component of n
+  uint32_t axis = 0;      // of that component
+  bool negative = false;  // its sign
+  // The other components over the largest, in cells.
+  double across_s = 0;
+  double across_t = 0;
+  double s = 0;  // from low[0] to high[0]
+  double t = 0;  // from low[0] to low[1]
+  const Corner* low = nullptr;
+  const Corner* high = nullptr;
+};
+
+inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
+  Place place;
+  if (corners_.empty()) return place;
   const double components[5] = {n.x, n.y, n.z, n.x, n.y};
   const double x = std::abs(n.x);
   const double y = std::abs(n.y);
   const double z = std::abs(n.z);
   const double larger = std::max(x, y);
-  const double largest = std::max(larger, z);
-  const double factor = half_ / largest;
+  place.largest = std::max(larger, z);
+  const double factor = half_ / place.largest;
   // Arithmetic of truth values, as compilers turn conditions into branches.
   const uint32_t is_y = y > x;
   const uint32_t is_z = z > larger;
-  const uint32_t axis = (is_y & (is_z - 1)) | (2 * is_z);
-  const uint32_t face = 2 * axis + static_cast<uint32_t>(std::signbit(components[axis]));
-  const double u = components[axis + 1] * factor + half_;
-  const double v = components[axis + 2] * factor + half_;
+  place.axis = (is_y & (is_z - 1)) | (2 * is_z);
+  place.negative = std::signbit(components[place.axis]);
+  place.across_s = components[place.axis + 1] * factor;
+  place.across_t = components[place.axis + 2] * factor;
+  const double u = place.across_s + half_;
+  const double v = place.across_t + half_;
+  const uint32_t face = 2 * place.axis + static_cast<uint32_t>(place.negative);
   const uint32_t last = side_ - 1;
   const uint32_t i = std::min(static_cast<uint32_t>(static_cast<int32_t>(u)), last);
   const uint32_t j = std::min(static_cast<uint32_t>(static_cast<int32_t>(v)), last);
   const uint32_t row = side_ + 1;
-  const Corner* const low = corners_.data() + (face * row + i) * row + j;
-  const Corner* const high = low + row;
-  // The weights are not negative: u and v may exceed side_ by rounding, or be below 0.
-  const double s = std::clamp(u - i, 0.0, 1.0);
-  const double t = std::clamp(v - j, 0.0, 1.0);
+  place.low = corners_.data() + (face * row + i) * row + j;
+  place.high = place.low + row;
+  // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
+  place.s = std::clamp(u - i, 0.0, 1.0);
+  place.t = std::clamp(v - j, 0.0, 1.0);
+  return place;
+}
+
+inline CenterBounds::Bounds CenterBounds::At(const Place& place) const {
+  if (place.low == nullptr) return {};
+  const double s = place.s;
+  const double t = place.t;
   const auto mean = [&](float a, float b, float c, float d) {
     return (1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * c + t * d);
   };
+  const Corner* const low = place.low;
+  const Corner* const high = place.high;
   return {
-      mean(low[0].support, low[1].support, high[0].support, high[1].support) * (largest * unit_),
-      mean(low[0].gauge, low[1].gauge, high[0].gauge, high[1].gauge) * (largest * per_unit_)};
+      mean(low[0].support, low[1].support, high[0].support, high[1].support) *
+          (place.largest * unit_),
+      mean(low[0].gauge, low[1].gauge, high[0].gauge, high[1].gauge) * (place.largest * per_unit_)};
+}
+
+inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
+  return At(PlaceOf(n));
+}
+
+// The gradient of the gauge per unit, which on a face is the largest component times a function of
+// the others over it.
+inline PlainVector CenterBounds::NormalAt(const Place& place) const {
+  if (side_ < kLeastGuessingSide || !(largest_gauge_ < std::numeric_limits<double>::infinity())) {
+    return {0, 0, 0};
+  }
+  const double corner = place.low[0].gauge;
+  const double along_low = place.low[1].gauge - corner;
+  const double along_high = double{place.high[1].gauge} - place.high[0].gauge;
+  const double twist = along_high - along_low;
+  const double slope_s = place.high[0].gauge - corner + place.t * twist;
+  const double slope_t = along_low + place.s * twist;
+  const double value = corner + place.t * along_low + place.s * slope_s;
+  const double slope = value - (place.across_s * slope_s + place.across_t * slope_t);
+  // After the component along the axis come the next two, the first after the last.
+  double normal[5];
+  normal[place.axis] = place.negative ? -slope : slope;
+  normal[place.axis + 1] = half_ * slope_s;
+  normal[place.axis + 2] = half_ * slope_t;
+  return {place.axis == 0 ? normal[0] : normal[3], place.axis == 2 ? normal[4] : normal[1],
+          normal[2]};
 }
 
 }  // namespace hulld

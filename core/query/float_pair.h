@@ -69,13 +69,9 @@ class FloatPair {
   PlainVector CenterDifference() const {
     return PlainVector(a_->rotated_center()) - (PlainVector(b_->rotated_center()) + offset_);
   }
-  // What is known of A along n_W as seen from its centre, and of B against it.
-  CenterBounds::Bounds CenterBoundsA(const PlainVector& n_W) const {
-    return a_->query_hull().center_bounds().Along(InA(n_W));
-  }
-  CenterBounds::Bounds CenterBoundsB(const PlainVector& n_W) const {
-    return b_->query_hull().center_bounds().Along(-InB(n_W));
-  }
+  // What the hulls' bounds about their centres say along n_W.
+  class CenterView;
+  CenterView ViewCenters(const PlainVector& n_W) const;
   // The difference of the means of the hulls' inner vertices, within the same bound.
   Vector InnerDifference() const { return InnerPoint(*a_) - (InnerPoint(*b_) + Vector(offset_)); }
 
@@ -85,10 +81,12 @@ class FloatPair {
     return 2 * SupportError(n_W) + kDirectionErrorFactor * error * size_;
   }
   static PlainVector Rotated(const PlacedHull& placed, uint32_t i) {
+    return OutOfOwnFrame(placed, placed.hull().vertices()[i]);
+  }
+  static PlainVector OutOfOwnFrame(const PlacedHull& placed, const PlainVector& v) {
     const double* const R = placed.R_WH().data();  // column by column
-    const Vector& v = placed.hull().vertices()[i];
-    return {R[0] * v.x() + R[3] * v.y() + R[6] * v.z(), R[1] * v.x() + R[4] * v.y() + R[7] * v.z(),
-            R[2] * v.x() + R[5] * v.y() + R[8] * v.z()};
+    return {R[0] * v.x + R[3] * v.y + R[6] * v.z, R[1] * v.x + R[4] * v.y + R[7] * v.z,
+            R[2] * v.x + R[5] * v.y + R[8] * v.z};
   }
   // n_W in a hull's own frame.
   static PlainVector InOwnFrame(const PlacedHull& placed, const PlainVector& n_W) {
@@ -105,6 +103,36 @@ class FloatPair {
   double size_;
   bool usable_;
 };
+
+class FloatPair::CenterView {
+ public:
+  CenterBounds::Bounds bounds_a() const { return center_bounds_a().At(place_a_); }
+  CenterBounds::Bounds bounds_b() const { return center_bounds_b().At(place_b_); }
+  // About the direction from A's surface to B's, where the line of the centres crosses them; zero
+  // where unknown.
+  PlainVector LikelyAxis() const {
+    return OutOfOwnFrame(*pair_->a_, center_bounds_a().NormalAt(place_a_)) -
+           OutOfOwnFrame(*pair_->b_, center_bounds_b().NormalAt(place_b_));
+  }
+
+ private:
+  friend class FloatPair;
+  CenterView(const FloatPair& pair, const PlainVector& n_W)
+      : pair_(&pair),
+        place_a_(center_bounds_a().PlaceOf(pair.InA(n_W))),
+        place_b_(center_bounds_b().PlaceOf(-pair.InB(n_W))) {}
+
+  const CenterBounds& center_bounds_a() const { return pair_->a_->query_hull().center_bounds(); }
+  const CenterBounds& center_bounds_b() const { return pair_->b_->query_hull().center_bounds(); }
+
+  const FloatPair* pair_;
+  CenterBounds::Place place_a_;
+  CenterBounds::Place place_b_;
+};
+
+inline FloatPair::CenterView FloatPair::ViewCenters(const PlainVector& n_W) const {
+  return CenterView(*this, n_W);
+}
 
 // In the header, as it is the step of every search. The values are those that the support maps
 // found in the hulls' own frames, so that the bound on the maximum holds for them.

@@ -252,8 +252,7 @@ class FloatSearch {
  public:
   FloatSearch(const FloatPair& pair, double tolerance) : pair_(pair), tolerance_(tolerance) {}
 
-  FloatSearchResult Run() {
-    PlainVector n = -pair_.CenterDifference();
+  FloatSearchResult Run(PlainVector n) {
     if (IsZero(n)) n = {1, 0, 0};
     while (result_.directions_tried < kMaxDirections && Explore(n)) {
     }
@@ -336,8 +335,9 @@ class FloatSearch {
 
 }  // namespace
 
-FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance) {
-  return FloatSearch(pair, tolerance).Run();
+FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
+                                        const PlainVector& first) {
+  return FloatSearch(pair, tolerance).Run(first);
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {

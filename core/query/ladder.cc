@@ -22,20 +22,25 @@ bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
 
 // What the hulls' bounds about their centres show along n, which leads from A's centre to B's: that
 // n separates them, or that the segment between the centres is covered by their insides.
-std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n) {
-  const double largest = LargestComponent(n);
-  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return std::nullopt;
+std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n,
+                                            const FloatPair::CenterView& view) {
   // Where one is unknown, no comparison holds.
-  const CenterBounds::Bounds a = pair.CenterBoundsA(n);
-  const CenterBounds::Bounds b = pair.CenterBoundsB(n);
-  if (a.support + b.support + kCenterSupportFactor * largest * pair.size() < SquaredNorm(n)) {
-    return Relation::kSeparated;
-  }
-  const double error = kCenterGaugeFactor * pair.size();
-  const double gauge_a = a.gauge + error * pair.a().query_hull().center_bounds().largest_gauge();
-  const double gauge_b = b.gauge + error * pair.b().query_hull().center_bounds().largest_gauge();
+  const CenterBounds::Bounds a = view.bounds_a();
+  const CenterBounds::Bounds b = view.bounds_b();
+  const double error = kCenterSupportFactor * LargestComponent(n) * pair.size();
+  if (a.support + b.support + error < SquaredNorm(n)) return Relation::kSeparated;
+  const double turn = kCenterGaugeFactor * pair.size();
+  const double gauge_a = a.gauge + turn * pair.a().query_hull().center_bounds().largest_gauge();
+  const double gauge_b = b.gauge + turn * pair.b().query_hull().center_bounds().largest_gauge();
   if (gauge_a * gauge_b * kCenterProductRoundUp < gauge_a + gauge_b) return Relation::kOverlapping;
   return std::nullopt;
+}
+
+// Where the walk looks first: along the normals of the surfaces between the centres, which show
+// better than the centres where a gap is; unless these are unknown or nearly cancel.
+PlainVector FirstDirection(const PlainVector& n, const PlainVector& likely) {
+  constexpr double kLeastLikely = 0x1p-4;
+  return SquaredNorm(likely) > kLeastLikely ? likely : n;
 }
 
 Relation RelationOf(FloatVerdict verdict) {
@@ -90,14 +95,18 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
         return decision;
       }
     }
-    if (purpose == Purpose::kRelation) {
-      if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n)) {
+    PlainVector first = n;
+    const double largest = LargestComponent(n);
+    if (purpose == Purpose::kRelation && largest >= kDirectionMin && largest <= kDirectionMax) {
+      const FloatPair::CenterView view = pair.ViewCenters(n);
+      if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) {
         decision.relation = *relation;
         if (*relation == Relation::kSeparated) decision.axis = Vector(n);
         return decision;
       }
+      first = FirstDirection(n, view.LikelyAxis());
     }
-    const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance);
+    const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
     decision.directions_tried += found.directions_tried;
     if (cache != nullptr) Remember(found, *cache);
     if (found.verdict != FloatVerdict::kUndecided) {

@@ -116,7 +116,7 @@ class SeparationSearch {
       start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
       return;
     }
-    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0);
+    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference());
     if (found.verdict == FloatVerdict::kSeparated) towards_ = found.axis;
     if (found.verdict != FloatVerdict::kOverlapping) return;
     start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
