@@ -102,6 +102,8 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
       if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) {
         decision.relation = *relation;
         if (*relation == Relation::kSeparated) decision.axis = Vector(n);
+        // What it suggested failed, and would cost the next query more than these bounds.
+        if (cache != nullptr) *cache = PairCache();
         return decision;
       }
       first = FirstDirection(n, view.LikelyAxis());
