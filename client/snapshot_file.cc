@@ -98,6 +98,15 @@ absl::Status WritePieces(std::istream& file, const std::string& directory, Snaps
   return absl::OkStatus();
 }
 
+absl::Status MarkRestored(const std::string& directory) {
+  const std::string mark = (fs::path(directory) / kRestoredMark).string();
+  std::ofstream(mark).close();
+  if (!SyncPath(mark) || !SyncPath(directory)) {
+    return absl::UnavailableError(absl::StrCat("cannot write ", mark));
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status SnapshotCheck::Take(const v1::SaveSnapshotResponse& part) {
@@ -185,6 +194,7 @@ absl::Status SnapshotWriter::Finish() {
   }
   fs::rename(partial_path_, path_, error);
   if (error) return absl::InvalidArgumentError(absl::StrCat(path_, ": ", error.message()));
+  SyncPath(fs::absolute(path_, error).parent_path().string());
   opened_ = false;
   return absl::OkStatus();
 }
@@ -215,6 +225,7 @@ absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
   if (status.ok() && file.peek() != std::ifstream::traits_type::eof()) {
     status = Damaged("something follows its end");
   }
+  if (status.ok()) status = MarkRestored(partial);
   if (status.ok()) {
     fs::remove(directory, error);
     fs::rename(partial, directory, error);

@@ -52,17 +52,22 @@ absl::Status BatchStream::Validate() {
                        registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
-  const absl::Status placements = ValidatePlacementCount(
-      request_.placements_size(), registry_.limits().max_placements, "the batch");
-  if (!placements.ok()) return placements;
+  options_.should_stop = [this] {
+    Executor::GiveWay();
+    return call_.ShouldStop();
+  };
+  absl::StatusOr<PlacementTable> table =
+      PlacementTable::Make(request_.placements(), request_.packed_placements(), call_.caller(),
+                           registry_.limits().max_placements, "the batch");
+  if (!table.ok()) return table.status();
+  table_ = *std::move(table);
   call_.AddPairs(pair_count());
-  return ValidatePairs(request_.pairs(), static_cast<size_t>(request_.placements_size()),
-                       registry_.limits().max_pairs_per_batch, "the batch");
+  return ValidatePairs(request_.pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
+                       "the batch");
 }
 
-// Fills table_ and head_, and sets relations_suffice_.
+// Fills head_, and sets relations_suffice_.
 absl::Status BatchStream::ResolvePlacements() {
-  table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   table_.EncodeHulls(head_.mutable_hulls(), head_.mutable_placement_problems());

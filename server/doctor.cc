@@ -111,18 +111,28 @@ void PrintText(const Report& report) {
               static_cast<unsigned long long>(report.vertices), report.findings.size());
 }
 
+absl::Status CutLog(RocksDbOptions options) {
+  options.read_only = false;
+  options.cut_log = true;
+  return RocksDbStore::Open(std::move(options)).status();
+}
+
 }  // namespace
 
 int RunDoctor(const std::vector<std::string>& arguments) {
-  CLI::App app("Audits every hull of a store that no hulld has open, and changes nothing.",
-               "hulld doctor");
+  CLI::App app("Audits every hull of a store that no hulld has open.", "hulld doctor");
   RocksDbOptions options;
   options.read_only = true;
   bool json = false;
+  bool cut_log = false;
   app.add_option("--data-dir", options.data_dir, "Directory of the store")
       ->envname("HULLD_DATA_DIR")
       ->required();
   app.add_flag("--json", json, "Print one JSON object");
+  app.add_flag(
+      "--cut-log", cut_log,
+      "If the log is damaged, cut it before its first damaged record: what was acknowledged "
+      "after that is lost, and the store takes a new ID. Without it nothing is changed");
   app.footer("Exit status: 0 all is well, 1 something is damaged, 2 there is nothing to look at.");
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
@@ -130,7 +140,11 @@ int RunDoctor(const std::vector<std::string>& arguments) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
-  const absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
+  absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
+  if (cut_log && absl::IsDataLoss(store.status())) {
+    const absl::Status cut = CutLog(options);
+    store = cut.ok() ? RocksDbStore::Open(options) : cut;
+  }
   if (!store.ok()) {
     std::fprintf(stderr, "hulld doctor: %s\n", std::string(store.status().message()).c_str());
     return absl::IsDataLoss(store.status()) ? kExitDamaged : kExitUsage;

@@ -12,6 +12,7 @@
 #include "server/doctor.h"
 #include "server/log.h"
 #include "server/server.h"
+#include "server/thread_priority.h"
 
 namespace hulld::server {
 namespace {
@@ -65,6 +66,7 @@ void LogStart(const Config& config, const Server& server) {
 // Serves until SIGTERM or SIGINT, then drains. Returns the exit status.
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
+  PreferShortTurns();
   // Blocked before any thread exists, so that every thread inherits it and this one can wait.
   const sigset_t signals = HandledSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);

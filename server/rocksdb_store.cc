@@ -2,11 +2,13 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <fcntl.h>
 #include <rocksdb/cache.h>
 #include <rocksdb/table.h>
 #include <rocksdb/utilities/checkpoint.h>
 #include <rocksdb/write_batch.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <utility>
@@ -23,6 +25,9 @@ std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "
 // Of the directories that MakeCopy makes.
 constexpr char kCopyPrefix[] = "copy-";
 
+// 'hullctl snapshot restore' leaves a file of this name in the directory that it makes.
+constexpr char kRestoredMark[] = "/restored";
+
 // What a server that was killed left behind.
 void RemoveCopies(const std::string& data_dir) {
   std::error_code error;
@@ -31,6 +36,13 @@ void RemoveCopies(const std::string& data_dir) {
       std::filesystem::remove_all(entry.path(), error);
     }
   }
+}
+
+bool SyncDirectory(const std::string& path) {
+  const int fd = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return false;
+  const bool synced = fsync(fd) == 0;
+  return close(fd) == 0 && synced;
 }
 
 std::string_view View(const rocksdb::Slice& slice) { return {slice.data(), slice.size()}; }
@@ -69,7 +81,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
   if (status.IsCorruption()) {
     return absl::DataLossError(absl::StrCat(
         "--data-dir ", data_dir, " is damaged (", cause,
-        "); restore a snapshot into another directory, or look what is left with 'hulld doctor'"));
+        "); restore a snapshot into another directory, or see 'hulld doctor --cut-log'"));
   }
   if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
     return absl::NotFoundError(
@@ -193,7 +205,9 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.paranoid_checks = true;
   // A record cut short at the end of the log was never acknowledged; anything else is damage that
   // must not pass in silence.
-  options.wal_recovery_mode = rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
+  options.wal_recovery_mode = options_.cut_log
+                                  ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
+                                  : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
   // Coordinates do not compress, and what is not compressed can be read around damage.
   options.compression = rocksdb::kNoCompression;
   options.write_buffer_size = 16 << 20;
@@ -242,7 +256,8 @@ absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> revision = ReadNumber(kRevisionKey);
   if (!revision.ok()) return Prefixed("the store's revision: ", revision.status());
   revision_ = *revision;
-  return absl::OkStatus();
+  if (options_.read_only) return absl::OkStatus();
+  return options_.cut_log ? TakeNewId() : LeaveFormerStore();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {
@@ -251,9 +266,36 @@ absl::Status RocksDbStore::InitializeMeta() {
   PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
   PutSealed(batch, kStoreIdKey, id_);
   PutSealed(batch, kRevisionKey, EncodeNumber(0));
+  return WriteMeta(&batch);
+}
+
+// Before anything else is served or written, and the mark goes last: a start that was interrupted
+// is repeated by the next.
+absl::Status RocksDbStore::LeaveFormerStore() {
+  const std::string mark = options_.data_dir + kRestoredMark;
+  std::error_code error;
+  if (!std::filesystem::exists(mark, error)) return absl::OkStatus();
+  const std::string former_id = id_;
+  if (absl::Status s = TakeNewId(); !s.ok()) return s;
+  if (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir)) {
+    return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
+  }
+  spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
+               revision_, id_);
+  return absl::OkStatus();
+}
+
+absl::Status RocksDbStore::TakeNewId() {
+  id_ = RandomId();
+  rocksdb::WriteBatch batch;
+  PutSealed(batch, kStoreIdKey, id_);
+  return WriteMeta(&batch);
+}
+
+absl::Status RocksDbStore::WriteMeta(rocksdb::WriteBatch* batch) {
   rocksdb::WriteOptions options;
   options.sync = true;
-  const rocksdb::Status status = db_->Write(options, &batch);
+  const rocksdb::Status status = db_->Write(options, batch);
   return status.ok() ? absl::OkStatus() : WriteError(status, options_.data_dir);
 }
 

@@ -30,6 +30,9 @@ struct RocksDbOptions {
   std::chrono::milliseconds sync_interval{500};
   // Looks without touching: nothing can be committed, and another process may have it open.
   bool read_only = false;
+  // Opens a store whose log is damaged as it was before the first damaged record: what was
+  // acknowledged after that is lost, and the store takes a new ID.
+  bool cut_log = false;
   // Null: the file system.
   rocksdb::Env* env = nullptr;
 };
@@ -75,6 +78,10 @@ class RocksDbStore : public Store {
   absl::Status OpenDb();
   absl::Status ReadMeta();
   absl::Status InitializeMeta();
+  // A store that was made of a snapshot takes an ID of its own.
+  absl::Status LeaveFormerStore();
+  absl::Status TakeNewId();
+  absl::Status WriteMeta(rocksdb::WriteBatch* batch);
   absl::StatusOr<std::string> Read(const std::string& key);
   absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
   absl::Status ScanRange(

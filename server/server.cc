@@ -28,6 +28,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   options.env = config.store_env;
   return RocksDbStore::Open(std::move(options));
 }
+
 // Long tasks give way to those of microseconds, but not as far as batches do.
 constexpr int kLongReadersNiceness = 1;
 

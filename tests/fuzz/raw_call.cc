@@ -18,8 +18,8 @@ using google::protobuf::ServiceDescriptor;
 
 // Of the services that the program is linked with.
 const MethodDescriptor* FindMethod(server::Rpc rpc) {
-  for (const char* service :
-       {"hulld.v1.HullService", "hulld.v1.CollisionService", "hulld.v1.StatusService"}) {
+  for (const char* service : {"hulld.v1.HullService", "hulld.v1.CollisionService",
+                              "hulld.v1.StatusService", "hulld.v1.MaintenanceService"}) {
     const ServiceDescriptor* const found =
         DescriptorPool::generated_pool()->FindServiceByName(service);
     if (found == nullptr) continue;

@@ -37,6 +37,18 @@ bool IsProblemCode(int code) {
          code == grpc::RESOURCE_EXHAUSTED;
 }
 
+// Of a request whose placements have one of two forms.
+template <typename Request>
+int PlacementCount(const Request& request) {
+  return request.placements_size() + request.packed_placements().hulls_size();
+}
+
+// The entries of the table of hulls that answers it.
+template <typename Request>
+int HullCount(const Request& request) {
+  return request.placements_size() + request.packed_placements().hull_ids_size();
+}
+
 // The placements that have a problem.
 template <typename Problems>
 std::string CheckProblems(const Problems& problems, int placements, std::set<uint32_t>* found) {
@@ -255,12 +267,11 @@ std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
   uint64_t next = 0;
   for (const v1::BatchCheckCollisionsResponse& part : parts) {
     const bool first = &part == &parts.front();
-    if (part.has_header() != first ||
-        part.hulls_size() != (first ? request.placements_size() : 0)) {
+    if (part.has_header() != first || part.hulls_size() != (first ? HullCount(request) : 0)) {
       return "the table of hulls is not in the first message alone";
     }
     std::string finding =
-        CheckProblems(part.placement_problems(), request.placements_size(), &problems);
+        CheckProblems(part.placement_problems(), PlacementCount(request), &problems);
     if (!finding.empty()) return finding;
     if (part.first_pair() != next) return "ranges of pairs do not follow each other";
     const auto pair_of = [&](int row) { return next + static_cast<uint64_t>(row); };
@@ -284,12 +295,12 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
                        std::span<const v1::FindCollisionsResponse> parts) {
   if (parts.empty() || !parts.back().has_totals()) return "a scene ends without its totals";
   if (!parts.front().has_header() || parts.front().pairs_size() > 0 ||
-      parts.front().hulls_size() != request.placements_size()) {
+      parts.front().hulls_size() != HullCount(request)) {
     return "the first message of a scene is not its table of hulls";
   }
   std::set<uint32_t> problems;
   std::string finding =
-      CheckProblems(parts.front().placement_problems(), request.placements_size(), &problems);
+      CheckProblems(parts.front().placement_problems(), PlacementCount(request), &problems);
   if (!finding.empty()) return finding;
   v1::SceneTotals counted;
   std::pair<int64_t, int64_t> before(-1, -1);
@@ -297,7 +308,7 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
     if (part.pairs_size() % 2 != 0) return "half a pair";
     for (int i = 0; i < part.pairs_size(); i += 2) {
       const std::pair<int64_t, int64_t> pair(part.pairs(i), part.pairs(i + 1));
-      if (pair <= before || pair.first >= pair.second || pair.second >= request.placements_size()) {
+      if (pair <= before || pair.first >= pair.second || pair.second >= PlacementCount(request)) {
         return "pairs of a scene are out of order or out of range";
       }
       before = pair;
@@ -326,6 +337,28 @@ std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsRe
   return relations;
 }
 
+void ReplaceCheck::Sent(const v1::ReplaceHullRequest& request) {
+  const bool opens = request.has_open();
+  if (opens == opened_ || (!opens && !request.has_points())) well_formed_ = false;
+  if (opens && !opened_) hull_id_ = request.open().hull_id();
+  opened_ = opened_ || opens;
+  const v1::PointBlock& block = request.points();
+  ends_ = request.has_points() && block.xyz().empty() && block.xyz_float().empty();
+  points_ += static_cast<uint64_t>(block.xyz_size() + block.xyz_float_size()) / 3;
+}
+
+std::string ReplaceCheck::EndedOk(const v1::ReplaceHullResponse& response) const {
+  if (!is_whole()) return "a stream that is not whole replaced a hull";
+  const v1::HullInfo& hull = response.hull();
+  if (hull.hull_id() != hull_id_) return "another hull was replaced";
+  if (hull.create_revision() != hull.revision()) return "a replacement is no new incarnation";
+  if (hull.counts().received() != points_) {
+    return absl::StrCat("a hull of ", points_, " points has received ", hull.counts().received());
+  }
+  if (response.durability() == v1::DURABILITY_UNSPECIFIED) return "a replacement's durability";
+  return CheckHullInfo(hull);
+}
+
 void AppendCheck::Sent(const v1::AppendPointsRequest& request) {
   if (!request.has_chunk()) return;
   const v1::PointBlock& points = request.chunk().points();
@@ -338,6 +371,7 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
     if (!response.has_opened()) return "an append stream does not start with `opened`";
     open_ = true;
     opened_ = response.opened();
+    hull_ = opened_.hull();
     revision_ = opened_.hull().revision();
     if (opened_.writer_id().empty()) return "the server chose no writer";
     return CheckHullInfo(opened_.hull());
@@ -355,6 +389,13 @@ std::string AppendCheck::Received(const v1::AppendPointsResponse& response) {
   if (ack.hull_revision() < revision_) return "the revision of a hull fell";
   revision_ = ack.hull_revision();
   received_ += ack.counts().received();
+  hull_.set_revision(ack.hull_revision());
+  hull_.set_vertex_count(ack.vertex_count());
+  v1::PointCounts& sums = *hull_.mutable_counts();
+  sums.set_received(sums.received() + ack.counts().received());
+  sums.set_outside(sums.outside() + ack.counts().outside());
+  sums.set_duplicate(sums.duplicate() + ack.counts().duplicate());
+  sums.set_inside(sums.inside() + ack.counts().inside());
   return CheckCounts(ack.counts());
 }
 

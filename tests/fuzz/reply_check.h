@@ -32,6 +32,28 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
 // The relations of a batch, in the order of its pairs.
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts);
 
+// Follows one ReplaceHull call.
+class ReplaceCheck {
+ public:
+  // Every message, whether or not it could be sent.
+  void Sent(const v1::ReplaceHullRequest& request);
+  // What is wrong with a call that ended OK.
+  std::string EndedOk(const v1::ReplaceHullResponse& response) const;
+
+  const std::string& hull_id() const { return hull_id_; }
+  // Whether the call may end OK: an opening, points, and an empty block at the end.
+  bool is_whole() const { return well_formed_ && ends_; }
+  // Whether it may not, for want of that block alone.
+  bool is_cut_short() const { return well_formed_ && !ends_; }
+
+ private:
+  std::string hull_id_;
+  bool opened_ = false;
+  bool well_formed_ = true;
+  bool ends_ = false;
+  uint64_t points_ = 0;
+};
+
 // Follows one AppendPoints call.
 class AppendCheck {
  public:
@@ -43,6 +65,8 @@ class AppendCheck {
 
   const v1::AppendOpened& opened() const { return opened_; }
   bool is_open() const { return open_; }
+  // The hull as the last reply told of it, but for its dimension; requires is_open().
+  const v1::HullInfo& hull() const { return hull_; }
 
  private:
   struct SentChunk {
@@ -52,6 +76,7 @@ class AppendCheck {
 
   std::vector<SentChunk> chunks_;
   v1::AppendOpened opened_;
+  v1::HullInfo hull_;
   bool open_ = false;
   uint64_t received_ = 0;
   uint64_t revision_ = 0;

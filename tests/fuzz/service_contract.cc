@@ -16,8 +16,9 @@ Codes CodesOf(Rpc rpc) {
     case Rpc::kCreateHull:
       return {grpc::INVALID_ARGUMENT, grpc::ALREADY_EXISTS};
     case Rpc::kAppendPoints:
-    case Rpc::kReplaceHull:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::FAILED_PRECONDITION, grpc::ABORTED};
+    case Rpc::kReplaceHull:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kGetHull:
     case Rpc::kGetHullMesh:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};

@@ -1,26 +1,32 @@
 #include "tests/fuzz/service_fuzz.h"
 
+#include <absl/strings/str_cat.h>
 #include <spdlog/sinks/null_sink.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include "client/snapshot_file.h"
 #include "tests/fuzz/service_program.h"
 
 namespace hulld::fuzz {
 namespace {
 
+// Programs between two openings of a durable store.
+constexpr int kProgramsPerOpening = 8;
+// Holds some of the hulls that programs make, so that the others come from the store.
+constexpr uint64_t kSmallMemory = 64 << 10;
+
 // Small, so that programs of a hundred bytes reach them.
-server::Config SmallConfig(const std::string& socket) {
+server::Config SmallConfig() {
   server::Config config;
-  config.listen = "unix:" + socket;
-  config.store = "memory";
   config.threads = 2;
   config.limits.max_message_bytes = 64 << 10;
   config.limits.max_points_per_chunk = 64;
@@ -80,7 +86,7 @@ std::string Put(v1::HullService::Stub& hulls, const KnownHull& hull) {
 
 }  // namespace
 
-ServiceFuzz::ServiceFuzz() {
+ServiceFuzz::ServiceFuzz(const std::string& store) : store_(store) {
   // What is logged is formatted, and goes nowhere.
   auto logger =
       std::make_shared<spdlog::logger>("fuzz", std::make_shared<spdlog::sinks::null_sink_mt>());
@@ -88,41 +94,125 @@ ServiceFuzz::ServiceFuzz() {
   spdlog::set_default_logger(std::move(logger));
   char directory[] = "/tmp/hulld-fuzz-XXXXXX";
   if (mkdtemp(directory) == nullptr) std::abort();
-  socket_ = std::string(directory) + "/socket";
-  auto started = server::Server::Start(SmallConfig(socket_));
-  if (!started.ok()) {
-    std::fprintf(stderr, "%s\n", started.status().ToString().c_str());
-    std::abort();
-  }
-  server_ = *std::move(started);
-  channel_ = grpc::CreateChannel("unix:" + socket_, grpc::InsecureChannelCredentials());
-  hulls_ = v1::HullService::NewStub(channel_);
-  collisions_ = v1::CollisionService::NewStub(channel_);
-  status_ = v1::StatusService::NewStub(channel_);
-  generic_ = std::make_unique<grpc::GenericStub>(channel_);
+  directory_ = directory;
+  data_dir_ = directory_ + "/data";
+  Start();
   for (const KnownHull& hull : Guards()) {
     if (!Put(*hulls_, hull).empty()) std::abort();
   }
 }
 
 ServiceFuzz::~ServiceFuzz() {
+  Stop();
+  std::error_code error;
+  std::filesystem::remove_all(directory_, error);
+}
+
+void ServiceFuzz::Start() {
+  server::Config config = SmallConfig();
+  // A channel to another address than before shares nothing with it.
+  config.listen = absl::StrCat("unix:", directory_, "/socket-", ++opened_);
+  config.store = store_;
+  config.data_dir = data_dir_;
+  if (store_ == "rocksdb") config.limits.memory_limit = kSmallMemory;
+  auto started = server::Server::Start(config);
+  if (!started.ok()) {
+    std::fprintf(stderr, "%s\n", started.status().ToString().c_str());
+    std::abort();
+  }
+  server_ = *std::move(started);
+  channel_ = grpc::CreateChannel(config.listen, grpc::InsecureChannelCredentials());
+  hulls_ = v1::HullService::NewStub(channel_);
+  collisions_ = v1::CollisionService::NewStub(channel_);
+  status_ = v1::StatusService::NewStub(channel_);
+  maintenance_ = v1::MaintenanceService::NewStub(channel_);
+  generic_ = std::make_unique<grpc::GenericStub>(channel_);
+}
+
+void ServiceFuzz::Stop() {
   channel_.reset();
   server_.reset();
-  unlink(socket_.c_str());
-  rmdir(socket_.substr(0, socket_.find_last_of('/')).c_str());
+}
+
+std::map<std::string, v1::HullInfo> ServiceFuzz::Hulls() {
+  grpc::ClientContext context;
+  v1::ListHullsResponse all;
+  std::map<std::string, v1::HullInfo> hulls;
+  if (!hulls_->ListHulls(&context, {}, &all).ok() || !all.next_page_token().empty()) return hulls;
+  for (const v1::HullInfo& hull : all.hulls()) hulls[hull.hull_id()] = hull;
+  return hulls;
+}
+
+std::map<std::string, std::string> ServiceFuzz::Contents() {
+  std::map<std::string, std::string> contents;
+  for (const auto& [hull_id, hull] : Hulls()) {
+    std::string& text = contents[hull_id] = hull.SerializeAsString();
+    grpc::ClientContext get;
+    v1::GetHullMeshRequest request;
+    request.set_hull_id(hull_id);
+    const auto reader = hulls_->GetHullMesh(&get, request);
+    v1::GetHullMeshResponse part;
+    while (reader->Read(&part)) {
+      absl::StrAppend(&text, part.vertices().SerializeAsString(),
+                      part.facets().SerializeAsString());
+    }
+    absl::StrAppend(&text, reader->Finish().error_message());
+
+    grpc::ClientContext append;
+    const auto stream = hulls_->AppendPoints(&append);
+    v1::AppendPointsRequest open;
+    open.mutable_open()->set_hull_id(hull_id);
+    open.mutable_open()->set_writer_id("w");
+    stream->Write(open);
+    stream->WritesDone();
+    v1::AppendPointsResponse opened;
+    stream->Read(&opened);
+    absl::StrAppend(&text, "writer at ", opened.opened().last_sequence(), " ",
+                    stream->Finish().error_message());
+  }
+  return contents;
+}
+
+std::string ServiceFuzz::Reopen() {
+  const std::map<std::string, std::string> before = Contents();
+  std::string former;
+  // Every second time a snapshot takes the place of the store.
+  if (opened_ % 2 == 0) {
+    const std::string file = absl::StrCat(directory_, "/snapshot-", opened_);
+    SnapshotWriter writer(file);
+    absl::Status status = writer.Open();
+    grpc::ClientContext context;
+    const auto reader = maintenance_->SaveSnapshot(&context, {});
+    v1::SaveSnapshotResponse part;
+    while (reader->Read(&part) && status.ok()) status = writer.Write(part);
+    if (status.ok()) status = writer.Finish();
+    former = std::exchange(data_dir_, absl::StrCat(directory_, "/restored-", opened_));
+    if (status.ok()) status = RestoreSnapshot(file, data_dir_).status();
+    if (!status.ok()) return "a snapshot cannot be restored: " + status.ToString();
+    std::filesystem::remove(file);
+  }
+  Stop();
+  Start();
+  if (!former.empty()) {
+    std::filesystem::remove_all(former);
+    // A store that was restored is another one.
+    store_id_.clear();
+  }
+  if (Contents() != before) return "a store is not what it was before it was opened again";
+  ++reached_[former.empty() ? "store opened again" : "snapshot opened"];
+  return {};
 }
 
 // Removes what the program before has left.
 std::string ServiceFuzz::Prepare() {
-  grpc::ClientContext context;
-  v1::ListHullsResponse all;
-  if (!hulls_->ListHulls(&context, {}, &all).ok()) return "hulls cannot be listed";
-  for (const v1::HullInfo& hull : all.hulls()) {
-    if (hull.hull_id().rfind("guard/", 0) == 0) continue;
+  const std::map<std::string, v1::HullInfo> hulls = Hulls();
+  if (hulls.empty()) return "hulls cannot be listed";
+  for (const auto& [hull_id, hull] : hulls) {
+    if (hull_id.rfind("guard/", 0) == 0) continue;
     grpc::ClientContext deletion;
     v1::DeleteHullRequest request;
     v1::DeleteHullResponse response;
-    request.set_hull_id(hull.hull_id());
+    request.set_hull_id(hull_id);
     const grpc::Status status = hulls_->DeleteHull(&deletion, request, &response);
     if (!status.ok()) return "cannot delete: " + status.error_message();
   }
@@ -135,14 +225,15 @@ std::string ServiceFuzz::Prepare() {
 std::string ServiceFuzz::Run(std::span<const uint8_t> program) {
   std::string finding = Prepare();
   if (!finding.empty()) return finding;
-  {
-    ServiceProgram run(*this, program);
-    finding = run.Run();
-    if (finding.empty()) finding = run.CheckGuards();
-  }
+  ServiceProgram run(*this, Hulls(), program);
+  finding = run.Run();
+  if (finding.empty()) finding = run.CheckGuards();
   if (!finding.empty()) return finding;
   constexpr std::chrono::seconds kPatience(60);
-  return server_->WaitIdle(kPatience) ? "" : "calls outlive the program that made them";
+  if (!server_->WaitIdle(kPatience)) return "calls outlive the program that made them";
+  finding = run.CheckAcknowledged();
+  const bool due = ++programs_ % kProgramsPerOpening == 0;
+  return finding.empty() && due && store_ != "memory" ? Reopen() : finding;
 }
 
 }  // namespace hulld::fuzz

@@ -13,28 +13,34 @@
 
 namespace {
 
-// The server lives as long as the process; it is never taken down.
-hulld::fuzz::ServiceFuzz& Service() {
-  static auto* const service = new hulld::fuzz::ServiceFuzz;
-  return *service;
+// The servers live as long as the process; they are never taken down.
+hulld::fuzz::ServiceFuzz& Service(bool durable) {
+  static auto* const memory = new hulld::fuzz::ServiceFuzz("memory");
+  static auto* const rocksdb = new hulld::fuzz::ServiceFuzz("rocksdb");
+  return durable ? *rocksdb : *memory;
 }
 
 void PrintReached() {
-  for (const auto& [what, count] : Service().reached()) {
-    std::fprintf(stderr, "%8d %s\n", count, what.c_str());
+  for (const bool durable : {false, true}) {
+    for (const auto& [what, count] : Service(durable).reached()) {
+      std::fprintf(stderr, "%8d %s%s\n", count, what.c_str(), durable ? ", durable" : "");
+    }
   }
 }
 
 }  // namespace
 
 extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
-  Service();
+  Service(false);
   std::atexit(PrintReached);
   return 0;
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
-  const std::string finding = Service().Run({data, size});
+  // The first byte says on which store the rest is run.
+  const bool durable = size > 0 && data[0] % 4 == 0;
+  const size_t start = size > 0 ? 1 : 0;
+  const std::string finding = Service(durable).Run({data + start, size - start});
   if (finding.empty()) return 0;
   std::fprintf(stderr, "%s\n", finding.c_str());
   std::abort();

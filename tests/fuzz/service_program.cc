@@ -7,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "client/packed_placements.h"
+#include "client/snapshot_file.h"
 #include "client/verify/certificate_check.h"
 #include "tests/fuzz/raw_call.h"
 
@@ -19,6 +21,17 @@ constexpr int kMostCalls = 24;
 // No call of a program takes long; one that does has hung.
 constexpr std::chrono::seconds kPatience(60);
 constexpr int kMostComparedPlacements = 7;
+
+bool Changes(Rpc rpc) {
+  return rpc == Rpc::kCreateHull || rpc == Rpc::kAppendPoints || rpc == Rpc::kReplaceHull ||
+         rpc == Rpc::kDeleteHull;
+}
+
+// What replies tell of a hull, whichever call they answer.
+std::string Known(const v1::HullInfo& hull) {
+  return absl::StrCat("created at ", hull.create_revision(), ", changed at ", hull.revision(),
+                      ", vertices ", hull.vertex_count(), ", ", hull.counts().ShortDebugString());
+}
 
 // A server stream with the context that it needs.
 template <typename Response>
@@ -50,6 +63,9 @@ bool IsCollision(v1::Relation relation) {
 const v1::ResponseHeader& HeaderOf(const v1::GetHullMeshResponse& part) {
   return part.header().header();
 }
+const v1::ResponseHeader& HeaderOf(const v1::SaveSnapshotResponse& part) {
+  return part.begin().header();
+}
 template <typename Part>
 const v1::ResponseHeader& HeaderOf(const Part& part) {
   return part.header();
@@ -64,7 +80,7 @@ std::string ServiceProgram::Run() {
 }
 
 void ServiceProgram::Step() {
-  switch (in_.Below(16)) {
+  switch (in_.Below(20)) {
     case 0:
       return CreateHull();
     case 1:
@@ -91,6 +107,12 @@ void ServiceProgram::Step() {
       return FindCollisions();
     case 14:
       return SendRaw();
+    case 15:
+    case 16:
+    case 17:
+      return ReplaceHull();
+    case 18:
+      return in_.OneOf(4) ? SaveSnapshot() : ReplaceHull();
     default:
       return in_.OneOf(4) ? GetStatus() : AppendPoints();
   }
@@ -136,7 +158,23 @@ void ServiceProgram::SeeHeader(const v1::ResponseHeader& header) {
 }
 
 void ServiceProgram::SeeHull(const v1::HullInfo& hull) {
-  revision_ = revisions_[hull.hull_id()] = hull.revision();
+  revision_ = hull.revision();
+  hulls_[hull.hull_id()] = hull;
+}
+
+void ServiceProgram::SeeKnownHull(const v1::HullInfo& hull) {
+  const auto known = hulls_.find(hull.hull_id());
+  if (!all_doubtful_ && doubtful_.count(hull.hull_id()) == 0 &&
+      (known == hulls_.end() || Known(known->second) != Known(hull))) {
+    Note(absl::StrCat("hull ", hull.hull_id(), " is ", Known(hull), "; acknowledged was ",
+                      known == hulls_.end() ? "none" : Known(known->second)));
+  }
+  SeeHull(hull);
+}
+
+uint64_t ServiceProgram::RevisionToExpect(const std::string& hull_id, uint64_t if_revision) const {
+  const auto known = hulls_.find(hull_id);
+  return if_revision == revision_ && known != hulls_.end() ? known->second.revision() : if_revision;
 }
 
 template <typename Stub, typename Request, typename Response>
@@ -147,9 +185,12 @@ bool ServiceProgram::Call(Rpc rpc, Stub& stub,
   grpc::ClientContext context;
   CallManner manner;
   Hurry(context, manner);
-  if (!Ended(rpc, manner, (stub.*method)(&context, request, response))) return false;
-  SeeHeader(response->header());
-  return true;
+  const bool ok = Ended(rpc, manner, (stub.*method)(&context, request, response));
+  if constexpr (requires { request.hull_id(); }) {
+    if (!ok && manner.hurried && Changes(rpc)) Doubt(request.hull_id());
+  }
+  if (ok) SeeHeader(response->header());
+  return ok;
 }
 
 template <typename Stub, typename Request, typename Response>
@@ -193,7 +234,11 @@ void ServiceProgram::CreateHull() {
     return;
   }
   Note(CheckHullInfo(response.hull()));
-  SeeHull(response.hull());
+  if (response.created()) {
+    SeeHull(response.hull());
+  } else {
+    SeeKnownHull(response.hull());
+  }
 }
 
 void ServiceProgram::GetHull() {
@@ -204,7 +249,7 @@ void ServiceProgram::GetHull() {
     return;
   }
   Note(CheckHull(request, response));
-  SeeHull(response.hull());
+  SeeKnownHull(response.hull());
 }
 
 void ServiceProgram::GetHullMesh() {
@@ -242,12 +287,13 @@ void ServiceProgram::DeleteHull() {
   v1::DeleteHullRequest request;
   v1::DeleteHullResponse response;
   FillMessage(in_, Hints(), &request);
-  const auto known = revisions_.find(request.hull_id());
-  if (request.has_if_revision() && request.if_revision() == revision_ &&
-      known != revisions_.end()) {
-    request.set_if_revision(known->second);
+  if (request.has_if_revision()) {
+    request.set_if_revision(RevisionToExpect(request.hull_id(), request.if_revision()));
   }
-  Call(Rpc::kDeleteHull, *service_.hulls_, &v1::HullService::Stub::DeleteHull, request, &response);
+  if (Call(Rpc::kDeleteHull, *service_.hulls_, &v1::HullService::Stub::DeleteHull, request,
+           &response)) {
+    hulls_.erase(request.hull_id());
+  }
 }
 
 void ServiceProgram::GetStatus() {
@@ -271,6 +317,81 @@ v1::AppendPointsRequest ServiceProgram::NextAppendMessage(bool first, uint64_t* 
   return request;
 }
 
+v1::ReplaceHullRequest ServiceProgram::NextReplaceMessage(bool first) {
+  v1::ReplaceHullRequest request;
+  if (in_.OneOf(24)) {
+    FillMessage(in_, Hints(), &request);
+  } else if (first) {
+    v1::ReplaceOpen& open = *request.mutable_open();
+    FillMessage(in_, Hints(), &open);
+    if (open.has_if_revision()) {
+      open.set_if_revision(RevisionToExpect(open.hull_id(), open.if_revision()));
+    }
+  } else {
+    FillMessage(in_, Hints(), request.mutable_points());
+  }
+  return request;
+}
+
+void ServiceProgram::ReplaceHull() {
+  grpc::ClientContext context;
+  CallManner manner;
+  Hurry(context, manner);
+  v1::ReplaceHullResponse response;
+  const auto stream = service_.hulls_->ReplaceHull(&context, &response);
+  const size_t messages = in_.Below(5);
+  const bool says_all = !in_.OneOf(4);
+  const size_t cancel_at = in_.OneOf(12) ? in_.Below(5) : ~size_t{0};
+  ReplaceCheck check;
+  bool going = true;
+  const auto send = [&](const v1::ReplaceHullRequest& request) {
+    check.Sent(request);
+    going = going && stream->Write(request);
+  };
+  for (size_t i = 0; i < messages; ++i) {
+    if (i == cancel_at) {
+      manner.cancelled = true;
+      context.TryCancel();
+    }
+    send(NextReplaceMessage(i == 0));
+  }
+  if (says_all) {
+    v1::ReplaceHullRequest end;
+    end.mutable_points();
+    send(end);
+  }
+  if (going) stream->WritesDone();
+  const bool ok = Ended(Rpc::kReplaceHull, manner, stream->Finish());
+  if (!ok && check.is_whole() && (manner.hurried || manner.cancelled)) Doubt(check.hull_id());
+  if (check.is_cut_short()) Reach("ReplaceHull cut short");
+  if (!ok) return;
+  Note(check.EndedOk(response));
+  SeeHeader(response.header());
+  const bool is_new = hulls_.count(check.hull_id()) == 0;
+  if (doubtful_.count(check.hull_id()) == 0 && !all_doubtful_ && response.created() != is_new) {
+    Note("a replacement does not tell whether there was a hull");
+  }
+  Reach(response.created() ? "ReplaceHull created" : "ReplaceHull replaced");
+  SeeHull(response.hull());
+}
+
+void ServiceProgram::SaveSnapshot() {
+  v1::SaveSnapshotRequest request;
+  std::vector<v1::SaveSnapshotResponse> parts;
+  FillMessage(in_, Hints(), &request);
+  if (!ReadStream(Rpc::kSaveSnapshot, *service_.maintenance_,
+                  &v1::MaintenanceService::Stub::SaveSnapshot, request, &parts)) {
+    return;
+  }
+  SnapshotCheck check;
+  for (const v1::SaveSnapshotResponse& part : parts) {
+    if (const absl::Status taken = check.Take(part); !taken.ok()) {
+      return Note("a snapshot: " + taken.ToString());
+    }
+  }
+  if (!check.complete()) Note("a snapshot ends OK and is not complete");
+}
+
 void ServiceProgram::AppendPoints() {
   grpc::ClientContext context;
   CallManner manner;
@@ -281,7 +402,13 @@ void ServiceProgram::AppendPoints() {
   const bool stepwise = in_.OneOf(2);
   const size_t cancel_at = in_.OneOf(12) ? in_.Below(4) : ~size_t{0};
   AppendCheck check;
+  std::string hull_id;
   v1::AppendPointsResponse response;
+  const auto receive = [&] {
+    Note(check.Received(response));
+    if (response.has_opened()) hull_id = response.opened().hull().hull_id();
+    if (check.is_open()) SeeHull(check.hull());
+  };
   uint64_t sequence = 1;
   for (size_t i = 0; i < messages; ++i) {
     if (i == cancel_at) {
@@ -290,18 +417,18 @@ void ServiceProgram::AppendPoints() {
     }
     const v1::AppendPointsRequest request = NextAppendMessage(i == 0, &sequence);
     check.Sent(request);
+    if (request.has_open() && hull_id.empty()) hull_id = request.open().hull_id();
     if (!stream->Write(request)) break;
     if (!stepwise && i > 0) continue;
     if (!stream->Read(&response)) break;
-    Note(check.Received(response));
-    if (response.has_ack()) revision_ = response.ack().hull_revision();
-    if (!response.has_opened()) continue;
-    SeeHull(response.opened().hull());
-    sequence = response.opened().last_sequence() + 1;
+    receive();
+    if (response.has_opened()) sequence = response.opened().last_sequence() + 1;
   }
   stream->WritesDone();
-  while (stream->Read(&response)) Note(check.Received(response));
+  while (stream->Read(&response)) receive();
   const bool ok = Ended(Rpc::kAppendPoints, manner, stream->Finish());
+  // What a refusal overtakes may stand without an acknowledgement.
+  if (!ok && (check.is_open() || manner.hurried || manner.cancelled)) Doubt(hull_id);
   Note(check.Ended(ok));
   if (ok && check.is_open()) Reach("AppendPoints opened");
 }
@@ -366,12 +493,19 @@ void ServiceProgram::BatchCheckCollisions() {
   v1::BatchCheckCollisionsRequest request;
   std::vector<v1::BatchCheckCollisionsResponse> parts;
   FillMessage(in_, Hints(), &request);
+  const std::optional<v1::BatchCheckCollisionsRequest> packed = MaybePacked(request);
+  const v1::BatchCheckCollisionsRequest& sent = packed.has_value() ? *packed : request;
   if (!ReadStream(Rpc::kBatchCheckCollisions, *service_.collisions_,
-                  &v1::CollisionService::Stub::BatchCheckCollisions, request, &parts)) {
+                  &v1::CollisionService::Stub::BatchCheckCollisions, sent, &parts)) {
     return;
   }
-  Note(CheckBatch(request, parts));
+  Note(CheckBatch(sent, parts));
   if (request.pairs_size() > 0) Reach("BatchCheckCollisions with pairs");
+  if (!packed.has_value() || request.tolerance() != 0 || !finding_.empty()) return;
+  Reach("BatchCheckCollisions compared with packed placements");
+  if (AskBatch(request) != RelationsOf(parts) && finding_.empty()) {
+    Note("packed placements are answered otherwise");
+  }
 }
 
 std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollisionsRequest& request) {
@@ -383,6 +517,17 @@ std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollision
   const grpc::Status status = reader->Finish();
   if (!status.ok()) Note("a batch that another RPC has answered: " + status.error_message());
   return RelationsOf(parts);
+}
+
+template <typename Request>
+std::optional<Request> ServiceProgram::MaybePacked(const Request& request) {
+  if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {
+    return std::nullopt;
+  }
+  Request packed = request;
+  *packed.mutable_packed_placements() = PackPlacements(request.placements());
+  packed.clear_placements();
+  return packed;
 }
 
 v1::StreamCollisionsRequest ServiceProgram::NextCollisionMessage(bool first, size_t placements) {
@@ -409,6 +554,9 @@ void ServiceProgram::StreamCollisions() {
   v1::StreamCollisionsRequest request = NextCollisionMessage(true, 0);
   const size_t placements = static_cast<size_t>(request.open().placements_size());
   CollisionStreamCheck check(request.open());
+  if (request.has_open()) {
+    if (auto packed = MaybePacked(request.open())) *request.mutable_open() = *std::move(packed);
+  }
   v1::StreamCollisionsResponse response;
   for (size_t i = 0; i < messages; ++i) {
     if (i == cancel_at) {
@@ -440,11 +588,13 @@ void ServiceProgram::FindCollisions() {
   v1::FindCollisionsRequest request;
   std::vector<v1::FindCollisionsResponse> parts;
   FillMessage(in_, Hints(), &request);
+  const std::optional<v1::FindCollisionsRequest> packed = MaybePacked(request);
+  const v1::FindCollisionsRequest& sent = packed.has_value() ? *packed : request;
   if (!ReadStream(Rpc::kFindCollisions, *service_.collisions_,
-                  &v1::CollisionService::Stub::FindCollisions, request, &parts)) {
+                  &v1::CollisionService::Stub::FindCollisions, sent, &parts)) {
     return;
   }
-  Note(CheckScene(request, parts));
+  Note(CheckScene(sent, parts));
   const bool comparable = request.placements_size() > 1 &&
                           request.placements_size() <= kMostComparedPlacements &&
                           request.tolerance() == 0 && !request.wanted().has_clearance();
@@ -491,6 +641,20 @@ void ServiceProgram::SendRaw() {
     Note(absl::StrCat(server::RpcName(call.rpc), " takes bytes that are no message"));
   }
   if (call.malformed) Reach("malformed message");
+  if (Changes(call.rpc)) all_doubtful_ = true;
+}
+
+std::string ServiceProgram::CheckAcknowledged() {
+  if (all_doubtful_) return finding_;
+  const std::map<std::string, v1::HullInfo> hulls = service_.Hulls();
+  for (const auto& [hull_id, known] : hulls_) {
+    if (doubtful_.count(hull_id) == 0 && hulls.count(hull_id) == 0) {
+      Note(absl::StrCat("hull ", hull_id, " is lost; acknowledged was ", Known(known)));
+    }
+  }
+  for (const auto& [hull_id, hull] : hulls) SeeKnownHull(hull);
+  Reach(doubtful_.empty() ? "all hulls as acknowledged" : "most hulls as acknowledged");
+  return finding_;
 }
 
 std::string ServiceProgram::CheckGuards() {

@@ -6,8 +6,11 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/rpc.h"
@@ -22,18 +25,25 @@ namespace hulld::fuzz {
 // One run of one program: decodes and makes its calls, and checks what comes back.
 class ServiceProgram {
  public:
-  ServiceProgram(ServiceFuzz& service, std::span<const uint8_t> program)
-      : service_(service), in_(program) {}
+  // hulls: all that there are, by ID.
+  ServiceProgram(ServiceFuzz& service, std::map<std::string, v1::HullInfo> hulls,
+                 std::span<const uint8_t> program)
+      : service_(service), in_(program), hulls_(std::move(hulls)) {}
 
   // The first finding, or nothing.
   std::string Run();
   // Whether the hulls that no program can name are as they were, and the server answers.
   std::string CheckGuards();
+  // Whether the hulls that are there are those that the server acknowledged, of whose changes each
+  // was answered or refused: nothing is lost, and what was refused has changed nothing. Requires
+  // that no call runs.
+  std::string CheckAcknowledged();
 
  private:
   void Step();
   void CreateHull();
   void AppendPoints();
+  void ReplaceHull();
   void GetHull();
   void GetHullMesh();
   void ListHulls();
@@ -43,6 +53,7 @@ class ServiceProgram {
   void StreamCollisions();
   void FindCollisions();
   void GetStatus();
+  void SaveSnapshot();
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0}; }
@@ -56,6 +67,12 @@ class ServiceProgram {
   void Settle();
   void SeeHeader(const v1::ResponseHeader& header);
   void SeeHull(const v1::HullInfo& hull);
+  // A hull that a reply tells of is the one that was acknowledged.
+  void SeeKnownHull(const v1::HullInfo& hull);
+  // A change of this hull was not acknowledged, and not refused for certain.
+  void Doubt(const std::string& hull_id) { doubtful_.insert(hull_id); }
+  // `if_revision` as a client has it that knows this hull, where it is to be the last one seen.
+  uint64_t RevisionToExpect(const std::string& hull_id, uint64_t if_revision) const;
 
   // One unary call; true when it ended OK, its header checked.
   template <typename Stub, typename Request, typename Response>
@@ -78,14 +95,22 @@ class ServiceProgram {
                              std::span<const v1::FindCollisionsResponse> parts);
 
   v1::AppendPointsRequest NextAppendMessage(bool first, uint64_t* sequence);
+  v1::ReplaceHullRequest NextReplaceMessage(bool first);
   v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
+  // The same request in its other form, now and then.
+  template <typename Request>
+  std::optional<Request> MaybePacked(const Request& request);
 
   ServiceFuzz& service_;
   ByteReader in_;
   std::string finding_;
-  // Of the hull that was last seen, and of each.
+  // Of the hull that was last seen.
   uint64_t revision_ = 0;
-  std::map<std::string, uint64_t> revisions_;
+  // What the server has acknowledged of each hull, and of which that is not all.
+  std::map<std::string, v1::HullInfo> hulls_;
+  std::set<std::string> doubtful_;
+  // A change of any hull may have happened.
+  bool all_doubtful_ = false;
   // Streams that nobody reads; they end with the program.
   std::vector<std::shared_ptr<void>> idle_;
 };

@@ -89,6 +89,7 @@ bool HistoryClient::ChangeAtRandom(const std::string& hull_id) {
   const int choice = Below(45);
   if (choice < 5) return Create(hull_id, Below(2) == 0);
   if (choice < 8) return Delete(hull_id, Below(2) == 0);
+  if (choice < 14) return Replace(hull_id);
   return Append(hull_id);
 }
 
@@ -113,6 +114,9 @@ bool HistoryClient::End(const std::string& hull_id, Operation& operation,
   const bool read = operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
                     operation.kind == Kind::kProbe;
   if (operation.outcome == Outcome::kUnknown) {
+    // The incarnation is gone: what it did, it did before this answer.
+    const bool gone = status.error_code() == grpc::StatusCode::FAILED_PRECONDITION;
+    if (gone) operation.returned = history_.Tick();
     // A read that was not answered says nothing.
     if (!read) history_.Record(hull_id, operation);
     return status.error_code() != grpc::StatusCode::UNAVAILABLE;
@@ -141,6 +145,18 @@ bool HistoryClient::Create(const std::string& hull_id, bool if_absent) {
   operation.created = response.created();
   operation.store_revision = response.header().revision();
   return End(hull_id, operation, status);
+}
+
+Coordinates HistoryClient::SomePoints(int count, Operation& operation) {
+  Coordinates xyz;
+  for (int i = 0; i < count; ++i) {
+    const int point = Below(kCloudSize);
+    operation.points |= PointSet{1} << point;
+    const double* from = HistoryCloud().data() + 3 * point;
+    xyz.insert(xyz.end(), from, from + 3);
+  }
+  operation.sent += static_cast<uint64_t>(count);
+  return xyz;
 }
 
 HistoryClient::Stream* HistoryClient::OpenStream(const std::string& hull_id, bool* answered) {
@@ -172,14 +188,7 @@ bool HistoryClient::Append(const std::string& hull_id) {
   operation.incarnation = stream->incarnation;
   operation.sequence = stream->next_sequence;
   operation.if_revision = SomeRevision(hull_id);
-  operation.sent = static_cast<uint64_t>(1 + Below(3));
-  Coordinates xyz;
-  for (uint64_t i = 0; i < operation.sent; ++i) {
-    const int point = Below(kCloudSize);
-    operation.points |= PointSet{1} << point;
-    const double* from = HistoryCloud().data() + 3 * point;
-    xyz.insert(xyz.end(), from, from + 3);
-  }
+  const Coordinates xyz = SomePoints(1 + Below(3), operation);
   // Now and then a chunk is sent again, as a client does that lost an ack.
   if (operation.sequence > 1 && Below(8) == 0) --operation.sequence;
   const std::optional<v1::AppendAck> ack =
@@ -198,6 +207,43 @@ bool HistoryClient::Append(const std::string& hull_id) {
   operation.outside = ack->counts().outside();
   operation.duplicate = ack->counts().duplicate();
   return End(hull_id, operation, grpc::Status::OK);
+}
+
+bool HistoryClient::Replace(const std::string& hull_id) {
+  Operation operation = Begin(Kind::kReplace);
+  operation.if_absent = Below(2) == 0;
+  operation.if_revision = SomeRevision(hull_id);
+  if (!operation.if_revision && Below(8) == 0) operation.if_revision = 0;
+  const bool cut_short = Below(6) == 0;
+  const bool cancelled = !cut_short && Below(12) == 0;
+
+  const std::unique_ptr<grpc::ClientContext> context = NewContext();
+  v1::ReplaceHullResponse response;
+  const auto writer = hulls_->ReplaceHull(context.get(), &response);
+  v1::ReplaceHullRequest request;
+  request.mutable_open()->set_hull_id(hull_id);
+  request.mutable_open()->set_create_if_absent(operation.if_absent);
+  if (operation.if_revision) request.mutable_open()->set_if_revision(*operation.if_revision);
+  bool going = writer->Write(request);
+  for (int blocks = 1 + Below(3); blocks > 0; --blocks) {
+    const Coordinates xyz = SomePoints(1 + Below(4), operation);
+    request.mutable_points()->mutable_xyz()->Assign(xyz.begin(), xyz.end());
+    going = going && writer->Write(request);
+  }
+  request.mutable_points()->clear_xyz();
+  if (!cut_short) going = going && writer->Write(request);
+  if (going) writer->WritesDone();
+  if (cancelled) context->TryCancel();
+  const grpc::Status status = writer->Finish();
+  if (cut_short) {
+    // No operation: whatever it did would be seen, and not be explained.
+    EXPECT_FALSE(status.ok()) << "a stream that was cut short replaced hull " << hull_id;
+    return status.error_code() != grpc::StatusCode::UNAVAILABLE;
+  }
+  TakeRecord(response.hull(), operation);
+  operation.created = response.created();
+  operation.store_revision = response.header().revision();
+  return End(hull_id, operation, status);
 }
 
 bool HistoryClient::Delete(const std::string& hull_id, bool if_known_revision) {

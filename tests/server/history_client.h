@@ -44,6 +44,9 @@ class HistoryClient {
   bool Create(const std::string& hull_id, bool if_absent);
   // Opens a stream when none is open, and appends one chunk.
   bool Append(const std::string& hull_id);
+  // One to three blocks. Now and then the stream ends without the last, empty one, which must
+  // change nothing, or is cancelled after it, which leaves open whether anything changed.
+  bool Replace(const std::string& hull_id);
   bool Delete(const std::string& hull_id, bool if_known_revision);
   bool Get(const std::string& hull_id);
   bool Mesh(const std::string& hull_id);
@@ -60,6 +63,8 @@ class HistoryClient {
   // Records the operation with the status of its call; false when nobody answered.
   bool End(const std::string& hull_id, Operation& operation, const grpc::Status& status);
   Stream* OpenStream(const std::string& hull_id, bool* answered);
+  // `count` points of the cloud, with repetition; tells the operation of them.
+  Coordinates SomePoints(int count, Operation& operation);
   // Absent most times; else the revision last seen.
   std::optional<uint64_t> SomeRevision(const std::string& hull_id);
   int Below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }

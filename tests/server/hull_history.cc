@@ -22,6 +22,8 @@ struct State {
   uint64_t revision = 0;
   bool revision_known = true;
   bool create_revision_known = true;
+  // Whether vertices came since its creation: until then both revisions are the same.
+  bool grown = false;
   PointSet points = 0;
   uint64_t received = 0;
   uint64_t outside = 0;
@@ -34,27 +36,14 @@ struct State {
   }
 
   std::string Key() const {
-    std::string key =
-        absl::StrCat(exists, ",", create_revision, ",", create_revision_known, ",", revision, ",",
-                     revision_known, ",", points, ",", received, ",", outside, ",", duplicate);
+    std::string key = absl::StrCat(exists, ",", create_revision, ",", create_revision_known, ",",
+                                   revision, ",", revision_known, ",", grown, ",", points, ",",
+                                   received, ",", outside, ",", duplicate);
     for (const auto& [writer, sequence] : writers)
       absl::StrAppend(&key, ",", writer, ":", sequence);
     return key;
   }
 };
-
-// Whether an answer may say that the hull is at this revision; from then on it is.
-bool Agree(State& state, uint64_t revision) {
-  if (state.revision_known) return state.revision == revision;
-  if (revision <= state.revision) return false;
-  if (!state.create_revision_known && state.points == 0 && state.received == 0) {
-    state.create_revision = revision;
-    state.create_revision_known = true;
-  }
-  state.revision = revision;
-  state.revision_known = true;
-  return true;
-}
 
 bool AgreeOnIncarnation(State& state, uint64_t create_revision) {
   if (!state.create_revision_known) {
@@ -62,6 +51,16 @@ bool AgreeOnIncarnation(State& state, uint64_t create_revision) {
     state.create_revision_known = true;
   }
   return state.create_revision == create_revision;
+}
+
+// Whether an answer may say that the hull is at this revision; from then on it is.
+bool Agree(State& state, uint64_t revision) {
+  if (state.revision_known) return state.revision == revision;
+  if (revision <= state.revision) return false;
+  if (!state.grown && !AgreeOnIncarnation(state, revision)) return false;
+  state.revision = revision;
+  state.revision_known = true;
+  return true;
 }
 
 // A change that was answered with this revision, or, when lost, had a later one than before.
@@ -76,6 +75,7 @@ bool Advance(State& state, const Operation& operation, uint64_t revision) {
   return true;
 }
 
+// A new incarnation, of no points, in the place of whatever there was.
 bool Create(State& state, const Operation& operation) {
   const uint64_t revision = state.revision;
   const bool known = state.revision_known;
@@ -153,6 +153,7 @@ bool StepAppend(State& state, const Operation& operation) {
     return false;
   }
   state.points |= added;
+  state.grown = state.grown || added != 0;
   state.received += operation.sent;
   state.outside += outside;
   state.duplicate += operation.sent - outside;
@@ -161,6 +162,32 @@ bool StepAppend(State& state, const Operation& operation) {
   return operation.received == operation.sent && operation.outside == outside &&
          operation.duplicate == operation.sent - outside &&
          operation.vertex_count == static_cast<uint64_t>(std::popcount(state.points));
+}
+
+// One change, in which the hull is never without the new points or with others.
+bool StepReplace(State& state, const Operation& operation) {
+  const bool absent_fits = operation.if_revision.value_or(0) == 0;
+  switch (operation.outcome) {
+    case Outcome::kNotFound:
+      return !state.exists && absent_fits && !operation.if_absent;
+    case Outcome::kAborted:
+      return state.exists ? Mismatch(state, operation) : !absent_fits;
+    case Outcome::kOk:
+    case Outcome::kUnknown:
+      break;
+    default:
+      return false;
+  }
+  const bool existed = state.exists;
+  if (existed ? !Match(state, operation) : !absent_fits || !operation.if_absent) return false;
+  if (!Create(state, operation)) return false;
+  state.points = operation.points;
+  state.received = operation.sent;
+  state.outside = static_cast<uint64_t>(std::popcount(operation.points));
+  state.duplicate = operation.sent - state.outside;
+  if (operation.outcome == Outcome::kUnknown) return true;
+  return operation.created == !existed && operation.revision == operation.create_revision &&
+         SameCounts(state, operation);
 }
 
 bool StepDelete(State& state, const Operation& operation) {
@@ -198,7 +225,7 @@ bool Step(State& state, const Operation& operation) {
     case Kind::kAppend:
       return StepAppend(state, operation);
     case Kind::kReplace:
-      return false;
+      return StepReplace(state, operation);
     case Kind::kDelete:
       return StepDelete(state, operation);
     case Kind::kGet:
@@ -361,7 +388,8 @@ std::string StoreRevisionFault(const HullHistory& history) {
       invoked.push_back({operation.invoked, operation.store_revision});
       const bool changed = (operation.kind == Kind::kAppend && !operation.already_applied &&
                             operation.outside > 0) ||
-                           operation.kind == Kind::kDelete || operation.created;
+                           operation.kind == Kind::kReplace || operation.kind == Kind::kDelete ||
+                           operation.created;
       if (!changed) continue;
       const uint64_t revision =
           operation.kind == Kind::kDelete ? operation.store_revision : operation.revision;

@@ -42,7 +42,9 @@ struct Operation {
   uint64_t returned = UINT64_MAX;
 
   // What was asked.
+  // Create, open: keeps a hull that exists. Open, replace: makes one that does not.
   bool if_absent = false;
+  // Of a replace 0: the hull must not exist.
   std::optional<uint64_t> if_revision;
   std::string writer;
   uint64_t sequence = 0;

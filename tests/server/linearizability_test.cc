@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <initializer_list>
 #include <string>
 #include <thread>
 #include <vector>
@@ -46,6 +48,42 @@ Operation AppendAt(uint64_t invoked, uint64_t returned, uint64_t revision, int p
   operation.points = PointSet{1} << point;
   operation.sent = operation.received = operation.outside = 1;
   operation.vertex_count = vertex_count;
+  return operation;
+}
+
+// The hull of these points, once each, in the place of one that there was.
+Operation ReplaceAt(uint64_t invoked, uint64_t returned, uint64_t revision, PointSet points) {
+  Operation operation = Answered(Kind::kReplace, invoked, returned, revision);
+  operation.create_revision = revision;
+  operation.points = points;
+  operation.sent = operation.received = operation.outside = operation.vertex_count =
+      static_cast<uint64_t>(std::popcount(points));
+  return operation;
+}
+
+Operation Unanswered(Operation operation, uint64_t returned = UINT64_MAX) {
+  operation.outcome = Outcome::kUnknown;
+  operation.returned = returned;
+  return operation;
+}
+
+Operation Refused(Operation operation, Outcome outcome) {
+  operation.outcome = outcome;
+  return operation;
+}
+
+Operation MeshAt(uint64_t invoked, uint64_t returned, uint64_t revision, PointSet points) {
+  Operation operation = Answered(Kind::kMesh, invoked, returned, revision);
+  operation.points = points;
+  return operation;
+}
+
+// A hull that took `points` points, each of them a vertex.
+Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t create_revision,
+                uint64_t points) {
+  Operation operation = Answered(Kind::kGet, invoked, returned, revision);
+  operation.create_revision = create_revision;
+  operation.received = operation.outside = operation.vertex_count = points;
   return operation;
 }
 
@@ -147,6 +185,134 @@ TEST(LinearizabilityCheck, RefusesAConditionThatDidNotHold) {
   EXPECT_NE(LinearizabilityFault({CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1), conditional}), "");
 }
 
+// A hull with point 5, at revision 2.
+std::vector<Operation> After(std::initializer_list<Operation> more) {
+  std::vector<Operation> operations = {CreateAt(1, 2), AppendAt(3, 4, 2, 5, 1)};
+  operations.insert(operations.end(), more);
+  return operations;
+}
+
+TEST(LinearizabilityCheck, AReplaceIsOneChangeWithCountsOfItsOwn) {
+  EXPECT_EQ(LinearizabilityFault(
+                After({ReplaceAt(5, 6, 3, 0xc0), MeshAt(7, 8, 3, 0xc0), GetAt(9, 10, 3, 3, 2)})),
+            "");
+  // The mesh overlaps it and may see either side.
+  for (const bool before : {false, true}) {
+    EXPECT_EQ(LinearizabilityFault(After({ReplaceAt(5, 8, 3, 0xc0),
+                                          before ? MeshAt(6, 7, 2, 0x20) : MeshAt(6, 7, 3, 0xc0),
+                                          GetAt(9, 10, 3, 3, 2)})),
+              "");
+  }
+  // No writer has a sequence in the new incarnation.
+  Operation chunk = AppendAt(7, 8, 4, 8, 3);
+  chunk.incarnation = 3;
+  EXPECT_EQ(LinearizabilityFault(After({ReplaceAt(5, 6, 3, 0xc0), chunk})), "");
+  chunk.sequence = 2;
+  EXPECT_NE(LinearizabilityFault(After({ReplaceAt(5, 6, 3, 0xc0), chunk})), "");
+}
+
+TEST(LinearizabilityCheck, AReplaceWithoutAnAnswerMayOrMayNotHaveHappened) {
+  const Operation lost = Unanswered(ReplaceAt(5, 6, 0, 0xc0));
+  EXPECT_EQ(LinearizabilityFault(After({lost, MeshAt(7, 8, 2, 0x20), MeshAt(9, 10, 2, 0x20)})), "");
+  EXPECT_EQ(LinearizabilityFault(After({lost, MeshAt(7, 8, 2, 0x20), MeshAt(9, 10, 4, 0xc0)})), "");
+  // But not happen and then not have happened.
+  EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(7, 8, 4, 0xc0), MeshAt(9, 10, 2, 0x20)})), "");
+  // Its revision is that of the creation, until vertices come.
+  EXPECT_EQ(LinearizabilityFault(After({lost, MeshAt(7, 8, 4, 0xc0), GetAt(9, 10, 4, 4, 2)})), "");
+  EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(7, 8, 4, 0xc0), GetAt(9, 10, 4, 3, 2)})), "");
+}
+
+TEST(LinearizabilityCheck, RefusesAReplaceThatWasLost) {
+  const Operation replace = ReplaceAt(5, 6, 3, 0xc0);
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(7, 8, 2, 0x20)})), "");
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(7, 8, 3, 0x20)})), "");
+  EXPECT_NE(LinearizabilityFault(After({replace, ProbeAt(7, 8, 3, 5, true)})), "");
+  EXPECT_NE(LinearizabilityFault(After({replace, GetAt(7, 8, 3, 1, 1)})), "");
+  // What was appended to the former hull counts for nothing, and nothing is appended to it.
+  EXPECT_NE(LinearizabilityFault(After({replace, AppendAt(7, 8, 4, 8, 3, "w", 2)})), "");
+}
+
+TEST(LinearizabilityCheck, RefusesAReplaceOfWhichOneHalfWasApplied) {
+  const Operation replace = ReplaceAt(5, 8, 3, 0xc0);
+  // New points are missing, before the answer or after it; or former ones are still there.
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(6, 7, 3, 0x40)})), "");
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0x80)})), "");
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xe0)})), "");
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0)})), "");
+  // So for one that nobody answered.
+  const Operation lost = Unanswered(replace);
+  EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0x40)})), "");
+  EXPECT_NE(LinearizabilityFault(After({lost, MeshAt(9, 10, 3, 0xe0)})), "");
+  // The points are new, and the counts or the incarnation are not.
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 3, 3)})),
+            "");
+  EXPECT_NE(LinearizabilityFault(After({replace, MeshAt(9, 10, 3, 0xc0), GetAt(11, 12, 3, 1, 2)})),
+            "");
+  // The former writer's sequence is still known.
+  Operation open = GetAt(9, 10, 3, 3, 2);
+  open.kind = Kind::kOpen;
+  open.writer = "w";
+  EXPECT_EQ(LinearizabilityFault(After({replace, open})), "");
+  open.last_sequence = 1;
+  EXPECT_NE(LinearizabilityFault(After({replace, open})), "");
+}
+
+TEST(LinearizabilityCheck, RefusesAReplaceThatWasAppliedTwice) {
+  // Seen, then another change, then seen again.
+  Operation chunk = AppendAt(9, 10, 4, 8, 3);
+  chunk.incarnation = 3;
+  const std::vector<Operation> twice = {MeshAt(7, 8, 3, 0xc0), chunk, MeshAt(11, 12, 5, 0xc0)};
+  for (const bool answered : {false, true}) {
+    const Operation replace = ReplaceAt(5, 6, 3, 0xc0);
+    std::vector<Operation> operations = After({answered ? replace : Unanswered(replace)});
+    operations.insert(operations.end(), twice.begin(), twice.end());
+    EXPECT_NE(LinearizabilityFault(operations), "");
+    // A second one explains it.
+    operations.push_back(Unanswered(ReplaceAt(6, 7, 0, 0xc0)));
+    EXPECT_EQ(LinearizabilityFault(operations), "");
+  }
+  // Again at once, which only the revision shows.
+  EXPECT_NE(LinearizabilityFault(After({ReplaceAt(5, 6, 3, 0xc0), GetAt(7, 8, 4, 4, 2)})), "");
+  // Or with the counts of both.
+  EXPECT_NE(LinearizabilityFault(After({ReplaceAt(5, 6, 3, 0xc0), GetAt(7, 8, 3, 3, 4)})), "");
+}
+
+TEST(LinearizabilityCheck, AReplaceHappensOnlyWhereItsConditionHolds) {
+  Operation replace = ReplaceAt(5, 6, 3, 0xc0);
+  for (const uint64_t revision : {0, 1, 2, 3}) {
+    replace.if_revision = revision;
+    EXPECT_EQ(LinearizabilityFault(After({replace})).empty(), revision == 2);
+    EXPECT_EQ(LinearizabilityFault(After({Refused(replace, Outcome::kAborted)})).empty(),
+              revision != 2);
+    EXPECT_NE(LinearizabilityFault(After({Refused(replace, Outcome::kNotFound)})), "");
+  }
+  // Where there is no hull: 0 alone holds, and it is made only where that was asked for.
+  replace = ReplaceAt(1, 2, 1, 0xc0);
+  for (const uint64_t revision : {0, 1}) {
+    for (const bool if_absent : {false, true}) {
+      replace.if_revision = revision;
+      replace.if_absent = if_absent;
+      replace.created = true;
+      const bool made = revision == 0 && if_absent;
+      EXPECT_EQ(LinearizabilityFault({replace}).empty(), made);
+      EXPECT_EQ(LinearizabilityFault({Refused(replace, Outcome::kNotFound)}).empty(),
+                revision == 0 && !if_absent);
+      EXPECT_EQ(LinearizabilityFault({Refused(replace, Outcome::kAborted)}).empty(), revision != 0);
+      replace.created = false;
+      EXPECT_NE(LinearizabilityFault({replace}), "");
+    }
+  }
+}
+
+TEST(LinearizabilityCheck, RefusesAReplaceWithTheRevisionOfAnotherChange) {
+  HullHistory history;
+  history.Record("a", CreateAt(1, 2));
+  Operation replace = ReplaceAt(3, 4, 1, 0xc0);
+  replace.if_absent = replace.created = true;
+  history.Record("b", replace);
+  EXPECT_THAT(HistoryFault(history), HasSubstr("revision 1 belongs to a change of a and to one"));
+}
+
 TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
   HullHistory history;
   history.Record("a", CreateAt(1, 2));
@@ -159,15 +325,13 @@ TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
 class Linearizability : public ServerTest {};
 
 TEST_F(Linearizability, ConcurrentClientsSeeOneHullAtATime) {
-#ifdef HULLD_SANITIZED
-  constexpr int kRounds = 2;
-#else
   constexpr int kRounds = 8;
-#endif
   constexpr int kClients = 8;
   constexpr int kCalls = 150;
   size_t acknowledged = 0;
   size_t refused = 0;
+  size_t replaced = 0;
+  size_t replaces_refused = 0;
   for (int round = 0; round < kRounds; ++round) {
     Restart(TestConfig());
     HullHistory history;
@@ -192,13 +356,20 @@ TEST_F(Linearizability, ConcurrentClientsSeeOneHullAtATime) {
       for (const Operation& operation : operations) {
         acknowledged += operation.outcome == Outcome::kOk;
         refused += operation.outcome == Outcome::kAborted;
+        if (operation.kind != Kind::kReplace) continue;
+        replaced += operation.outcome == Outcome::kOk;
+        replaces_refused += operation.outcome == Outcome::kAborted;
       }
     }
   }
   RecordProperty("acknowledged", static_cast<int>(acknowledged));
+  RecordProperty("replaced", static_cast<int>(replaced));
+  RecordProperty("replaces_refused", static_cast<int>(replaces_refused));
   // The histories hold what they are to test.
   EXPECT_GT(acknowledged, size_t{kRounds * kClients * kCalls / 2});
   EXPECT_GT(refused, size_t{kRounds * 10});
+  EXPECT_GT(replaced, size_t{kRounds * 20});
+  EXPECT_GT(replaces_refused, size_t{kRounds * 2});
 }
 
 }  // namespace

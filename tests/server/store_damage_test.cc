@@ -24,6 +24,20 @@ class StoreDamage : public StoreTest {
     value[value.size() / 2] ^= 4;
     ASSERT_TRUE(hulls_->store().db().Put({}, key, value).ok());
   }
+  std::filesystem::path LogFile() const {
+    std::filesystem::path log;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_ + "/data/rocksdb")) {
+      if (entry.path().extension() == ".log") log = entry.path();
+    }
+    return log;
+  }
+  static void FlipBits(const std::filesystem::path& path, uintmax_t offset, int mask) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(static_cast<std::streamoff>(offset));
+    const char byte = static_cast<char>(file.get() ^ mask);
+    file.seekp(static_cast<std::streamoff>(offset));
+    file.put(byte);
+  }
   void FillThree() {
     Start();
     for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Put(id, CubeCorners()).ok());
@@ -136,13 +150,8 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
     std::filesystem::copy(directory_ + "/data", copy, std::filesystem::copy_options::recursive);
     const std::filesystem::path path =
         std::filesystem::path(copy) / "rocksdb" / files[trial % files.size()].filename();
-    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-    const auto offset = static_cast<std::streamoff>(random() % std::filesystem::file_size(path));
-    file.seekg(offset);
-    const char byte = static_cast<char>(file.get() ^ (1 << random() % 8));
-    file.seekp(offset);
-    file.put(byte);
-    file.close();
+    const uintmax_t offset = random() % std::filesystem::file_size(path);
+    FlipBits(path, offset, 1 << random() % 8);
 
     absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("copy");
     if (!store.ok()) {
@@ -181,14 +190,33 @@ TEST_F(StoreDamage, ALogThatEndsInAHalfRecordLosesThatRecordAlone) {
   const HullView before = *hulls_->View("a");
   const uint64_t revision = before.record.revision;
   hulls_ = nullptr;
-  std::filesystem::path log;
-  for (const auto& entry : std::filesystem::directory_iterator(directory_ + "/data/rocksdb")) {
-    if (entry.path().extension() == ".log") log = entry.path();
-  }
-  std::filesystem::resize_file(log, std::filesystem::file_size(log) - 10);
+  std::filesystem::resize_file(LogFile(), std::filesystem::file_size(LogFile()) - 10);
   Start();
   EXPECT_EQ(hulls_->View("a")->record.revision, revision);
   EXPECT_EQ(hulls_->View("b")->record.vertex_count, 0);
+}
+
+TEST_F(StoreDamage, ALogThatIsDamagedInItsMiddleCanBeCutThere) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
+  const std::string store_id = hulls_->store().id();
+  const uint64_t revision = hulls_->View("a")->record.revision;
+  const uintmax_t kept = std::filesystem::file_size(LogFile());
+  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("c", CubeCorners()).ok());
+  hulls_ = nullptr;
+  FlipBits(LogFile(), kept + 30, 1);
+  EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/data";
+  options.cut_log = true;
+  ASSERT_TRUE(RocksDbStore::Open(options).ok());
+  Start();
+  EXPECT_EQ(hulls_->View("a")->record.revision, revision);
+  EXPECT_EQ(hulls_->View("b").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(hulls_->View("c").status().code(), absl::StatusCode::kNotFound);
+  // The revisions of b and c will be given to other changes.
+  EXPECT_NE(hulls_->store().id(), store_id);
 }
 
 }  // namespace
