@@ -45,17 +45,19 @@ class CenterBounds {
   Bounds At(const Place& place) const;
   Bounds Along(const PlainVector& n) const;
   // About the outward normal of the hull where the ray from c along the n of a place leaves it,
-  // longer where the hull is narrow. Without a gauge, and for hulls of few facets, of which this
-  // says little: zero.
+  // longer where the hull is narrow. Zero where that is coarse or unknown.
   PlainVector NormalAt(const Place& place) const;
+  // Whether there are few corners, or none: then the bounds say little but of what is deep inside,
+  // and the normals nothing.
+  bool coarse() const { return side_ < kLeastFineSide; }
   // At least g(d) for all d with components of at most 1; infinite where unknown.
   double largest_gauge() const { return largest_gauge_; }
 
   size_t MemoryBytes() const { return corners_.capacity() * sizeof(Corner); }
 
  private:
-  // With fewer cells along a side of a face no normal is guessed. Observed: it does not pay.
-  static constexpr uint32_t kLeastGuessingSide = 4;
+  // Cells along a side of a face. Observed: guessing a normal from fewer does not pay.
+  static constexpr uint32_t kLeastFineSide = 4;
   // Of directions whose largest component is 1: the support function in units, the gauge per unit.
   struct Corner {
     float support;
@@ -145,7 +147,7 @@ inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
 // The gradient of the gauge per unit, which on a face is the largest component times a function of
 // the others over it.
 inline PlainVector CenterBounds::NormalAt(const Place& place) const {
-  if (side_ < kLeastGuessingSide || !(largest_gauge_ < std::numeric_limits<double>::infinity())) {
+  if (coarse() || !(largest_gauge_ < std::numeric_limits<double>::infinity())) {
     return {0, 0, 0};
   }
   const double corner = place.low[0].gauge;

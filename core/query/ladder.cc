@@ -36,11 +36,31 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
   return std::nullopt;
 }
 
-// Where the walk looks first: along the normals of the surfaces between the centres, which show
-// better than the centres where a gap is; unless these are unknown or nearly cancel.
-PlainVector FirstDirection(const PlainVector& n, const PlainVector& likely) {
+// Whether bounds about the centres may settle a pair that spheres do not.
+bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
+  const double largest = LargestComponent(n);
+  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return false;
+  const QueryHull& a = pair.a().query_hull();
+  const QueryHull& b = pair.b().query_hull();
+  if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
+  // Coarse bounds settle little but overlaps of hulls whose centres are this near.
+  const double reach = a.radius() + b.radius();
+  return 4 * SquaredNorm(n) < reach * reach;
+}
+
+// What the bounds about the centres tell; or else `first` becomes where the walk should look first:
+// along the normals of the surfaces between the centres, which show better than the centres where a
+// gap is, unless these are unknown or nearly cancel. Kept apart from what the farthest pairs need.
+[[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
+                                                        PlainVector& first) {
   constexpr double kLeastLikely = 0x1p-4;
-  return SquaredNorm(likely) > kLeastLikely ? likely : n;
+  if (!CentersMayTell(pair, n)) return std::nullopt;
+  const FloatPair::CenterView view = pair.ViewCenters(n);
+  if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) return relation;
+  if (const PlainVector likely = view.LikelyAxis(); SquaredNorm(likely) > kLeastLikely) {
+    first = likely;
+  }
+  return std::nullopt;
 }
 
 Relation RelationOf(FloatVerdict verdict) {
@@ -96,17 +116,14 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
       }
     }
     PlainVector first = n;
-    const double largest = LargestComponent(n);
-    if (purpose == Purpose::kRelation && largest >= kDirectionMin && largest <= kDirectionMax) {
-      const FloatPair::CenterView view = pair.ViewCenters(n);
-      if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) {
+    if (purpose == Purpose::kRelation) {
+      if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
         decision.relation = *relation;
         if (*relation == Relation::kSeparated) decision.axis = Vector(n);
         // What it suggested failed, and would cost the next query more than these bounds.
         if (cache != nullptr) *cache = PairCache();
         return decision;
       }
-      first = FirstDirection(n, view.LikelyAxis());
     }
     const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
     decision.directions_tried += found.directions_tried;
