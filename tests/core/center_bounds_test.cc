@@ -143,7 +143,7 @@ TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
   Random random(seed);
   const std::vector<NamedHull> solids = Solids(random);
   int settled[2] = {0, 0};
-  for (int round = 0; round < 3000; ++round) {
+  for (int round = 0; round < 5000; ++round) {
     const NamedHull& one = solids[random.Below(static_cast<int>(solids.size()))];
     const NamedHull& other = solids[random.Below(static_cast<int>(solids.size()))];
     if (one.hull.max_abs_coordinate() > 0x1p60 * other.hull.max_abs_coordinate()) continue;
