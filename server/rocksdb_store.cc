@@ -22,19 +22,18 @@ namespace {
 
 std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "/rocksdb"; }
 
-// Of the directories that MakeCopy makes.
-constexpr char kCopyPrefix[] = "copy-";
+// Ours alone, and nothing in it outlives the server: what else lies in the data directory is not
+// ours to touch.
+std::string ScratchDirectory(const std::string& data_dir) { return data_dir + "/hulld-scratch"; }
 
 // 'hullctl snapshot restore' leaves a file of this name in the directory that it makes.
 constexpr char kRestoredMark[] = "/restored";
 
 // What a server that was killed left behind.
-void RemoveCopies(const std::string& data_dir) {
+void ClearScratch(const std::string& data_dir) {
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(data_dir, error)) {
-    if (entry.path().filename().string().starts_with(kCopyPrefix)) {
-      std::filesystem::remove_all(entry.path(), error);
-    }
+  for (const auto& entry : std::filesystem::directory_iterator(ScratchDirectory(data_dir), error)) {
+    std::filesystem::remove_all(entry.path(), error);
   }
 }
 
@@ -172,7 +171,7 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   }
   if (absl::Status s = store->OpenDb(); !s.ok()) return s;
   if (absl::Status s = store->ReadMeta(); !s.ok()) return s;
-  if (!store->options_.read_only) RemoveCopies(store->options_.data_dir);
+  if (!store->options_.read_only) ClearScratch(store->options_.data_dir);
   if (store->options_.durability == Durability::kRelaxed && !store->options_.read_only) {
     store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
   }
@@ -466,9 +465,10 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
 }
 
 absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
-  const std::string directory = absl::StrCat(options_.data_dir, "/", kCopyPrefix, RandomId());
+  const std::string directory =
+      absl::StrCat(ScratchDirectory(options_.data_dir), "/copy-", RandomId());
   std::error_code error;
-  std::filesystem::create_directory(directory, error);
+  std::filesystem::create_directories(directory, error);
   if (error) {
     return absl::UnavailableError(
         absl::StrCat("cannot make ", directory, " for the copy: ", error.message()));
@@ -495,7 +495,10 @@ absl::Status RocksDbStore::Recover() {
 
 // Whether a file can be written and synced.
 absl::Status RocksDbStore::Probe() {
-  const std::string path = options_.data_dir + "/probe";
+  const std::string scratch = ScratchDirectory(options_.data_dir);
+  const std::string path = scratch + "/probe";
+  // Should it fail, so will what follows.
+  env_->CreateDirIfMissing(scratch).PermitUncheckedError();
   std::unique_ptr<rocksdb::WritableFile> file;
   rocksdb::Status status = env_->NewWritableFile(path, &file, rocksdb::EnvOptions());
   if (status.ok()) status = file->Append(std::string(size_t{64} << 10, '\0'));

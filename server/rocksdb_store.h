@@ -64,7 +64,7 @@ class RocksDbStore : public Store {
   absl::Status Commit(std::span<const Change* const> changes) override;
   absl::Status Recover() override;
 
-  // Hard links in <data-dir>/copy-..., in the layout of a data directory.
+  // Hard links in <data-dir>/hulld-scratch/copy-..., in the layout of a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
 
   const std::string& data_dir() const { return options_.data_dir; }

@@ -4,6 +4,8 @@
 #include <rocksdb/env.h>
 
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <random>
@@ -132,6 +134,19 @@ TEST_F(StoreFault, AnOutageLosesWhatWasNotSynced) {
     if (!DurableRegistry(*std::move(store)).View("h").ok()) ++lost;
   }
   EXPECT_GT(lost, 0);
+}
+
+TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
+  Start();
+  const std::string path = directory_ + "/data/probe";
+  std::ofstream(path) << "mine";
+  files_->SetFault(Fault::kIoError);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNone);
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::string content;
+  std::ifstream(path) >> content;
+  EXPECT_EQ(content, "mine");
 }
 
 // What writers were told, by hull: sums of the chunks that were acked.
