@@ -2,13 +2,11 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <fcntl.h>
 #include <rocksdb/cache.h>
 #include <rocksdb/table.h>
 #include <rocksdb/utilities/checkpoint.h>
 #include <rocksdb/write_batch.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <utility>
@@ -35,13 +33,6 @@ void ClearScratch(const std::string& data_dir) {
   for (const auto& entry : std::filesystem::directory_iterator(ScratchDirectory(data_dir), error)) {
     std::filesystem::remove_all(entry.path(), error);
   }
-}
-
-bool SyncDirectory(const std::string& path) {
-  const int fd = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return false;
-  const bool synced = fsync(fd) == 0;
-  return close(fd) == 0 && synced;
 }
 
 std::string_view View(const rocksdb::Slice& slice) { return {slice.data(), slice.size()}; }
@@ -162,12 +153,7 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   }
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
   if (!store->options_.read_only) {
-    std::error_code error;
-    std::filesystem::create_directories(store->options_.data_dir, error);
-    if (error) {
-      return absl::UnavailableError(
-          absl::StrCat("cannot make --data-dir ", store->options_.data_dir, ": ", error.message()));
-    }
+    if (absl::Status s = store->MakeDirectories(); !s.ok()) return s;
   }
   if (absl::Status s = store->OpenDb(); !s.ok()) return s;
   if (absl::Status s = store->ReadMeta(); !s.ok()) return s;
@@ -225,6 +211,49 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   return options;
 }
 
+// What is committed is as durable as the entries of the directories that it is kept in. Those above
+// it that are not new are synced too: an earlier start may have made them, and been killed before
+// this. Of them some may not be ours to open.
+absl::Status RocksDbStore::MakeDirectories() {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path database =
+      fs::absolute(DatabaseDirectory(options_.data_dir), error).lexically_normal();
+  // What a start makes once the directories are durable.
+  if (env_->FileExists((database / "CURRENT").string()).ok()) return absl::OkStatus();
+  const auto failure = [this](const fs::path& path, const rocksdb::Status& status) {
+    return absl::UnavailableError(absl::StrCat("cannot make --data-dir ", options_.data_dir, ": ",
+                                               path.string(), ": ", status.ToString()));
+  };
+  std::vector<fs::path> missing;
+  fs::path above = database;
+  while (above != above.root_path() && !fs::exists(above, error)) {
+    missing.push_back(above);
+    above = above.parent_path();
+  }
+  for (auto path = missing.rbegin(); path != missing.rend(); ++path) {
+    const rocksdb::Status made = env_->CreateDirIfMissing(path->string());
+    if (!made.ok()) return failure(*path, made);
+  }
+  for (const fs::path& path : missing) {
+    const rocksdb::Status synced = SyncDirectory(path);
+    if (!synced.ok()) return failure(path, synced);
+  }
+  for (fs::path path = above;; path = path.parent_path()) {
+    const rocksdb::Status synced = SyncDirectory(path);
+    const bool ours = path == above || path == database.parent_path();
+    if (!synced.ok() && ours) return failure(path, synced);
+    if (path == path.root_path()) return absl::OkStatus();
+  }
+}
+
+// Makes the entries of a directory durable.
+rocksdb::Status RocksDbStore::SyncDirectory(const std::string& path) {
+  std::unique_ptr<rocksdb::Directory> directory;
+  const rocksdb::Status opened = env_->NewDirectory(path, &directory);
+  return opened.ok() ? directory->Fsync() : opened;
+}
+
 absl::Status RocksDbStore::OpenDb() {
   const std::string directory = DatabaseDirectory(options_.data_dir);
   rocksdb::DB* db = nullptr;
@@ -276,7 +305,7 @@ absl::Status RocksDbStore::LeaveFormerStore() {
   if (!std::filesystem::exists(mark, error)) return absl::OkStatus();
   const std::string former_id = id_;
   if (absl::Status s = TakeNewId(); !s.ok()) return s;
-  if (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir)) {
+  if (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir).ok()) {
     return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
   }
   spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,

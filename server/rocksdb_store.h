@@ -22,7 +22,7 @@
 namespace hulld::server {
 
 struct RocksDbOptions {
-  // Made when it does not exist.
+  // Made when it does not exist, and on disk before anything is acknowledged.
   std::string data_dir;
   // kSync or kRelaxed.
   Durability durability = Durability::kSync;
@@ -75,6 +75,8 @@ class RocksDbStore : public Store {
   explicit RocksDbStore(RocksDbOptions options);
 
   rocksdb::Options DbOptions() const;
+  absl::Status MakeDirectories();
+  rocksdb::Status SyncDirectory(const std::string& path);
   absl::Status OpenDb();
   absl::Status ReadMeta();
   absl::Status InitializeMeta();

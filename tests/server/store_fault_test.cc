@@ -136,6 +136,24 @@ TEST_F(StoreFault, AnOutageLosesWhatWasNotSynced) {
   EXPECT_GT(lost, 0);
 }
 
+TEST_F(StoreFault, TheDirectoriesOfANewStoreAreOnDiskBeforeItServes) {
+  const absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("new/parent/data");
+  ASSERT_TRUE(store.ok()) << store.status();
+  for (const char* made : {"/new", "/new/parent", "/new/parent/data", "/new/parent/data/rocksdb"}) {
+    EXPECT_THAT(files_->directories(), ::testing::Contains(directory_ + made));
+  }
+  EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
+}
+
+// As after a first start that was killed before it had synced what it made.
+TEST_F(StoreFault, DirectoriesThatAFirstStartLeftUnsyncedAreSyncedByTheNext) {
+  ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new").ok());
+  ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new/data").ok());
+  ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new/data/rocksdb").ok());
+  ASSERT_TRUE(OpenStore("new/data").ok());
+  EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
+}
+
 TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
   Start();
   const std::string path = directory_ + "/data/probe";
