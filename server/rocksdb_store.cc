@@ -324,7 +324,9 @@ absl::Status RocksDbStore::WriteMeta(rocksdb::WriteBatch* batch) {
   rocksdb::WriteOptions options;
   options.sync = true;
   const rocksdb::Status status = db_->Write(options, batch);
-  return status.ok() ? absl::OkStatus() : WriteError(status, options_.data_dir);
+  if (!status.ok()) return WriteError(status, options_.data_dir);
+  files_->Commit();
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::string> RocksDbStore::Read(const std::string& key) {

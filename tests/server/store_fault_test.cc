@@ -154,6 +154,20 @@ TEST_F(StoreFault, DirectoriesThatAFirstStartLeftUnsyncedAreSyncedByTheNext) {
   EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
 }
 
+TEST_F(StoreFault, AFirstChangeThatFailsLeavesTheStoreItsId) {
+  Start();
+  const std::string id = hulls_->store().id();
+  files_->SetFault(Fault::kNoSpace);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNone);
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const uint64_t revision = hulls_->registry().Sizes().store_revision;
+  Start();
+  EXPECT_EQ(hulls_->store().id(), id);
+  EXPECT_EQ(hulls_->registry().Sizes().store_revision, revision);
+  EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
+}
+
 TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
   Start();
   const std::string path = directory_ + "/data/probe";
