@@ -178,9 +178,7 @@ RocksDbStore::~RocksDbStore() {
   }
   sync_wake_.notify_all();
   if (syncer_.joinable()) syncer_.join();
-  if (db_ != nullptr && options_.durability == Durability::kRelaxed && !options_.read_only) {
-    SyncLog().IgnoreError();
-  }
+  if (relaxed_run_ && db_ != nullptr) EndRelaxedRun().IgnoreError();
 }
 
 rocksdb::Options RocksDbStore::DbOptions() const {
@@ -268,9 +266,12 @@ absl::Status RocksDbStore::OpenDb() {
 absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> format = ReadNumber(kFormatKey);
   if (absl::IsNotFound(format.status())) {
-    if (!options_.read_only) return InitializeMeta();
-    return absl::NotFoundError(
-        absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+    if (options_.read_only) {
+      return absl::NotFoundError(
+          absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+    }
+    if (absl::Status s = InitializeMeta(); !s.ok()) return s;
+    return BeginRun();
   }
   if (!format.ok()) return Prefixed("the store's format: ", format.status());
   if (*format > kStoreFormat) {
@@ -284,8 +285,7 @@ absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> revision = ReadNumber(kRevisionKey);
   if (!revision.ok()) return Prefixed("the store's revision: ", revision.status());
   revision_ = *revision;
-  if (options_.read_only) return absl::OkStatus();
-  return options_.cut_log ? TakeNewId() : LeaveFormerStore();
+  return options_.read_only ? absl::OkStatus() : BeginRun();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {
@@ -297,26 +297,52 @@ absl::Status RocksDbStore::InitializeMeta() {
   return WriteMeta(&batch);
 }
 
-// Before anything else is served or written, and the mark goes last: a start that was interrupted
-// is repeated by the next.
-absl::Status RocksDbStore::LeaveFormerStore() {
-  const std::string mark = options_.data_dir + kRestoredMark;
+// Before anything else is served or written. A store that may have lost what it had acknowledged
+// takes an ID of its own, as the revisions of what is lost will be given to other changes: one that
+// was made of a snapshot, one whose log is cut, and one that ended relaxed without syncing its log.
+// The new ID and the marks in the database change together, and the mark in the directory goes
+// last: a start that was interrupted is repeated by the next.
+absl::Status RocksDbStore::BeginRun() {
   std::error_code error;
-  if (!std::filesystem::exists(mark, error)) return absl::OkStatus();
+  const std::string mark = options_.data_dir + kRestoredMark;
+  const bool restored = std::filesystem::exists(mark, error);
+  const absl::StatusOr<std::string> run = Read(kRelaxedKey);
+  if (absl::IsUnavailable(run.status())) return run.status();
+  const bool cut_short = !absl::IsNotFound(run.status());
+  const bool relaxed = options_.durability == Durability::kRelaxed;
   const std::string former_id = id_;
-  if (absl::Status s = TakeNewId(); !s.ok()) return s;
-  if (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir).ok()) {
+  rocksdb::WriteBatch batch;
+  if (options_.cut_log || restored || cut_short) {
+    id_ = RandomId();
+    PutSealed(batch, kStoreIdKey, id_);
+  }
+  if (relaxed) PutSealed(batch, kRelaxedKey, "");
+  if (!relaxed && cut_short) batch.Delete(kRelaxedKey);
+  if (batch.Count() > 0) {
+    if (absl::Status s = WriteMeta(&batch); !s.ok()) return s;
+  }
+  relaxed_run_ = relaxed;
+  if (restored &&
+      (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir).ok())) {
     return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
   }
-  spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
-               revision_, id_);
+  if (restored) {
+    spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
+                 revision_, id_);
+  } else if (cut_short) {
+    spdlog::warn(
+        "store {} was open with --durability=relaxed and was not closed: what it acknowledged "
+        "last may be lost; at revision {} this is store {}",
+        former_id, revision_, id_);
+  }
   return absl::OkStatus();
 }
 
-absl::Status RocksDbStore::TakeNewId() {
-  id_ = RandomId();
+// Syncs the log with all that was written before. Should that fail, the mark stays.
+absl::Status RocksDbStore::EndRelaxedRun() {
+  if (absl::Status s = SyncLog(); !s.ok()) return s;
   rocksdb::WriteBatch batch;
-  PutSealed(batch, kStoreIdKey, id_);
+  batch.Delete(kRelaxedKey);
   return WriteMeta(&batch);
 }
 

@@ -80,9 +80,8 @@ class RocksDbStore : public Store {
   absl::Status OpenDb();
   absl::Status ReadMeta();
   absl::Status InitializeMeta();
-  // A store that was made of a snapshot takes an ID of its own.
-  absl::Status LeaveFormerStore();
-  absl::Status TakeNewId();
+  absl::Status BeginRun();
+  absl::Status EndRelaxedRun();
   absl::Status WriteMeta(rocksdb::WriteBatch* batch);
   absl::StatusOr<std::string> Read(const std::string& key);
   absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
@@ -101,6 +100,8 @@ class RocksDbStore : public Store {
   std::unique_ptr<rocksdb::Env> env_;
   std::string id_;
   uint64_t revision_ = 0;
+  // Whether kRelaxedKey is there, and ours to remove.
+  bool relaxed_run_ = false;
 
   // Held shared by whoever uses db_, alone by Reopen.
   mutable std::shared_mutex db_mutex_;

@@ -18,6 +18,7 @@ namespace hulld::server {
 // byte order is theirs; numbers in values are little endian.
 //
 //   m/format, m/store_id, m/revision     of the store
+//   m/relaxed                            while --durability=relaxed has it open; without a value
 //   h<hull ID>                           a StoredHull
 //   w<incarnation><writer ID>            the writer's last committed sequence
 //   b<incarnation><revision><part>       vertices of a base, in parts
@@ -30,6 +31,7 @@ inline constexpr uint64_t kStoreFormat = 1;
 inline constexpr char kFormatKey[] = "m/format";
 inline constexpr char kStoreIdKey[] = "m/store_id";
 inline constexpr char kRevisionKey[] = "m/revision";
+inline constexpr char kRelaxedKey[] = "m/relaxed";
 inline constexpr char kHullPrefix = 'h';
 inline constexpr char kWriterPrefix = 'w';
 inline constexpr char kBasePrefix = 'b';

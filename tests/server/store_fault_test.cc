@@ -181,6 +181,55 @@ TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
   EXPECT_EQ(content, "mine");
 }
 
+// The revisions that it gave before may be given to other changes.
+TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
+  durability_ = Durability::kRelaxed;
+  sync_interval_ = std::chrono::hours(1);
+  Start();
+  const std::string id = hulls_->store().id();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::mt19937_64 random(5);
+  files_->CopySurvivors(directory_ + "/data", directory_ + "/left", random);
+  env_ = nullptr;
+  std::vector<std::string> ids;
+  for (const Durability durability : {Durability::kSync, Durability::kRelaxed, Durability::kSync}) {
+    durability_ = durability;
+    const absl::StatusOr<std::unique_ptr<RocksDbStore>> left = OpenStore("left");
+    ASSERT_TRUE(left.ok()) << left.status();
+    ids.push_back((*left)->id());
+  }
+  EXPECT_NE(ids[0], id);
+  // Those ended cleanly.
+  EXPECT_EQ(ids[1], ids[0]);
+  EXPECT_EQ(ids[2], ids[0]);
+}
+
+TEST_F(StoreFault, ARelaxedStoreWhoseEndCouldNotBeSyncedIsAnotherStore) {
+  durability_ = Durability::kRelaxed;
+  sync_interval_ = std::chrono::hours(1);
+  Start();
+  const std::string id = hulls_->store().id();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Start();
+  EXPECT_EQ(hulls_->store().id(), id);
+  files_->SetFault(Fault::kSyncError);
+  hulls_ = nullptr;
+  files_->SetFault(Fault::kNone);
+  Start();
+  EXPECT_NE(hulls_->store().id(), id);
+}
+
+TEST_F(StoreFault, AStoreThatSyncsKeepsItsIdThroughAnOutage) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::mt19937_64 random(5);
+  files_->CopySurvivors(directory_ + "/data", directory_ + "/left", random);
+  env_ = nullptr;
+  const absl::StatusOr<std::unique_ptr<RocksDbStore>> left = OpenStore("left");
+  ASSERT_TRUE(left.ok()) << left.status();
+  EXPECT_EQ((*left)->id(), hulls_->store().id());
+}
+
 // What writers were told, by hull: sums of the chunks that were acked.
 class Acks {
  public:
