@@ -186,8 +186,11 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.env = env_.get();
   options.create_if_missing = !options_.read_only;
   options.paranoid_checks = true;
-  // A record cut short at the end of the log was never acknowledged; anything else is damage that
-  // must not pass in silence.
+  // A record that the end of its log cuts short is dropped: if the disk keeps what it synced, the
+  // record was being written, and a store that syncs had not acknowledged it. All else that does
+  // not match its checksum is refused, the last record too: its pages may have reached the disk in
+  // another order when the power went out, but it may as well have been acknowledged and damaged
+  // since, and the log does not tell which.
   options.wal_recovery_mode = options_.cut_log
                                   ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
                                   : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
