@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <unordered_set>
 #include <utility>
 
 #include "server/random_id.h"
@@ -101,6 +102,13 @@ void DropIncarnation(rocksdb::WriteBatch& batch, const StoredHull& hull,
   if (hull.writer_count > 0) drop(kWriterPrefix);
   if (layout.base_revision != 0) drop(kBasePrefix);
   if (layout.delta_count > 0) drop(kDeltaPrefix);
+}
+
+// Whether the change deletes or replaces a hull of which no more than the ID is known, as its
+// record is damaged.
+bool EndsUnknown(const Change& change) {
+  if (change.deleted) return change.hull.record.create_revision == 0;
+  return change.replaced.has_value() && change.replaced->record.create_revision == 0;
 }
 
 void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
@@ -437,6 +445,37 @@ absl::StatusOr<StoredHull> RocksDbStore::Find(const std::string& hull_id) {
   return hull;
 }
 
+// Deletes what belongs to no hull. That is left of hulls whose records are damaged, so that their
+// incarnations are not known, once they end. While the record of another hull is damaged nothing is
+// deleted, as it may be that one's: whoever ends the last of them deletes it all. Reads all
+// records, and seeks once for each incarnation.
+void RocksDbStore::DropLostIncarnations(const std::set<std::string>& ending,
+                                        rocksdb::WriteBatch* batch) {
+  std::unordered_set<uint64_t> known;
+  bool certain = true;
+  const absl::Status read =
+      ForEachHull([&](const std::string& hull_id, const absl::StatusOr<StoredHull>& hull) {
+        if (ending.contains(hull_id)) return;
+        certain = certain && hull.ok();
+        if (hull.ok()) known.insert(hull->record.create_revision);
+      });
+  if (!read.ok() || !certain) return;
+  const std::shared_lock lock(db_mutex_);
+  if (db_ == nullptr) return;
+  for (const char prefix : {kWriterPrefix, kBasePrefix, kDeltaPrefix}) {
+    const std::unique_ptr<rocksdb::Iterator> it(db_->NewIterator(rocksdb::ReadOptions()));
+    it->Seek(std::string(1, prefix));
+    while (it->Valid() && it->key()[0] == prefix) {
+      const uint64_t incarnation = IncarnationOf(View(it->key()));
+      const std::string end = IncarnationKey(prefix, incarnation + 1);
+      if (!known.contains(incarnation)) {
+        batch->DeleteRange(IncarnationKey(prefix, incarnation), end);
+      }
+      it->Seek(end);
+    }
+  }
+}
+
 absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {
   std::vector<Vector> vertices;
   vertices.reserve(hull.layout.base_vertices + hull.layout.delta_vertices);
@@ -504,6 +543,12 @@ absl::StatusOr<uint64_t> RocksDbStore::LoadSequence(const HullRecord& hull,
 
 absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   rocksdb::WriteBatch batch;
+  std::set<std::string> unknown;
+  for (const Change* change : changes) {
+    if (EndsUnknown(*change)) unknown.insert(change->hull.record.hull_id);
+  }
+  // First, as it is about what was committed before.
+  if (!unknown.empty()) DropLostIncarnations(unknown, &batch);
   uint64_t revision = 0;
   for (const Change* change : changes) {
     Encode(batch, *change);
@@ -527,14 +572,14 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
 absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
   const std::string directory =
       absl::StrCat(ScratchDirectory(options_.data_dir), "/copy-", RandomId());
+  const std::shared_lock lock(db_mutex_);
+  if (db_ == nullptr) return CannotBeRead(options_.data_dir);
   std::error_code error;
   std::filesystem::create_directories(directory, error);
   if (error) {
     return absl::UnavailableError(
         absl::StrCat("cannot make ", directory, " for the copy: ", error.message()));
   }
-  const std::shared_lock lock(db_mutex_);
-  if (db_ == nullptr) return CannotBeRead(options_.data_dir);
   rocksdb::Checkpoint* created = nullptr;
   rocksdb::Status status = rocksdb::Checkpoint::Create(db_.get(), &created);
   const std::unique_ptr<rocksdb::Checkpoint> checkpoint(created);

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -88,6 +89,7 @@ class RocksDbStore : public Store {
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
+  void DropLostIncarnations(const std::set<std::string>& ending, rocksdb::WriteBatch* batch);
   absl::Status LoadBase(const StoredHull& hull, std::vector<Vector>* vertices);
   absl::Status LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices);
   absl::Status Probe();

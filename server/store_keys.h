@@ -42,6 +42,8 @@ inline constexpr size_t kBasePartVertices = 32768;
 std::string HullKey(std::string_view hull_id);
 // Where an incarnation's keys of one kind start; they end before those of incarnation + 1.
 std::string IncarnationKey(char prefix, uint64_t incarnation);
+// The incarnation in any of the keys below.
+uint64_t IncarnationOf(std::string_view key);
 std::string WriterKey(uint64_t incarnation, std::string_view writer_id);
 std::string BaseKey(uint64_t incarnation, uint64_t revision, uint32_t part);
 std::string DeltaKey(uint64_t incarnation, uint64_t revision);

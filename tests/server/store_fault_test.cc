@@ -181,6 +181,26 @@ TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
   EXPECT_EQ(content, "mine");
 }
 
+TEST_F(StoreFault, NoCopyIsBegunOfAStoreThatCannotBeRead) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::ofstream(directory_ + "/data/rocksdb/CURRENT") << "nothing";
+  files_->SetFault(Fault::kSyncError);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNone);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  const auto directories = [this] {
+    std::vector<std::string> found;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(directory_ + "/data")) {
+      if (entry.is_directory()) found.push_back(entry.path());
+    }
+    return found;
+  };
+  const std::vector<std::string> before = directories();
+  EXPECT_EQ(hulls_->store().MakeCopy().status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(directories(), before);
+}
+
 // The revisions that it gave before may be given to other changes.
 TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
   durability_ = Durability::kRelaxed;
