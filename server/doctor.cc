@@ -11,6 +11,7 @@
 #include "core/hull/audit.h"
 #include "core/hull/hull_builder.h"
 #include "server/config.h"
+#include "server/log.h"
 #include "server/rocksdb_store.h"
 
 namespace hulld::server {
@@ -68,20 +69,7 @@ Report ExamineAll(RocksDbStore& store) {
   return report;
 }
 
-std::string JsonText(const std::string& text) {
-  std::string json = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') json += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      char escape[8];
-      std::snprintf(escape, sizeof escape, "\\u%04x", c);
-      json += escape;
-    } else {
-      json += c;
-    }
-  }
-  return json + "\"";
-}
+std::string JsonText(const std::string& text) { return "\"" + JsonEscape(text) + "\""; }
 
 void PrintJson(const Report& report) {
   std::string findings;

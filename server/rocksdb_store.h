@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -22,7 +23,7 @@
 namespace hulld::server {
 
 struct RocksDbOptions {
-  // Made when it does not exist.
+  // Made when it does not exist, and on disk before anything is acknowledged.
   std::string data_dir;
   // kSync or kRelaxed.
   Durability durability = Durability::kSync;
@@ -64,7 +65,7 @@ class RocksDbStore : public Store {
   absl::Status Commit(std::span<const Change* const> changes) override;
   absl::Status Recover() override;
 
-  // Hard links in <data-dir>/copy-..., in the layout of a data directory.
+  // Hard links in <data-dir>/hulld-scratch/copy-..., in the layout of a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
 
   const std::string& data_dir() const { return options_.data_dir; }
@@ -75,18 +76,20 @@ class RocksDbStore : public Store {
   explicit RocksDbStore(RocksDbOptions options);
 
   rocksdb::Options DbOptions() const;
+  absl::Status MakeDirectories();
+  rocksdb::Status SyncDirectory(const std::string& path);
   absl::Status OpenDb();
   absl::Status ReadMeta();
   absl::Status InitializeMeta();
-  // A store that was made of a snapshot takes an ID of its own.
-  absl::Status LeaveFormerStore();
-  absl::Status TakeNewId();
+  absl::Status BeginRun();
+  absl::Status EndRelaxedRun();
   absl::Status WriteMeta(rocksdb::WriteBatch* batch);
   absl::StatusOr<std::string> Read(const std::string& key);
   absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
+  void DropLostIncarnations(const std::set<std::string>& ending, rocksdb::WriteBatch* batch);
   absl::Status LoadBase(const StoredHull& hull, std::vector<Vector>* vertices);
   absl::Status LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices);
   absl::Status Probe();
@@ -99,6 +102,8 @@ class RocksDbStore : public Store {
   std::unique_ptr<rocksdb::Env> env_;
   std::string id_;
   uint64_t revision_ = 0;
+  // Whether kRelaxedKey is there, and ours to remove.
+  bool relaxed_run_ = false;
 
   // Held shared by whoever uses db_, alone by Reopen.
   mutable std::shared_mutex db_mutex_;

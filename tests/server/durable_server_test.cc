@@ -1,6 +1,7 @@
 // A server on a durable store, over the contract: restarts, replacement, snapshots, the doctor.
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -43,6 +44,15 @@ class DurableServer : public ServerTest {
       block.mutable_xyz()->Assign(xyz.begin(), xyz.end());
       return sink(block);
     });
+  }
+
+  void SaveSnapshot(const std::string& file) {
+    SnapshotWriter writer(file);
+    ASSERT_TRUE(writer.Open().ok());
+    const absl::Status saved = MakeClient().SaveSnapshot(
+        [&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); });
+    ASSERT_TRUE(saved.ok()) << saved;
+    ASSERT_TRUE(writer.Finish().ok());
   }
 
   std::string directory_;
@@ -142,12 +152,7 @@ TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
   Put("sphere", Sphere(300));
   const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/snapshot";
-  SnapshotWriter writer(file);
-  ASSERT_TRUE(writer.Open().ok());
-  const absl::Status saved = MakeClient().SaveSnapshot(
-      [&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); });
-  ASSERT_TRUE(saved.ok()) << saved;
-  ASSERT_TRUE(writer.Finish().ok());
+  SaveSnapshot(file);
   // The server goes on, and what comes later is not in the snapshot.
   ASSERT_TRUE(Delete("sphere").ok());
   const auto restored = RestoreSnapshot(file, directory_ + "/restored");
@@ -167,13 +172,7 @@ TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
 TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
   Put("sphere", Sphere(300));
   const std::string file = directory_ + "/snapshot";
-  SnapshotWriter writer(file);
-  ASSERT_TRUE(writer.Open().ok());
-  ASSERT_TRUE(
-      MakeClient()
-          .SaveSnapshot([&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); })
-          .ok());
-  ASSERT_TRUE(writer.Finish().ok());
+  SaveSnapshot(file);
   const auto size = std::filesystem::file_size(file);
   const std::string copy = directory_ + "/copy";
   for (const uintmax_t at : {uintmax_t{20}, size / 3, size / 2, size - 3}) {
@@ -189,6 +188,48 @@ TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
     EXPECT_FALSE(RestoreSnapshot(copy, directory_ + "/restored").ok()) << at;
     EXPECT_FALSE(std::filesystem::exists(directory_ + "/restored"));
   }
+}
+
+TEST_F(DurableServer, ASnapshotIsRestoredWithinADirectoryThatIsThere) {
+  Put("sphere", Sphere(300));
+  const v1::GetHullResponse before = Get("sphere");
+  const std::string file = directory_ + "/snapshot";
+  SaveSnapshot(file);
+  // A mount point cannot be replaced, and nothing can be made beside it by who owns no more than
+  // itself.
+  const std::string target = directory_ + "/mounted";
+  std::filesystem::create_directories(target + "/lost+found");
+  // What a restoring that was killed left behind.
+  std::filesystem::create_directories(target + "/restoring/rocksdb");
+  std::ofstream(target + "/restoring/rocksdb/CURRENT") << "half";
+  std::ofstream(target + "/restored").close();
+  // Somebody else's.
+  std::filesystem::create_directories(target + ".restoring/mine");
+  const auto inode = [&target] {
+    struct stat status = {};
+    EXPECT_EQ(stat(target.c_str(), &status), 0);
+    return status.st_ino;
+  };
+  const ino_t inode_before = inode();
+  const auto restored = RestoreSnapshot(file, target);
+  ASSERT_TRUE(restored.ok()) << restored.status();
+  EXPECT_EQ(inode(), inode_before);
+  EXPECT_TRUE(std::filesystem::exists(target + ".restoring/mine"));
+  EXPECT_FALSE(std::filesystem::exists(target + "/restoring"));
+  Restart(DurableConfig("mounted"));
+  EXPECT_EQ(Get("sphere").hull().SerializeAsString(), before.hull().SerializeAsString());
+  EXPECT_NE(Get("sphere").header().store_id(), before.header().store_id());
+}
+
+TEST_F(DurableServer, ARestoringThatFailsLeavesTheDirectoryEmpty) {
+  Put("sphere", Sphere(300));
+  const std::string file = directory_ + "/snapshot";
+  SaveSnapshot(file);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 3);
+  const std::string target = directory_ + "/mounted";
+  std::filesystem::create_directory(target);
+  EXPECT_FALSE(RestoreSnapshot(file, target).ok());
+  EXPECT_TRUE(std::filesystem::is_empty(target));
 }
 
 TEST_F(DurableServer, TheDoctorLooksAtAStoreThatNobodyHasOpen) {
