@@ -88,9 +88,9 @@ absl::Status Appender::OpenFirst() {
 }
 
 absl::Status Appender::Reconnect(absl::Status cause) {
-  while (absl::IsUnavailable(cause)) {
+  while (MayRetry(cause)) {
     ++failures_;
-    if (!WaitBeforeRetry(retry_, failures_, Deadline::max())) break;
+    if (!WaitBeforeRetry(retry_, failures_, Deadline::max(), cause)) break;
     absl::StatusOr<v1::AppendOpened> opened = Connect();
     if (opened.ok()) {
       ++totals_.reconnects;

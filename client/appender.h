@@ -43,9 +43,10 @@ struct AppendTotals {
 };
 
 // A stream of chunks into one hull: pipelined, with a bounded number in flight. When the connection
-// breaks it reconnects as the same writer, asks for the last committed sequence and resends what is
-// missing, so that each chunk is applied once. It does not carry on when the hull or the store is
-// another one than before: what was acknowledged would be missing there.
+// breaks, or the server ends the stream and says when to come again, it reconnects as the same
+// writer, asks for the last committed sequence and resends what is missing, so that each chunk is
+// applied once. It does not carry on when the hull or the store is another one than before: what
+// was acknowledged would be missing there.
 //
 // For one thread. Destroying it cancels what is not acknowledged.
 class Appender {

@@ -1,6 +1,7 @@
 #include "client/connection_security.h"
 
 #include <absl/strings/str_cat.h>
+#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
@@ -63,9 +64,12 @@ bool IsToken(const std::string& token) {
 }  // namespace
 
 bool IsLoopback(const std::string& server) {
-  const auto starts_with = [&server](const char* prefix) { return server.rfind(prefix, 0) == 0; };
-  return starts_with("127.") || starts_with("localhost:") || starts_with("[::1]:") ||
-         starts_with("unix:");
+  if (server.starts_with("unix:") || server.starts_with("[::1]:")) return true;
+  const std::string host = server.substr(0, server.rfind(':'));
+  if (host == "localhost") return true;
+  // An address, not a name that begins like one.
+  in_addr address;
+  return host.starts_with("127.") && inet_pton(AF_INET, host.c_str(), &address) == 1;
 }
 
 absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::string& server) {

@@ -5,10 +5,12 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 namespace hulld {
 namespace {
@@ -74,11 +76,12 @@ absl::StatusOr<v1::SaveSnapshotResponse> ReadPart(std::istream& file) {
   return part;
 }
 
+absl::Status CannotWrite(const fs::path& path) {
+  return absl::UnavailableError(absl::StrCat("cannot write ", path.string()));
+}
+
 // Writes the files below `directory`.
 absl::Status WritePieces(std::istream& file, const std::string& directory, SnapshotCheck* check) {
-  const auto cannot_write = [](const fs::path& path) {
-    return absl::UnavailableError(absl::StrCat("cannot write ", path.string()));
-  };
   while (!check->complete()) {
     const absl::StatusOr<v1::SaveSnapshotResponse> part = ReadPart(file);
     if (!part.ok()) return part.status();
@@ -92,10 +95,96 @@ absl::Status WritePieces(std::istream& file, const std::string& directory, Snaps
                                                 : std::ios::binary | std::ios::app);
     out << piece.data();
     out.close();
-    if (error || !out || !SyncPath(path.string())) return cannot_write(path);
-    if (!SyncPath(path.parent_path().string())) return cannot_write(path.parent_path());
+    if (error || !out || !SyncPath(path.string())) return CannotWrite(path);
+    if (!SyncPath(path.parent_path().string())) return CannotWrite(path.parent_path());
   }
   return absl::OkStatus();
+}
+
+// Where a snapshot is unpacked, in the directory that it is for: nothing else may be ours to write,
+// and what is mounted there cannot be replaced.
+constexpr char kStagingName[] = "restoring";
+// The part of a data directory that makes hulld take it for a store.
+constexpr char kDatabaseName[] = "rocksdb";
+
+// Whether nothing is there but what a restoring that was killed left behind, and what a file system
+// has in its root.
+bool IsFree(const fs::path& directory) {
+  std::error_code error;
+  bool restoring = false;
+  bool marked = false;
+  for (const auto& entry : fs::directory_iterator(directory, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name == kStagingName) {
+      restoring = true;
+    } else if (name == kRestoredMark) {
+      marked = true;
+    } else if (name != "lost+found") {
+      return false;
+    }
+  }
+  return !error && (!marked || restoring);
+}
+
+// Makes a directory and what is missing above it; returns those that it made, the lowest first.
+absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory) {
+  std::error_code error;
+  std::vector<fs::path> made;
+  for (fs::path path = directory; !fs::exists(path, error); path = path.parent_path()) {
+    made.push_back(path);
+  }
+  fs::create_directories(directory, error);
+  if (!error) return made;
+  return absl::UnavailableError(
+      absl::StrCat("cannot make ", directory.string(), ": ", error.message()));
+}
+
+// Moves what was unpacked to its place. The mark comes first and the database last, in one step: a
+// directory either holds no store yet, or all of the snapshot and the mark.
+absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
+  const fs::path mark = directory / kRestoredMark;
+  std::ofstream(mark).close();
+  if (!SyncPath(mark.string()) || !SyncPath(directory.string())) return CannotWrite(mark);
+  std::error_code error;
+  std::vector<fs::path> parts;
+  for (const auto& entry : fs::directory_iterator(staging, error)) {
+    parts.push_back(entry.path().filename());
+  }
+  if (error) return CannotWrite(staging);
+  std::ranges::partition(parts, [](const fs::path& part) { return part != kDatabaseName; });
+  for (const fs::path& part : parts) {
+    if (part == kDatabaseName && !SyncPath(directory.string())) return CannotWrite(directory);
+    fs::rename(staging / part, directory / part, error);
+    if (error) {
+      const absl::Status status = absl::UnavailableError(
+          absl::StrCat("cannot make ", (directory / part).string(), ": ", error.message()));
+      for (const fs::path& moved : parts) {
+        if (moved == part) break;
+        fs::remove_all(directory / moved, error);
+      }
+      return status;
+    }
+  }
+  return absl::OkStatus();
+}
+
+// Of a file whose first line is read.
+absl::Status Restore(std::ifstream& file, const fs::path& target, SnapshotCheck* check) {
+  const fs::path staging = target / kStagingName;
+  std::error_code error;
+  fs::remove_all(staging, error);
+  fs::create_directory(staging, error);
+  if (error) {
+    return absl::UnavailableError(
+        absl::StrCat("cannot make ", staging.string(), ": ", error.message()));
+  }
+  if (absl::Status s = WritePieces(file, staging.string(), check); !s.ok()) return s;
+  if (file.peek() != std::ifstream::traits_type::eof()) {
+    return Damaged("something follows its end");
+  }
+  if (absl::Status s = MoveIntoPlace(staging, target); !s.ok()) return s;
+  fs::remove(staging, error);
+  return SyncPath(target.string()) ? absl::OkStatus() : CannotWrite(target);
 }
 
 }  // namespace
@@ -185,6 +274,7 @@ absl::Status SnapshotWriter::Finish() {
   }
   fs::rename(partial_path_, path_, error);
   if (error) return absl::InvalidArgumentError(absl::StrCat(path_, ": ", error.message()));
+  SyncPath(fs::absolute(path_, error).parent_path().string());
   opened_ = false;
   return absl::OkStatus();
 }
@@ -199,35 +289,26 @@ absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
     return absl::InvalidArgumentError(absl::StrCat(path, " is no snapshot of hulld"));
   }
   std::error_code error;
-  if (fs::exists(directory, error) && !fs::is_empty(directory, error)) {
+  const fs::path target =
+      fs::absolute(fs::path(directory) / ".", error).lexically_normal().parent_path();
+  if (fs::exists(target, error) && !IsFree(target)) {
     return absl::FailedPreconditionError(
         absl::StrCat(directory, " is there and not empty; name a new directory"));
   }
-  // Beside its place, to which it is moved once it is whole.
-  const std::string partial = (fs::path(directory) / ".").parent_path().string() + ".restoring";
-  fs::remove_all(partial, error);
-  fs::create_directories(partial, error);
-  if (error) {
-    return absl::UnavailableError(absl::StrCat("cannot make ", partial, ": ", error.message()));
-  }
+  const absl::StatusOr<std::vector<fs::path>> made = MakeDirectories(target);
+  if (!made.ok()) return made.status();
   SnapshotCheck check;
-  absl::Status status = WritePieces(file, partial, &check);
-  if (status.ok() && file.peek() != std::ifstream::traits_type::eof()) {
-    status = Damaged("something follows its end");
-  }
-  if (status.ok()) {
-    fs::remove(directory, error);
-    fs::rename(partial, directory, error);
-    if (error) {
-      status = absl::UnavailableError(
-          absl::StrCat("cannot move ", partial, " to ", directory, ": ", error.message()));
-    }
-  }
+  const absl::Status status = Restore(file, target, &check);
   if (!status.ok()) {
-    fs::remove_all(partial, error);
+    // Never a store without its mark.
+    if (!fs::exists(target / kDatabaseName, error)) fs::remove(target / kRestoredMark, error);
+    fs::remove_all(target / kStagingName, error);
+    if (!made->empty()) fs::remove(target, error);
     return status;
   }
-  SyncPath(fs::absolute(directory, error).parent_path().string());
+  for (const fs::path& entry : *made) {
+    if (!SyncPath(entry.parent_path().string())) return CannotWrite(entry.parent_path());
+  }
   return check;
 }
 

@@ -62,9 +62,17 @@ class SnapshotWriter {
   SnapshotCheck check_;
 };
 
-// Makes a data directory of a snapshot: all of it, or nothing. Returns what the snapshot said of
-// itself. INVALID_ARGUMENT: the file is no snapshot, is damaged or cut short; FAILED_PRECONDITION:
-// the directory is there and not empty; UNAVAILABLE: it cannot be written.
+// A file of this name in a data directory tells hulld that the directory was made of a snapshot.
+// Changes after a snapshot raise revisions that the store it was taken of has raised too, so hulld
+// gives the new store an ID of its own: nobody may take one for the other.
+inline constexpr char kRestoredMark[] = "restored";
+
+// Makes a data directory of a snapshot: all of it, or no store. The directory need not be there; if
+// it is, it must be empty (but for lost+found, and for what was left of a call that was killed),
+// and only what is in it is written. Returns what the snapshot said of itself; the store that hulld
+// makes of the directory has another ID. INVALID_ARGUMENT: the file is no snapshot, is damaged or
+// cut short; FAILED_PRECONDITION: the directory is there and not empty; UNAVAILABLE: it cannot be
+// written.
 absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
                                               const std::string& directory);
 

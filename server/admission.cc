@@ -130,16 +130,15 @@ void Admission::CancelOverdue() {
       watched_changed_.wait(lock);
       continue;
     }
-    // Entries are never cancelled twice: a cancelled one moves to the end of the list.
     const auto end = watched_.front().end;
     if (std::chrono::steady_clock::now() < end) {
       watched_changed_.wait_until(lock, end);
       continue;
     }
-    watched_.front().end = std::chrono::steady_clock::time_point::max();
+    watched_.front().is_cancelled = true;
     grpc_call* const call = watched_.front().call;
     grpc_call_ref(call);
-    watched_.splice(watched_.end(), watched_, watched_.begin());
+    cancelled_.splice(cancelled_.end(), watched_, watched_.begin());
     // gRPC may call back, and those calls may leave, before this returns.
     lock.unlock();
     grpc_call_cancel(call, nullptr);
@@ -165,7 +164,7 @@ void Admission::Leave(Ticket& ticket) {
     const std::lock_guard lock(mutex_);
     if (ticket.is_watched_) {
       watched = ticket.watched_->call;
-      watched_.erase(ticket.watched_);
+      (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
     }
     if (ticket.kind_ == CallKind::kBatch) --batches_;
     if (ticket.kind_ == CallKind::kStream) {

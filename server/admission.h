@@ -59,6 +59,7 @@ class Admission {
     struct Watched {
       std::chrono::steady_clock::time_point end;
       grpc_call* call;
+      bool is_cancelled = false;
     };
     Ticket(Admission* admission, CallKind kind) : admission_(admission), kind_(kind) {}
 
@@ -121,6 +122,8 @@ class Admission {
   std::unordered_map<std::string, uint64_t> streams_;
   // In the order in which they end, as all are given the same time.
   std::list<Ticket::Watched> watched_;
+  // Those of which the time was up: nothing more is done about them.
+  std::list<Ticket::Watched> cancelled_;
   std::condition_variable watched_changed_;
   bool ending_ = false;
   std::thread watchman_;

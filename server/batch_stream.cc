@@ -52,17 +52,22 @@ absl::Status BatchStream::Validate() {
                        registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
-  const absl::Status placements = ValidatePlacementCount(
-      request_.placements_size(), registry_.limits().max_placements, "the batch");
-  if (!placements.ok()) return placements;
+  options_.should_stop = [this] {
+    Executor::GiveWay();
+    return call_.ShouldStop();
+  };
+  absl::StatusOr<PlacementTable> table =
+      PlacementTable::Make(request_.placements(), request_.packed_placements(), call_.caller(),
+                           registry_.limits().max_placements, "the batch");
+  if (!table.ok()) return table.status();
+  table_ = *std::move(table);
   call_.AddPairs(pair_count());
-  return ValidatePairs(request_.pairs(), static_cast<size_t>(request_.placements_size()),
-                       registry_.limits().max_pairs_per_batch, "the batch");
+  return ValidatePairs(request_.pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
+                       "the batch");
 }
 
-// Fills table_, and sets relations_suffice_.
+// Sets relations_suffice_.
 absl::Status BatchStream::ResolvePlacements() {
-  table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
   relations_suffice_ = options_.method == Method::kCertifiedSearch &&
                        IsRelationOnly(request_.wanted()) && table_.all_answerable();
@@ -73,7 +78,7 @@ void BatchStream::QueueHead() {
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   size_t next = 0;
   while ((next = table_.EncodeHulls(next, head_.mutable_hulls(),
-                                    head_.mutable_placement_problems())) < table_.size()) {
+                                    head_.mutable_placement_problems())) < table_.table_rows()) {
     ready_.push_back(std::exchange(head_, {}));
   }
 }

@@ -49,11 +49,7 @@ absl::Status Call::Authenticate() {
   if (admission_.authenticator() == nullptr) return absl::OkStatus();
   absl::StatusOr<Caller> caller =
       admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_);
-  if (!caller.ok()) {
-    const bool unknown = absl::IsUnauthenticated(caller.status());
-    metrics().CountAuthFailure(unknown ? "unauthenticated" : "permission_denied");
-    return caller.status();
-  }
+  if (!caller.ok()) return caller.status();
   caller_ = *std::move(caller);
   return absl::OkStatus();
 }
@@ -108,6 +104,8 @@ grpc::Status Call::End(const absl::Status& status) {
   if (KindOf(rpc_) != CallKind::kStream) LogSlow(duration, status, "slow request");
   if (status.ok()) return grpc::Status::OK;
   CountLimit(status);
+  if (absl::IsUnauthenticated(status)) metrics().CountAuthFailure("unauthenticated");
+  if (absl::IsPermissionDenied(status)) metrics().CountAuthFailure("permission_denied");
   const LogLevel level = IsFault(status.code()) ? LogLevel::kError : LogLevel::kDebug;
   if (IsLogged(level)) {
     Log(level, "request failed",

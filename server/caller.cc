@@ -3,6 +3,7 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
+#include "server/config.h"
 #include "server/hull_id.h"
 #include "server/rpc.h"
 
@@ -68,6 +69,11 @@ absl::Status CheckHullId(const Caller& caller, const std::string& id, const std:
 }
 
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix) {
+  if (prefix.size() > Config::kMaxIdCharacters) {
+    return absl::InvalidArgumentError(absl::StrCat("prefix holds ", prefix.size(),
+                                                   " characters; an ID holds at most ",
+                                                   Config::kMaxIdCharacters));
+  }
   if (prefix.starts_with(caller.prefix)) return prefix;
   if (caller.prefix.starts_with(prefix)) return caller.prefix;
   return OutsidePrefix(caller, "prefix", prefix);

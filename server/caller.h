@@ -48,8 +48,9 @@ absl::Status CheckPermission(const Caller& caller, Rpc rpc);
 // not under the caller's prefix, whether or not such a hull exists.
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field);
 
-// The prefix to list for a caller who asks for `prefix`: the narrower of the two. PERMISSION_DENIED
-// when nothing the caller sees can start with it.
+// The prefix to list for a caller who asks for `prefix`: the narrower of the two.
+// INVALID_ARGUMENT: longer than any ID. PERMISSION_DENIED when nothing the caller sees can start
+// with it.
 absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix);
 
 }  // namespace hulld::server

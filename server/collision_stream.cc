@@ -23,22 +23,10 @@ constexpr std::chrono::milliseconds kFirstSliceTime(2);
 constexpr std::chrono::milliseconds kSliceTime(20);
 // The clock is read once for so many pairs.
 constexpr size_t kPairsPerLook = 64;
-constexpr int kPoseNumbers = 7;
 // Of an update that is answered where it arrives.
 constexpr int kMostQuickPairs = 8;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
-
-absl::StatusOr<Pose> PoseAt(const v1::CollisionStreamUpdate& update, int i) {
-  const double* const numbers = update.poses().data() + static_cast<ptrdiff_t>(kPoseNumbers) * i;
-  Pose pose;
-  pose.q = {numbers[0], numbers[1], numbers[2], numbers[3]};
-  pose.t = Vector(numbers[4], numbers[5], numbers[6]);
-  if (absl::Status s = ValidatePose(pose); !s.ok()) {
-    return Prefixed(absl::StrCat("poses[", i, "]."), s);
-  }
-  return pose;
-}
 
 }  // namespace
 
@@ -142,19 +130,19 @@ absl::Status CollisionStream::HandleOpen() {
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
                        call_.lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
-  const auto placements = static_cast<size_t>(open.placements_size());
-  const absl::Status valid =
-      ValidatePairs(open.pairs(), placements, registry_.limits().max_pairs_per_batch, "the stream");
+  absl::StatusOr<PlacementTable> table =
+      PlacementTable::Make(open.placements(), open.packed_placements(), call_.caller(),
+                           registry_.limits().max_placements, "the stream");
+  if (!table.ok()) return Prefixed("open: ", table.status());
+  const absl::Status valid = ValidatePairs(open.pairs(), table->size(),
+                                           registry_.limits().max_pairs_per_batch, "the stream");
   if (!valid.ok()) return Prefixed("open: ", valid);
-  const absl::Status few = ValidatePlacementCount(open.placements_size(),
-                                                  registry_.limits().max_placements, "the stream");
-  if (!few.ok()) return Prefixed("open: ", few);
   options_ = *std::move(options);
   wanted_ = open.wanted();
   only_changes_ = open.only_changes();
-  table_ = PlacementTable(open.placements(), call_.caller());
+  table_ = *std::move(table);
 
-  pairs_begin_.assign(placements + 1, 0);
+  pairs_begin_.assign(table_.size() + 1, 0);
   for (int i = 0; i < open.pairs_size(); i += 2) {
     pairs_.push_back({open.pairs(i), open.pairs(i + 1), {}, v1::RELATION_UNSPECIFIED});
     ++pairs_begin_[pairs_.back().a];
@@ -195,8 +183,8 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
           absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
     }
     named[placement] = true;
-    const absl::StatusOr<Pose> pose = PoseAt(update, i);
-    if (!pose.ok()) return pose.status();
+    const absl::StatusOr<Pose> pose = DecodePoseAt(update.poses(), i);
+    if (!pose.ok()) return Prefixed(absl::StrCat("poses[", i, "]."), pose.status());
     poses.push_back(*pose);
   }
   if (update.refresh_hulls()) {
@@ -217,7 +205,7 @@ absl::Status CollisionStream::Refresh() {
     // The vertices that a cache names are those of the hull before.
     for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) pairs_[pairs_of_[k]].cache = {};
   }
-  next_hull_ = 0;
+  next_row_ = 0;
   return absl::OkStatus();
 }
 
@@ -277,10 +265,10 @@ void CollisionStream::Send(bool last) {
 
 // Computes until the answer is complete, a message is full, or it is the turn of others.
 void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
-  if (next_hull_ < table_.size()) {
-    next_hull_ = table_.EncodeHulls(next_hull_, response_.mutable_hulls(),
-                                    response_.mutable_placement_problems());
-    if (next_hull_ < table_.size()) return Send(false);
+  if (next_row_ < table_.table_rows()) {
+    next_row_ = table_.EncodeHulls(next_row_, response_.mutable_hulls(),
+                                   response_.mutable_placement_problems());
+    if (next_row_ < table_.table_rows()) return Send(false);
     response_bytes_ = response_.ByteSizeLong();
   }
   const auto end = std::chrono::steady_clock::now() + time;

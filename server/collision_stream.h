@@ -90,8 +90,8 @@ class CollisionStream
   v1::Wanted wanted_;
   QueryOptions options_;
   PlacementTable table_;
-  // The first placement whose hull is still to be told; table_.size() when none is.
-  size_t next_hull_ = 0;
+  // The first row of the table that is still to be told; all rows when none is.
+  size_t next_row_ = 0;
   std::vector<PairState> pairs_;
   // The pairs of placement i: pairs_of_[pairs_begin_[i]] up to pairs_begin_[i + 1].
   std::vector<uint32_t> pairs_of_;

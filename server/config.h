@@ -39,8 +39,8 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull and StreamCollisions. A client is a token or, without tokens, a
-  // peer address.
+  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveSnapshot. A client is a token or,
+  // without tokens, a peer address.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns.
   uint64_t max_concurrent_batches = 32;
@@ -95,6 +95,11 @@ struct Config {
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
+  // What gRPC may hold of messages that are on their way, before it slows down their senders; more
+  // where --max-message-bytes is large.
+  static constexpr size_t kTransportBytes = size_t{256} << 20;
+  // Calls that one connection may have open; its client makes others wait.
+  static constexpr int kCallsPerConnection = 1024;
   // Long replies are cut into messages of about this size.
   static constexpr size_t kReplyMessageBytes = 1 << 20;
   // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC

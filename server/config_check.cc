@@ -8,20 +8,22 @@
 #include <system_error>
 
 #include "server/listen_address.h"
+#include "server/metrics_endpoint.h"
 #include "server/secret_file.h"
 #include "server/tls_identity.h"
 #include "server/token_table.h"
 
 namespace hulld::server {
-namespace {
 
 absl::Status CheckListening(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
   if (!address.ok()) return address.status();
-  return CheckExposure(*address, config.has_tls(), config.insecure);
+  if (absl::Status s = CheckExposure(*address, config.has_tls(), config.insecure); !s.ok()) {
+    return s;
+  }
+  if (config.metrics_address.empty()) return absl::OkStatus();
+  return ParseMetricsAddress(config.metrics_address, config.metrics_insecure).status();
 }
-
-}  // namespace
 
 absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
                                                      std::chrono::system_clock::time_point now) {

@@ -18,6 +18,10 @@ namespace hulld::server {
 absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
                                                      std::chrono::system_clock::time_point now);
 
+// Whether the server may listen where the settings say, metrics included. INVALID_ARGUMENT names
+// the setting.
+absl::Status CheckListening(const Config& config);
+
 // OK when a store can live in this directory: it can be written, or made where it is to be.
 // INVALID_ARGUMENT names --data-dir.
 absl::Status CheckDataDir(const std::string& path);

@@ -84,6 +84,15 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
   return pose;
 }
 
+absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i) {
+  const double* const numbers = poses.data() + static_cast<ptrdiff_t>(kPoseNumbers) * i;
+  Pose pose;
+  pose.q = {numbers[0], numbers[1], numbers[2], numbers[3]};
+  pose.t = Vector(numbers[4], numbers[5], numbers[6]);
+  if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
+  return pose;
+}
+
 absl::StatusOr<Method> DecodeMethod(v1::Method method) {
   switch (method) {
     case v1::METHOD_UNSPECIFIED:

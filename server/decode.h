@@ -2,6 +2,7 @@
 #define HULLD_SERVER_DECODE_H_
 
 #include <absl/status/statusor.h>
+#include <google/protobuf/repeated_field.h>
 
 #include <cstdint>
 #include <string>
@@ -29,6 +30,11 @@ absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_p
 
 // A pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in "rotation.w".
 absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
+
+// Of poses in a row: seven numbers each, quaternion w x y z and translation x y z.
+inline constexpr int kPoseNumbers = 7;
+// The i-th of them. INVALID_ARGUMENT as DecodePose.
+absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i);
 
 // INVALID_ARGUMENT: a number that stands for no method.
 absl::StatusOr<Method> DecodeMethod(v1::Method method);

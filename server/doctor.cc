@@ -11,6 +11,7 @@
 #include "core/hull/audit.h"
 #include "core/hull/hull_builder.h"
 #include "server/config.h"
+#include "server/log.h"
 #include "server/rocksdb_store.h"
 
 namespace hulld::server {
@@ -68,20 +69,7 @@ Report ExamineAll(RocksDbStore& store) {
   return report;
 }
 
-std::string JsonText(const std::string& text) {
-  std::string json = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') json += '\\';
-    if (static_cast<unsigned char>(c) < 0x20) {
-      char escape[8];
-      std::snprintf(escape, sizeof escape, "\\u%04x", c);
-      json += escape;
-    } else {
-      json += c;
-    }
-  }
-  return json + "\"";
-}
+std::string JsonText(const std::string& text) { return "\"" + JsonEscape(text) + "\""; }
 
 void PrintJson(const Report& report) {
   std::string findings;
@@ -111,18 +99,28 @@ void PrintText(const Report& report) {
               static_cast<unsigned long long>(report.vertices), report.findings.size());
 }
 
+absl::Status CutLog(RocksDbOptions options) {
+  options.read_only = false;
+  options.cut_log = true;
+  return RocksDbStore::Open(std::move(options)).status();
+}
+
 }  // namespace
 
 int RunDoctor(const std::vector<std::string>& arguments) {
-  CLI::App app("Audits every hull of a store that no hulld has open, and changes nothing.",
-               "hulld doctor");
+  CLI::App app("Audits every hull of a store that no hulld has open.", "hulld doctor");
   RocksDbOptions options;
   options.read_only = true;
   bool json = false;
+  bool cut_log = false;
   app.add_option("--data-dir", options.data_dir, "Directory of the store")
       ->envname("HULLD_DATA_DIR")
       ->required();
   app.add_flag("--json", json, "Print one JSON object");
+  app.add_flag(
+      "--cut-log", cut_log,
+      "If the log is damaged, cut it before its first damaged record: what was acknowledged "
+      "after that is lost, and the store takes a new ID. Without it nothing is changed");
   app.footer("Exit status: 0 all is well, 1 something is damaged, 2 there is nothing to look at.");
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
@@ -130,7 +128,11 @@ int RunDoctor(const std::vector<std::string>& arguments) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
-  const absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
+  absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
+  if (cut_log && absl::IsDataLoss(store.status())) {
+    const absl::Status cut = CutLog(options);
+    store = cut.ok() ? RocksDbStore::Open(options) : cut;
+  }
   if (!store.ok()) {
     std::fprintf(stderr, "hulld doctor: %s\n", std::string(store.status().message()).c_str());
     return absl::IsDataLoss(store.status()) ? kExitDamaged : kExitUsage;

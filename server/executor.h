@@ -19,6 +19,11 @@ class Executor {
   explicit Executor(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
 
   int threads() const { return threads_; }
+  // Lets threads that wait for this one's core have it, now and then; called often by what runs on
+  // the team. Linux would else let a thread that computes go on until its next tick, of 4 ms as a
+  // rule, whoever wakes up meanwhile. Cost: ~30 ns, and a system call every 100 us.
+  static void GiveWay();
+
   void Submit(std::function<void()> task) { opener_.Submit(std::move(task)); }
 
  private:

@@ -15,7 +15,11 @@ void Complain(const char* what, const absl::Status& status, std::string* complai
   const std::string message(status.message());
   if (message == *complaint) return;
   *complaint = message;
-  if (!status.ok()) spdlog::error("{} stay as they were: {}", what, message);
+  if (status.ok()) {
+    spdlog::info("{} can be read again", what);
+  } else {
+    spdlog::error("{} stay as they were: {}", what, message);
+  }
 }
 
 }  // namespace

@@ -1,10 +1,13 @@
 // hulld: keeps 3D convex hulls by ID and answers exact collision queries. See --help.
 
+#include <malloc.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "server/config.h"
@@ -12,6 +15,7 @@
 #include "server/doctor.h"
 #include "server/log.h"
 #include "server/server.h"
+#include "server/thread_priority.h"
 
 namespace hulld::server {
 namespace {
@@ -65,6 +69,10 @@ void LogStart(const Config& config, const Server& server) {
 // Serves until SIGTERM or SIGINT, then drains. Returns the exit status.
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
+  PreferShortTurns();
+  // Messages are allocated on many threads, and what one arena keeps for itself is lost to the
+  // others.
+  mallopt(M_ARENA_MAX, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
   // Blocked before any thread exists, so that every thread inherits it and this one can wait.
   const sigset_t signals = HandledSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);

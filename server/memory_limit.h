@@ -2,11 +2,17 @@
 #define HULLD_SERVER_MEMORY_LIMIT_H_
 
 #include <cstdint>
+#include <filesystem>
 
 namespace hulld::server {
 
-// Half of the memory that this process may use: the machine's, or its control group's (version 2,
-// then 1) where that is less. Bytes.
+// The least limit of memory among the control group of this process and the groups that hold it;
+// that of version 2 and of version 1, where both are in use. UINT64_MAX: there is none. Bytes.
+// root: where /proc and /sys/fs/cgroup are, for tests.
+uint64_t ControlGroupMemory(const std::filesystem::path& root = "/");
+
+// Half of the memory that this process may use: the machine's, or ControlGroupMemory() where that
+// is less. Bytes.
 uint64_t DefaultMemoryLimit();
 
 }  // namespace hulld::server

@@ -78,7 +78,7 @@ class Metrics : public prometheus::Collectable {
   void CountMessage(Rpc rpc, std::chrono::steady_clock::duration duration);
   // hulld_limits_hit_total: the limit is named like its flag, as in "max-hulls".
   void CountLimit(const std::string& limit);
-  // hulld_auth_failures_total: the reason is one of few words, as in "unknown_token".
+  // hulld_auth_failures_total: the reason is "unauthenticated" or "permission_denied".
   void CountAuthFailure(const std::string& reason);
   // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of one committed chunk.
   void CountPoints(const PointCounts& counts);

@@ -35,13 +35,8 @@ std::string BindAddress(const ListenAddress& address) {
 
 }  // namespace
 
-MetricsEndpoint::MetricsEndpoint() = default;
-MetricsEndpoint::~MetricsEndpoint() = default;
-
-absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
-                                                                        bool exposed,
-                                                                        const Metrics& metrics) {
-  const absl::StatusOr<ListenAddress> parsed = ParseListenAddress(address, kFlag);
+absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed) {
+  absl::StatusOr<ListenAddress> parsed = ParseListenAddress(address, kFlag);
   if (!parsed.ok()) return parsed.status();
   if (parsed->is_unix()) {
     return absl::InvalidArgumentError(
@@ -52,6 +47,17 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const st
         kFlag, " is \"", address, "\", which other machines can reach, and metrics are neither ",
         "encrypted nor authenticated; use 127.0.0.1, or allow it with --metrics-insecure"));
   }
+  return parsed;
+}
+
+MetricsEndpoint::MetricsEndpoint() = default;
+MetricsEndpoint::~MetricsEndpoint() = default;
+
+absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
+                                                                        bool exposed,
+                                                                        const Metrics& metrics) {
+  const absl::StatusOr<ListenAddress> parsed = ParseMetricsAddress(address, exposed);
+  if (!parsed.ok()) return parsed.status();
   std::unique_ptr<MetricsEndpoint> endpoint(new MetricsEndpoint);
   endpoint->metrics_ = std::make_shared<Borrowed>(metrics);
   try {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "server/listen_address.h"
 #include "server/metrics.h"
 
 namespace prometheus {
@@ -14,13 +15,15 @@ class Exposer;
 
 namespace hulld::server {
 
+// INVALID_ARGUMENT: --metrics-address is malformed, or not local although not `exposed`.
+absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed);
+
 // Where Prometheus reads the metrics over HTTP: GET /metrics, neither encrypted nor authenticated.
 class MetricsEndpoint {
  public:
   // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: whether other machines
   // may reach it. The metrics must outlive this.
-  // INVALID_ARGUMENT: the address is malformed, or not local although not `exposed`. UNAVAILABLE:
-  // it cannot be bound.
+  // INVALID_ARGUMENT: as ParseMetricsAddress. UNAVAILABLE: it cannot be bound.
   static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Start(const std::string& address,
                                                                 bool exposed,
                                                                 const Metrics& metrics);

@@ -30,7 +30,79 @@ bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b
          a->record.create_revision == b->record.create_revision;
 }
 
+absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
+  if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
+  return LimitExceeded(absl::StrCat(what, " holds ", count, of), max_placements, "max-placements");
+}
+
+// Whether the lists fit each other.
+absl::Status CheckPacked(const v1::PackedPlacements& packed) {
+  if (packed.poses_size() / kPoseNumbers != packed.hulls_size() ||
+      packed.poses_size() % kPoseNumbers != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packed_placements.poses holds ", packed.poses_size(), " numbers for ",
+                     packed.hulls_size(), " placements; each needs seven: w x y z and x y z"));
+  }
+  const auto hulls = static_cast<uint32_t>(packed.hull_ids_size());
+  for (int i = 0; i < packed.hulls_size(); ++i) {
+    if (packed.hulls(i) >= hulls) {
+      return absl::InvalidArgumentError(absl::StrCat("packed_placements.hulls[", i, "] is ",
+                                                     packed.hulls(i), ", but hull_ids holds ",
+                                                     hulls, "; indices start at 0"));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
+
+absl::StatusOr<PlacementTable> PlacementTable::Make(
+    const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+    const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
+    const char* what) {
+  const bool is_packed = packed.hull_ids_size() + packed.hulls_size() + packed.poses_size() > 0;
+  if (is_packed && !placements.empty()) {
+    return absl::InvalidArgumentError(
+        "placements and packed_placements are both set; give one of them");
+  }
+  const absl::Status few = CheckCount(is_packed ? packed.hulls_size() : placements.size(),
+                                      " placements", max_placements, what);
+  if (!few.ok()) return few;
+  if (!is_packed) return PlacementTable(placements, caller);
+  const absl::Status few_hulls =
+      CheckCount(packed.hull_ids_size(), " hull_ids", max_placements, what);
+  if (!few_hulls.ok()) return few_hulls;
+  if (absl::Status s = CheckPacked(packed); !s.ok()) return s;
+  return PlacementTable(packed, caller);
+}
+
+PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller& caller)
+    : is_packed_(true) {
+  std::vector<absl::Status> malformed(packed.hull_ids_size());
+  named_.resize(malformed.size());
+  for (size_t k = 0; k < named_.size(); ++k) {
+    const std::string& id = packed.hull_ids(static_cast<int>(k));
+    malformed[k] =
+        Prefixed("packed_placements.", CheckHullId(caller, id, absl::StrCat("hull_ids[", k, "]")));
+    if (!malformed[k].ok()) continue;
+    named_[k] = ids_.size();
+    ids_.push_back(id);
+  }
+  entries_.resize(packed.hulls_size());
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    const uint32_t hull = packed.hulls(static_cast<int>(i));
+    entry.hull = named_[hull];
+    entry.malformed = malformed[hull];
+    if (!entry.malformed.ok()) continue;
+    const absl::StatusOr<Pose> pose = DecodePoseAt(packed.poses(), static_cast<int>(i));
+    if (pose.ok()) {
+      entry.pose = *pose;
+    } else {
+      entry.malformed = Prefixed(absl::StrCat("packed_placements.poses[", i, "]."), pose.status());
+    }
+  }
+}
 
 PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                                const Caller& caller) {
@@ -109,29 +181,26 @@ size_t PlacementTable::EncodeHulls(
     size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
     google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const {
   size_t bytes = 0;
-  size_t i = first;
-  for (; i < entries_.size() && bytes < Config::kReplyMessageBytes; ++i) {
-    v1::HullVersion* const version = hulls->Add();
-    const absl::Status& status = problem(i);
+  size_t row = first;
+  for (; row < table_rows() && bytes < Config::kReplyMessageBytes; ++row) {
     bytes += kEntryBytes;
-    if (status.ok()) {
-      EncodeVersion(hulls_[*entries_[i].hull]->record, version);
+    const bool is_name = row < named_.size();
+    const size_t i = is_name ? 0 : row - named_.size();
+    if (is_name || !is_packed_) {
+      v1::HullVersion* const version = hulls->Add();
+      const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
+      const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
+      if (known) EncodeVersion(hulls_[*hull]->record, version);
       bytes += version->ByteSizeLong();
-      continue;
     }
+    if (is_name || problem(i).ok()) continue;
     v1::PlacementProblem* const encoded = problems->Add();
     encoded->set_placement(static_cast<uint32_t>(i));
-    encoded->set_code(ToGrpc(status.code()));
-    encoded->set_message(std::string(status.message()));
+    encoded->set_code(ToGrpc(problem(i).code()));
+    encoded->set_message(std::string(problem(i).message()));
     bytes += kEntryBytes + encoded->ByteSizeLong();
   }
-  return i;
-}
-
-absl::Status ValidatePlacementCount(int count, uint64_t max_placements, const char* what) {
-  if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
-  return LimitExceeded(absl::StrCat(what, " holds ", count, " placements"), max_placements,
-                       "max-placements");
+  return row;
 }
 
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,

@@ -26,9 +26,14 @@ namespace hulld::server {
 class PlacementTable {
  public:
   PlacementTable() = default;
-  // Notes what is malformed and what is not the caller's; no hull is known before Resolve.
-  PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-                 const Caller& caller);
+  // Of a request that has one of the two forms. Notes what is malformed and what is not the
+  // caller's; no hull is known before Resolve. INVALID_ARGUMENT: both forms, or packed ones whose
+  // lists do not fit each other. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
+  // `what` holds them, as in "the batch".
+  static absl::StatusOr<PlacementTable> Make(
+      const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+      const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
+      const char* what);
 
   // Resolves every hull once, all at one revision of the store. Not for gRPC's threads.
   // CANCELLED: should_stop said so.
@@ -47,10 +52,12 @@ class PlacementTable {
 
   // The store's revision of the last Resolve.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
-  // A version per placement from `first` on, and their problems, as many as fill a message; returns
-  // where the next message goes on, which is size() after the last.
+  // A version per placement, or per hull that packed placements name, and the problems: the rows of
+  // a table, from row `first` on, as many as fill a message. Returns where the next message goes
+  // on, which is table_rows() after the last.
   size_t EncodeHulls(size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
                      google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
+  size_t table_rows() const { return named_.size() + entries_.size(); }
 
  private:
   struct Entry {
@@ -61,10 +68,18 @@ class PlacementTable {
     Pose pose;
   };
 
+  PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                 const Caller& caller);
+  PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
+
   const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 
   std::vector<Entry> entries_;
+  // Of packed placements: each that was named, as an index into ids_; none when it is malformed or
+  // not the caller's.
+  bool is_packed_ = false;
+  std::vector<std::optional<size_t>> named_;
   std::vector<std::string> ids_;
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
@@ -72,10 +87,6 @@ class PlacementTable {
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
 };
-
-// RESOURCE_EXHAUSTED: more than max_placements (--max-placements). `what` holds them, as in "the
-// batch".
-absl::Status ValidatePlacementCount(int count, uint64_t max_placements, const char* what);
 
 // INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
 // max_pairs (--max-pairs-per-batch).

@@ -128,9 +128,12 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
   locked.Lock();
   if (!sequence.ok()) return sequence.status();
   // What others committed meanwhile is newer.
-  writer =
-      hull.writers.try_emplace(writer_id, RegisteredHull::Sequences{*sequence, *sequence}).first;
-  return writer->second.committed;
+  writer = hull.writers.find(writer_id);
+  if (writer != hull.writers.end()) return writer->second.committed;
+  // Who has not written yet leaves nothing behind.
+  if (*sequence > 0)
+    hull.writers.emplace(writer_id, RegisteredHull::Sequences{*sequence, *sequence});
+  return *sequence;
 }
 
 void Registry::CloseAppend(const AppendSession& session) {
@@ -157,10 +160,10 @@ void Registry::RunNextChunk(const HullPointer& hull) {
   hull->chunks.pop_front();
   std::optional<ChunkResult> already;
   PointCounts counts;
-  if (pending.on_built) locked.Afterwards(pending.on_built);
   absl::StatusOr<Change> change = Build(locked, hull, pending, &already, &counts);
   pending.chunk.points = {};
   cache_.bytes -= pending.charged_bytes;
+  if (pending.on_built) locked.Afterwards(pending.on_built);
   if (change.ok()) {
     SubmitChunk(hull, pending, *std::move(change), counts);
   } else {

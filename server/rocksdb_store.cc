@@ -9,6 +9,7 @@
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
+#include <unordered_set>
 #include <utility>
 
 #include "server/random_id.h"
@@ -20,16 +21,18 @@ namespace {
 
 std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "/rocksdb"; }
 
-// Of the directories that MakeCopy makes.
-constexpr char kCopyPrefix[] = "copy-";
+// Ours alone, and nothing in it outlives the server: what else lies in the data directory is not
+// ours to touch.
+std::string ScratchDirectory(const std::string& data_dir) { return data_dir + "/hulld-scratch"; }
+
+// 'hullctl snapshot restore' leaves a file of this name in the directory that it makes.
+constexpr char kRestoredMark[] = "/restored";
 
 // What a server that was killed left behind.
-void RemoveCopies(const std::string& data_dir) {
+void ClearScratch(const std::string& data_dir) {
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(data_dir, error)) {
-    if (entry.path().filename().string().starts_with(kCopyPrefix)) {
-      std::filesystem::remove_all(entry.path(), error);
-    }
+  for (const auto& entry : std::filesystem::directory_iterator(ScratchDirectory(data_dir), error)) {
+    std::filesystem::remove_all(entry.path(), error);
   }
 }
 
@@ -69,7 +72,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
   if (status.IsCorruption()) {
     return absl::DataLossError(absl::StrCat(
         "--data-dir ", data_dir, " is damaged (", cause,
-        "); restore a snapshot into another directory, or look what is left with 'hulld doctor'"));
+        "); restore a snapshot into another directory, or see 'hulld doctor --cut-log'"));
   }
   if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
     return absl::NotFoundError(
@@ -99,6 +102,13 @@ void DropIncarnation(rocksdb::WriteBatch& batch, const StoredHull& hull,
   if (hull.writer_count > 0) drop(kWriterPrefix);
   if (layout.base_revision != 0) drop(kBasePrefix);
   if (layout.delta_count > 0) drop(kDeltaPrefix);
+}
+
+// Whether the change deletes or replaces a hull of which no more than the ID is known, as its
+// record is damaged.
+bool EndsUnknown(const Change& change) {
+  if (change.deleted) return change.hull.record.create_revision == 0;
+  return change.replaced.has_value() && change.replaced->record.create_revision == 0;
 }
 
 void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
@@ -151,16 +161,11 @@ absl::StatusOr<std::unique_ptr<RocksDbStore>> RocksDbStore::Open(RocksDbOptions 
   }
   std::unique_ptr<RocksDbStore> store(new RocksDbStore(std::move(options)));
   if (!store->options_.read_only) {
-    std::error_code error;
-    std::filesystem::create_directories(store->options_.data_dir, error);
-    if (error) {
-      return absl::UnavailableError(
-          absl::StrCat("cannot make --data-dir ", store->options_.data_dir, ": ", error.message()));
-    }
+    if (absl::Status s = store->MakeDirectories(); !s.ok()) return s;
   }
   if (absl::Status s = store->OpenDb(); !s.ok()) return s;
   if (absl::Status s = store->ReadMeta(); !s.ok()) return s;
-  if (!store->options_.read_only) RemoveCopies(store->options_.data_dir);
+  if (!store->options_.read_only) ClearScratch(store->options_.data_dir);
   if (store->options_.durability == Durability::kRelaxed && !store->options_.read_only) {
     store->syncer_ = std::thread([raw = store.get()] { raw->SyncAtIntervals(); });
   }
@@ -181,9 +186,7 @@ RocksDbStore::~RocksDbStore() {
   }
   sync_wake_.notify_all();
   if (syncer_.joinable()) syncer_.join();
-  if (db_ != nullptr && options_.durability == Durability::kRelaxed && !options_.read_only) {
-    SyncLog().IgnoreError();
-  }
+  if (relaxed_run_ && db_ != nullptr) EndRelaxedRun().IgnoreError();
 }
 
 rocksdb::Options RocksDbStore::DbOptions() const {
@@ -191,9 +194,14 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.env = env_.get();
   options.create_if_missing = !options_.read_only;
   options.paranoid_checks = true;
-  // A record cut short at the end of the log was never acknowledged; anything else is damage that
-  // must not pass in silence.
-  options.wal_recovery_mode = rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
+  // A record that the end of its log cuts short is dropped: if the disk keeps what it synced, the
+  // record was being written, and a store that syncs had not acknowledged it. All else that does
+  // not match its checksum is refused, the last record too: its pages may have reached the disk in
+  // another order when the power went out, but it may as well have been acknowledged and damaged
+  // since, and the log does not tell which.
+  options.wal_recovery_mode = options_.cut_log
+                                  ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
+                                  : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
   // Coordinates do not compress, and what is not compressed can be read around damage.
   options.compression = rocksdb::kNoCompression;
   options.write_buffer_size = 16 << 20;
@@ -210,6 +218,49 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   table.block_cache = rocksdb::NewLRUCache(8 << 20);
   options.table_factory.reset(rocksdb::NewBlockBasedTableFactory(table));
   return options;
+}
+
+// What is committed is as durable as the entries of the directories that it is kept in. Those above
+// it that are not new are synced too: an earlier start may have made them, and been killed before
+// this. Of them some may not be ours to open.
+absl::Status RocksDbStore::MakeDirectories() {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::path database =
+      fs::absolute(DatabaseDirectory(options_.data_dir), error).lexically_normal();
+  // What a start makes once the directories are durable.
+  if (env_->FileExists((database / "CURRENT").string()).ok()) return absl::OkStatus();
+  const auto failure = [this](const fs::path& path, const rocksdb::Status& status) {
+    return absl::UnavailableError(absl::StrCat("cannot make --data-dir ", options_.data_dir, ": ",
+                                               path.string(), ": ", status.ToString()));
+  };
+  std::vector<fs::path> missing;
+  fs::path above = database;
+  while (above != above.root_path() && !fs::exists(above, error)) {
+    missing.push_back(above);
+    above = above.parent_path();
+  }
+  for (auto path = missing.rbegin(); path != missing.rend(); ++path) {
+    const rocksdb::Status made = env_->CreateDirIfMissing(path->string());
+    if (!made.ok()) return failure(*path, made);
+  }
+  for (const fs::path& path : missing) {
+    const rocksdb::Status synced = SyncDirectory(path);
+    if (!synced.ok()) return failure(path, synced);
+  }
+  for (fs::path path = above;; path = path.parent_path()) {
+    const rocksdb::Status synced = SyncDirectory(path);
+    const bool ours = path == above || path == database.parent_path();
+    if (!synced.ok() && ours) return failure(path, synced);
+    if (path == path.root_path()) return absl::OkStatus();
+  }
+}
+
+// Makes the entries of a directory durable.
+rocksdb::Status RocksDbStore::SyncDirectory(const std::string& path) {
+  std::unique_ptr<rocksdb::Directory> directory;
+  const rocksdb::Status opened = env_->NewDirectory(path, &directory);
+  return opened.ok() ? directory->Fsync() : opened;
 }
 
 absl::Status RocksDbStore::OpenDb() {
@@ -243,9 +294,12 @@ absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
 absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> format = ReadNumber(kFormatKey);
   if (absl::IsNotFound(format.status())) {
-    if (!options_.read_only) return InitializeMeta();
-    return absl::NotFoundError(
-        absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+    if (options_.read_only) {
+      return absl::NotFoundError(
+          absl::StrCat("--data-dir ", options_.data_dir, " holds no store of hulld"));
+    }
+    if (absl::Status s = InitializeMeta(); !s.ok()) return s;
+    return BeginRun();
   }
   if (!format.ok()) return Prefixed("the store's format: ", format.status());
   if (*format > kStoreFormat) {
@@ -259,7 +313,7 @@ absl::Status RocksDbStore::ReadMeta() {
   const absl::StatusOr<uint64_t> revision = ReadNumber(kRevisionKey);
   if (!revision.ok()) return Prefixed("the store's revision: ", revision.status());
   revision_ = *revision;
-  return absl::OkStatus();
+  return options_.read_only ? absl::OkStatus() : BeginRun();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {
@@ -268,10 +322,65 @@ absl::Status RocksDbStore::InitializeMeta() {
   PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
   PutSealed(batch, kStoreIdKey, id_);
   PutSealed(batch, kRevisionKey, EncodeNumber(0));
+  return WriteMeta(&batch);
+}
+
+// Before anything else is served or written. A store that may have lost what it had acknowledged
+// takes an ID of its own, as the revisions of what is lost will be given to other changes: one that
+// was made of a snapshot, one whose log is cut, and one that ended relaxed without syncing its log.
+// The new ID and the marks in the database change together, and the mark in the directory goes
+// last: a start that was interrupted is repeated by the next.
+absl::Status RocksDbStore::BeginRun() {
+  std::error_code error;
+  const std::string mark = options_.data_dir + kRestoredMark;
+  const bool restored = std::filesystem::exists(mark, error);
+  const absl::StatusOr<std::string> run = Read(kRelaxedKey);
+  if (absl::IsUnavailable(run.status())) return run.status();
+  const bool cut_short = !absl::IsNotFound(run.status());
+  const bool relaxed = options_.durability == Durability::kRelaxed;
+  const std::string former_id = id_;
+  rocksdb::WriteBatch batch;
+  if (options_.cut_log || restored || cut_short) {
+    id_ = RandomId();
+    PutSealed(batch, kStoreIdKey, id_);
+  }
+  if (relaxed) PutSealed(batch, kRelaxedKey, "");
+  if (!relaxed && cut_short) batch.Delete(kRelaxedKey);
+  if (batch.Count() > 0) {
+    if (absl::Status s = WriteMeta(&batch); !s.ok()) return s;
+  }
+  relaxed_run_ = relaxed;
+  if (restored &&
+      (!std::filesystem::remove(mark, error) || !SyncDirectory(options_.data_dir).ok())) {
+    return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
+  }
+  if (restored) {
+    spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
+                 revision_, id_);
+  } else if (cut_short) {
+    spdlog::warn(
+        "store {} was open with --durability=relaxed and was not closed: what it acknowledged "
+        "last may be lost; at revision {} this is store {}",
+        former_id, revision_, id_);
+  }
+  return absl::OkStatus();
+}
+
+// Syncs the log with all that was written before. Should that fail, the mark stays.
+absl::Status RocksDbStore::EndRelaxedRun() {
+  if (absl::Status s = SyncLog(); !s.ok()) return s;
+  rocksdb::WriteBatch batch;
+  batch.Delete(kRelaxedKey);
+  return WriteMeta(&batch);
+}
+
+absl::Status RocksDbStore::WriteMeta(rocksdb::WriteBatch* batch) {
   rocksdb::WriteOptions options;
   options.sync = true;
-  const rocksdb::Status status = db_->Write(options, &batch);
-  return status.ok() ? absl::OkStatus() : WriteError(status, options_.data_dir);
+  const rocksdb::Status status = db_->Write(options, batch);
+  if (!status.ok()) return WriteError(status, options_.data_dir);
+  files_->Commit();
+  return absl::OkStatus();
 }
 
 absl::StatusOr<std::string> RocksDbStore::Read(const std::string& key) {
@@ -359,6 +468,37 @@ absl::StatusOr<StoredHull> RocksDbStore::Find(const std::string& hull_id) {
   return hull;
 }
 
+// Deletes what belongs to no hull. That is left of hulls whose records are damaged, so that their
+// incarnations are not known, once they end. While the record of another hull is damaged nothing is
+// deleted, as it may be that one's: whoever ends the last of them deletes it all. Reads all
+// records, and seeks once for each incarnation.
+void RocksDbStore::DropLostIncarnations(const std::set<std::string>& ending,
+                                        rocksdb::WriteBatch* batch) {
+  std::unordered_set<uint64_t> known;
+  bool certain = true;
+  const absl::Status read =
+      ForEachHull([&](const std::string& hull_id, const absl::StatusOr<StoredHull>& hull) {
+        if (ending.contains(hull_id)) return;
+        certain = certain && hull.ok();
+        if (hull.ok()) known.insert(hull->record.create_revision);
+      });
+  if (!read.ok() || !certain) return;
+  const std::shared_lock lock(db_mutex_);
+  if (db_ == nullptr) return;
+  for (const char prefix : {kWriterPrefix, kBasePrefix, kDeltaPrefix}) {
+    const std::unique_ptr<rocksdb::Iterator> it(db_->NewIterator(rocksdb::ReadOptions()));
+    it->Seek(std::string(1, prefix));
+    while (it->Valid() && it->key()[0] == prefix) {
+      const uint64_t incarnation = IncarnationOf(View(it->key()));
+      const std::string end = IncarnationKey(prefix, incarnation + 1);
+      if (!known.contains(incarnation)) {
+        batch->DeleteRange(IncarnationKey(prefix, incarnation), end);
+      }
+      it->Seek(end);
+    }
+  }
+}
+
 absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {
   std::vector<Vector> vertices;
   vertices.reserve(hull.layout.base_vertices + hull.layout.delta_vertices);
@@ -426,6 +566,12 @@ absl::StatusOr<uint64_t> RocksDbStore::LoadSequence(const HullRecord& hull,
 
 absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   rocksdb::WriteBatch batch;
+  std::set<std::string> unknown;
+  for (const Change* change : changes) {
+    if (EndsUnknown(*change)) unknown.insert(change->hull.record.hull_id);
+  }
+  // First, as it is about what was committed before.
+  if (!unknown.empty()) DropLostIncarnations(unknown, &batch);
   uint64_t revision = 0;
   for (const Change* change : changes) {
     Encode(batch, *change);
@@ -447,15 +593,16 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
 }
 
 absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
-  const std::string directory = absl::StrCat(options_.data_dir, "/", kCopyPrefix, RandomId());
+  const std::string directory =
+      absl::StrCat(ScratchDirectory(options_.data_dir), "/copy-", RandomId());
+  const std::shared_lock lock(db_mutex_);
+  if (db_ == nullptr) return CannotBeRead(options_.data_dir);
   std::error_code error;
-  std::filesystem::create_directory(directory, error);
+  std::filesystem::create_directories(directory, error);
   if (error) {
     return absl::UnavailableError(
         absl::StrCat("cannot make ", directory, " for the copy: ", error.message()));
   }
-  const std::shared_lock lock(db_mutex_);
-  if (db_ == nullptr) return CannotBeRead(options_.data_dir);
   rocksdb::Checkpoint* created = nullptr;
   rocksdb::Status status = rocksdb::Checkpoint::Create(db_.get(), &created);
   const std::unique_ptr<rocksdb::Checkpoint> checkpoint(created);
@@ -476,7 +623,10 @@ absl::Status RocksDbStore::Recover() {
 
 // Whether a file can be written and synced.
 absl::Status RocksDbStore::Probe() {
-  const std::string path = options_.data_dir + "/probe";
+  const std::string scratch = ScratchDirectory(options_.data_dir);
+  const std::string path = scratch + "/probe";
+  // Should it fail, so will what follows.
+  env_->CreateDirIfMissing(scratch).PermitUncheckedError();
   std::unique_ptr<rocksdb::WritableFile> file;
   rocksdb::Status status = env_->NewWritableFile(path, &file, rocksdb::EnvOptions());
   if (status.ok()) status = file->Append(std::string(size_t{64} << 10, '\0'));

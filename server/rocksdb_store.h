@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -23,7 +24,7 @@
 namespace hulld::server {
 
 struct RocksDbOptions {
-  // Made when it does not exist.
+  // Made when it does not exist, and on disk before anything is acknowledged.
   std::string data_dir;
   // kSync or kRelaxed.
   Durability durability = Durability::kSync;
@@ -31,6 +32,9 @@ struct RocksDbOptions {
   std::chrono::milliseconds sync_interval{500};
   // Looks without touching: nothing can be committed, and another process may have it open.
   bool read_only = false;
+  // Opens a store whose log is damaged as it was before the first damaged record: what was
+  // acknowledged after that is lost, and the store takes a new ID.
+  bool cut_log = false;
   // Null: the file system.
   rocksdb::Env* env = nullptr;
 };
@@ -67,7 +71,7 @@ class RocksDbStore : public Store {
             read_failures_.load(std::memory_order_relaxed)};
   }
 
-  // Hard links in <data-dir>/copy-..., in the layout of a data directory.
+  // Hard links in <data-dir>/hulld-scratch/copy-..., in the layout of a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
 
   const std::string& data_dir() const { return options_.data_dir; }
@@ -78,6 +82,8 @@ class RocksDbStore : public Store {
   explicit RocksDbStore(RocksDbOptions options);
 
   rocksdb::Options DbOptions() const;
+  absl::Status MakeDirectories();
+  rocksdb::Status SyncDirectory(const std::string& path);
   absl::Status OpenDb();
   // As one of a sync when one failed since the last that was counted.
   void CountWriteFailure();
@@ -86,11 +92,15 @@ class RocksDbStore : public Store {
   absl::Status ReadFailed(const rocksdb::Status& status);
   absl::Status ReadMeta();
   absl::Status InitializeMeta();
+  absl::Status BeginRun();
+  absl::Status EndRelaxedRun();
+  absl::Status WriteMeta(rocksdb::WriteBatch* batch);
   absl::StatusOr<std::string> Read(const std::string& key);
   absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
+  void DropLostIncarnations(const std::set<std::string>& ending, rocksdb::WriteBatch* batch);
   absl::Status LoadBase(const StoredHull& hull, std::vector<Vector>* vertices);
   absl::Status LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices);
   absl::Status Probe();
@@ -103,6 +113,8 @@ class RocksDbStore : public Store {
   std::unique_ptr<rocksdb::Env> env_;
   std::string id_;
   uint64_t revision_ = 0;
+  // Whether kRelaxedKey is there, and ours to remove.
+  bool relaxed_run_ = false;
 
   // Held shared by whoever uses db_, alone by Reopen.
   mutable std::shared_mutex db_mutex_;

@@ -24,10 +24,10 @@ constexpr std::chrono::seconds kMostPatienceInAll(20);
 constexpr size_t kPairBytes = 10;
 
 // INVALID_ARGUMENT: groups that do not fit the placements.
-absl::Status ValidateGroups(const v1::FindCollisionsRequest& request) {
-  if (request.groups_size() != 0 && request.groups_size() != request.placements_size()) {
+absl::Status ValidateGroups(const v1::FindCollisionsRequest& request, size_t placements) {
+  if (!request.groups().empty() && static_cast<size_t>(request.groups_size()) != placements) {
     return absl::InvalidArgumentError(absl::StrCat("groups holds ", request.groups_size(),
-                                                   " groups for ", request.placements_size(),
+                                                   " groups for ", placements,
                                                    " placements; give one for each or none"));
   }
   if (request.ignored_group_pairs_size() % 2 != 0) {
@@ -41,9 +41,9 @@ absl::Status ValidateGroups(const v1::FindCollisionsRequest& request) {
         absl::StrCat(request.ignore_same_group() ? "ignore_same_group" : "ignored_group_pairs",
                      " needs groups; give one for each placement"));
   }
-  if (request.movers() > static_cast<uint32_t>(request.placements_size())) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "movers is ", request.movers(), ", but placements holds ", request.placements_size()));
+  if (request.movers() > placements) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("movers is ", request.movers(), ", but placements holds ", placements));
   }
   return absl::OkStatus();
 }
@@ -87,19 +87,23 @@ absl::Status SceneStream::Open() {
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request_.wanted(), request_.tolerance(),
                        registry_.limits(), call_.lifetime());
   if (!options.ok()) return options.status();
-  const absl::Status placements = ValidatePlacementCount(
-      request_.placements_size(), registry_.limits().max_placements, "the scene");
-  if (!placements.ok()) return placements;
-  if (absl::Status s = ValidateGroups(request_); !s.ok()) return s;
+  absl::StatusOr<PlacementTable> table =
+      PlacementTable::Make(request_.placements(), request_.packed_placements(), call_.caller(),
+                           registry_.limits().max_placements, "the scene");
+  if (!table.ok()) return table.status();
+  table_ = *std::move(table);
+  if (absl::Status s = ValidateGroups(request_, table_.size()); !s.ok()) return s;
   ignored_groups_ = IgnoredGroups(request_);
   options_.ignored_groups = ignored_groups_;
   options_.groups = {request_.groups().data(), static_cast<size_t>(request_.groups_size())};
   if (request_.has_movers()) options_.movers = request_.movers();
   patience_left_ = kMostPatienceInAll;
   options_.query = *std::move(options);
-  options_.query.should_stop = [this] { return call_.ShouldStop() || too_slow_; };
+  options_.query.should_stop = [this] {
+    Executor::GiveWay();
+    return call_.ShouldStop() || too_slow_;
+  };
   options_.threads = executor_.threads();
-  table_ = PlacementTable(request_.placements(), call_.caller());
   if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
   QueueHead();
   return absl::OkStatus();
@@ -114,7 +118,7 @@ void SceneStream::QueueHead() {
     next =
         table_.EncodeHulls(next, filling_.mutable_hulls(), filling_.mutable_placement_problems());
     ready_.push_back(std::exchange(filling_, {}));
-  } while (next < table_.size());
+  } while (next < table_.table_rows());
   Proceed();
 }
 

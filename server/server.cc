@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "server/config_check.h"
 #include "server/listen_address.h"
 #include "server/memory_store.h"
 #include "server/rocksdb_store.h"
@@ -28,6 +29,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   options.env = config.store_env;
   return RocksDbStore::Open(std::move(options));
 }
+
 // Long tasks give way to those of microseconds, but not as far as batches do.
 constexpr int kLongReadersNiceness = 1;
 
@@ -90,11 +92,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
 }
 
 absl::Status Server::Listen(const Config& config) {
+  if (absl::Status s = CheckListening(config); !s.ok()) return s;
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
-  if (!address.ok()) return address.status();
-  if (absl::Status s = CheckExposure(*address, config.has_tls(), config.insecure); !s.ok()) {
-    return s;
-  }
   if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
 
   grpc::EnableDefaultHealthCheckService(true);

@@ -25,6 +25,12 @@ std::string BigEndian(T number) {
   return bytes;
 }
 
+uint64_t FromBigEndian(std::string_view bytes) {
+  uint64_t number = 0;
+  for (const char c : bytes) number = number << 8 | static_cast<unsigned char>(c);
+  return number;
+}
+
 uint32_t Checksum(std::string_view key, std::string_view value) {
   const auto add = [](uLong sum, std::string_view text) {
     return crc32_z(sum, reinterpret_cast<const Bytef*>(text.data()), text.size());
@@ -49,6 +55,10 @@ std::string IncarnationKey(char prefix, uint64_t incarnation) {
   return std::string(1, prefix).append(BigEndian(incarnation));
 }
 
+uint64_t IncarnationOf(std::string_view key) {
+  return FromBigEndian(key.substr(1, sizeof(uint64_t)));
+}
+
 std::string WriterKey(uint64_t incarnation, std::string_view writer_id) {
   return IncarnationKey(kWriterPrefix, incarnation).append(writer_id);
 }
@@ -64,11 +74,7 @@ std::string DeltaKey(uint64_t incarnation, uint64_t revision) {
 }
 
 uint64_t DeltaRevision(std::string_view key) {
-  uint64_t revision = 0;
-  for (const char c : key.substr(key.size() - sizeof(revision))) {
-    revision = revision << 8 | static_cast<unsigned char>(c);
-  }
-  return revision;
+  return FromBigEndian(key.substr(key.size() - sizeof(uint64_t)));
 }
 
 std::string Seal(std::string_view key, std::string value) {

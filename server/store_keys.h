@@ -18,6 +18,7 @@ namespace hulld::server {
 // byte order is theirs; numbers in values are little endian.
 //
 //   m/format, m/store_id, m/revision     of the store
+//   m/relaxed                            while --durability=relaxed has it open; without a value
 //   h<hull ID>                           a StoredHull
 //   w<incarnation><writer ID>            the writer's last committed sequence
 //   b<incarnation><revision><part>       vertices of a base, in parts
@@ -30,6 +31,7 @@ inline constexpr uint64_t kStoreFormat = 1;
 inline constexpr char kFormatKey[] = "m/format";
 inline constexpr char kStoreIdKey[] = "m/store_id";
 inline constexpr char kRevisionKey[] = "m/revision";
+inline constexpr char kRelaxedKey[] = "m/relaxed";
 inline constexpr char kHullPrefix = 'h';
 inline constexpr char kWriterPrefix = 'w';
 inline constexpr char kBasePrefix = 'b';
@@ -40,6 +42,8 @@ inline constexpr size_t kBasePartVertices = 32768;
 std::string HullKey(std::string_view hull_id);
 // Where an incarnation's keys of one kind start; they end before those of incarnation + 1.
 std::string IncarnationKey(char prefix, uint64_t incarnation);
+// The incarnation in any of the keys below.
+uint64_t IncarnationOf(std::string_view key);
 std::string WriterKey(uint64_t incarnation, std::string_view writer_id);
 std::string BaseKey(uint64_t incarnation, uint64_t revision, uint32_t part);
 std::string DeltaKey(uint64_t incarnation, uint64_t revision);

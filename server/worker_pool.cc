@@ -1,43 +1,10 @@
 #include "server/worker_pool.h"
 
-#include <sys/resource.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
-#include <cstdint>
 #include <utility>
 
+#include "server/thread_priority.h"
+
 namespace hulld::server {
-namespace {
-
-// How long a thread that gives way runs before one that wakes up may take its core: the least that
-// Linux takes, instead of some milliseconds.
-constexpr uint64_t kSliceNanoseconds = 100'000;
-
-// The first version of Linux's struct sched_attr, which no header of glibc 2.36 declares.
-struct SchedulingAttributes {
-  uint32_t size;
-  uint32_t policy;  // 0: SCHED_OTHER
-  uint64_t flags;
-  int32_t nice;
-  uint32_t priority;
-  uint64_t runtime;  // of SCHED_OTHER: the slice, since Linux 6.12; ignored before
-  uint64_t deadline;
-  uint64_t period;
-};
-
-// Lets other threads have the core of this one sooner and longer. On Linux both belong to the
-// thread, whatever POSIX says of niceness, and threads that it starts inherit them. Where the
-// system refuses, latency under load is all that suffers.
-void GiveWay(int niceness) {
-  SchedulingAttributes attributes = {};
-  attributes.size = sizeof attributes;
-  attributes.nice = getpriority(PRIO_PROCESS, 0) + niceness;
-  attributes.runtime = kSliceNanoseconds;
-  syscall(SYS_sched_setattr, 0, &attributes, 0);
-}
-
-}  // namespace
 
 WorkerPool::WorkerPool(int threads, std::optional<PoolMetrics> metrics, int niceness)
     : metrics_(metrics) {
@@ -69,7 +36,7 @@ void WorkerPool::NoteWaiting() {
 }
 
 void WorkerPool::Work(int niceness) {
-  if (niceness > 0) GiveWay(niceness);
+  if (niceness > 0) LowerPriority(niceness);
   std::unique_lock lock(mutex_);
   while (true) {
     ready_.wait(lock, [this] { return ending_ || !tasks_.empty(); });

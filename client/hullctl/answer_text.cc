@@ -32,7 +32,7 @@ std::string AxisKindText(v1::AxisKind kind) {
 std::string RungText(v1::Rung rung) {
   switch (rung) {
     case v1::RUNG_BOUNDS:
-      return "spheres round the hulls";
+      return "bounds round the hulls";
     case v1::RUNG_CACHED:
       return "what decided the step before";
     case v1::RUNG_FLOATING_POINT:

@@ -51,8 +51,7 @@ class SceneRun {
       const std::string* const cause = problem == problems.end() ? nullptr : &problem->second;
       const uint32_t a = part.pairs(2 * i);
       const uint32_t b = part.pairs(2 * i + 1);
-      const auto placements = static_cast<uint32_t>(request_.placements_size());
-      if (a >= placements || b >= placements) {
+      if (HullIdOf(a) == nullptr || HullIdOf(b) == nullptr) {
         return absl::InternalError("the answer names a placement that there is not");
       }
       Print(a, b, RowAt(part.columns(), i), cause);
@@ -77,8 +76,20 @@ class SceneRun {
              << (cause != nullptr ? "FAILED\t" + *cause : RowText(row)) << "\n";
   }
 
+  // Null where there is no such placement.
+  const std::string* HullIdOf(uint32_t placement) const {
+    const v1::PackedPlacements& packed = request_.packed_placements();
+    if (placement < static_cast<uint32_t>(request_.placements_size())) {
+      return &request_.placements(static_cast<int>(placement)).hull_id();
+    }
+    if (placement >= static_cast<uint32_t>(packed.hulls_size())) return nullptr;
+    const uint32_t hull = packed.hulls(static_cast<int>(placement));
+    if (hull >= static_cast<uint32_t>(packed.hull_ids_size())) return nullptr;
+    return &packed.hull_ids(static_cast<int>(hull));
+  }
+
   std::string Name(uint32_t placement) const {
-    return absl::StrCat(placement, ":", request_.placements(static_cast<int>(placement)).hull_id());
+    return absl::StrCat(placement, ":", *HullIdOf(placement));
   }
 
   void PrintEnd(bool ok) {
@@ -135,7 +146,11 @@ void AddSceneCommand(CLI::App* app, Invocation* invocation) {
       "  {\"placements\":[{\"hullId\":\"arm\"},\n"
       "                 {\"hullId\":\"box\",\"pose\":{\"translation\":{\"x\":2}}},\n"
       "                 {\"hullId\":\"box\",\"pose\":{\"rotation\":{\"w\":1,\"z\":1}}}],\n"
-      "   \"groups\":[0,1,1], \"ignoreSameGroup\":true, \"wanted\":{\"clearance\":0.1}}");
+      "   \"groups\":[0,1,1], \"ignoreSameGroup\":true, \"wanted\":{\"clearance\":0.1}}\n"
+      "Many placements are read faster as packedPlacements: the IDs of the hulls, the index of\n"
+      "each placement's hull, and its pose in seven numbers, w x y z and x y z:\n"
+      "  {\"packedPlacements\":{\"hullIds\":[\"arm\",\"box\"], \"hulls\":[0,1],\n"
+      "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]}}");
   command->callback([=] { invocation->action = [=] { return Scene(*invocation, *path); }; });
 }
 

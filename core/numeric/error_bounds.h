@@ -138,6 +138,31 @@ inline constexpr double kRadiusRoundUp = 1 + 16 * kUnitRoundoff;
 inline constexpr double kSphereErrorFactor = 256 * kUnitRoundoff;
 inline constexpr double kSphereSquareRoundUp = 1 + 16 * kUnitRoundoff;
 
+// Bounds about a hull's centre c (center_bounds.h), made only where the radius R, the largest
+// |v - c|, and the least reach from c along a corner's direction are at least kCenterLeastRadius M.
+// At a corner, the support value errs by 64 u M (16 u M, the blur 32 u M, n . c and the difference)
+// <= 2^-27 R. The point p shown to be inside is off the corner's ray by e <= 6 u M, so that for the
+// gauge g, at most (1 + e g_max) / t for p at t, g_max <= (1 + 2^-29) / least t and g <= (1 +
+// 2^-30) / t. Interpolating errs by 8 u of the direction and 10 u of the mean, turning a direction
+// into the hull's frame by 57 u. The margin covers these for the support function, times R and the
+// largest component of the direction; and for the gauge what is relative to the gauge itself.
+// Proven.
+inline constexpr double kCenterLeastRadius = 0x1p-20;
+inline constexpr double kCenterMargin = 0x1p-20;
+
+// n . (a - b) over all vertices against the support functions along n about the centres, n the
+// computed difference of the centres, which errs by 128 u S per component: 384 u |n| S; n . n,
+// at most 3 sqrt(3) |n| S, errs by 16 u |n| S, the sums by 22 u |n| S. Times |n| S. Proven.
+inline constexpr double kCenterSupportFactor = 512 * kUnitRoundoff;
+
+// The gauge of a hull along the true difference n of the centres in its frame, against that along
+// the computed one: the difference errs by 128 u S per component, turned by sqrt(3) times that; the
+// turning by 57 u |n|, the interpolation by 8 sqrt(3) u |n|, |n| <= sqrt(3) S: 345 u S. Times S and
+// the largest gauge. Then the points c_A + s n of A with s < 1 / g_A and c_B - t n of B with t < 1
+// / g_B meet inside both when 1 / g_A + 1 / g_B > 1; the factor covers rounding in that. Proven.
+inline constexpr double kCenterGaugeFactor = 512 * kUnitRoundoff;
+inline constexpr double kCenterProductRoundUp = 1 + 16 * kUnitRoundoff;
+
 // A direction whose components err by h: a value n . v in a hull's own frame by at most sqrt(3) h *
 // sqrt(3) M, so that two of them may change their order when they differ by less than 6 h M. Times
 // h S. Proven.

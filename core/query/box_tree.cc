@@ -30,7 +30,7 @@ Box BoundingBox(const PlacedHull& placed) {
   const double error = kSupportErrorFactor * size;
   Box box;
   for (int axis = 0; axis < 3; ++axis) {
-    const Vector n = placed.R_WH().row(axis).transpose();
+    const PlainVector n = Vector(placed.R_WH().row(axis));
     box.high[axis] = t[axis] + support.CertainFarthest(n, blur).value + error;
     box.low[axis] = t[axis] - support.CertainFarthest(-n, blur).value - error;
   }

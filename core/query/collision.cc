@@ -130,7 +130,7 @@ absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
                                        const QueryOptions& options, PairCache* cache) {
   const FloatPair pair(a, b);
   const absl::StatusOr<Decision> decision =
-      Decide(pair, options.tolerance, cache, options.should_stop);
+      Decide(pair, options.tolerance, cache, Purpose::kEvidence, options.should_stop);
   if (!decision.ok()) return decision.status();
   Answer answer;
   answer.relation = decision->relation;
@@ -153,9 +153,11 @@ PairCache Mirrored(PairCache cache) {
 // What the ladder decides of A and B, the axis and the pairs of which may be those of B and A.
 absl::StatusOr<Decision> DecideEither(const PlacedHull& a, const PlacedHull& b, double tolerance,
                                       PairCache* cache, const std::function<bool()>& should_stop) {
-  if (Compare(a, b) <= 0) return Decide(FloatPair(a, b), tolerance, cache, should_stop);
+  if (Compare(a, b) <= 0)
+    return Decide(FloatPair(a, b), tolerance, cache, Purpose::kRelation, should_stop);
   if (cache != nullptr) *cache = Mirrored(*cache);
-  absl::StatusOr<Decision> decision = Decide(FloatPair(b, a), tolerance, cache, should_stop);
+  absl::StatusOr<Decision> decision =
+      Decide(FloatPair(b, a), tolerance, cache, Purpose::kRelation, should_stop);
   if (cache != nullptr) *cache = Mirrored(*cache);
   return decision;
 }

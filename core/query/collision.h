@@ -42,7 +42,7 @@ enum class Method { kCertifiedSearch, kTextbookSat };
 
 // What decided an answer.
 enum class Rung {
-  kBounds,         // spheres round the hulls
+  kBounds,         // spheres round the hulls; for the relation alone, their reach between centres
   kCached,         // the axis or the vertex pairs of the previous query of the pair
   kFloatingPoint,  // the hulls, in floating point with a proven error bound
   kExact,          // exact arithmetic

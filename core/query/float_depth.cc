@@ -25,13 +25,13 @@ constexpr size_t kUsualFacets = 192;
 constexpr size_t kMaxVertices = size_t{1} << 18;
 
 struct Corner {
-  Vector w;
+  PlainVector w;
   VertexPair pair;
 };
 
 // The plane of a facet.
 struct Plane {
-  Vector n = Vector::Zero();  // unit length, outward
+  PlainVector n;  // unit length, outward
   // The least n . p over its corners p.
   double distance = 0;
   // Whether the corners are certain to turn left as seen from outside, about the origin.
@@ -65,17 +65,17 @@ class Expansion {
  private:
   using Entry = std::pair<double, uint32_t>;  // a facet by its distance
 
-  Corner At(VertexPair pair) const { return {pair_.Difference(pair) * per_unit_, pair}; }
+  Corner At(VertexPair pair) const { return {per_unit_ * pair_.Difference(pair), pair}; }
 
   double HighOf(const FloatPair::Support& farthest) const {
     return farthest.value + kReachErrorFactor * pair_.size();
   }
 
   // Flat parts of A - B make it dear to be certain; that is put off until it may end the expansion.
-  FloatPair::Support Reach(const Vector& n, double low) {
+  FloatPair::Support Reach(const PlainVector& n, double low) {
     FloatPair::Support farthest = pair_.Farthest(n);
     if (!farthest.certain && goal_.Met(low, std::min(bounds_.high, HighOf(farthest)))) {
-      farthest = pair_.CertainFarthest(n);
+      farthest = pair_.CertainFarthest(n, farthest);
     }
     if (farthest.certain) bounds_.high = std::min(bounds_.high, HighOf(farthest));
     return farthest;
@@ -88,20 +88,21 @@ class Expansion {
     } else if (!SpanTetrahedron()) {
       return false;
     }
-    const Vector n = (corners_[1].w - corners_[0].w).cross(corners_[2].w - corners_[0].w);
-    if (n.dot(corners_[3].w - corners_[0].w) > 0) std::swap(corners_[1], corners_[2]);
+    const PlainVector n = Cross(corners_[1].w - corners_[0].w, corners_[2].w - corners_[0].w);
+    if (Dot(n, corners_[3].w - corners_[0].w) > 0) std::swap(corners_[1], corners_[2]);
     surface_.Start();
     return AddPlanes(0);
   }
 
   // The farther of the two vertices farthest along and against n, as seen from the corner 0.
-  bool AddFarther(Vector n) {
-    if (!(n.norm() > 0)) return false;
-    n.normalize();
+  bool AddFarther(PlainVector n) {
+    const double length = Norm(n);
+    if (!(length > 0)) return false;
+    n = (1 / length) * n;
     const VertexPair pairs[2] = {Reach(n, 0).pair, Reach(-n, 0).pair};
     double heights[2];
     for (int i = 0; i < 2; ++i) {
-      heights[i] = std::abs(n.dot(At(pairs[i]).w - corners_[0].w));
+      heights[i] = std::abs(Dot(n, At(pairs[i]).w - corners_[0].w));
     }
     const int farther = heights[1] > heights[0];
     corners_.push_back(At(pairs[farther]));
@@ -109,13 +110,13 @@ class Expansion {
   }
 
   bool SpanTetrahedron() {
-    corners_.push_back(At(Reach(Vector::UnitX(), 0).pair));
-    if (!AddFarther(Vector::UnitX())) return false;
-    const Vector e = corners_[1].w - corners_[0].w;
-    const Vector across = e.cross(Vector::UnitY());
-    const Vector other = e.cross(Vector::UnitZ());
-    if (!AddFarther(across.squaredNorm() > other.squaredNorm() ? across : other)) return false;
-    return AddFarther(e.cross(corners_[2].w - corners_[0].w));
+    corners_.push_back(At(Reach({1, 0, 0}, 0).pair));
+    if (!AddFarther({1, 0, 0})) return false;
+    const PlainVector e = corners_[1].w - corners_[0].w;
+    const PlainVector across = Cross(e, {0, 1, 0});
+    const PlainVector other = Cross(e, {0, 0, 1});
+    if (!AddFarther(SquaredNorm(across) > SquaredNorm(other) ? across : other)) return false;
+    return AddFarther(Cross(e, corners_[2].w - corners_[0].w));
   }
 
   // For all facets from `first` on.
@@ -123,14 +124,14 @@ class Expansion {
     planes_.resize(surface_.facets().size());
     for (uint32_t i = first; i < planes_.size(); ++i) {
       const auto& corners = surface_.facets()[i].corners;
-      const Vector& p = corners_[corners[0]].w;
-      const Vector& q = corners_[corners[1]].w;
-      const Vector& r = corners_[corners[2]].w;
-      Vector n = (q - p).cross(r - p);
-      const double length = n.norm();
+      const PlainVector& p = corners_[corners[0]].w;
+      const PlainVector& q = corners_[corners[1]].w;
+      const PlainVector& r = corners_[corners[2]].w;
+      const PlainVector normal = Cross(q - p, r - p);
+      const double length = Norm(normal);
       if (!(length > 0)) return false;
-      n /= length;
-      const double distance = std::min(n.dot(p), std::min(n.dot(q), n.dot(r)));
+      const PlainVector n = (1 / length) * normal;
+      const double distance = std::min(Dot(n, p), std::min(Dot(n, q), Dot(n, r)));
       planes_[i] = {n, distance, length * distance > kLeastOutward};
       // One beyond the upper bound never becomes the nearest.
       if (distance * unit_ > bounds_.high) continue;
@@ -162,30 +163,30 @@ class Expansion {
   }
 
   bool IsAbove(uint32_t facet, const Corner& corner) const {
-    return planes_[facet].n.dot(corner.w) > planes_[facet].distance + kRelativeVisibility;
+    return Dot(planes_[facet].n, corner.w) > planes_[facet].distance + kRelativeVisibility;
   }
 
   // Expands the nearest facet; false when the goal is met or nothing is gained.
   bool Step() {
     const std::optional<uint32_t> nearest = Nearest();
     if (!nearest || corners_.size() >= kMaxVertices) return false;
-    const Vector n = planes_[*nearest].n;
+    const PlainVector n = planes_[*nearest].n;
     const double low = std::max(0.0, Low(nearest));
     FloatPair::Support farthest = Reach(n, low);
     if (goal_.Met(low, bounds_.high)) return false;
     Corner corner = At(farthest.pair);
     if (!farthest.certain && !IsAbove(*nearest, corner)) {
-      farthest = pair_.CertainFarthest(n);
+      farthest = pair_.CertainFarthest(n, farthest);
       bounds_.high = std::min(bounds_.high, HighOf(farthest));
       corner = At(farthest.pair);
     }
     // One of its own vertices: the surface is not convex up to rounding.
     if (!IsAbove(*nearest, corner) || Contains(farthest.pair)) return false;
     corners_.push_back(corner);
-    const Vector w = corner.w;
+    const PlainVector w = corner.w;
     const auto apex = static_cast<uint32_t>(corners_.size() - 1);
     const std::optional<uint32_t> first = surface_.Expand(*nearest, apex, [&](uint32_t i) {
-      return planes_[i].n.dot(w) > planes_[i].distance + kRelativeVisibility;
+      return Dot(planes_[i].n, w) > planes_[i].distance + kRelativeVisibility;
     });
     intact_ = first && AddPlanes(*first);
     return intact_;
@@ -219,7 +220,7 @@ class Expansion {
     uint32_t nearest = 0;
     for (uint32_t i = 0; i < planes_.size(); ++i) {
       if (!surface_.facets()[i].alive || planes_[i].distance * unit_ > bounds_.high) continue;
-      const double length = NearestOn(i).point.norm();
+      const double length = Norm(NearestOn(i).point);
       if (!(length < least)) continue;
       least = length;
       nearest = i;

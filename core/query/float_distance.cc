@@ -35,11 +35,11 @@ class Walk {
       // Flat parts of A - B make it dear to be certain; that is put off until it may end the walk.
       if (!farthest.certain &&
           (goal_.Met(LowOf(farthest), bounds_.high) || Contains(farthest.pair))) {
-        farthest = pair_.CertainFarthest(n);
+        farthest = pair_.CertainFarthest(n, farthest);
       }
       if (farthest.certain) bounds_.low = std::max(bounds_.low, LowOf(farthest));
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
-      corners_[count_++] = {pair_.Difference(farthest.pair) * per_unit_, farthest.pair};
+      corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
       const NearestPart part = Nearest();
       // In exact arithmetic every step is nearer.
       if (count_ == 0 || !Accept(part)) break;

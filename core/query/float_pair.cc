@@ -2,19 +2,14 @@
 
 namespace hulld {
 
-// The values are those that the support maps found in the hulls' own frames, so that the bound on
-// the maximum holds for them.
-FloatPair::Support FloatPair::Farthest(const Vector& n_W) const {
-  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W));
-  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W));
-  return {{a.vertex, b.vertex}, a.value + b.value - n_W.dot(offset_), a.certain && b.certain};
-}
-
-FloatPair::Support FloatPair::CertainFarthest(const Vector& n_W) const {
-  const double blur = kSupportBlurFactor * n_W.cwiseAbs().maxCoeff() * size_;
-  const SupportMap::Support a = a_->query_hull().support().CertainFarthest(InA(n_W), blur);
-  const SupportMap::Support b = b_->query_hull().support().CertainFarthest(-InB(n_W), blur);
-  return {{a.vertex, b.vertex}, a.value + b.value - n_W.dot(offset_), true};
+FloatPair::Support FloatPair::CertainFarthest(const PlainVector& n_W, const Support& found) const {
+  if (found.certain) return found;
+  const double blur = kSupportBlurFactor * LargestComponent(n_W) * size_;
+  const SupportMap::Support a =
+      a_->query_hull().support().CertainFarthest(InA(n_W), blur, found.pair.a);
+  const SupportMap::Support b =
+      b_->query_hull().support().CertainFarthest(-InB(n_W), blur, found.pair.b);
+  return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), true};
 }
 
 std::vector<uint32_t> FloatPair::CandidatesA(const Vector& n_W, double error) const {

@@ -29,8 +29,10 @@ struct FloatSearchResult {
 // certified: SEPARATED when the support value is below -SupportError, OVERLAPPING when the origin
 // is inside a tetrahedron of vertices of A - B by more than the error of its volumes,
 // WITHIN_TOLERANCE when a point of A - B is within the tolerance of the origin and a plane, beyond
-// which A - B does not reach, too. Requires pair.usable().
-FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance);
+// which A - B does not reach, too. `first` is where to look first, as from A's centre to B's.
+// Requires pair.usable().
+FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
+                                        const PlainVector& first);
 
 // Proves anew what the cache of an earlier query suggests; undecided where it cannot.
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache);

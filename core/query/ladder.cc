@@ -1,6 +1,7 @@
 #include "core/query/ladder.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
@@ -11,12 +12,55 @@
 namespace hulld {
 namespace {
 
-// Whether spheres round the hulls show that they are separated; then along n.
-bool SpheresSeparate(const FloatPair& pair, Vector* n) {
-  *n = -pair.CenterDifference();
+// Whether spheres round the hulls show that they are separated; then along n, which leads from A's
+// centre to B's.
+bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
   const double reach = pair.a().query_hull().radius() + pair.b().query_hull().radius() +
                        kSphereErrorFactor * pair.size();
-  return n->squaredNorm() > reach * reach * kSphereSquareRoundUp;
+  return SquaredNorm(n) > reach * reach * kSphereSquareRoundUp;
+}
+
+// What the hulls' bounds about their centres show along n, which leads from A's centre to B's: that
+// n separates them, or that the segment between the centres is covered by their insides.
+std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n,
+                                            const FloatPair::CenterView& view) {
+  // Where one is unknown, no comparison holds.
+  const CenterBounds::Bounds a = view.bounds_a();
+  const CenterBounds::Bounds b = view.bounds_b();
+  const double error = kCenterSupportFactor * LargestComponent(n) * pair.size();
+  if (a.support + b.support + error < SquaredNorm(n)) return Relation::kSeparated;
+  const double turn = kCenterGaugeFactor * pair.size();
+  const double gauge_a = a.gauge + turn * pair.a().query_hull().center_bounds().largest_gauge();
+  const double gauge_b = b.gauge + turn * pair.b().query_hull().center_bounds().largest_gauge();
+  if (gauge_a * gauge_b * kCenterProductRoundUp < gauge_a + gauge_b) return Relation::kOverlapping;
+  return std::nullopt;
+}
+
+// Whether bounds about the centres may settle a pair that spheres do not.
+bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
+  const double largest = LargestComponent(n);
+  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return false;
+  const QueryHull& a = pair.a().query_hull();
+  const QueryHull& b = pair.b().query_hull();
+  if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
+  // Coarse bounds settle little but overlaps of hulls whose centres are this near.
+  const double reach = a.radius() + b.radius();
+  return 4 * SquaredNorm(n) < reach * reach;
+}
+
+// What the bounds about the centres tell; or else `first` becomes where the walk should look first:
+// along the normals of the surfaces between the centres, which show better than the centres where a
+// gap is, unless these are unknown or nearly cancel. Kept apart from what the farthest pairs need.
+[[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
+                                                        PlainVector& first) {
+  constexpr double kLeastLikely = 0x1p-4;
+  if (!CentersMayTell(pair, n)) return std::nullopt;
+  const FloatPair::CenterView view = pair.ViewCenters(n);
+  if (const std::optional<Relation> relation = CompareOnCenterLine(pair, n, view)) return relation;
+  if (const PlainVector likely = view.LikelyAxis(); SquaredNorm(likely) > kLeastLikely) {
+    first = likely;
+  }
+  return std::nullopt;
 }
 
 Relation RelationOf(FloatVerdict verdict) {
@@ -55,11 +99,12 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 }  // namespace
 
 absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
-                                const std::function<bool()>& should_stop) {
+                                Purpose purpose, const std::function<bool()>& should_stop) {
   Decision decision;
   if (pair.usable()) {
-    if (Vector n; SpheresSeparate(pair, &n)) {
-      decision.axis = n;
+    const PlainVector n = -pair.CenterDifference();
+    if (SpheresSeparate(pair, n)) {
+      decision.axis = Vector(n);
       return decision;
     }
     if (cache != nullptr) {
@@ -70,7 +115,17 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
         return decision;
       }
     }
-    const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance);
+    PlainVector first = n;
+    if (purpose == Purpose::kRelation) {
+      if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
+        decision.relation = *relation;
+        if (*relation == Relation::kSeparated) decision.axis = Vector(n);
+        // What it suggested failed, and would cost the next query more than these bounds.
+        if (cache != nullptr) *cache = PairCache();
+        return decision;
+      }
+    }
+    const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
     decision.directions_tried += found.directions_tried;
     if (cache != nullptr) Remember(found, *cache);
     if (found.verdict != FloatVerdict::kUndecided) {

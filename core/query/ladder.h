@@ -27,12 +27,19 @@ struct Decision {
   uint64_t directions_tried = 0;
 };
 
+// What a decision is for.
+enum class Purpose {
+  kRelation,
+  kEvidence,  // also for what the search found: axis and pairs
+};
+
 // The ladder: each rung answers only what its own error bound proves. Spheres round the hulls; what
-// the cache suggests; the hulls in floating point; exact arithmetic. Requires hulls not empty.
-// Updates the cache, which may be null. CANCELLED when should_stop said so (it may be empty); only
-// the exact rung asks it.
+// the cache suggests; for the relation alone, how far the hulls reach along the line of their
+// centres; the hulls in floating point; exact arithmetic. Requires hulls not empty. Updates the
+// cache, which may be null. CANCELLED when should_stop said so (it may be empty); only the exact
+// rung asks it.
 absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
-                                const std::function<bool()>& should_stop);
+                                Purpose purpose, const std::function<bool()>& should_stop);
 
 }  // namespace hulld
 

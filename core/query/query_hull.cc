@@ -47,7 +47,11 @@ uint32_t VertexOffFirstFacet(const Hull& hull) {
 }  // namespace
 
 QueryHull::QueryHull(const Hull& hull)
-    : hull_(&hull), support_(*hull_), radius_(RadiusOf(*hull_)), exponent_(ExponentOf(*hull_)) {
+    : hull_(&hull),
+      support_(*hull_),
+      center_bounds_(*hull_, support_),
+      radius_(RadiusOf(*hull_)),
+      exponent_(ExponentOf(*hull_)) {
   if (hull_->empty()) return;
   const auto v = hull_->vertices();
   for (int axis = 0; axis < 3; ++axis) {

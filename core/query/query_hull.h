@@ -7,6 +7,7 @@
 #include <span>
 
 #include "core/hull/hull.h"
+#include "core/query/center_bounds.h"
 #include "core/query/support_map.h"
 
 namespace hulld {
@@ -15,11 +16,13 @@ namespace hulld {
 // and kept beside it. Immutable; readable by any thread.
 class QueryHull {
  public:
-  // `hull` must outlive the result. Cost: that of a SupportMap.
+  // `hull` must outlive the result. Cost: that of a SupportMap and of CenterBounds.
   explicit QueryHull(const Hull& hull);
 
   const Hull& hull() const { return *hull_; }
   const SupportMap& support() const { return support_; }
+  // About hull().center().
+  const CenterBounds& center_bounds() const { return center_bounds_; }
   // Every vertex is within this distance of hull().center(); rounded up. 0 when empty.
   double radius() const { return radius_; }
   // Every non-zero coordinate is a multiple of 2^exponent; kAboveAllExponents when there is none.
@@ -30,13 +33,16 @@ class QueryHull {
     return std::span(inner_vertices_).first(inner_count_);
   }
   // Bytes beyond the snapshot's own.
-  size_t MemoryBytes() const { return sizeof(*this) + support_.MemoryBytes(); }
+  size_t MemoryBytes() const {
+    return sizeof(*this) + support_.MemoryBytes() + center_bounds_.MemoryBytes();
+  }
 
  private:
   void AddInnerVertex(size_t vertex);
 
   const Hull* hull_;
   SupportMap support_;
+  CenterBounds center_bounds_;
   double radius_ = 0;
   int exponent_ = 0;
   std::array<uint32_t, 10> inner_vertices_ = {};

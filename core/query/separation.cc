@@ -116,7 +116,7 @@ class SeparationSearch {
       start_.assign(decision.pairs.begin(), decision.pairs.begin() + decision.pair_count);
       return;
     }
-    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0);
+    const FloatSearchResult found = SearchInFloatingPoint(pair_, 0, -pair_.CenterDifference());
     if (found.verdict == FloatVerdict::kSeparated) towards_ = found.axis;
     if (found.verdict != FloatVerdict::kOverlapping) return;
     start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
@@ -175,8 +175,8 @@ class SeparationSearch {
     Vector p_A = Vector::Zero();
     Vector p_B = Vector::Zero();
     for (uint32_t i = 0; i < point.count; ++i) {
-      p_A += point.weights[i] * pair_.PositionA(point.pairs[i].a);
-      p_B += point.weights[i] * pair_.PositionB(point.pairs[i].b);
+      p_A += Vector(point.weights[i] * pair_.PositionA(point.pairs[i].a));
+      p_B += Vector(point.weights[i] * pair_.PositionB(point.pairs[i].b));
     }
     const Vector& t = pair_.a().X_WH().t;
     Witness witness{p_A + t, p_B + t, 0};

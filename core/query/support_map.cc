@@ -59,11 +59,11 @@ template <typename Block>
 
 template <typename Block, typename Support>
 [[gnu::always_inline]] inline void ScanBlocks(const std::vector<Block>& blocks, size_t count,
-                                              const Vector& n, Support& support) {
+                                              const PlainVector& n, Support& support) {
   Lanes x, y, z, best, values;
-  Broadcast(n.x(), x);
-  Broadcast(n.y(), y);
-  Broadcast(n.z(), z);
+  Broadcast(n.x, x);
+  Broadcast(n.y, y);
+  Broadcast(n.z, z);
   Evaluate(blocks[0], x, y, z, best);
   LaneIds best_ids = {0, 1, 2, 3};
   LaneIds ids = best_ids;
@@ -235,13 +235,16 @@ void SupportMap::BuildNeighbors(const Hull& hull) {
 void SupportMap::BuildCells(const Hull& hull) {
   const double cells = kCellsPerVertex * static_cast<double>(vertices_.size());
   side_ = std::max(2u, static_cast<uint32_t>(std::lround(std::sqrt(cells / 6))));
-  scale_ = ExtentsOf(vertices_);
+  half_ = 0.5 * side_;
+  below_half_ = half_ * (1 - 0x1p-40);
+  const Vector scale = ExtentsOf(vertices_);
+  scale_ = scale;
 
   // Of each edge the normals on its two sides, in the map's directions, of unit length.
   std::vector<std::array<Vector, 2>> sides(hull.edges().size());
   for (size_t f = 0; f < hull.facet_count(); ++f) {
     const std::span<const uint32_t> facet = hull.facet(f);
-    const Vector normal = NormalOf(facet, vertices_).cwiseProduct(scale_).stableNormalized();
+    const Vector normal = NormalOf(facet, vertices_).cwiseProduct(scale).stableNormalized();
     for (size_t i = 0; i < facet.size(); ++i) {
       const uint32_t tail = facet[i];
       const uint32_t head = facet[i + 1 < facet.size() ? i + 1 : 0];
@@ -291,10 +294,10 @@ Vector SupportMap::CenterOf(uint32_t cell) const {
   n[axis] = face % 2 == 0 ? 1 : -1;
   n[kAfter[axis]] = (2.0 * (cell / side_ % side_) + 1) / side_ - 1;
   n[kAfter[axis + 1]] = (2.0 * (cell % side_) + 1) / side_ - 1;
-  return n.cwiseQuotient(scale_);
+  return n.cwiseQuotient(Vector(scale_));
 }
 
-SupportMap::Support SupportMap::LookUpLong(const Cell& cell, const Vector& n) const {
+SupportMap::Support SupportMap::LookUpLong(const Cell& cell, const PlainVector& n) const {
   const uint32_t* const list = lists_.data() + (cell.ids[3] - kLong);
   Support best{list[1], ValueOf(list[1], n), false};
   // A single one stands for many.
@@ -306,7 +309,7 @@ SupportMap::Support SupportMap::LookUpLong(const Cell& cell, const Vector& n) co
   return best;
 }
 
-SupportMap::Support SupportMap::Climb(Support from, const Vector& n) const {
+SupportMap::Support SupportMap::Climb(Support from, const PlainVector& n) const {
   for (;;) {
     Support best = from;
     for (const uint32_t id : NeighborsOf(from.vertex)) {
@@ -318,30 +321,31 @@ SupportMap::Support SupportMap::Climb(Support from, const Vector& n) const {
   }
 }
 
-SupportMap::Support SupportMap::ScanPortably(const Vector& n) const {
+SupportMap::Support SupportMap::ScanPortably(const PlainVector& n) const {
   Support support;
   ScanBlocks(blocks_, vertices_.size(), n, support);
   return support;
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
-__attribute__((target("avx2"))) SupportMap::Support SupportMap::ScanAvx2(const Vector& n) const {
+__attribute__((target("avx2"))) SupportMap::Support SupportMap::ScanAvx2(
+    const PlainVector& n) const {
   Support support;
   ScanBlocks(blocks_, vertices_.size(), n, support);
   return support;
 }
 #else
-SupportMap::Support SupportMap::ScanAvx2(const Vector& n) const { return ScanPortably(n); }
+SupportMap::Support SupportMap::ScanAvx2(const PlainVector& n) const { return ScanPortably(n); }
 #endif
 
-SupportMap::Support SupportMap::Scan(const Vector& n) const {
+SupportMap::Support SupportMap::Scan(const PlainVector& n) const {
   return CurrentSimdPath() == SimdPath::kAvx2 ? ScanAvx2(n) : ScanPortably(n);
 }
 
 // Calls visit(vertex, value) for all vertices with a value of at least from.value - slack, or says
 // false when there are too many. Such vertices are connected by edges among themselves.
 template <typename Visit>
-bool SupportMap::VisitPlateau(const Support& from, const Vector& n, double slack,
+bool SupportMap::VisitPlateau(const Support& from, const PlainVector& n, double slack,
                               Visit visit) const {
   const double least = from.value - slack;
   std::array<uint32_t, kMostFlooded> found;
@@ -361,7 +365,7 @@ bool SupportMap::VisitPlateau(const Support& from, const Vector& n, double slack
   return true;
 }
 
-SupportMap::Support SupportMap::MakeCertain(Support from, const Vector& n, double blur) const {
+SupportMap::Support SupportMap::MakeCertain(Support from, const PlainVector& n, double blur) const {
   double nearest = -INFINITY;
   for (const uint32_t id : NeighborsOf(from.vertex)) nearest = std::max(nearest, ValueOf(id, n));
   if (nearest < from.value - blur) return {from.vertex, from.value, true};
@@ -379,7 +383,7 @@ SupportMap::Support SupportMap::MakeCertain(Support from, const Vector& n, doubl
   return best;
 }
 
-std::vector<uint32_t> SupportMap::Plateau(const Vector& n, double slack) const {
+std::vector<uint32_t> SupportMap::Plateau(const PlainVector& n, double slack) const {
   const Support top = CertainFarthest(n, slack);
   const double least = top.value - slack;
   std::vector<uint32_t> plateau;

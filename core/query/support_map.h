@@ -10,6 +10,7 @@
 
 #include "core/hull/hull.h"
 #include "core/numeric/vector.h"
+#include "core/query/plain_vector.h"
 
 namespace hulld {
 
@@ -43,17 +44,21 @@ class SupportMap {
 
   // A vertex far along n, the farthest where certain and almost always otherwise. Requires the hull
   // not empty. Cost: O(V) for a small hull, O(1) on average for a large one.
-  Support Farthest(const Vector& n) const { return cells_.empty() ? Scan(n) : LookUp(n); }
+  Support Farthest(const PlainVector& n) const { return cells_.empty() ? Scan(n) : LookUp(n); }
 
   // The farthest: `value` is within `blur` of the largest computed value.
-  Support CertainFarthest(const Vector& n, double blur) const {
-    const Support found = Farthest(n);
-    return found.certain ? found : MakeCertain(found, n, blur);
+  Support CertainFarthest(const PlainVector& n, double blur) const {
+    return CertainFarthest(n, blur, Farthest(n).vertex);
+  }
+  // The same, from what Farthest(n) found.
+  Support CertainFarthest(const PlainVector& n, double blur, uint32_t found) const {
+    const Support from{found, ValueOf(found, n), cells_.empty()};
+    return from.certain ? from : MakeCertain(from, n, blur);
   }
 
   // All vertices whose computed value is within `slack` of the largest, ascending. Requires slack
   // >= blur.
-  std::vector<uint32_t> Plateau(const Vector& n, double slack) const;
+  std::vector<uint32_t> Plateau(const PlainVector& n, double slack) const;
 
   size_t MemoryBytes() const;
 
@@ -88,20 +93,20 @@ class SupportMap {
     return std::span(neighbors_)
         .subspan(neighbor_starts_[vertex], neighbor_starts_[vertex + 1] - neighbor_starts_[vertex]);
   }
-  Support Scan(const Vector& n) const;
-  Support ScanPortably(const Vector& n) const;
-  Support ScanAvx2(const Vector& n) const;
-  uint32_t CellOf(const Vector& n_own) const;
+  Support Scan(const PlainVector& n) const;
+  Support ScanPortably(const PlainVector& n) const;
+  Support ScanAvx2(const PlainVector& n) const;
+  uint32_t CellOf(const PlainVector& n_own) const;
   Vector CenterOf(uint32_t cell) const;
-  Support LookUp(const Vector& n) const;
-  Support LookUpLong(const Cell& cell, const Vector& n) const;
-  Support Climb(Support from, const Vector& n) const;
-  Support MakeCertain(Support from, const Vector& n, double blur) const;
+  Support LookUp(const PlainVector& n) const;
+  Support LookUpLong(const Cell& cell, const PlainVector& n) const;
+  Support Climb(Support from, const PlainVector& n) const;
+  Support MakeCertain(Support from, const PlainVector& n, double blur) const;
   template <typename Visit>
-  bool VisitPlateau(const Support& from, const Vector& n, double slack, Visit visit) const;
-  double ValueOf(uint32_t vertex, const Vector& n) const {
+  bool VisitPlateau(const Support& from, const PlainVector& n, double slack, Visit visit) const;
+  double ValueOf(uint32_t vertex, const PlainVector& n) const {
     const Vector& v = vertices_[vertex];
-    return (n.x() * v.x() + n.y() * v.y()) + n.z() * v.z();
+    return (n.x * v.x() + n.y * v.y()) + n.z * v.z();
   }
 
   std::span<const Vector> vertices_;
@@ -113,44 +118,54 @@ class SupportMap {
   // Large hulls: the cube map, 6 x side x side.
   std::vector<Cell> cells_;
   std::vector<uint32_t> lists_;
-  Vector scale_ = Vector::Ones();
+  PlainVector scale_ = {1, 1, 1};
   uint32_t side_ = 0;
+  // side_ / 2, and a little less.
+  double half_ = 0;
+  double below_half_ = 0;
 };
 
 // Without branches on data: directions come in no foreseeable order. Some cell also for n = 0 and
 // for what overflows.
-inline uint32_t SupportMap::CellOf(const Vector& n_own) const {
-  const Vector n = n_own.cwiseProduct(scale_);
-  const double x = std::abs(n.x());
-  const double y = std::abs(n.y());
-  const double z = std::abs(n.z());
-  const int x_or_y = x >= y ? 0 : 1;
-  const int axis = std::max(x, y) >= z ? x_or_y : 2;
-  const double along = n[axis];
-  const double half = 0.5 * side_;
-  const double factor = half / std::abs(along);
-  const double most = side_ - 1.0;
+inline uint32_t SupportMap::CellOf(const PlainVector& n_own) const {
+  // The first two again, so that the components after any one need no table.
+  const double n[5] = {n_own.x * scale_.x, n_own.y * scale_.y, n_own.z * scale_.z,
+                       n_own.x * scale_.x, n_own.y * scale_.y};
+  const double x = std::abs(n[0]);
+  const double y = std::abs(n[1]);
+  const double z = std::abs(n[2]);
+  const double larger = std::max(x, y);
+  const double factor = half_ / std::max(larger, z);
+  // Arithmetic of truth values, as compilers turn conditions into branches.
+  const uint32_t is_y = y > x;
+  const uint32_t is_z = z > larger;
+  const uint32_t axis = (is_y & (is_z - 1)) | (2 * is_z);
   // Written so that NaN becomes a number.
   const auto index = [&](double component) {
-    double place = component * factor + half;
-    place = place < most ? place : most;
-    place = place > 0 ? place : 0;
-    return static_cast<uint32_t>(static_cast<int64_t>(place));
+    double place = component * factor;
+    place = place < below_half_ ? place : below_half_;
+    place = place > -below_half_ ? place : -below_half_;
+    return static_cast<uint32_t>(static_cast<int64_t>(place + half_));
   };
-  const uint32_t face =
-      2 * static_cast<uint32_t>(axis) + static_cast<uint32_t>(std::signbit(along));
-  return (face * side_ + index(n[kAfter[axis]])) * side_ + index(n[kAfter[axis + 1]]);
+  const uint32_t face = 2 * axis + static_cast<uint32_t>(std::signbit(n[axis]));
+  return (face * side_ + index(n[axis + 1])) * side_ + index(n[axis + 2]);
 }
 
-inline SupportMap::Support SupportMap::LookUp(const Vector& n) const {
+inline SupportMap::Support SupportMap::LookUp(const PlainVector& n) const {
   const Cell& cell = cells_[CellOf(n)];
   if (cell.ids[3] >= kLong) return LookUpLong(cell, n);
-  const double values[4] = {ValueOf(cell.ids[0], n), ValueOf(cell.ids[1], n),
-                            ValueOf(cell.ids[2], n), ValueOf(cell.ids[3], n)};
-  const int low = values[1] > values[0] ? 1 : 0;
-  const int high = values[3] > values[2] ? 3 : 2;
-  const int best = values[high] > values[low] ? high : low;
-  return {cell.ids[best], values[best], false};
+  const double v0 = ValueOf(cell.ids[0], n);
+  const double v1 = ValueOf(cell.ids[1], n);
+  const double v2 = ValueOf(cell.ids[2], n);
+  const double v3 = ValueOf(cell.ids[3], n);
+  const double low_value = std::max(v0, v1);
+  const double high_value = std::max(v2, v3);
+  // Arithmetic of truth values, as above.
+  const uint32_t low = v1 > v0;
+  const uint32_t high = 2 + (v3 > v2);
+  const uint32_t is_high = high_value > low_value;
+  const uint32_t best = (low & (is_high - 1)) | (high & -is_high);
+  return {cell.ids[best], std::max(low_value, high_value), false};
 }
 
 }  // namespace hulld

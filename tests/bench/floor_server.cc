@@ -48,6 +48,9 @@ void FillHead(const Request& request, Response* response) {
   for (const v1::Placement& placement : request.placements()) {
     FillVersion(placement.hull_id(), response->add_hulls());
   }
+  for (const std::string& hull_id : request.packed_placements().hull_ids()) {
+    FillVersion(hull_id, response->add_hulls());
+  }
 }
 
 template <typename Columns>
@@ -201,7 +204,8 @@ class CollisionFloor : public v1::CollisionService::CallbackService {
     }
     std::vector<v1::FindCollisionsResponse> messages(2);
     FillHead(*request, &messages[0]);
-    const auto placements = static_cast<uint32_t>(request->placements_size());
+    const auto placements = static_cast<uint32_t>(request->placements_size() +
+                                                  request->packed_placements().hulls_size());
     for (int i = 0; i < found; ++i) {
       messages[1].add_pairs(static_cast<uint32_t>(i) % placements);
       messages[1].add_pairs(placements - 1);

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <thread>
+#include <tuple>
 
 #include "core/query/batch.h"
 #include "core/query/scene.h"
@@ -41,9 +42,25 @@ void FillPlacement(size_t hull, const Pose& pose, v1::Placement* message) {
   FillPose(pose, message->mutable_pose());
 }
 
-void AddPose(const Pose& pose, v1::CollisionStreamUpdate* update) {
-  for (const double number : pose.q) update->add_poses(number);
-  for (int k = 0; k < 3; ++k) update->add_poses(pose.t[k]);
+// To an update or to packed placements.
+template <typename Poses>
+void AddPose(const Pose& pose, Poses* message) {
+  for (const double number : pose.q) message->add_poses(number);
+  for (int k = 0; k < 3; ++k) message->add_poses(pose.t[k]);
+}
+
+// How placements are written down.
+enum class Form { kList, kPacked };
+
+template <typename Request>
+void AddPlacement(Form form, size_t hull, const Pose& pose, Request* request) {
+  if (form == Form::kList) return FillPlacement(hull, pose, request->add_placements());
+  v1::PackedPlacements* const packed = request->mutable_packed_placements();
+  while (static_cast<size_t>(packed->hull_ids_size()) <= hull) {
+    packed->add_hull_ids(Ur5Id(packed->hull_ids_size()));
+  }
+  packed->add_hulls(static_cast<uint32_t>(hull));
+  AddPose(pose, packed);
 }
 
 Sample Summarize(std::vector<double> call_us, double seconds, double per_call) {
@@ -94,16 +111,17 @@ struct Batch {
 };
 
 // `distinct` questions of a regime, each as often as makes `count` pairs.
-std::shared_ptr<Batch> MakeBatch(Regime regime, size_t distinct, size_t count) {
+std::shared_ptr<Batch> MakeBatch(Regime regime, size_t distinct, size_t count,
+                                 Form form = Form::kList) {
   const QuerySet& set = Ur5Questions(regime, distinct);
   auto batch = std::make_shared<Batch>();
   batch->placed = set.a;
   batch->placed.insert(batch->placed.end(), set.b.begin(), set.b.end());
   for (const QuerySet::Query& query : set.queries) {
-    FillPlacement(query.hull_a, query.X_WA, batch->request.add_placements());
+    AddPlacement(form, query.hull_a, query.X_WA, &batch->request);
   }
   for (const QuerySet::Query& query : set.queries) {
-    FillPlacement(query.hull_b, query.X_WB, batch->request.add_placements());
+    AddPlacement(form, query.hull_b, query.X_WB, &batch->request);
   }
   for (size_t i = 0; i < count; ++i) {
     const auto a = static_cast<uint32_t>(i % distinct);
@@ -188,7 +206,7 @@ struct Scene {
 };
 
 // About three radii of room for each of `count` links.
-std::shared_ptr<Scene> MakeScene(size_t count) {
+std::shared_ptr<Scene> MakeScene(size_t count, Form form) {
   const QuerySet& hulls = Ur5Questions(Regime::kFar, 1);
   Random random(20261121);
   auto scene = std::make_shared<Scene>();
@@ -201,7 +219,7 @@ std::shared_ptr<Scene> MakeScene(size_t count) {
     Pose pose;
     pose.q = random.Rotation();
     for (int k = 0; k < 3; ++k) pose.t[k] = random.Between(-half, half);
-    FillPlacement(hull, pose, scene->request.add_placements());
+    AddPlacement(form, hull, pose, &scene->request);
     scene->placed.push_back(*PlacedHull::Make(hulls.query_hulls[hull], pose));
   }
   SceneOptions options;
@@ -269,6 +287,8 @@ std::vector<RemoteWorkload> MakeBatchWorkloads(double seconds) {
   add("batch ur5 close", MakeBatch(Regime::kClose, 128, kPairs));
   add("batch ur5 deep", MakeBatch(Regime::kDeep, 128, kPairs));
   add("batch ur5 close, two placements a pair", MakeBatch(Regime::kClose, kOwnPairs, kOwnPairs));
+  add("batch ur5 close, two packed placements a pair",
+      MakeBatch(Regime::kClose, kOwnPairs, kOwnPairs, Form::kPacked));
   return workloads;
 }
 
@@ -285,10 +305,12 @@ std::vector<RemoteWorkload> MakeStreamWorkloads(double seconds) {
 
 std::vector<RemoteWorkload> MakeSceneWorkloads(double seconds) {
   std::vector<RemoteWorkload> workloads;
-  for (const size_t count : {size_t{1000}, size_t{10000}}) {
-    const std::shared_ptr<Scene> scene = MakeScene(count);
+  const std::tuple<size_t, Form, const char*> scenes[] = {
+      {1000, Form::kList, ""}, {10000, Form::kList, ""}, {10000, Form::kPacked, ", packed"}};
+  for (const auto& [count, form, suffix] : scenes) {
+    const std::shared_ptr<Scene> scene = MakeScene(count, form);
     workloads.push_back(
-        {"scene " + std::to_string(count) + " ur5 links", "calls",
+        {"scene " + std::to_string(count) + " ur5 links" + suffix, "calls",
          [=](RemoteSubject& subject) { return SearchScene(subject, *scene, seconds); },
          [=] {
            return Repeat(1, seconds, 1, [&](int, size_t) {

@@ -24,7 +24,8 @@ class AppenderTest : public testing::Test {
     ClientOptions options;
     options.server = fake_.address();
     options.timeout = timeout;
-    options.retry.wait = [this](std::chrono::milliseconds) {
+    options.retry.wait = [this](std::chrono::milliseconds wait) {
+      waits_.push_back(wait);
       if (before_reconnect_) before_reconnect_();
     };
     auto appender = Client(options).OpenAppend("a", options_);
@@ -52,6 +53,7 @@ class AppenderTest : public testing::Test {
 
   AppendOptions options_;
   std::function<void()> before_reconnect_;
+  std::vector<std::chrono::milliseconds> waits_;
   FakeHulld fake_;
 };
 
@@ -136,6 +138,34 @@ TEST_F(AppenderTest, ABrokenConnectionIsResumedWithoutLossOrRepetition) {
     EXPECT_EQ(appender->totals().points_acknowledged, 10u);
     EXPECT_EQ(appender->totals().chunks_recovered, lose_acks ? 4u : 0u);
   }
+}
+
+TEST_F(AppenderTest, AServerThatSaysWhenToComeAgainIsKeptTo) {
+  StreamScript script;
+  script.break_after = 3;
+  script.exhausted = true;
+  script.retry_hint = std::chrono::milliseconds(7777);
+  fake_.ScriptStreams({script});
+  const auto appender = Open();
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(appender->Append(Block(i)).ok());
+  const absl::Status finished = appender->Finish();
+  ASSERT_TRUE(finished.ok()) << finished;
+  EXPECT_THAT(FirstCoordinates(), ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_EQ(appender->totals().reconnects, 1u);
+  EXPECT_THAT(waits_, ElementsAre(std::chrono::milliseconds(7777)));
+}
+
+TEST_F(AppenderTest, AServerThatIsExhaustedAndDoesNotSaySoEndsTheAppend) {
+  StreamScript script;
+  script.break_after = 3;
+  script.exhausted = true;
+  fake_.ScriptStreams({script});
+  const auto appender = Open();
+  absl::Status status;
+  for (int i = 0; i < 10 && status.ok(); ++i) status = appender->Append(Block(i));
+  if (status.ok()) status = appender->Finish();
+  EXPECT_TRUE(absl::IsResourceExhausted(status)) << status;
+  EXPECT_TRUE(waits_.empty());
 }
 
 TEST_F(AppenderTest, AConnectionThatKeepsBreakingIsGivenUp) {

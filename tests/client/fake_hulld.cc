@@ -45,7 +45,7 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
     return grpc::Status::OK;
   }
 
-  grpc::Status AppendPoints(grpc::ServerContext*,
+  grpc::Status AppendPoints(grpc::ServerContext* context,
                             grpc::ServerReaderWriter<v1::AppendPointsResponse,
                                                      v1::AppendPointsRequest>* stream) override {
     if (auto status = fake_.Enter("AppendPoints"); !status.ok()) return status;
@@ -77,9 +77,7 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
         stream->Write(response);
         unacknowledged = 0;
       }
-      if (++committed == script.break_after) {
-        return {grpc::StatusCode::UNAVAILABLE, "Socket closed"};
-      }
+      if (++committed == script.break_after) return Break(script, context);
     }
     return grpc::Status::OK;
   }
@@ -143,6 +141,15 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
   }
 
  private:
+  static grpc::Status Break(const StreamScript& script, grpc::ServerContext* context) {
+    if (script.retry_hint.has_value()) {
+      context->AddTrailingMetadata("grpc-retry-pushback-ms",
+                                   std::to_string(script.retry_hint->count()));
+    }
+    if (script.exhausted) return {grpc::StatusCode::RESOURCE_EXHAUSTED, "too many calls"};
+    return {grpc::StatusCode::UNAVAILABLE, "Socket closed"};
+  }
+
   // Requires the lock.
   void Create(const std::string& hull_id) {
     FakeHull& hull = fake_.hulls_[hull_id];

@@ -3,6 +3,7 @@
 
 #include <grpcpp/server.h>
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
@@ -34,6 +35,10 @@ struct StreamScript {
   std::optional<int> break_after;
   // ... and their acknowledgements are lost.
   bool lose_acks = false;
+  // It ends with RESOURCE_EXHAUSTED instead, as if the server had too much to do.
+  bool exhausted = false;
+  // When the server says that the client may come again.
+  std::optional<std::chrono::milliseconds> retry_hint;
   // Only each n-th chunk is acknowledged, with those before it.
   int ack_every = 1;
   // Every chunk but no acknowledgement is taken, until Release().

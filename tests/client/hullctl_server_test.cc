@@ -229,6 +229,12 @@ TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
   EXPECT_EQ(ran.out,
             "0:cube\t1:cube\tTOUCHING\twithin\n1:cube\t2:cube\tSEPARATED\twithin\n"
             "# touching 1 overlapping 0 separated 1 failed 0\n");
+  const TempFile packed("packed.json",
+                        R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0],
+                            "poses":[1,0,0,0, 0,0,0,  1,0,0,0, 1,0,0]}})");
+  ran = Ask({"scene", packed.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
   const TempFile typo("typo.json", R"({"placement":[]})");
   ran = Ask({"scene", typo.path()});
   EXPECT_EQ(ran.code, 2);

@@ -72,6 +72,12 @@ testing::AssertionResult RelationCheck::AskOnce(const Hull& a, const Pose& X_WA,
   const testing::AssertionResult axis = AxisIsValid(a, X_WA, b, X_WB, *answer);
   if (!axis) return failure() << axis.message();
   if (!textbook) {
+    const absl::StatusOr<Answer> plain = CheckCollision(a, X_WA, b, X_WB);
+    if (!plain.ok()) return failure() << plain.status();
+    if (plain->relation != expected) {
+      return failure() << Name(plain->relation) << " where nothing else is wanted, expected "
+                       << Name(expected);
+    }
     const testing::AssertionResult certificate = CertificateIsValid(a, X_WA, b, X_WB, *answer);
     if (!certificate) return failure() << certificate.message();
   }

@@ -19,7 +19,8 @@ class RelationCheck {
   };
 
   // Whether core says `expected` for A and B and for B and A, by both methods, each with a valid
-  // axis and a consistent analysis, and the search with a certificate that proves it.
+  // axis and a consistent analysis, and the search with a certificate that proves it; and the
+  // search also when asked for nothing else.
   testing::AssertionResult Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
                                Relation expected, Ways ways = kAllWays);
 

@@ -84,6 +84,8 @@ class MessageFiller {
     if (field.has_optional_keyword() || name == "tolerance" || name == "simplification") {
       return in_.OneOf(4);
     }
+    // Requests have placements in one form; programs pack them themselves.
+    if (name == "packed_placements") return in_.OneOf(32);
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return !in_.OneOf(8);
     return !in_.OneOf(32);
   }

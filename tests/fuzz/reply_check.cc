@@ -37,6 +37,18 @@ bool IsProblemCode(int code) {
          code == grpc::RESOURCE_EXHAUSTED;
 }
 
+// Of a request whose placements have one of two forms.
+template <typename Request>
+int PlacementCount(const Request& request) {
+  return request.placements_size() + request.packed_placements().hulls_size();
+}
+
+// The entries of the table of hulls that answers it.
+template <typename Request>
+int HullCount(const Request& request) {
+  return request.placements_size() + request.packed_placements().hull_ids_size();
+}
+
 // The placements that have a problem.
 template <typename Problems>
 std::string CheckProblems(const Problems& problems, int placements, std::set<uint32_t>* found) {
@@ -255,12 +267,11 @@ std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
   uint64_t next = 0;
   for (const v1::BatchCheckCollisionsResponse& part : parts) {
     const bool first = &part == &parts.front();
-    if (part.has_header() != first ||
-        part.hulls_size() != (first ? request.placements_size() : 0)) {
+    if (part.has_header() != first || part.hulls_size() != (first ? HullCount(request) : 0)) {
       return "the table of hulls is not in the first message alone";
     }
     std::string finding =
-        CheckProblems(part.placement_problems(), request.placements_size(), &problems);
+        CheckProblems(part.placement_problems(), PlacementCount(request), &problems);
     if (!finding.empty()) return finding;
     if (part.first_pair() != next) return "ranges of pairs do not follow each other";
     const auto pair_of = [&](int row) { return next + static_cast<uint64_t>(row); };
@@ -284,12 +295,12 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
                        std::span<const v1::FindCollisionsResponse> parts) {
   if (parts.empty() || !parts.back().has_totals()) return "a scene ends without its totals";
   if (!parts.front().has_header() || parts.front().pairs_size() > 0 ||
-      parts.front().hulls_size() != request.placements_size()) {
+      parts.front().hulls_size() != HullCount(request)) {
     return "the first message of a scene is not its table of hulls";
   }
   std::set<uint32_t> problems;
   std::string finding =
-      CheckProblems(parts.front().placement_problems(), request.placements_size(), &problems);
+      CheckProblems(parts.front().placement_problems(), PlacementCount(request), &problems);
   if (!finding.empty()) return finding;
   v1::SceneTotals counted;
   std::pair<int64_t, int64_t> before(-1, -1);
@@ -297,7 +308,7 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
     if (part.pairs_size() % 2 != 0) return "half a pair";
     for (int i = 0; i < part.pairs_size(); i += 2) {
       const std::pair<int64_t, int64_t> pair(part.pairs(i), part.pairs(i + 1));
-      if (pair <= before || pair.first >= pair.second || pair.second >= request.placements_size()) {
+      if (pair <= before || pair.first >= pair.second || pair.second >= PlacementCount(request)) {
         return "pairs of a scene are out of order or out of range";
       }
       before = pair;

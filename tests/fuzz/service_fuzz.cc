@@ -193,7 +193,11 @@ std::string ServiceFuzz::Reopen() {
   }
   Stop();
   Start();
-  if (!former.empty()) std::filesystem::remove_all(former);
+  if (!former.empty()) {
+    std::filesystem::remove_all(former);
+    // A store that was restored is another one.
+    store_id_.clear();
+  }
   if (Contents() != before) return "a store is not what it was before it was opened again";
   ++reached_[former.empty() ? "store opened again" : "snapshot opened"];
   return {};

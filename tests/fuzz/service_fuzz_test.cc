@@ -67,6 +67,7 @@ constexpr Goal kGoals[] = {
     {"certificate", 10},
     {"BatchCheckCollisions OK", 10},
     {"BatchCheckCollisions with pairs", 10},
+    {"BatchCheckCollisions compared with packed placements", 3},
     {"BatchCheckCollisions INVALID_ARGUMENT", 10},
     {"BatchCheckCollisions not read", 1},
     {"StreamCollisions OK", 10},

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "client/packed_placements.h"
 #include "client/snapshot_file.h"
 #include "client/verify/certificate_check.h"
 #include "tests/fuzz/raw_call.h"
@@ -492,12 +493,19 @@ void ServiceProgram::BatchCheckCollisions() {
   v1::BatchCheckCollisionsRequest request;
   std::vector<v1::BatchCheckCollisionsResponse> parts;
   FillMessage(in_, Hints(), &request);
+  const std::optional<v1::BatchCheckCollisionsRequest> packed = MaybePacked(request);
+  const v1::BatchCheckCollisionsRequest& sent = packed.has_value() ? *packed : request;
   if (!ReadStream(Rpc::kBatchCheckCollisions, *service_.collisions_,
-                  &v1::CollisionService::Stub::BatchCheckCollisions, request, &parts)) {
+                  &v1::CollisionService::Stub::BatchCheckCollisions, sent, &parts)) {
     return;
   }
-  Note(CheckBatch(request, parts));
+  Note(CheckBatch(sent, parts));
   if (request.pairs_size() > 0) Reach("BatchCheckCollisions with pairs");
+  if (!packed.has_value() || request.tolerance() != 0 || !finding_.empty()) return;
+  Reach("BatchCheckCollisions compared with packed placements");
+  if (AskBatch(request) != RelationsOf(parts) && finding_.empty()) {
+    Note("packed placements are answered otherwise");
+  }
 }
 
 std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollisionsRequest& request) {
@@ -509,6 +517,17 @@ std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollision
   const grpc::Status status = reader->Finish();
   if (!status.ok()) Note("a batch that another RPC has answered: " + status.error_message());
   return RelationsOf(parts);
+}
+
+template <typename Request>
+std::optional<Request> ServiceProgram::MaybePacked(const Request& request) {
+  if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {
+    return std::nullopt;
+  }
+  Request packed = request;
+  *packed.mutable_packed_placements() = PackPlacements(request.placements());
+  packed.clear_placements();
+  return packed;
 }
 
 v1::StreamCollisionsRequest ServiceProgram::NextCollisionMessage(bool first, size_t placements) {
@@ -535,6 +554,9 @@ void ServiceProgram::StreamCollisions() {
   v1::StreamCollisionsRequest request = NextCollisionMessage(true, 0);
   const size_t placements = static_cast<size_t>(request.open().placements_size());
   CollisionStreamCheck check(request.open());
+  if (request.has_open()) {
+    if (auto packed = MaybePacked(request.open())) *request.mutable_open() = *std::move(packed);
+  }
   v1::StreamCollisionsResponse response;
   for (size_t i = 0; i < messages; ++i) {
     if (i == cancel_at) {
@@ -566,11 +588,13 @@ void ServiceProgram::FindCollisions() {
   v1::FindCollisionsRequest request;
   std::vector<v1::FindCollisionsResponse> parts;
   FillMessage(in_, Hints(), &request);
+  const std::optional<v1::FindCollisionsRequest> packed = MaybePacked(request);
+  const v1::FindCollisionsRequest& sent = packed.has_value() ? *packed : request;
   if (!ReadStream(Rpc::kFindCollisions, *service_.collisions_,
-                  &v1::CollisionService::Stub::FindCollisions, request, &parts)) {
+                  &v1::CollisionService::Stub::FindCollisions, sent, &parts)) {
     return;
   }
-  Note(CheckScene(request, parts));
+  Note(CheckScene(sent, parts));
   const bool comparable = request.placements_size() > 1 &&
                           request.placements_size() <= kMostComparedPlacements &&
                           request.tolerance() == 0 && !request.wanted().has_clearance();

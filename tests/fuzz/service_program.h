@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -96,6 +97,9 @@ class ServiceProgram {
   v1::AppendPointsRequest NextAppendMessage(bool first, uint64_t* sequence);
   v1::ReplaceHullRequest NextReplaceMessage(bool first);
   v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
+  // The same request in its other form, now and then.
+  template <typename Request>
+  std::optional<Request> MaybePacked(const Request& request);
 
   ServiceFuzz& service_;
   ByteReader in_;

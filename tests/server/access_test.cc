@@ -1,5 +1,6 @@
 // Tokens over the contract: who may call what, and who sees which hulls.
 
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <google/protobuf/descriptor.h>
@@ -12,8 +13,9 @@
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <regex>
 #include <set>
+#include <string>
+#include <string_view>
 
 #include "server/caller.h"
 #include "tests/server/test_certificates.h"
@@ -182,13 +184,17 @@ class Access : public ServerTest {
     const Outcome services = Run("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
                                  {}, {std::string(":\0", 2)});
     std::set<std::string> calls;
-    const std::regex pattern("hulld\\.v1\\.[A-Za-z]+");
-    for (std::sregex_iterator found(services.replies.begin(), services.replies.end(), pattern), end;
-         found != end; ++found) {
+    const std::string_view replies = services.replies;
+    constexpr std::string_view kPackage = "hulld.v1.";
+    for (std::size_t at = replies.find(kPackage); at != replies.npos;
+         at = replies.find(kPackage, at + 1)) {
+      std::size_t end = at + kPackage.size();
+      while (end < replies.size() && absl::ascii_isalpha(replies[end])) ++end;
+      const std::string name(replies.substr(at, end - at));
       const auto* const service =
-          google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(found->str());
+          google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(name);
       if (service == nullptr) {
-        ADD_FAILURE() << found->str();
+        ADD_FAILURE() << name;
         continue;
       }
       for (int i = 0; i < service->method_count(); ++i) {

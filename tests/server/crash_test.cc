@@ -31,11 +31,7 @@ namespace {
 int Crashes() {
   const char* given = std::getenv("HULLD_CRASHES");
   if (given != nullptr) return std::atoi(given);
-#ifdef HULLD_SANITIZED
-  return 4;
-#else
   return 12;
-#endif
 }
 
 uint64_t Seed() {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <prometheus/text_serializer.h>
 #include <rocksdb/env.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -49,6 +50,15 @@ class DurableServer : public ServerTest {
       block.mutable_xyz()->Assign(xyz.begin(), xyz.end());
       return sink(block);
     });
+  }
+
+  void SaveSnapshot(const std::string& file) {
+    SnapshotWriter writer(file);
+    ASSERT_TRUE(writer.Open().ok());
+    const absl::Status saved = MakeClient().SaveSnapshot(
+        [&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); });
+    ASSERT_TRUE(saved.ok()) << saved;
+    ASSERT_TRUE(writer.Finish().ok());
   }
 
   std::string directory_;
@@ -206,14 +216,9 @@ TEST_F(DurableServer, ReplacingEndsTheStreamsThatAppend) {
 
 TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
   Put("sphere", Sphere(300));
-  const std::string before = Get("sphere").SerializeAsString();
+  const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/snapshot";
-  SnapshotWriter writer(file);
-  ASSERT_TRUE(writer.Open().ok());
-  const absl::Status saved = MakeClient().SaveSnapshot(
-      [&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); });
-  ASSERT_TRUE(saved.ok()) << saved;
-  ASSERT_TRUE(writer.Finish().ok());
+  SaveSnapshot(file);
   // The server goes on, and what comes later is not in the snapshot.
   ASSERT_TRUE(Delete("sphere").ok());
   const auto restored = RestoreSnapshot(file, directory_ + "/restored");
@@ -221,19 +226,19 @@ TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
   EXPECT_EQ(RestoreSnapshot(file, directory_ + "/restored").status().code(),
             absl::StatusCode::kFailedPrecondition);
   Restart(DurableConfig("restored"));
-  EXPECT_EQ(Get("sphere").SerializeAsString(), before);
+  const v1::GetHullResponse after = Get("sphere");
+  EXPECT_EQ(after.hull().SerializeAsString(), before.hull().SerializeAsString());
+  EXPECT_EQ(after.header().revision(), before.header().revision());
+  // From here on both may give the same revision to different changes.
+  EXPECT_NE(after.header().store_id(), before.header().store_id());
+  Restart(DurableConfig("restored"));
+  EXPECT_EQ(Get("sphere").header().store_id(), after.header().store_id());
 }
 
 TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
   Put("sphere", Sphere(300));
   const std::string file = directory_ + "/snapshot";
-  SnapshotWriter writer(file);
-  ASSERT_TRUE(writer.Open().ok());
-  ASSERT_TRUE(
-      MakeClient()
-          .SaveSnapshot([&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); })
-          .ok());
-  ASSERT_TRUE(writer.Finish().ok());
+  SaveSnapshot(file);
   const auto size = std::filesystem::file_size(file);
   const std::string copy = directory_ + "/copy";
   for (const uintmax_t at : {uintmax_t{20}, size / 3, size / 2, size - 3}) {
@@ -249,6 +254,48 @@ TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
     EXPECT_FALSE(RestoreSnapshot(copy, directory_ + "/restored").ok()) << at;
     EXPECT_FALSE(std::filesystem::exists(directory_ + "/restored"));
   }
+}
+
+TEST_F(DurableServer, ASnapshotIsRestoredWithinADirectoryThatIsThere) {
+  Put("sphere", Sphere(300));
+  const v1::GetHullResponse before = Get("sphere");
+  const std::string file = directory_ + "/snapshot";
+  SaveSnapshot(file);
+  // A mount point cannot be replaced, and nothing can be made beside it by who owns no more than
+  // itself.
+  const std::string target = directory_ + "/mounted";
+  std::filesystem::create_directories(target + "/lost+found");
+  // What a restoring that was killed left behind.
+  std::filesystem::create_directories(target + "/restoring/rocksdb");
+  std::ofstream(target + "/restoring/rocksdb/CURRENT") << "half";
+  std::ofstream(target + "/restored").close();
+  // Somebody else's.
+  std::filesystem::create_directories(target + ".restoring/mine");
+  const auto inode = [&target] {
+    struct stat status = {};
+    EXPECT_EQ(stat(target.c_str(), &status), 0);
+    return status.st_ino;
+  };
+  const ino_t inode_before = inode();
+  const auto restored = RestoreSnapshot(file, target);
+  ASSERT_TRUE(restored.ok()) << restored.status();
+  EXPECT_EQ(inode(), inode_before);
+  EXPECT_TRUE(std::filesystem::exists(target + ".restoring/mine"));
+  EXPECT_FALSE(std::filesystem::exists(target + "/restoring"));
+  Restart(DurableConfig("mounted"));
+  EXPECT_EQ(Get("sphere").hull().SerializeAsString(), before.hull().SerializeAsString());
+  EXPECT_NE(Get("sphere").header().store_id(), before.header().store_id());
+}
+
+TEST_F(DurableServer, ARestoringThatFailsLeavesTheDirectoryEmpty) {
+  Put("sphere", Sphere(300));
+  const std::string file = directory_ + "/snapshot";
+  SaveSnapshot(file);
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 3);
+  const std::string target = directory_ + "/mounted";
+  std::filesystem::create_directory(target);
+  EXPECT_FALSE(RestoreSnapshot(file, target).ok());
+  EXPECT_TRUE(std::filesystem::is_empty(target));
 }
 
 TEST_F(DurableServer, TheDoctorLooksAtAStoreThatNobodyHasOpen) {

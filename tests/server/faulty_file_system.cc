@@ -1,5 +1,6 @@
 #include "tests/server/faulty_file_system.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -15,7 +16,9 @@ using rocksdb::IOStatus;
 
 // RocksDB joins paths with slashes of its own.
 std::string Normal(const std::string& path) {
-  return std::filesystem::path(path).lexically_normal().string();
+  std::string normal = std::filesystem::path(path).lexically_normal().string();
+  if (normal.size() > 1 && normal.ends_with('/')) normal.pop_back();
+  return normal;
 }
 
 std::string ReadAll(const std::string& path) {
@@ -114,6 +117,9 @@ class FaultyFileSystem::Directory : public rocksdb::FSDirectory {
       file.entry_synced = true;
       file.former.reset();
     }
+    for (auto& [path, synced] : system_.directories_) {
+      if (std::filesystem::path(path).parent_path() == name_) synced = true;
+    }
     return IOStatus::OK();
   }
   IOStatus Close(const IOOptions&, IODebugContext*) override { return IOStatus::OK(); }
@@ -144,6 +150,22 @@ IOStatus FaultyFileSystem::NewRandomAccessFile(const std::string& name,
   return opened;
 }
 
+std::vector<std::string> FaultyFileSystem::directories() const {
+  const std::lock_guard lock(state_mutex_);
+  std::vector<std::string> names;
+  for (const auto& [name, synced] : directories_) names.push_back(name);
+  return names;
+}
+
+std::vector<std::string> FaultyFileSystem::unsynced_directories() const {
+  const std::lock_guard lock(state_mutex_);
+  std::vector<std::string> names;
+  for (const auto& [name, synced] : directories_) {
+    if (!synced) names.push_back(name);
+  }
+  return names;
+}
+
 IOStatus FaultyFileSystem::Error(bool is_sync) const {
   switch (fault_) {
     case Fault::kNone:
@@ -169,6 +191,10 @@ void FaultyFileSystem::CopySurvivors(const std::string& source, const std::strin
   std::filesystem::create_directories(target);
   for (const auto& [path, file] : files_) {
     if (!path.starts_with(source + "/")) continue;
+    const bool directory_lost = std::ranges::any_of(directories_, [&path](const auto& directory) {
+      return !directory.second && path.starts_with(directory.first + "/");
+    });
+    if (directory_lost) continue;
     const std::string copy = target + path.substr(source.size());
     if (!file.entry_synced && !file.former.has_value()) continue;
     std::filesystem::create_directories(std::filesystem::path(copy).parent_path());
@@ -199,10 +225,24 @@ IOStatus FaultyFileSystem::NewWritableFile(const std::string& name,
 IOStatus FaultyFileSystem::NewDirectory(const std::string& name, const IOOptions&,
                                         std::unique_ptr<rocksdb::FSDirectory>* result,
                                         IODebugContext*) {
-  std::string normal = Normal(name);
-  if (normal.ends_with('/')) normal.pop_back();
-  *result = std::make_unique<Directory>(*this, normal);
+  *result = std::make_unique<Directory>(*this, Normal(name));
   return IOStatus::OK();
+}
+
+IOStatus FaultyFileSystem::CreateDir(const std::string& name, const IOOptions& options,
+                                     IODebugContext* debug) {
+  const std::shared_lock writing(mutex_);
+  const std::lock_guard lock(state_mutex_);
+  if (IOStatus error = Error(false); !error.ok()) return error;
+  const IOStatus made = FileSystemWrapper::CreateDir(name, options, debug);
+  if (made.ok()) directories_[Normal(name)] = false;
+  return made;
+}
+
+IOStatus FaultyFileSystem::CreateDirIfMissing(const std::string& name, const IOOptions& options,
+                                              IODebugContext* debug) {
+  if (std::filesystem::is_directory(name)) return IOStatus::OK();
+  return CreateDir(name, options, debug);
 }
 
 IOStatus FaultyFileSystem::RenameFile(const std::string& source, const std::string& target,

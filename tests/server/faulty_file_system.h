@@ -11,6 +11,7 @@
 #include <random>
 #include <shared_mutex>
 #include <string>
+#include <vector>
 
 namespace hulld::server {
 
@@ -40,6 +41,10 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   // Syncs of files so far.
   int64_t syncs() const;
 
+  // The directories that were made, and those of them whose entries could be lost.
+  std::vector<std::string> directories() const;
+  std::vector<std::string> unsynced_directories() const;
+
   // Makes `target` what is left of `source` after the power went out at this very moment. Of bytes
   // that were not synced a random part, from the front, is left, too. Both without a slash at the
   // end; nothing that is written meanwhile is seen in part.
@@ -55,6 +60,10 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   rocksdb::IOStatus NewDirectory(const std::string& name, const rocksdb::IOOptions& options,
                                  std::unique_ptr<rocksdb::FSDirectory>* result,
                                  rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus CreateDir(const std::string& name, const rocksdb::IOOptions& options,
+                              rocksdb::IODebugContext* debug) override;
+  rocksdb::IOStatus CreateDirIfMissing(const std::string& name, const rocksdb::IOOptions& options,
+                                       rocksdb::IODebugContext* debug) override;
   rocksdb::IOStatus RenameFile(const std::string& source, const std::string& target,
                                const rocksdb::IOOptions& options,
                                rocksdb::IODebugContext* debug) override;
@@ -84,6 +93,8 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   Fault fault_ = Fault::kNone;
   int64_t syncs_ = 0;
   std::map<std::string, Written> files_;
+  // Whether the entry of each that was made is synced.
+  std::map<std::string, bool> directories_;
 };
 
 }  // namespace hulld::server

@@ -144,6 +144,8 @@ TEST_F(GuardProcess, CheckConfigEndsWith0Or2AndNamesTheSetting) {
   expect({"--listen", "0.0.0.0:50551"}, 0, "hulld:");
   expect({"--listen", "nowhere"}, 2, "--listen is \"nowhere\"");
   check({"--listen", "0.0.0.0:50551"}, 2, "--insecure");
+  expect({"--metrics-address", "nonsense"}, 2, "--metrics-address is \"nonsense\"");
+  expect({"--metrics-address", "0.0.0.0:9464"}, 2, "--metrics-insecure");
   expect({"--max-hulls", "none"}, 2, "--max-hulls");
   expect({"--tls-key", directory_ + "/crt"}, 2, "--tls-key " + directory_ + "/crt: ");
   expect({"--tls-client-ca", "/nonexistent"}, 2, "--tls-client-ca /nonexistent: ");

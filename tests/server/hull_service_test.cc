@@ -261,6 +261,15 @@ TEST_F(HullCalls, PagesHoldAHundredByDefaultAndAThousandAtMost) {
   EXPECT_THAT(status.error_message(), HasSubstr("page_size is 1001; the limit is 1000"));
 }
 
+TEST_F(HullCalls, APrefixLongerThanAnyIdIsRefusedAndNotSentBack) {
+  v1::ListHullsRequest request;
+  v1::ListHullsResponse response;
+  request.set_prefix(std::string(100'000, 'x'));
+  const grpc::Status status = List(request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(status.error_message(), "prefix holds 100000 characters; an ID holds at most 256");
+}
+
 TEST_F(HullCalls, ForeignPageTokensAreRefused) {
   for (const char* id : {"a/1", "a/2", "b/1"}) Create(id);
   v1::ListHullsRequest request;

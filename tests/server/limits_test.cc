@@ -1,16 +1,21 @@
 // Limits on calls: each refuses with an error that names its flag, and is counted.
 
 #include <gmock/gmock.h>
+#include <grpc/grpc.h>
+#include <grpc/grpc_security.h>
+#include <grpc/slice.h>
 #include <gtest/gtest.h>
 #include <prometheus/text_serializer.h>
 
 #include <chrono>
+#include <list>
 #include <memory>
 #include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "server/admission.h"
 #include "server/limit_error.h"
 #include "server/status_map.h"
 #include "tests/server/test_server.h"
@@ -245,6 +250,79 @@ TEST_F(LimitsTest, ACallWhoseClientDoesNotReadLosesItsPlaceWhenItsTimeIsUp) {
   const BatchReader unread = StartBatch(&context, request);
   EXPECT_TRUE(WaitIdle());
   EXPECT_FALSE(FinishBatch(*unread).ok());
+}
+
+// Calls of gRPC's own that nobody answers.
+class UnansweredCalls {
+ public:
+  UnansweredCalls() {
+    grpc_init();
+    queue_ = grpc_completion_queue_create_for_next(nullptr);
+    grpc_channel_credentials* const plain = grpc_insecure_credentials_create();
+    channel_ = grpc_channel_create("127.0.0.1:1", plain, nullptr);
+    grpc_channel_credentials_release(plain);
+  }
+  ~UnansweredCalls() {
+    for (Started& call : calls_) {
+      grpc_metadata_array_destroy(&call.metadata);
+      grpc_slice_unref(call.details);
+      grpc_call_unref(call.call);
+    }
+    grpc_channel_destroy(channel_);
+    grpc_completion_queue_shutdown(queue_);
+    grpc_completion_queue_next(queue_, gpr_inf_future(GPR_CLOCK_REALTIME), nullptr);
+    grpc_completion_queue_destroy(queue_);
+    grpc_shutdown();
+  }
+
+  grpc_call* Start() {
+    Started& call = calls_.emplace_back();
+    grpc_metadata_array_init(&call.metadata);
+    call.call = grpc_channel_create_call(channel_, nullptr, GRPC_PROPAGATE_DEFAULTS, queue_,
+                                         grpc_slice_from_static_string("/none"), nullptr,
+                                         gpr_inf_future(GPR_CLOCK_REALTIME), nullptr);
+    grpc_op end = {};
+    end.op = GRPC_OP_RECV_STATUS_ON_CLIENT;
+    end.data.recv_status_on_client = {&call.metadata, &call.status, &call.details, nullptr};
+    grpc_call_start_batch(call.call, &end, 1, &call, nullptr);
+    return call.call;
+  }
+  // Waits for the end of any of them.
+  grpc_status_code Next() {
+    const grpc_event event =
+        grpc_completion_queue_next(queue_, gpr_inf_future(GPR_CLOCK_REALTIME), nullptr);
+    return static_cast<Started*>(event.tag)->status;
+  }
+
+ private:
+  struct Started {
+    grpc_call* call = nullptr;
+    grpc_metadata_array metadata = {};
+    grpc_status_code status = GRPC_STATUS_OK;
+    grpc_slice details = grpc_empty_slice();
+  };
+  grpc_completion_queue* queue_ = nullptr;
+  grpc_channel* channel_ = nullptr;
+  std::list<Started> calls_;
+};
+
+TEST(AdmissionTest, EveryOverdueCallIsCancelledWhileACancelledOneStays) {
+  Limits limits;
+  limits.max_request_time = std::chrono::milliseconds(1);
+  Metrics metrics;
+  Admission admission(limits, metrics);
+  UnansweredCalls calls;
+  const auto admit = [&] {
+    return std::make_unique<Admission::Ticket>(
+        *admission.Admit(Rpc::kBatchCheckCollisions, {}, calls.Start()));
+  };
+  std::unique_ptr<Admission::Ticket> first = admit();
+  EXPECT_EQ(calls.Next(), GRPC_STATUS_CANCELLED);
+  const std::unique_ptr<Admission::Ticket> second = admit();
+  first = nullptr;
+  const std::unique_ptr<Admission::Ticket> third = admit();
+  EXPECT_EQ(calls.Next(), GRPC_STATUS_CANCELLED);
+  EXPECT_EQ(calls.Next(), GRPC_STATUS_CANCELLED);
 }
 
 TEST_F(LimitsTest, PlacementsAndPointsPerHullAreBounded) {

@@ -325,11 +325,7 @@ TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
 class Linearizability : public ServerTest {};
 
 TEST_F(Linearizability, ConcurrentClientsSeeOneHullAtATime) {
-#ifdef HULLD_SANITIZED
-  constexpr int kRounds = 2;
-#else
   constexpr int kRounds = 8;
-#endif
   constexpr int kClients = 8;
   constexpr int kCalls = 150;
   size_t acknowledged = 0;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/hull/audit.h"
+#include "server/doctor.h"
 #include "server/store_keys.h"
 #include "tests/server/store_fixture.h"
 
@@ -23,6 +24,28 @@ class StoreDamage : public StoreTest {
     ASSERT_TRUE(hulls_->store().db().Get({}, key, &value).ok());
     value[value.size() / 2] ^= 4;
     ASSERT_TRUE(hulls_->store().db().Put({}, key, value).ok());
+  }
+  std::filesystem::path LogFile() const {
+    std::filesystem::path log;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_ + "/data/rocksdb")) {
+      if (entry.path().extension() == ".log") log = entry.path();
+    }
+    return log;
+  }
+  static void FlipBits(const std::filesystem::path& path, uintmax_t offset, int mask) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(static_cast<std::streamoff>(offset));
+    const char byte = static_cast<char>(file.get() ^ mask);
+    file.seekp(static_cast<std::streamoff>(offset));
+    file.put(byte);
+  }
+  size_t CountKeys(char prefix) {
+    const std::unique_ptr<rocksdb::Iterator> it(hulls_->store().db().NewIterator({}));
+    size_t count = 0;
+    for (it->Seek(std::string(1, prefix)); it->Valid() && it->key()[0] == prefix; it->Next()) {
+      ++count;
+    }
+    return count;
   }
   void FillThree() {
     Start();
@@ -62,6 +85,60 @@ TEST_F(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   EXPECT_TRUE(page.hulls[1].damaged);
   EXPECT_EQ(hulls_->Create("b", true).status().code(), absl::StatusCode::kDataLoss);
   ExpectOnlyBIsDamaged();
+}
+
+TEST_F(StoreDamage, ADeletedHullWhoseRecordIsDamagedLeavesNothing) {
+  FillThree();
+  ASSERT_TRUE(hulls_->Put("b", SpherePoints(40'000, 9)).ok());
+  ASSERT_GT(CountKeys(kBasePrefix), 0);
+  Flip(HullKey("b"));
+  Start();
+  ASSERT_TRUE(hulls_->Delete("b").ok());
+  EXPECT_EQ(CountKeys(kWriterPrefix), 2);
+  EXPECT_EQ(CountKeys(kDeltaPrefix), 2);
+  EXPECT_EQ(CountKeys(kBasePrefix), 0);
+  Start();
+  for (const char* id : {"a", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
+  EXPECT_EQ(hulls_->Open("a", "w")->last_sequence, 1);
+}
+
+TEST_F(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothing) {
+  FillThree();
+  Flip(HullKey("b"));
+  Start();
+  auto builder = std::make_shared<HullBuilder>();
+  ASSERT_TRUE(builder->Add(CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Replace({"b", {}, false, builder, {}}).ok());
+  EXPECT_EQ(CountKeys(kWriterPrefix), 2);
+  EXPECT_EQ(CountKeys(kDeltaPrefix) + CountKeys(kBasePrefix), 3);
+  Start();
+  for (const char* id : {"a", "b", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
+}
+
+// Of two such hulls nobody knows which keys are whose.
+TEST_F(StoreDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedToo) {
+  FillThree();
+  Flip(HullKey("a"));
+  Flip(HullKey("b"));
+  Start();
+  ASSERT_TRUE(hulls_->Delete("b").ok());
+  EXPECT_EQ(CountKeys(kDeltaPrefix), 3);
+  Start();
+  EXPECT_EQ(hulls_->View("a").status().code(), absl::StatusCode::kDataLoss);
+  ASSERT_TRUE(hulls_->Delete("a").ok());
+  EXPECT_EQ(CountKeys(kDeltaPrefix), 1);
+  EXPECT_EQ(CountKeys(kWriterPrefix), 1);
+  EXPECT_EQ(hulls_->View("c")->record.vertex_count, 8);
+}
+
+TEST_F(StoreDamage, TheDoctorsReportIsUtf8WhateverTheKeysAre) {
+  FillThree();
+  ASSERT_TRUE(hulls_->store().db().Put({}, HullKey("x\xff\"\n"), "garbage").ok());
+  hulls_ = nullptr;
+  ::testing::internal::CaptureStdout();
+  EXPECT_EQ(RunDoctor({"--data-dir", directory_ + "/data", "--json"}), 1);
+  const std::string report = ::testing::internal::GetCapturedStdout();
+  EXPECT_THAT(report, HasSubstr(R"({"hullId":"x\ufffd\"\u000a")"));
 }
 
 TEST_F(StoreDamage, AMissingDeltaIsReported) {
@@ -136,13 +213,8 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
     std::filesystem::copy(directory_ + "/data", copy, std::filesystem::copy_options::recursive);
     const std::filesystem::path path =
         std::filesystem::path(copy) / "rocksdb" / files[trial % files.size()].filename();
-    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-    const auto offset = static_cast<std::streamoff>(random() % std::filesystem::file_size(path));
-    file.seekg(offset);
-    const char byte = static_cast<char>(file.get() ^ (1 << random() % 8));
-    file.seekp(offset);
-    file.put(byte);
-    file.close();
+    const uintmax_t offset = random() % std::filesystem::file_size(path);
+    FlipBits(path, offset, 1 << random() % 8);
 
     absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("copy");
     if (!store.ok()) {
@@ -181,14 +253,56 @@ TEST_F(StoreDamage, ALogThatEndsInAHalfRecordLosesThatRecordAlone) {
   const HullView before = *hulls_->View("a");
   const uint64_t revision = before.record.revision;
   hulls_ = nullptr;
-  std::filesystem::path log;
-  for (const auto& entry : std::filesystem::directory_iterator(directory_ + "/data/rocksdb")) {
-    if (entry.path().extension() == ".log") log = entry.path();
-  }
-  std::filesystem::resize_file(log, std::filesystem::file_size(log) - 10);
+  std::filesystem::resize_file(LogFile(), std::filesystem::file_size(LogFile()) - 10);
   Start();
   EXPECT_EQ(hulls_->View("a")->record.revision, revision);
   EXPECT_EQ(hulls_->View("b")->record.vertex_count, 0);
+}
+
+// As when the power goes out while the pages of a record are on their way to the disk, the last of
+// them first. What is read does not tell whether the record was acknowledged.
+TEST_F(StoreDamage, ALastRecordThatIsTornInItsMiddleIsDamage) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+  const std::string store_id = hulls_->store().id();
+  hulls_ = nullptr;
+  std::fstream log(LogFile(), std::ios::in | std::ios::out | std::ios::binary);
+  log.seekp(-100, std::ios::end);
+  log << std::string(50, '\0');
+  log.close();
+  EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/data";
+  options.cut_log = true;
+  ASSERT_TRUE(RocksDbStore::Open(options).ok());
+  Start();
+  EXPECT_EQ(hulls_->View("a")->record.vertex_count, 8);
+  EXPECT_EQ(hulls_->View("b")->record.vertex_count, 0);
+  EXPECT_NE(hulls_->store().id(), store_id);
+}
+
+TEST_F(StoreDamage, ALogThatIsDamagedInItsMiddleCanBeCutThere) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
+  const std::string store_id = hulls_->store().id();
+  const uint64_t revision = hulls_->View("a")->record.revision;
+  const uintmax_t kept = std::filesystem::file_size(LogFile());
+  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("c", CubeCorners()).ok());
+  hulls_ = nullptr;
+  FlipBits(LogFile(), kept + 30, 1);
+  EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/data";
+  options.cut_log = true;
+  ASSERT_TRUE(RocksDbStore::Open(options).ok());
+  Start();
+  EXPECT_EQ(hulls_->View("a")->record.revision, revision);
+  EXPECT_EQ(hulls_->View("b").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(hulls_->View("c").status().code(), absl::StatusCode::kNotFound);
+  // The revisions of b and c will be given to other changes.
+  EXPECT_NE(hulls_->store().id(), store_id);
 }
 
 }  // namespace

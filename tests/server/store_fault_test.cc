@@ -4,6 +4,8 @@
 #include <rocksdb/env.h>
 
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <random>
@@ -190,6 +192,120 @@ TEST_F(StoreFault, AnOutageLosesWhatWasNotSynced) {
     if (!DurableRegistry(*std::move(store)).View("h").ok()) ++lost;
   }
   EXPECT_GT(lost, 0);
+}
+
+TEST_F(StoreFault, TheDirectoriesOfANewStoreAreOnDiskBeforeItServes) {
+  const absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("new/parent/data");
+  ASSERT_TRUE(store.ok()) << store.status();
+  for (const char* made : {"/new", "/new/parent", "/new/parent/data", "/new/parent/data/rocksdb"}) {
+    EXPECT_THAT(files_->directories(), ::testing::Contains(directory_ + made));
+  }
+  EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
+}
+
+// As after a first start that was killed before it had synced what it made.
+TEST_F(StoreFault, DirectoriesThatAFirstStartLeftUnsyncedAreSyncedByTheNext) {
+  ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new").ok());
+  ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new/data").ok());
+  ASSERT_TRUE(faulty_env_->CreateDir(directory_ + "/new/data/rocksdb").ok());
+  ASSERT_TRUE(OpenStore("new/data").ok());
+  EXPECT_THAT(files_->unsynced_directories(), ::testing::IsEmpty());
+}
+
+TEST_F(StoreFault, AFirstChangeThatFailsLeavesTheStoreItsId) {
+  Start();
+  const std::string id = hulls_->store().id();
+  files_->SetFault(Fault::kNoSpace);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNone);
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const uint64_t revision = hulls_->registry().Sizes().store_revision;
+  Start();
+  EXPECT_EQ(hulls_->store().id(), id);
+  EXPECT_EQ(hulls_->registry().Sizes().store_revision, revision);
+  EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
+}
+
+TEST_F(StoreFault, AFileNamedLikeOurProbeOutlivesARepair) {
+  Start();
+  const std::string path = directory_ + "/data/probe";
+  std::ofstream(path) << "mine";
+  files_->SetFault(Fault::kIoError);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNone);
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::string content;
+  std::ifstream(path) >> content;
+  EXPECT_EQ(content, "mine");
+}
+
+TEST_F(StoreFault, NoCopyIsBegunOfAStoreThatCannotBeRead) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::ofstream(directory_ + "/data/rocksdb/CURRENT") << "nothing";
+  files_->SetFault(Fault::kSyncError);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNone);
+  EXPECT_FALSE(hulls_->Put("h", CubeCorners()).ok());
+  const auto directories = [this] {
+    std::vector<std::string> found;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(directory_ + "/data")) {
+      if (entry.is_directory()) found.push_back(entry.path());
+    }
+    return found;
+  };
+  const std::vector<std::string> before = directories();
+  EXPECT_EQ(hulls_->store().MakeCopy().status().code(), absl::StatusCode::kUnavailable);
+  EXPECT_EQ(directories(), before);
+}
+
+// The revisions that it gave before may be given to other changes.
+TEST_F(StoreFault, ARelaxedStoreThatAnOutageEndedIsAnotherStore) {
+  durability_ = Durability::kRelaxed;
+  sync_interval_ = std::chrono::hours(1);
+  Start();
+  const std::string id = hulls_->store().id();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::mt19937_64 random(5);
+  files_->CopySurvivors(directory_ + "/data", directory_ + "/left", random);
+  env_ = nullptr;
+  std::vector<std::string> ids;
+  for (const Durability durability : {Durability::kSync, Durability::kRelaxed, Durability::kSync}) {
+    durability_ = durability;
+    const absl::StatusOr<std::unique_ptr<RocksDbStore>> left = OpenStore("left");
+    ASSERT_TRUE(left.ok()) << left.status();
+    ids.push_back((*left)->id());
+  }
+  EXPECT_NE(ids[0], id);
+  // Those ended cleanly.
+  EXPECT_EQ(ids[1], ids[0]);
+  EXPECT_EQ(ids[2], ids[0]);
+}
+
+TEST_F(StoreFault, ARelaxedStoreWhoseEndCouldNotBeSyncedIsAnotherStore) {
+  durability_ = Durability::kRelaxed;
+  sync_interval_ = std::chrono::hours(1);
+  Start();
+  const std::string id = hulls_->store().id();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Start();
+  EXPECT_EQ(hulls_->store().id(), id);
+  files_->SetFault(Fault::kSyncError);
+  hulls_ = nullptr;
+  files_->SetFault(Fault::kNone);
+  Start();
+  EXPECT_NE(hulls_->store().id(), id);
+}
+
+TEST_F(StoreFault, AStoreThatSyncsKeepsItsIdThroughAnOutage) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::mt19937_64 random(5);
+  files_->CopySurvivors(directory_ + "/data", directory_ + "/left", random);
+  env_ = nullptr;
+  const absl::StatusOr<std::unique_ptr<RocksDbStore>> left = OpenStore("left");
+  ASSERT_TRUE(left.ok()) << left.status();
+  EXPECT_EQ((*left)->id(), hulls_->store().id());
 }
 
 // What writers were told, by hull: sums of the chunks that were acked.

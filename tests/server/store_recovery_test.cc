@@ -191,6 +191,18 @@ TEST_F(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
   EXPECT_LT(hulls.registry().Commits().batches, kHulls);
 }
 
+TEST_F(StoreRecovery, AStartRemovesOldCopiesOfItsOwnAlone) {
+  Start();
+  const absl::StatusOr<std::string> copy = hulls_->store().MakeCopy();
+  ASSERT_TRUE(copy.ok()) << copy.status();
+  EXPECT_TRUE(std::filesystem::exists(*copy + "/rocksdb/CURRENT"));
+  const std::string others = directory_ + "/data/copy-before-upgrade/rocksdb";
+  std::filesystem::create_directories(others);
+  Start();
+  EXPECT_FALSE(std::filesystem::exists(*copy));
+  EXPECT_TRUE(std::filesystem::exists(others));
+}
+
 TEST_F(StoreRecovery, ASecondServerIsRefused) {
   Start();
   const auto second = OpenStore();
