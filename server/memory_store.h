@@ -18,7 +18,6 @@ class MemoryStore : public Store {
   bool keeps_hulls() const override { return false; }
   uint64_t revision() const override { return 0; }
   absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
-  absl::StatusOr<StoredHull> Find(const std::string&) override { return KeepsNothing(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
     return KeepsNothing();
   }

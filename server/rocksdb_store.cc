@@ -196,9 +196,9 @@ rocksdb::Options RocksDbStore::DbOptions() const {
   options.paranoid_checks = true;
   // A record that the end of its log cuts short is dropped: if the disk keeps what it synced, the
   // record was being written, and a store that syncs had not acknowledged it. All else that does
-  // not match its checksum is refused, the last record too: its pages may have reached the disk in
-  // another order when the power went out, but it may as well have been acknowledged and damaged
-  // since, and the log does not tell which.
+  // not match its checksum is refused, what was not synced when the power went out too (in a store
+  // that syncs, the last record at most): its pages may have reached the disk in another order, but
+  // it may as well have been acknowledged and damaged since, and the log does not tell which.
   options.wal_recovery_mode = options_.cut_log
                                   ? rocksdb::WALRecoveryMode::kPointInTimeRecovery
                                   : rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
@@ -456,16 +456,6 @@ absl::Status RocksDbStore::ForEachHull(const StoredHullVisitor& visit) {
                      visit(hull_id, std::move(hull));
                      return absl::OkStatus();
                    });
-}
-
-absl::StatusOr<StoredHull> RocksDbStore::Find(const std::string& hull_id) {
-  const absl::StatusOr<std::string> value = Read(HullKey(hull_id));
-  if (absl::IsNotFound(value.status()) || absl::IsUnavailable(value.status())) {
-    return value.status();
-  }
-  absl::StatusOr<StoredHull> hull = value.ok() ? DecodeStoredHull(hull_id, *value) : value.status();
-  if (!hull.ok()) return Damaged(hull_id, hull.status());
-  return hull;
 }
 
 // Deletes what belongs to no hull. That is left of hulls whose records are damaged, so that their

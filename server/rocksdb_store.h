@@ -59,7 +59,6 @@ class RocksDbStore : public Store {
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  absl::StatusOr<StoredHull> Find(const std::string& hull_id) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;

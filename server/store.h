@@ -84,8 +84,6 @@ class Store {
 
   // Every hull, in byte order of the IDs.
   virtual absl::Status ForEachHull(const StoredHullVisitor& visit) = 0;
-  // NOT_FOUND, or DATA_LOSS naming the hull.
-  virtual absl::StatusOr<StoredHull> Find(const std::string& hull_id) = 0;
   // Points whose hull `hull` is. DATA_LOSS naming the hull: something is missing or damaged.
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
   // The writer's last committed sequence; 0 when there is none.
