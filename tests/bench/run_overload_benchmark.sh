@@ -16,7 +16,7 @@ cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
 cmake --build --preset release --target hulld overload_benchmark
 
 log=$(mktemp)
-build/release/server/hulld --listen 127.0.0.1:0 2>"$log" &
+build/release/server/hulld --store memory --listen 127.0.0.1:0 2>"$log" &
 server=$!
 trap 'kill "$server"; wait "$server" || true; rm -f "$log"' EXIT
 until address=$(sed -n 's/.*listening on //p' "$log") && [[ -n $address ]]; do
