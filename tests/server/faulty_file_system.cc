@@ -191,9 +191,10 @@ void FaultyFileSystem::CopySurvivors(const std::string& source, const std::strin
   std::filesystem::create_directories(target);
   for (const auto& [path, file] : files_) {
     if (!path.starts_with(source + "/")) continue;
-    const bool directory_lost = std::ranges::any_of(directories_, [&path](const auto& directory) {
-      return !directory.second && path.starts_with(directory.first + "/");
-    });
+    const bool directory_lost =
+        std::ranges::any_of(directories_, [&path = path](const auto& directory) {
+          return !directory.second && path.starts_with(directory.first + "/");
+        });
     if (directory_lost) continue;
     const std::string copy = target + path.substr(source.size());
     if (!file.entry_synced && !file.former.has_value()) continue;
