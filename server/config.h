@@ -95,8 +95,8 @@ struct Config {
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
-  // What gRPC may hold of messages that are on their way, before it slows down their senders; more
-  // where --max-message-bytes is large.
+  // What gRPC may hold of messages that are on their way, before it slows down or ends their
+  // calls; more where --max-message-bytes is large.
   static constexpr size_t kTransportBytes = size_t{256} << 20;
   // Calls that one connection may have open; its client makes others wait.
   static constexpr int kCallsPerConnection = 1024;

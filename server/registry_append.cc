@@ -131,8 +131,9 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
   writer = hull.writers.find(writer_id);
   if (writer != hull.writers.end()) return writer->second.committed;
   // Who has not written yet leaves nothing behind.
-  if (*sequence > 0)
+  if (*sequence > 0) {
     hull.writers.emplace(writer_id, RegisteredHull::Sequences{*sequence, *sequence});
+  }
   return *sequence;
 }
 
