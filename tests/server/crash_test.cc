@@ -1,6 +1,7 @@
 // hulld killed while clients call it, and started again on the same store, many times.
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -9,6 +10,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <random>
 #include <span>
@@ -62,10 +64,14 @@ class RestartableServer : public ::testing::Test {
  protected:
   std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
 
-  // A connection of client number `i` alone.
+  // A connection of client number `i` alone. It tries again at once while the server starts;
+  // a connection may take a second to be made, which is what gRPC means by the least backoff.
   std::shared_ptr<grpc::Channel> Channel(int i) const {
     grpc::ChannelArguments own;
     own.SetInt("hulld.test.client", i);
+    own.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
+    own.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
+    own.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
     return grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own);
   }
 
@@ -77,7 +83,20 @@ class RestartableServer : public ::testing::Test {
     arguments.insert(arguments.end(), options.begin(), options.end());
     server_ = std::make_unique<Process>(arguments);
     const auto deadline = std::chrono::system_clock::now() + std::chrono::seconds(60);
-    ASSERT_TRUE(Channel(-1)->WaitForConnected(deadline)) << "hulld did not start";
+    ASSERT_TRUE(Channel(-1)->WaitForConnected(deadline)) << "hulld did not start" << Said();
+  }
+
+  // Kills the server.
+  void Kill() {
+    server_->Signal(SIGKILL);
+    EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself" << Said();
+  }
+
+  // What the server logged until it was killed, which this does if nobody has.
+  std::string Said() {
+    server_->Signal(SIGKILL);
+    server_->ReadToEnd();
+    return absl::StrCat("; it said:\n", absl::StrJoin(server_->lines(), ""));
   }
 
   const TemporaryDirectory directory_;
@@ -110,7 +129,7 @@ class Crash : public RestartableServer {
       });
     }
     for (std::thread& thread : threads) thread.join();
-    EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself";
+    EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself" << Said();
     history_.Settle();
   }
 
@@ -196,13 +215,14 @@ class Interrupted : public RestartableServer {
   Client MakeClient() const {
     ClientOptions options;
     // Patient enough for any restart; the waits are short, so that little time is lost.
-    options.retry.max_attempts = 1000;
+    options.retry.max_attempts = std::numeric_limits<int>::max();
     options.retry.initial_backoff = std::chrono::milliseconds(5);
     options.retry.max_backoff = std::chrono::milliseconds(20);
     options.timeout = std::chrono::minutes(2);
+    // As Channel does.
     grpc::ChannelArguments own;
     own.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
-    own.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 5);
+    own.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
     own.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
     return Client(options,
                   grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own));
@@ -268,8 +288,7 @@ TEST_F(Interrupted, AWriterThatReconnectsLosesAndRepeatsNothing) {
     const size_t enough =
         blocks.size() * static_cast<size_t>(kill) / static_cast<size_t>(kills + 1);
     for (size_t now = sent; now < enough; now = sent) sent.wait(now);
-    server_->Signal(SIGKILL);
-    EXPECT_EQ(server_->Wait(), -1);
+    Kill();
     StartServer();
   }
   writer.join();
@@ -315,7 +334,7 @@ TEST_F(Interrupted, AServerStoppedInTheMiddleOfABatchEndsItAndItself) {
     {
       const auto hulls = v1::HullService::NewStub(Channel(0));
       Appender appender(*hulls, "interrupted/batch", "w", true);
-      ASSERT_TRUE(appender.Append(appender.opened().last_sequence() + 1, Sphere(400)));
+      ASSERT_TRUE(appender.Append(appender.opened().last_sequence() + 1, Sphere(100)));
       ASSERT_TRUE(appender.Finish().ok());
     }
     v1::BatchCheckCollisionsRequest request;

@@ -1,30 +1,49 @@
 #include "tests/server/hulld_process.h"
 
+#include <fcntl.h>
 #include <signal.h>
+#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <string_view>
 
 namespace hulld::server {
+namespace {
+
+// The environment, in which hulld keeps nothing on disk unless its arguments say otherwise: tests
+// leave nothing behind.
+std::vector<char*> Environment() {
+  static char memory[] = "HULLD_STORE=memory";
+  std::vector<char*> environment;
+  bool chosen = false;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    environment.push_back(*variable);
+    chosen |= std::string_view(*variable).starts_with("HULLD_STORE=");
+  }
+  if (!chosen) environment.push_back(memory);
+  environment.push_back(nullptr);
+  return environment;
+}
+
+}  // namespace
 
 Process::Process(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), HULLD_PROGRAM);
   int ends[2];
-  if (pipe(ends) != 0) return;
-  pid_ = fork();
-  if (pid_ == 0) {
-    dup2(ends[1], STDERR_FILENO);
-    close(ends[0]);
-    close(ends[1]);
-    std::vector<char*> argv;
-    for (std::string& argument : arguments) argv.push_back(argument.data());
-    argv.push_back(nullptr);
-    // Unless the arguments say otherwise: tests leave nothing behind.
-    setenv("HULLD_STORE", "memory", 0);
-    execv(HULLD_PROGRAM, argv.data());
-    _exit(127);
-  }
+  if (pipe2(ends, O_CLOEXEC) != 0) std::abort();
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  // Not fork: threads of clients run here, and whatever lock one of them holds at that moment, the
+  // child would wait for ever.
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  ended_ =
+      posix_spawn(&pid_, HULLD_PROGRAM, &actions, nullptr, argv.data(), Environment().data()) != 0;
+  posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   errors_ = fdopen(ends[0], "r");
 }
@@ -46,11 +65,18 @@ std::string Process::ReadLineWith(const std::string& text) {
   return "";
 }
 
-void Process::Signal(int number) { kill(pid_, number); }
+void Process::ReadToEnd() {
+  char line[4096];
+  while (fgets(line, sizeof line, errors_) != nullptr) lines_.emplace_back(line);
+}
+
+void Process::Signal(int number) {
+  if (!ended_) kill(pid_, number);
+}
 
 int Process::Wait() {
   int status = 0;
-  waitpid(pid_, &status, 0);
+  if (ended_ || waitpid(pid_, &status, 0) != pid_) return -1;
   ended_ = true;
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }

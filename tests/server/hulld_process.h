@@ -20,6 +20,9 @@ class Process {
   // Reads up to the first line that holds `text` and returns it; empty at the end of the output.
   std::string ReadLineWith(const std::string& text);
 
+  // Reads what is left of the output, which ends when the process does.
+  void ReadToEnd();
+
   const std::vector<std::string>& lines() const { return lines_; }
   pid_t pid() const { return pid_; }
   void Signal(int number);

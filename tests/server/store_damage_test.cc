@@ -196,6 +196,11 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
   ASSERT_TRUE(hulls_->Put("late", CubeCorners()).ok());
   hulls_ = nullptr;
 
+#ifdef HULLD_SANITIZED
+  constexpr int kTrials = 40;
+#else
+  constexpr int kTrials = 120;
+#endif
   std::mt19937_64 random(20261121);
   int refused_to_open = 0;
   int reported = 0;
@@ -206,7 +211,7 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
     if (extension == ".sst" || extension == ".log") files.push_back(entry.path());
   }
   ASSERT_GE(files.size(), 2);
-  for (int trial = 0; trial < 120; ++trial) {
+  for (int trial = 0; trial < kTrials; ++trial) {
     SCOPED_TRACE(trial);
     const std::string copy = directory_ + "/copy";
     std::filesystem::remove_all(copy);

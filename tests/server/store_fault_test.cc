@@ -336,7 +336,11 @@ class Acks {
 // The power goes out at random moments under four writers. Whatever was acked before is there
 // afterwards, every hull is sound, and revisions did not go back.
 TEST_F(StoreFault, NoAckPrecedesItsSync) {
+#ifdef HULLD_SANITIZED
+  constexpr int kOutages = 12;
+#else
   constexpr int kOutages = 50;
+#endif
   constexpr int kWriters = 4;
   constexpr uint64_t kSeed = 811;
   RecordProperty("seed", std::to_string(kSeed));
