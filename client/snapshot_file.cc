@@ -151,7 +151,8 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
     parts.push_back(entry.path().filename());
   }
   if (error) return CannotWrite(staging);
-  std::ranges::partition(parts, [](const fs::path& part) { return part != kDatabaseName; });
+  std::partition(parts.begin(), parts.end(),
+                 [](const fs::path& part) { return part != kDatabaseName; });
   for (const fs::path& part : parts) {
     if (part == kDatabaseName && !SyncPath(directory.string())) return CannotWrite(directory);
     fs::rename(staging / part, directory / part, error);

@@ -142,6 +142,11 @@ absl::Status CollisionStream::HandleOpen() {
   only_changes_ = open.only_changes();
   table_ = *std::move(table);
 
+  if (absl::Status s = ChargeFor(static_cast<size_t>(open.pairs_size()) / 2); !s.ok()) {
+    return Prefixed("open: ", s);
+  }
+
+  pairs_.reserve(static_cast<size_t>(open.pairs_size()) / 2);
   pairs_begin_.assign(table_.size() + 1, 0);
   for (int i = 0; i < open.pairs_size(); i += 2) {
     pairs_.push_back({open.pairs(i), open.pairs(i + 1), {}, v1::RELATION_UNSPECIFIED});
@@ -159,6 +164,15 @@ absl::Status CollisionStream::HandleOpen() {
   is_asked_.assign(pairs_.size(), false);
   for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
   return Refresh();
+}
+
+// Counts what the stream is to hold against --memory-limit, before it is held. RESOURCE_EXHAUSTED:
+// there is no room for it.
+absl::Status CollisionStream::ChargeFor(size_t pairs) {
+  // A pair among the pairs of two placements, and among those that are asked about.
+  constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
+  charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
+  return registry_.CheckMemory();
 }
 
 // Checks all of the update before it applies any.

@@ -50,7 +50,8 @@ class CollisionStream
       : registry_(registry),
         readers_(readers),
         long_readers_(long_readers),
-        call_(context, admission, Rpc::kStreamCollisions) {}
+        call_(context, admission, Rpc::kStreamCollisions),
+        charge_(registry) {}
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
@@ -63,6 +64,7 @@ class CollisionStream
   void Handle();
   absl::Status HandleMessage();
   absl::Status HandleOpen();
+  absl::Status ChargeFor(size_t pairs);
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
   absl::Status Refresh();
   void AskAbout(uint32_t pair);
@@ -76,6 +78,8 @@ class CollisionStream
   WorkerPool& readers_;
   WorkerPool& long_readers_;
   Call call_;
+  // Of placements and pairs. Goes before the call, which keeps the server alive.
+  MemoryCharge charge_;
   // Keeps this alive until gRPC is done with it; a queued task holds another reference.
   std::shared_ptr<CollisionStream> self_;
 

@@ -45,7 +45,7 @@ HullService::AppendPoints(grpc::CallbackServerContext* context) {
 
 grpc::ServerReadReactor<v1::ReplaceHullRequest>* HullService::ReplaceHull(
     grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) {
-  return ReplaceStream::Start(*context, admission_, registry_, long_readers_, response);
+  return ReplaceStream::Start(*context, admission_, registry_, writers_, response);
 }
 
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,

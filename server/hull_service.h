@@ -14,13 +14,15 @@ namespace hulld::server {
 
 // hulld.v1.HullService: the contract in hull.proto over the registry. Calls that only look into
 // records are answered where they arrive; those that need a snapshot, on `readers`,
-// meshes and audits, which may take long, on `long_readers`.
+// meshes and audits, which may take long, on `long_readers`, and replacements are built on
+// `writers`, as the registry builds chunks.
 class HullService : public v1::HullService::CallbackService {
  public:
-  HullService(Registry& registry, Admission& admission, WorkerPool& readers,
+  HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
               WorkerPool& long_readers)
       : registry_(registry),
         admission_(admission),
+        writers_(writers),
         readers_(readers),
         long_readers_(long_readers) {}
 
@@ -56,6 +58,7 @@ class HullService : public v1::HullService::CallbackService {
 
   Registry& registry_;
   Admission& admission_;
+  WorkerPool& writers_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;
 };

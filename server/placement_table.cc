@@ -129,6 +129,14 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
   }
 }
 
+size_t PlacementTable::MemoryBytes() const {
+  size_t of_ids = 0;
+  for (const std::string& id : ids_) of_ids += id.capacity();
+  return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull) + sizeof(char)) +
+         named_.size() * sizeof named_[0] +
+         ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>)) + of_ids;
+}
+
 absl::Status PlacementTable::Resolve(Registry& registry, const std::function<bool()>& should_stop) {
   absl::StatusOr<Resolved> resolved = registry.Resolve(ids_, should_stop);
   if (!resolved.ok()) return resolved.status();

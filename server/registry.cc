@@ -215,11 +215,13 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
 }
 
 void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
+  if (store_.keeps_hulls()) replacement.vertices = replacement.builder->Vertices();
+  const auto shared = std::make_shared<Replacement>(std::move(replacement));
   Locked locked(mutex_);
-  ReplaceLocked(locked, std::make_shared<const Replacement>(std::move(replacement)), done);
+  ReplaceLocked(locked, shared, done);
 }
 
-void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<const Replacement>& replacement,
+void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                              const Reply<ReplaceResult>& done) {
   const std::string& id = replacement->hull_id;
   const std::optional<uint64_t>& if_revision = replacement->if_revision;
@@ -246,32 +248,30 @@ void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<const Replace
     locked.Afterwards([done, refusal] { done(refusal); });
     return;
   }
-  CommitReplacement(locked, former, replacement, done);
+  CommitReplacement(former, *replacement, done);
 }
 
-// former: null when there is none.
-void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
-                                 const std::shared_ptr<const Replacement>& replacement,
+// Requires that the mutex is held. former: null when there is none.
+void Registry::CommitReplacement(const HullPointer& former, Replacement& replacement,
                                  const Reply<ReplaceResult>& done) {
-  const HullBuilder& builder = *replacement->builder;
   Change change;
   change.revision = ++assigned_revision_;
   HullRecord& record = change.hull.record;
-  record.hull_id = replacement->hull_id;
+  record.hull_id = replacement.hull_id;
   record.create_revision = record.revision = change.revision;
-  record.dimension = builder.dimension();
-  record.vertex_count = builder.vertex_count();
-  record.counts = replacement->counts;
+  record.dimension = replacement.builder->dimension();
+  record.vertex_count = replacement.builder->vertex_count();
+  record.counts = replacement.counts;
   if (former != nullptr) change.replaced = former->committed;
-  if (store_.keeps_hulls() && record.vertex_count > 0) {
+  if (!replacement.vertices.empty()) {
     change.vertex_change = VertexChange::kReplaced;
-    change.vertices = builder.Vertices();
+    change.vertices = std::move(replacement.vertices);
     change.hull.layout = {record.revision, record.vertex_count, 0, 0};
   }
   // The new incarnation is unknown to others until it takes the place of the former.
   auto hull = std::make_shared<RegisteredHull>();
   hull->committed = hull->head = change.hull;
-  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement->builder));
+  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
   hull->builder_bytes = hull->builder->MemoryBytes();
   if (record.vertex_count == 0) hull->snapshot = empty_snapshot_;
   if (former == nullptr) {
@@ -282,29 +282,33 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
   } else {
     former->ending = true;
   }
-  const HullPointer submitted = former == nullptr ? hull : former;
-  Submit(submitted, std::move(change),
+  Submit(former == nullptr ? hull : former, std::move(change),
          [this, hull, former, done](Locked& later, const absl::Status& status) {
-           absl::StatusOr<ReplaceResult> result = ErrorOrEmpty<ReplaceResult>(status);
-           const std::string id = hull->committed.record.hull_id;
-           if (former == nullptr) --creating_;
-           (former == nullptr ? hull : former)->ending = false;
-           if (status.ok()) {
-             if (former != nullptr) Forget(later, former, Gone(id, "replaced"));
-             hull->state = RegisteredHull::State::kPresent;
-             hulls_[id] = hull;
-             vertex_count_ += hull->committed.record.vertex_count;
-             revision_ = hull->committed.record.revision;
-             Charge(later, *hull);
-             Evict(later);
-             result = ReplaceResult{revision_, hull->committed.record, former == nullptr};
-           } else if (former == nullptr) {
-             vertex_count_ += hull->committed.record.vertex_count;
-             Forget(later, hull, status);
-           }
-           later.Afterwards([done, result] { done(result); });
+           FinishReplacement(later, former, hull, status, done);
          });
-  (void)locked;
+}
+
+// hull: what takes the place of `former`, or of none, if the status allows.
+void Registry::FinishReplacement(Locked& locked, const HullPointer& former, const HullPointer& hull,
+                                 const absl::Status& status, const Reply<ReplaceResult>& done) {
+  absl::StatusOr<ReplaceResult> result = ErrorOrEmpty<ReplaceResult>(status);
+  const std::string id = hull->committed.record.hull_id;
+  if (former == nullptr) --creating_;
+  (former == nullptr ? hull : former)->ending = false;
+  if (status.ok()) {
+    if (former != nullptr) Forget(locked, former, Gone(id, "replaced"));
+    hull->state = RegisteredHull::State::kPresent;
+    hulls_[id] = hull;
+    vertex_count_ += hull->committed.record.vertex_count;
+    revision_ = hull->committed.record.revision;
+    Charge(locked, *hull);
+    Evict(locked);
+    result = ReplaceResult{revision_, hull->committed.record, former == nullptr};
+  } else if (former == nullptr) {
+    vertex_count_ += hull->committed.record.vertex_count;
+    Forget(locked, hull, status);
+  }
+  locked.Afterwards([done, result] { done(result); });
 }
 
 HullPage Registry::List(const std::string& prefix, const std::string& after,

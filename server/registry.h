@@ -61,6 +61,8 @@ struct Replacement {
   std::shared_ptr<HullBuilder> builder;
   // Sums over the points that the builder was given.
   PointCounts counts;
+  // The builder's, for the store; Registry::Replace fills it.
+  std::vector<Vector> vertices = {};
 };
 
 struct ListedHull {
@@ -84,7 +86,7 @@ struct RegistrySizes {
 // What the registry holds of hulls in memory, and how that served so far.
 struct CacheStatistics {
   // Builders and snapshots; points that wait to be built, and vertices that wait for the store; and
-  // what calls hold of hulls that are not there yet (MemoryCharge).
+  // what calls hold for long (MemoryCharge).
   uint64_t bytes = 0;
   uint64_t limit_bytes = 0;
   // Hulls that a reader asked for and whose snapshot was there.
@@ -148,8 +150,9 @@ using Reply = std::function<void(absl::StatusOr<T>)>;
 
 class Registry;
 
-// What a call holds of a hull that the registry does not know yet, counted against --memory-limit
-// until this goes. Not thread-safe; the registry must outlive it.
+// What a call holds for long, of a hull that the registry does not know yet or of placements and
+// pairs, counted against --memory-limit until this goes. Not thread-safe; the registry must outlive
+// it.
 class MemoryCharge {
  public:
   explicit MemoryCharge(Registry& registry) : registry_(registry) {}
@@ -209,7 +212,7 @@ class Registry {
   void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
 
   // Puts a hull in the place of another, at once for all readers. It is a new incarnation: sessions
-  // of the former one end. Replies as above.
+  // of the former one end. Replies as above. Copies the vertices, hence not for gRPC's threads.
   // NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
   // --max-hulls, or the disk is full; UNAVAILABLE: as above.
   void Replace(Replacement replacement, Reply<ReplaceResult> done);
@@ -279,11 +282,12 @@ class Registry {
                  const std::function<void(Locked&, const absl::Status&)>& done);
   void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
                     const Reply<uint64_t>& done);
-  void ReplaceLocked(Locked& locked, const std::shared_ptr<const Replacement>& replacement,
+  void ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                      const Reply<ReplaceResult>& done);
-  void CommitReplacement(Locked& locked, const HullPointer& former,
-                         const std::shared_ptr<const Replacement>& replacement,
+  void CommitReplacement(const HullPointer& former, Replacement& replacement,
                          const Reply<ReplaceResult>& done);
+  void FinishReplacement(Locked& locked, const HullPointer& former, const HullPointer& hull,
+                         const absl::Status& status, const Reply<ReplaceResult>& done);
 
   void Submit(const HullPointer& hull, Change change, Finish finish);
   void CommitQueued();
@@ -300,6 +304,10 @@ class Registry {
   void RunNextChunk(const HullPointer& hull);
   absl::StatusOr<Change> Build(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                                std::optional<ChunkResult>* already, PointCounts* counts);
+  absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, Change& change,
+                                        std::unique_ptr<HullBuilder>& builder);
+  absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
+  void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
   absl::Status CheckChunk(Locked& locked, RegisteredHull& hull, const PendingChunk& pending,
                           std::optional<ChunkResult>* already);
   void SubmitChunk(const HullPointer& hull, const PendingChunk& pending, Change change,

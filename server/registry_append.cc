@@ -46,13 +46,6 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
   return RevisionMismatch(record, *chunk.if_revision);
 }
 
-void AddTo(PointCounts& sums, const PointCounts& counts) {
-  sums.received += counts.received;
-  sums.outside += counts.outside;
-  sums.duplicate += counts.duplicate;
-  sums.inside += counts.inside;
-}
-
 }  // namespace
 
 void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
@@ -209,6 +202,60 @@ absl::Status Registry::CheckChunk(Locked& locked, RegisteredHull& hull, const Pe
   return CheckMemoryLocked(locked);
 }
 
+// The points of a chunk go into its hull's builder, which is read from the store where there is
+// none, and what the store is to keep of it into the change. Without the mutex.
+absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending, Change& change,
+                                                std::unique_ptr<HullBuilder>& builder) {
+  if (builder == nullptr) {
+    absl::StatusOr<std::unique_ptr<HullBuilder>> loaded =
+        LoadBuilder(change.hull, pending.should_stop);
+    if (!loaded.ok()) return loaded.status();
+    builder = *std::move(loaded);
+  }
+  if (pending.should_stop && pending.should_stop()) {
+    return absl::CancelledError("the call was cancelled");
+  }
+  absl::StatusOr<PointCounts> added =
+      builder->Add(pending.chunk.points,
+                   {static_cast<size_t>(limits_.max_vertices_per_hull), pending.should_stop});
+  if (added.ok() && added->outside > 0 && store_.keeps_hulls()) {
+    const bool base = Store::WantsBase(change.hull.layout, added->outside);
+    change.vertex_change = base ? VertexChange::kReplaced : VertexChange::kAdded;
+    change.vertices = base ? builder->Vertices() : builder->NewVertices();
+  }
+  return added;
+}
+
+// What a writer is told when AddPoints failed.
+absl::Status Registry::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
+  if (absl::IsDataLoss(cause)) {
+    hull.damage = cause;
+    ++cache_.damaged;
+  }
+  if (!absl::IsResourceExhausted(cause)) return cause;
+  return LimitExceeded(
+      absl::StrCat(QuotedHull(hull.head.record.hull_id), " would hold too many vertices"),
+      limits_.max_vertices_per_hull, "max-vertices-per-hull");
+}
+
+// The record and the layout of the hull as it is with the points that were added.
+void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change) {
+  HullRecord& record = change.hull.record;
+  VertexLayout& layout = change.hull.layout;
+  record.counts += added;
+  change.revision = assigned_revision_;
+  if (added.outside == 0) return;
+  change.revision = record.revision = ++assigned_revision_;
+  record.vertex_count = hull.builder->vertex_count();
+  record.dimension = hull.builder->dimension();
+  if (change.vertex_change == VertexChange::kReplaced) {
+    layout = {record.revision, record.vertex_count, 0, 0};
+  } else if (change.vertex_change == VertexChange::kAdded) {
+    ++layout.delta_count;
+    layout.delta_vertices += change.vertices.size();
+  }
+}
+
 // Entered and left with the mutex held; requires that the hull is busy for the caller. On success
 // `head` and the writer's sequence include the change.
 absl::StatusOr<Change> Registry::Build(Locked& locked, const HullPointer& hull,
@@ -225,29 +272,8 @@ absl::StatusOr<Change> Registry::Build(Locked& locked, const HullPointer& hull,
   const bool load = builder == nullptr;
 
   locked.Unlock();
-  absl::StatusOr<PointCounts> added = absl::CancelledError("the call was cancelled");
-  if (load) {
-    absl::StatusOr<std::unique_ptr<HullBuilder>> loaded =
-        LoadBuilder(change.hull, pending.should_stop);
-    if (loaded.ok()) {
-      builder = *std::move(loaded);
-    } else {
-      added = loaded.status();
-    }
-  }
-  const bool stopped = pending.should_stop && pending.should_stop();
-  if (builder != nullptr && !stopped) {
-    added = builder->Add(pending.chunk.points,
-                         {static_cast<size_t>(limits_.max_vertices_per_hull), pending.should_stop});
-  }
+  const absl::StatusOr<PointCounts> added = AddPoints(pending, change, builder);
   pending.chunk.points = {};
-  const bool changed = added.ok() && added->outside > 0;
-  VertexLayout& layout = change.hull.layout;
-  if (changed && store_.keeps_hulls()) {
-    const bool base = Store::WantsBase(layout, added->outside);
-    change.vertex_change = base ? VertexChange::kReplaced : VertexChange::kAdded;
-    change.vertices = base ? builder->Vertices() : builder->NewVertices();
-  }
   const size_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
   locked.Lock();
 
@@ -259,32 +285,10 @@ absl::StatusOr<Change> Registry::Build(Locked& locked, const HullPointer& hull,
   }
   hull->builder = std::move(builder);
   hull->builder_bytes = builder_bytes;
-  const std::string& id = hull->head.record.hull_id;
-  if (absl::IsDataLoss(added.status())) {
-    hull->damage = added.status();
-    ++cache_.damaged;
-  }
-  if (absl::IsResourceExhausted(added.status())) {
-    return LimitExceeded(absl::StrCat(name, QuotedHull(id), " would hold too many vertices"),
-                         limits_.max_vertices_per_hull, "max-vertices-per-hull");
-  }
-  if (!added.ok()) return Prefixed(name, added.status());
+  if (!added.ok()) return Prefixed(name, WhyNotBuilt(*hull, added.status()));
 
   *counts = *added;
-  HullRecord& record = change.hull.record;
-  AddTo(record.counts, *added);
-  change.revision = assigned_revision_;
-  if (changed) {
-    change.revision = record.revision = ++assigned_revision_;
-    record.vertex_count = hull->builder->vertex_count();
-    record.dimension = hull->builder->dimension();
-    if (change.vertex_change == VertexChange::kReplaced) {
-      layout = {record.revision, record.vertex_count, 0, 0};
-    } else if (change.vertex_change == VertexChange::kAdded) {
-      ++layout.delta_count;
-      layout.delta_vertices += change.vertices.size();
-    }
-  }
+  FillChange(*hull, *added, change);
   RegisteredHull::Sequences& sequences = hull->writers[pending.session.writer_id];
   if (sequences.head == 0) ++change.hull.writer_count;
   sequences.head = pending.chunk.sequence;

@@ -239,9 +239,10 @@ void Registry::Evict(Locked& locked) {
 absl::Status Registry::CheckMemoryLocked(Locked& locked) {
   Evict(locked);
   if (cache_.bytes <= limits_.memory_limit) return absl::OkStatus();
-  return Overloaded(absl::StrCat("hulls in use, and points on their way to them, hold ",
-                                 cache_.bytes, " bytes of memory"),
-                    limits_.memory_limit, "memory-limit", kRetryMemory);
+  return Overloaded(
+      absl::StrCat("hulls in use, points on their way to them and streams of queries hold ",
+                   cache_.bytes, " bytes of memory"),
+      limits_.memory_limit, "memory-limit", kRetryMemory);
 }
 
 void MemoryCharge::Set(uint64_t bytes) {

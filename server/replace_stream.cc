@@ -15,8 +15,8 @@ namespace hulld::server {
 
 grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& workers, v1::ReplaceHullResponse* response) {
-  auto* stream = new ReplaceStream(context, admission, registry, workers, response);
+    WorkerPool& writers, v1::ReplaceHullResponse* response) {
+  auto* stream = new ReplaceStream(context, admission, registry, writers, response);
   const absl::Status begun = stream->call_.Begin();
   if (begun.ok()) {
     stream->Read();
@@ -37,7 +37,7 @@ void ReplaceStream::OnReadDone(bool ok) {
   if (!ok) {
     if (absl::Status s = WhyNotRead(request_); !s.ok()) return End(s);
     // Only the empty block tells a client that has said all from one that is gone.
-    if (opened && complete_) return Commit();
+    if (opened && complete_) return writers_.Submit([this] { Commit(); });
     if (opened) {
       return End(absl::InvalidArgumentError(
           "the stream ended without an empty block of points, which says that nothing is missing; "
@@ -61,7 +61,7 @@ void ReplaceStream::OnReadDone(bool ok) {
       }
       complete_ = request_.points().xyz().empty() && request_.points().xyz_float().empty();
       if (complete_) return Read();
-      workers_.Submit([this, arrival = std::chrono::steady_clock::now()] {
+      writers_.Submit([this, arrival = std::chrono::steady_clock::now()] {
         const absl::Status built = Build();
         if (!built.ok()) return End(call_.ShouldStop() ? call_.StopStatus() : built);
         call_.EndMessage(arrival);
@@ -106,11 +106,7 @@ absl::Status ReplaceStream::Build() {
   }
   if (!added.ok()) return Prefixed(name, added.status());
   charge_.Set(replacement_.builder->MemoryBytes());
-  PointCounts& counts = replacement_.counts;
-  counts.received += added->received;
-  counts.outside += added->outside;
-  counts.duplicate += added->duplicate;
-  counts.inside += added->inside;
+  replacement_.counts += *added;
   return absl::OkStatus();
 }
 

@@ -15,20 +15,21 @@
 
 namespace hulld::server {
 
-// One ReplaceHull call: builds a hull apart, message by message on a worker thread, and hands it to
-// the registry when the client has said all. One step follows the other, so that nothing needs a
-// lock: a read, or the building of what was read. It owns itself until gRPC is done with it.
+// One ReplaceHull call: builds a hull apart, message by message on a thread of the writers, and
+// hands it to the registry when the client has said all. One step follows the other, so that
+// nothing needs a lock: a read, or the building of what was read. It owns itself until gRPC is done
+// with it.
 class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
  public:
   static grpc::ServerReadReactor<v1::ReplaceHullRequest>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& workers, v1::ReplaceHullResponse* response);
+      WorkerPool& writers, v1::ReplaceHullResponse* response);
 
  private:
   ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                WorkerPool& workers, v1::ReplaceHullResponse* response)
+                WorkerPool& writers, v1::ReplaceHullResponse* response)
       : registry_(registry),
-        workers_(workers),
+        writers_(writers),
         response_(response),
         call_(context, admission, Rpc::kReplaceHull),
         charge_(registry) {}
@@ -44,7 +45,7 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
   void End(const absl::Status& status);
 
   Registry& registry_;
-  WorkerPool& workers_;
+  WorkerPool& writers_;
   v1::ReplaceHullResponse* response_;
   Call call_;
   // Of the builder, until the registry has it. Goes before the call, which keeps the server alive.

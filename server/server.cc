@@ -44,7 +44,7 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       readers_(PoolThreads(), metrics_.AddPool("readers")),
       long_readers_(PoolThreads(), metrics_.AddPool("long_readers"), kLongReadersNiceness),
       executor_(config.threads, metrics_.AddPool("executor")),
-      hull_service_(registry_, admission_, readers_, long_readers_),
+      hull_service_(registry_, admission_, writers_, readers_, long_readers_),
       collision_service_(registry_, admission_, readers_, long_readers_, executor_),
       status_service_(registry_, admission_),
       maintenance_service_(*store_, registry_, admission_, long_readers_) {

@@ -66,8 +66,8 @@ class Server {
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
-  // Chunks, and everything else that may take longer than moving bytes. Three pools, so that
-  // readers never wait for writers, nor those of microseconds for those of seconds.
+  // Chunks and replacements, and everything else that may take longer than moving bytes. Three
+  // pools, so that readers never wait for writers, nor those of microseconds for those of seconds.
   WorkerPool writers_;
   Registry registry_;
   WorkerPool readers_;

@@ -24,6 +24,14 @@ struct PointCounts {
   uint64_t duplicate = 0;
   // Points in the hull after the block that are no vertex of it.
   uint64_t inside = 0;
+
+  PointCounts& operator+=(const PointCounts& other) {
+    received += other.received;
+    outside += other.outside;
+    duplicate += other.duplicate;
+    inside += other.inside;
+    return *this;
+  }
   friend bool operator==(const PointCounts&, const PointCounts&) = default;
 };
 

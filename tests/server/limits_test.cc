@@ -220,6 +220,38 @@ TEST_F(LimitsTest, AReplacementUnderWayCountsAgainstTheMemoryLimit) {
   EXPECT_TRUE(append().ok());
 }
 
+// What a stream keeps of each pair is kept for as long as it lives.
+TEST_F(LimitsTest, PairsOfAStreamCountAgainstTheMemoryLimit) {
+  Config config = TestConfig();
+  config.limits.memory_limit = 1 << 20;
+  Restart(config);
+  Put("cube", Cube());
+  const auto answer_pairs = [this](int pairs) {
+    grpc::ClientContext context;
+    const auto stream = collisions_->StreamCollisions(&context);
+    v1::StreamCollisionsRequest request;
+    *request.mutable_open()->add_placements() = PlacementOf("cube");
+    *request.mutable_open()->add_placements() = PlacementOf("cube", 9);
+    for (int i = 0; i < pairs; ++i) {
+      request.mutable_open()->add_pairs(0);
+      request.mutable_open()->add_pairs(1);
+    }
+    stream->Write(request);
+    stream->WritesDone();
+    v1::StreamCollisionsResponse response;
+    int answered = 0;
+    while (stream->Read(&response)) answered += response.pairs_size();
+    const grpc::Status status = stream->Finish();
+    EXPECT_EQ(answered, status.ok() ? pairs : 0);
+    return status;
+  };
+  // A pair takes more than 64 bytes and less than 512.
+  EXPECT_TRUE(answer_pairs(1000).ok());
+  ExpectRefused(answer_pairs(1 << 14), "memory-limit");
+  ASSERT_TRUE(WaitIdle());
+  EXPECT_TRUE(answer_pairs(1000).ok());
+}
+
 TEST_F(LimitsTest, ARequestEndsWhenItsTimeIsUp) {
   Config config = TestConfig();
   config.limits.max_request_time = std::chrono::milliseconds(50);
