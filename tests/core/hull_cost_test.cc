@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <vector>
 
 #include "core/hull/hull_builder.h"
@@ -133,6 +134,10 @@ TEST(HullCost, MemoryIsBoundedByTheVertices) {
       EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 300) << cloud.name;
       const auto queried = static_cast<double>(hull.MemoryBytes() + QueryHull(hull).MemoryBytes());
       EXPECT_LE(queried / vertices, 350) << cloud.name;
+      std::printf("%s, %s: %.0f vertices, bytes for each: %.0f, for queries %.0f, builder %.0f\n",
+                  cloud.name, b == &builder ? "at once" : "one by one", vertices,
+                  static_cast<double>(hull.MemoryBytes()) / vertices, queried / vertices,
+                  static_cast<double>(b->MemoryBytes()) / vertices);
       // At least the vertices and the triangles are counted.
       EXPECT_GE(static_cast<double>(hull.MemoryBytes()) / vertices, 24 + 24 + 24) << cloud.name;
       EXPECT_GE(static_cast<double>(b->MemoryBytes()) / vertices, 24 + 2 * 64 - 1) << cloud.name;
