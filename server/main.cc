@@ -1,18 +1,16 @@
 // hulld: keeps 3D convex hulls by ID and answers exact collision queries. See --help.
 
-#include <malloc.h>
 #include <signal.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cstdio>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "server/config.h"
 #include "server/config_check.h"
 #include "server/doctor.h"
+#include "server/heap.h"
 #include "server/log.h"
 #include "server/server.h"
 #include "server/thread_priority.h"
@@ -41,14 +39,21 @@ void LogStore(const Config& config) {
   }
 }
 
-// Waits for SIGTERM or SIGINT, and looks at the files again at each SIGHUP until then.
+// Waits for SIGTERM or SIGINT. Until then it looks at the files again at each SIGHUP, and now and
+// then for memory that nobody needs.
 int WaitForEnd(const sigset_t& signals, Server& server) {
-  int received = 0;
-  while (sigwait(&signals, &received) == 0 && received == SIGHUP) {
-    spdlog::info("SIGHUP received: looking at the files of certificates and tokens");
-    server.ReloadFiles();
+  constexpr timespec kPause = {.tv_sec = 10, .tv_nsec = 0};
+  for (;;) {
+    const int received = sigtimedwait(&signals, nullptr, &kPause);
+    if (received == SIGHUP) {
+      spdlog::info("SIGHUP received: looking at the files of certificates and tokens");
+      server.ReloadFiles();
+    } else if (received > 0) {
+      return received;
+    } else {
+      GiveBackFreeMemory();
+    }
   }
-  return received;
 }
 
 void LogStart(const Config& config, const Server& server) {
@@ -70,9 +75,7 @@ void LogStart(const Config& config, const Server& server) {
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
   PreferShortTurns();
-  // Messages are allocated on many threads, and what one arena keeps for itself is lost to the
-  // others.
-  mallopt(M_ARENA_MAX, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
+  BoundArenas();
   // Blocked before any thread exists, so that every thread inherits it and this one can wait.
   const sigset_t signals = HandledSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
