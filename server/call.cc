@@ -32,9 +32,11 @@ bool IsFault(absl::StatusCode code) {
 absl::Status Call::Begin() {
   const auto& metadata = context_.client_metadata();
   const auto given = metadata.find(kRequestIdKey);
-  if (given != metadata.end()) request_id_ = {given->second.data(), given->second.size()};
-  if (!IsRequestId(request_id_)) request_id_ = NextRequestId();
-  context_.AddTrailingMetadata(kRequestIdKey, request_id_);
+  if (given != metadata.end()) {
+    const std::string id(given->second.data(), given->second.size());
+    request_id_told_ = true;
+    if (IsRequestId(id)) std::call_once(request_id_made_, [&] { request_id_ = id; });
+  }
   if (absl::Status s = Authenticate(); !s.ok()) return s;
 
   absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
@@ -43,6 +45,12 @@ absl::Status Call::Begin() {
   ticket_.emplace(*std::move(ticket));
   if (KindOf(rpc_) != CallKind::kStream) lifetime_.LimitTime(admission_.limits().max_request_time);
   return absl::OkStatus();
+}
+
+const std::string& Call::request_id() const {
+  std::call_once(request_id_made_, [this] { request_id_ = NextRequestId(); });
+  request_id_told_ = true;
+  return request_id_;
 }
 
 absl::Status Call::Authenticate() {
@@ -83,7 +91,7 @@ void Call::CountLimit(const absl::Status& status) const {
 void Call::Log(LogLevel level, const std::string& message, LogFields fields) const {
   if (!IsLogged(level)) return;
   fields.insert(fields.begin(),
-                {LogField("rpc", RpcName(rpc_)), LogField("request_id", request_id_)});
+                {LogField("rpc", RpcName(rpc_)), LogField("request_id", request_id())});
   LogEvent(level, message, fields);
 }
 
@@ -102,6 +110,7 @@ grpc::Status Call::End(const absl::Status& status) {
   const Clock::duration duration = Clock::now() - arrival_;
   metrics().CountCall(rpc_, status.code(), duration);
   if (KindOf(rpc_) != CallKind::kStream) LogSlow(duration, status, "slow request");
+  if (!status.ok() || request_id_told_) context_.AddTrailingMetadata(kRequestIdKey, request_id());
   if (status.ok()) return grpc::Status::OK;
   CountLimit(status);
   if (absl::IsUnauthenticated(status)) metrics().CountAuthFailure("unauthenticated");
@@ -119,7 +128,7 @@ grpc::Status Call::End(const absl::Status& status) {
   }
   const grpc::Status plain = ToGrpc(status);
   return grpc::Status(plain.error_code(), plain.error_message(),
-                      EncodeErrorDetails(status, request_id_));
+                      EncodeErrorDetails(status, request_id()));
 }
 
 }  // namespace hulld::server

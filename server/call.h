@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -31,9 +32,10 @@ class Call {
   Rpc rpc() const { return rpc_; }
   // Who calls. Requires that Begin succeeded.
   const Caller& caller() const { return caller_; }
-  // The client's (metadata x-request-id), or ours. The reply carries it, and so does all that is
-  // logged about the call.
-  const std::string& request_id() const { return request_id_; }
+  // The client's (metadata x-request-id), or ours, made when it is first needed: most calls succeed
+  // and have nothing said of them. All that is logged about the call carries it, and the reply of a
+  // call that is logged or fails, or whose client gave one.
+  const std::string& request_id() const;
   Metrics& metrics() const { return admission_.metrics(); }
 
   const CallLifetime& lifetime() const { return lifetime_; }
@@ -79,7 +81,10 @@ class Call {
   Admission& admission_;
   const Rpc rpc_;
   const Clock::time_point arrival_ = Clock::now();
-  std::string request_id_;
+  mutable std::string request_id_;
+  mutable std::once_flag request_id_made_;
+  // Somebody besides the client knows it.
+  mutable std::atomic<bool> request_id_told_ = false;
   CallLifetime lifetime_;
   std::atomic<uint64_t> pairs_ = 0;
   std::atomic<uint64_t> points_ = 0;

@@ -191,12 +191,14 @@ std::string ValueOf(const std::multimap<grpc::string_ref, grpc::string_ref>& met
   return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
 }
 
-TEST_F(Observation, EveryReplyCarriesARequestId) {
-  const auto ask = [this](const std::string& given) {
+TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
+  const auto ask = [this](const std::string& given, const std::string& hull_id = "none") {
     grpc::ClientContext context;
     if (!given.empty()) context.AddMetadata("x-request-id", given);
-    v1::GetStatusResponse response;
-    EXPECT_TRUE(status_->GetStatus(&context, {}, &response).ok());
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id(hull_id);
+    hulls_->GetHull(&context, request, &response);
     return ValueOf(context.GetServerTrailingMetadata(), "x-request-id");
   };
   EXPECT_EQ(ask("cell-1/job_42"), "cell-1/job_42");
@@ -205,6 +207,11 @@ TEST_F(Observation, EveryReplyCarriesARequestId) {
   EXPECT_FALSE(made.contains(""));
   EXPECT_FALSE(made.contains("no spaces"));
   EXPECT_EQ(ask(std::string(128, 'x')), std::string(128, 'x'));
+  // Of a call that succeeds nobody else speaks.
+  Put("cube", Cube());
+  EXPECT_EQ(ask("", "cube"), "");
+  EXPECT_EQ(ask("mine", "cube"), "mine");
+  EXPECT_NE(ask("no spaces", "cube"), "");
 }
 
 TEST_F(Observation, AnAuditThatNobodyWaitsForEndsUnfinished) {
