@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 #include <unordered_set>
 #include <utility>
 
@@ -274,7 +275,11 @@ class OrderSearch {
         operations_.begin(), operations_.end(), [](const Operation& o) { return !IsOptional(o); }));
   }
 
-  bool Run() { return Extend(State(), 0, 0); }
+  bool Run() {
+    bool found = Enter(State(), 0, 0);
+    while (!found && !path_.empty()) found = TryNext();
+    return found;
+  }
 
   // The longest order found, and what could not follow it.
   std::string Fault() const {
@@ -293,6 +298,22 @@ class OrderSearch {
   }
 
  private:
+  // A state of the hull on the way to an order of all operations.
+  struct Node {
+    State state;
+    // Operations so far that were answered.
+    size_t count = 0;
+    // When the latest operation so far was invoked.
+    uint64_t latest = 0;
+    std::vector<size_t> candidates;
+    size_t next = 0;
+    // The candidate that led to the next node.
+    std::optional<size_t> taken;
+    // first_left_ and last_done_ before this.
+    size_t first_before = 0;
+    size_t last_before = 0;
+  };
+
   // Whether an operation without an answer can no longer take effect, because one that was invoked
   // after its end, at tick `latest`, has.
   bool IsTooLate(size_t i, uint64_t latest) const {
@@ -330,38 +351,49 @@ class OrderSearch {
     return key;
   }
 
-  // latest: when the latest operation in the order so far was invoked.
-  bool Extend(const State& state, size_t count, uint64_t latest) {
+  // Puts a state at the end of the path, with what may come next. Returns whether it explains all.
+  bool Enter(State state, size_t count, uint64_t latest) {
     if (count == required_) return true;
-    const size_t first_before = first_left_;
-    const size_t last_before = last_done_;
+    Node node{std::move(state), count, latest, {}, 0, std::nullopt, first_left_, last_done_};
     while (first_left_ < operations_.size() &&
            (done_[first_left_] || IsTooLate(first_left_, latest))) {
       ++first_left_;
     }
-    bool found = false;
-    if (seen_.insert(Key(state)).second) {
-      const std::vector<size_t> candidates = Candidates(latest);
+    if (seen_.insert(Key(node.state)).second) {
+      node.candidates = Candidates(latest);
       if (count > best_count_ || best_done_.empty()) {
         best_count_ = count;
-        best_state_ = state;
-        best_candidates_ = candidates;
+        best_state_ = node.state;
+        best_candidates_ = node.candidates;
         best_done_ = done_;
       }
-      for (const size_t i : candidates) {
-        State next = state;
-        if (!Step(next, operations_[i])) continue;
-        done_[i] = true;
-        last_done_ = std::max(last_before, i);
-        found = Extend(next, count + !IsOptional(operations_[i]),
-                       std::max(latest, operations_[i].invoked));
-        done_[i] = false;
-        last_done_ = last_before;
-        if (found) break;
-      }
     }
-    first_left_ = first_before;
-    return found;
+    path_.push_back(std::move(node));
+    return false;
+  }
+
+  // Tries the next candidate of the last state of the path, or leaves it when there is none.
+  // Returns whether all is explained then.
+  bool TryNext() {
+    Node& last = path_.back();
+    if (last.taken.has_value()) {
+      done_[*last.taken] = false;
+      last_done_ = last.last_before;
+      last.taken = std::nullopt;
+    }
+    if (last.next == last.candidates.size()) {
+      first_left_ = last.first_before;
+      path_.pop_back();
+      return false;
+    }
+    const size_t i = last.candidates[last.next++];
+    State next = last.state;
+    if (!Step(next, operations_[i])) return false;
+    done_[i] = true;
+    last_done_ = std::max(last.last_before, i);
+    last.taken = i;
+    return Enter(std::move(next), last.count + !IsOptional(operations_[i]),
+                 std::max(last.latest, operations_[i].invoked));
   }
 
   std::vector<Operation> operations_;
@@ -369,6 +401,8 @@ class OrderSearch {
   size_t required_ = 0;
   size_t first_left_ = 0;
   size_t last_done_ = 0;
+  // Not the call stack: a history may be longer than that is deep.
+  std::vector<Node> path_;
   std::unordered_set<std::string> seen_;
   size_t best_count_ = 0;
   State best_state_;
