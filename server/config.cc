@@ -184,9 +184,9 @@ class Parser {
              "Writers whose sequences are kept for one hull", kAny);
     AddLimit(
         "memory-limit", limits.memory_limit,
-        "Bytes of memory that hulls, and points on their way to them, may hold, beside messages of "
-        "calls and the store's own buffers; 0: half of what the machine or the control group "
-        "has",
+        "Bytes of memory that hulls, points on their way to them, replacements under way and the "
+        "pairs of streams may hold, beside messages of calls and the store's own buffers; 0: half "
+        "of what the machine or the control group has",
         kAny, 0);
     AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
              kMaxGrpcMessageBytes);
