@@ -83,7 +83,7 @@ class Call {
   const Clock::time_point arrival_ = Clock::now();
   mutable std::string request_id_;
   mutable std::once_flag request_id_made_;
-  // Somebody besides the client knows it.
+  // The client gave one, or something names it: the reply is to carry it.
   mutable std::atomic<bool> request_id_told_ = false;
   CallLifetime lifetime_;
   std::atomic<uint64_t> pairs_ = 0;
