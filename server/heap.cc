@@ -11,6 +11,7 @@
 namespace hulld::server {
 namespace {
 
+// Bytes that malloc may keep. A choice: ordinary work leaves less behind.
 constexpr size_t kWorthIt = 64 << 20;
 
 // Memory of this process that is resident and no file's; 0 where the system does not tell.

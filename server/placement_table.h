@@ -40,7 +40,7 @@ class PlacementTable {
   absl::Status Resolve(Registry& registry, const std::function<bool()>& should_stop);
 
   size_t size() const { return entries_.size(); }
-  // What this holds once it is resolved, hulls apart, to a few percent.
+  // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
   std::span<const PlacedHull> placed() const { return placed_; }
   bool is_answerable(size_t i) const { return problem(i).ok(); }

@@ -16,7 +16,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-#include <numbers>
 #include <random>
 #include <string>
 #include <thread>
@@ -24,8 +23,9 @@
 
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
+#include "tests/bench/ball_hull.h"
 
-namespace hulld {
+namespace hulld::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -33,35 +33,6 @@ using Clock = std::chrono::steady_clock;
 constexpr int kVertices = 256;
 constexpr int kPlacements = 1000;
 constexpr int kPairsPerBatch = 200'000;
-
-void Require(const grpc::Status& status, const char* what) {
-  if (status.ok()) return;
-  std::fprintf(stderr, "overload_benchmark: %s: %s\n", what, status.error_message().c_str());
-  std::exit(1);
-}
-
-// Points on the unit sphere, spread evenly (Fibonacci).
-void AddBall(v1::HullService::Stub& hulls) {
-  grpc::ClientContext context;
-  const auto stream = hulls.AppendPoints(&context);
-  v1::AppendPointsRequest open;
-  open.mutable_open()->set_hull_id("overload/ball");
-  open.mutable_open()->set_create_if_absent(true);
-  v1::AppendPointsRequest chunk;
-  chunk.mutable_chunk()->set_sequence(1);
-  const double turn = std::numbers::pi * (3 - std::sqrt(5.0));
-  for (int i = 0; i < kVertices; ++i) {
-    const double height = 1 - (2 * i + 1.0) / kVertices;
-    const double radius = std::sqrt(1 - height * height);
-    for (const double x : {radius * std::cos(turn * i), radius * std::sin(turn * i), height}) {
-      chunk.mutable_chunk()->mutable_points()->add_xyz(x);
-    }
-  }
-  v1::AppendPointsResponse reply;
-  if (stream->Write(open) && stream->Read(&reply) && stream->Write(chunk)) stream->Read(&reply);
-  stream->WritesDone();
-  Require(stream->Finish(), "AppendPoints");
-}
 
 // Half of the pairs near each other, so that the ladder has something to climb.
 v1::BatchCheckCollisionsRequest MakeBatch() {
@@ -159,7 +130,7 @@ int Main(const std::string& address, int rounds, int calls) {
   const auto channel = grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
   const auto hulls = v1::HullService::NewStub(channel);
   const auto collisions = v1::CollisionService::NewStub(channel);
-  AddBall(*hulls);
+  MakeBallHull(*hulls, "overload/ball", kVertices, 1);
   const v1::BatchCheckCollisionsRequest batch = MakeBatch();
   Phase warm_up = {"warm-up", 0, {}};
   Measure(address, *collisions, batch, 500, &warm_up);
@@ -182,13 +153,13 @@ int Main(const std::string& address, int rounds, int calls) {
 }
 
 }  // namespace
-}  // namespace hulld
+}  // namespace hulld::bench
 
 int main(int argc, char** argv) {
   if (argc < 2 || argc > 4) {
     std::fprintf(stderr, "usage: overload_benchmark ADDRESS [ROUNDS] [CALLS]\n");
     return 2;
   }
-  return hulld::Main(argv[1], argc > 2 ? std::atoi(argv[2]) : 5,
-                     argc > 3 ? std::atoi(argv[3]) : 2000);
+  return hulld::bench::Main(argv[1], argc > 2 ? std::atoi(argv[2]) : 5,
+                            argc > 3 ? std::atoi(argv[3]) : 2000);
 }

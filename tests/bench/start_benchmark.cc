@@ -9,23 +9,23 @@
 // are in the page cache: this is a restart of the program, not of the machine.
 
 #include <grpcpp/grpcpp.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
+#include "tests/bench/ball_hull.h"
 #include "tests/bench/child_server.h"
 
 namespace hulld::bench {
@@ -37,43 +37,7 @@ constexpr int kStarts = 5;
 // Many, so that the store commits many hulls at once.
 constexpr int kWriters = 64;
 
-void Require(const grpc::Status& status, const char* what) {
-  if (status.ok()) return;
-  std::fprintf(stderr, "start_benchmark: %s: %s\n", what, status.error_message().c_str());
-  std::exit(1);
-}
-
 std::string IdOf(int hull) { return "start/" + std::to_string(hull); }
-
-// Points on a sphere, spread evenly (Fibonacci).
-v1::AppendPointsRequest MakeChunk(int points, double radius) {
-  v1::AppendPointsRequest request;
-  request.mutable_chunk()->set_sequence(1);
-  const double turn = std::numbers::pi * (3 - std::sqrt(5.0));
-  for (int i = 0; i < points; ++i) {
-    const double z = 1 - (2 * i + 1.0) / points;
-    const double r = std::sqrt(1 - z * z);
-    for (const double x : {r * std::cos(turn * i), r * std::sin(turn * i), z}) {
-      request.mutable_chunk()->mutable_points()->add_xyz(radius * x);
-    }
-  }
-  return request;
-}
-
-void MakeHull(v1::HullService::Stub& stub, int hull, int points) {
-  grpc::ClientContext context;
-  const auto stream = stub.AppendPoints(&context);
-  v1::AppendPointsRequest open;
-  open.mutable_open()->set_hull_id(IdOf(hull));
-  open.mutable_open()->set_create_if_absent(true);
-  v1::AppendPointsResponse reply;
-  if (stream->Write(open) && stream->Read(&reply) &&
-      stream->Write(MakeChunk(points, 1 + 1e-6 * hull))) {
-    stream->Read(&reply);
-  }
-  stream->WritesDone();
-  Require(stream->Finish(), "AppendPoints");
-}
 
 void Fill(const std::string& address, int hulls, int points) {
   std::atomic<int> next = 0;
@@ -82,7 +46,9 @@ void Fill(const std::string& address, int hulls, int points) {
     writers.emplace_back([&] {
       const auto stub = v1::HullService::NewStub(
           grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
-      for (int hull = next++; hull < hulls; hull = next++) MakeHull(*stub, hull, points);
+      for (int hull = next++; hull < hulls; hull = next++) {
+        MakeBallHull(*stub, IdOf(hull), points, 1 + 1e-6 * hull);
+      }
     });
   }
   for (std::thread& writer : writers) writer.join();
@@ -106,7 +72,7 @@ double ResidentMebibytes(pid_t pid) {
   double total = 0;
   double resident = 0;
   status >> total >> resident;
-  return resident * 4096 / (1 << 20);
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
 double DirectoryMebibytes(const std::string& directory) {

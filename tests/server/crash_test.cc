@@ -64,14 +64,20 @@ class RestartableServer : public ::testing::Test {
  protected:
   std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
 
-  // A connection of client number `i` alone. It tries again at once while the server starts;
-  // a connection may take a second to be made, which is what gRPC means by the least backoff.
+  // Of a connection that tries again at once while the server starts. It may take a second to be
+  // made, which is what gRPC means by the least backoff.
+  static grpc::ChannelArguments ReconnectAtOnce() {
+    grpc::ChannelArguments arguments;
+    arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
+    arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
+    arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
+    return arguments;
+  }
+
+  // A connection of client number `i` alone.
   std::shared_ptr<grpc::Channel> Channel(int i) const {
-    grpc::ChannelArguments own;
+    grpc::ChannelArguments own = ReconnectAtOnce();
     own.SetInt("hulld.test.client", i);
-    own.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
-    own.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
-    own.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
     return grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own);
   }
 
@@ -219,13 +225,8 @@ class Interrupted : public RestartableServer {
     options.retry.initial_backoff = std::chrono::milliseconds(5);
     options.retry.max_backoff = std::chrono::milliseconds(20);
     options.timeout = std::chrono::minutes(2);
-    // As Channel does.
-    grpc::ChannelArguments own;
-    own.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
-    own.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
-    own.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
-    return Client(options,
-                  grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own));
+    return Client(options, grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(),
+                                                     ReconnectAtOnce()));
   }
 
   // That the hull is the one of these points, to the last bit, and has been given them once each.
