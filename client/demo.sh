@@ -35,7 +35,7 @@ trap 'exit 143' TERM
 
 heading() { printf '\n== %s\n' "$*"; }
 
-ctl() { "$build/client/hullctl" --server "$address" "$@"; }
+ctl() { "$build/bin/hullctl" --server "$address" "$@"; }
 
 # field NAME: the value of a row of one of hullctl's tables, read from standard input.
 field() { awk -F '  +' -v name="$1" '$1 == name { print $2 }'; }
@@ -65,7 +65,7 @@ start_server() {
   heading "Starting hulld on $address"
   # Afresh each time: the hulls of the last run would be there otherwise.
   rm -rf "$work/data"
-  "$build/server/hulld" --listen "$address" --data-dir "$work/data" >"$work/hulld.log" 2>&1 &
+  "$build/bin/hulld" --listen "$address" --data-dir "$work/data" >"$work/hulld.log" 2>&1 &
   server_pid=$!
   for _ in {1..100}; do
     if ctl status >"$work/status" 2>&1; then
@@ -167,7 +167,7 @@ streaming_scene() {
   ctl create live >/dev/null
   last=$(ctl get live | field revision)
   # Not through ctl: the process itself must be the one to stop.
-  "$build/client/hullctl" --server "$address" append live - --chunk-points 500 \
+  "$build/bin/hullctl" --server "$address" append live - --chunk-points 500 \
     <"$points" >"$work/append" &
   writer_pid=$!
   exec 4>"$points"

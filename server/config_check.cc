@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <system_error>
 
-#include "server/listen_address.h"
-#include "server/metrics_endpoint.h"
-#include "server/secret_file.h"
-#include "server/tls_identity.h"
-#include "server/token_table.h"
+#include "server/access/secret_file.h"
+#include "server/access/tls_identity.h"
+#include "server/access/token_table.h"
+#include "server/process/listen_address.h"
+#include "server/process/metrics_endpoint.h"
 
 namespace hulld::server {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/config.h"
+#include "server/settings/config.h"
 
 namespace hulld::server {
 

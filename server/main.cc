@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "server/config.h"
+#include "server/admin/doctor.h"
 #include "server/config_check.h"
-#include "server/doctor.h"
-#include "server/heap.h"
-#include "server/log.h"
+#include "server/process/heap.h"
+#include "server/process/log.h"
+#include "server/process/thread_priority.h"
 #include "server/server.h"
-#include "server/thread_priority.h"
+#include "server/settings/config.h"
 
 namespace hulld::server {
 namespace {

@@ -8,11 +8,11 @@
 #include <thread>
 #include <utility>
 
+#include "server/call/transport.h"
 #include "server/config_check.h"
-#include "server/listen_address.h"
-#include "server/memory_store.h"
-#include "server/rocksdb_store.h"
-#include "server/transport.h"
+#include "server/process/listen_address.h"
+#include "server/store/memory_store.h"
+#include "server/store/rocksdb_store.h"
 
 namespace hulld::server {
 namespace {

@@ -8,19 +8,19 @@
 #include <memory>
 #include <string>
 
-#include "server/admission.h"
-#include "server/collision_service.h"
-#include "server/config.h"
-#include "server/executor.h"
-#include "server/guard.h"
-#include "server/hull_service.h"
-#include "server/maintenance_service.h"
-#include "server/metrics.h"
-#include "server/metrics_endpoint.h"
-#include "server/registry.h"
-#include "server/status_service.h"
-#include "server/store.h"
-#include "server/worker_pool.h"
+#include "server/access/guard.h"
+#include "server/admin/maintenance_service.h"
+#include "server/admin/status_service.h"
+#include "server/call/admission.h"
+#include "server/collisions/collision_service.h"
+#include "server/hulls/hull_service.h"
+#include "server/process/executor.h"
+#include "server/process/metrics.h"
+#include "server/process/metrics_endpoint.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+#include "server/settings/config.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 

@@ -3,11 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "client/hullctl/arguments.h"
-#include "client/hullctl/commands.h"
-#include "client/hullctl/connection_options.h"
-#include "client/hullctl/exit_code.h"
-#include "client/hullctl/invocation.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/connection_options.h"
+#include "client/hullctl/command_line/exit_code.h"
+#include "client/hullctl/command_line/invocation.h"
+#include "client/hullctl/commands/commands.h"
 
 namespace hulld {
 namespace {

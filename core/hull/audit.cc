@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/hull/stop_poll.h"
+#include "core/base/stop_poll.h"
 #include "core/numeric/integer.h"
 
 namespace hulld {

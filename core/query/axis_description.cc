@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/query/exact_search.h"
+#include "core/query/exact/exact_search.h"
 
 namespace hulld {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "core/numeric/integer.h"
 #include "core/query/collision.h"
-#include "core/query/exact_pair.h"
+#include "core/query/exact/exact_pair.h"
 
 namespace hulld {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/numeric/vector.h"
-#include "core/query/placed_hull.h"
+#include "core/query/placed/placed_hull.h"
 
 namespace hulld {
 

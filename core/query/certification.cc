@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/query/exact_nearest.h"
+#include "core/query/exact/exact_nearest.h"
 
 namespace hulld {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <functional>
 
-#include "core/query/certificate.h"
-#include "core/query/exact_pair.h"
+#include "core/query/exact/exact_pair.h"
 #include "core/query/ladder.h"
+#include "core/query/terms/certificate.h"
 
 namespace hulld {
 

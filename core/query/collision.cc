@@ -13,8 +13,8 @@
 
 #include "core/query/axis_description.h"
 #include "core/query/certification.h"
-#include "core/query/exact_pair.h"
-#include "core/query/float_pair.h"
+#include "core/query/exact/exact_pair.h"
+#include "core/query/floating/float_pair.h"
 #include "core/query/ladder.h"
 #include "core/query/separation.h"
 #include "core/query/textbook_sat.h"

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "core/hull/hull.h"
-#include "core/query/certificate.h"
-#include "core/query/placed_hull.h"
-#include "core/query/pose.h"
+#include "core/query/placed/placed_hull.h"
+#include "core/query/terms/certificate.h"
+#include "core/query/terms/pose.h"
 
 namespace hulld {
 

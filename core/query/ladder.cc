@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
-#include "core/query/exact_pair.h"
-#include "core/query/exact_search.h"
-#include "core/query/float_search.h"
+#include "core/query/exact/exact_pair.h"
+#include "core/query/exact/exact_search.h"
+#include "core/query/floating/float_search.h"
 
 namespace hulld {
 namespace {

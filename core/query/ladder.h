@@ -8,9 +8,9 @@
 #include <functional>
 #include <variant>
 
-#include "core/query/certificate.h"
 #include "core/query/collision.h"
-#include "core/query/float_pair.h"
+#include "core/query/floating/float_pair.h"
+#include "core/query/terms/certificate.h"
 
 namespace hulld {
 

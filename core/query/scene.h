@@ -12,7 +12,7 @@
 
 #include "core/query/batch.h"
 #include "core/query/collision.h"
-#include "core/query/placed_hull.h"
+#include "core/query/placed/placed_hull.h"
 
 namespace hulld {
 

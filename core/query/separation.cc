@@ -11,13 +11,13 @@
 
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/rational.h"
-#include "core/query/exact_depth.h"
-#include "core/query/exact_nearest.h"
-#include "core/query/exact_pair.h"
-#include "core/query/float_depth.h"
-#include "core/query/float_distance.h"
-#include "core/query/float_search.h"
-#include "core/query/separation_bounds.h"
+#include "core/query/exact/exact_depth.h"
+#include "core/query/exact/exact_nearest.h"
+#include "core/query/exact/exact_pair.h"
+#include "core/query/floating/float_depth.h"
+#include "core/query/floating/float_distance.h"
+#include "core/query/floating/float_search.h"
+#include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/query/collision.h"
-#include "core/query/float_pair.h"
+#include "core/query/floating/float_pair.h"
 #include "core/query/ladder.h"
 
 namespace hulld {

@@ -14,9 +14,9 @@
 #include "core/numeric/integer.h"
 #include "core/numeric/vector.h"
 #include "core/query/axis_description.h"
-#include "core/query/exact_pair.h"
-#include "core/query/exact_search.h"
-#include "core/query/float_pair.h"
+#include "core/query/exact/exact_pair.h"
+#include "core/query/exact/exact_search.h"
+#include "core/query/floating/float_pair.h"
 
 namespace hulld {
 namespace {

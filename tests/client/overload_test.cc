@@ -7,7 +7,7 @@
 
 #include "client/client.h"
 #include "client/grpc_status.h"
-#include "tests/server/test_server.h"
+#include "tests/server/harness/test_server.h"
 
 namespace hulld {
 namespace {

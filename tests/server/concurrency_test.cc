@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "tests/server/test_server.h"
+#include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
 namespace {

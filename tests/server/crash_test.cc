@@ -20,11 +20,11 @@
 
 #include "client/appender.h"
 #include "client/client.h"
-#include "core/hull/hull_builder.h"
-#include "tests/server/history_client.h"
-#include "tests/server/hull_history.h"
-#include "tests/server/hulld_process.h"
-#include "tests/server/test_server.h"
+#include "core/hull/growth/hull_builder.h"
+#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/hulld_process.h"
+#include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
 namespace {

@@ -11,9 +11,9 @@
 
 #include "client/client.h"
 #include "client/snapshot_file.h"
-#include "server/doctor.h"
-#include "tests/server/faulty_file_system.h"
-#include "tests/server/test_server.h"
+#include "server/admin/doctor.h"
+#include "tests/server/harness/faulty_file_system.h"
+#include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
 namespace {

@@ -1,6 +1,6 @@
 // The program itself: started, talked to, ended by a signal.
 
-#include "tests/server/hulld_process.h"
+#include "tests/server/harness/hulld_process.h"
 
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>

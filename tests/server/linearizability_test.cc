@@ -10,9 +10,9 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/history_client.h"
-#include "tests/server/hull_history.h"
-#include "tests/server/test_server.h"
+#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
 namespace {

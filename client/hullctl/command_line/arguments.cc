@@ -1,0 +1,111 @@
+#include "client/hullctl/command_line/arguments.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+#include <vector>
+
+#include "client/formats/text_number.h"
+
+namespace hulld {
+namespace {
+
+absl::StatusOr<std::vector<double>> ParseNumbers(std::string_view text) {
+  std::vector<double> numbers;
+  for (;;) {
+    const size_t comma = text.find(',');
+    const std::string_view part = Trim(text.substr(0, comma));
+    double number = 0;
+    const NumberText kind = ParseDouble(part, &number);
+    if (kind != NumberText::kNumber) return absl::InvalidArgumentError(NumberProblem(kind, part));
+    if (!std::isfinite(number)) {
+      return absl::InvalidArgumentError(absl::StrCat(Quoted(part), " is not a finite number"));
+    }
+    numbers.push_back(number);
+    if (comma == std::string_view::npos) return numbers;
+    text.remove_prefix(comma + 1);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text) {
+  struct Unit {
+    std::string_view name;
+    double milliseconds;
+  };
+  static constexpr Unit kUnits[] = {{"ms", 1}, {"s", 1e3}, {"m", 6e4}, {"h", 3.6e6}, {"", 1e3}};
+  constexpr double kDay = 24 * 3.6e6;
+  for (const Unit& unit : kUnits) {
+    std::string_view number = text;
+    if (number.size() < unit.name.size() ||
+        number.substr(number.size() - unit.name.size()) != unit.name) {
+      continue;
+    }
+    number.remove_suffix(unit.name.size());
+    double value = 0;
+    if (ParseDouble(number, &value) != NumberText::kNumber) continue;
+    const double milliseconds = value * unit.milliseconds;
+    if (!(milliseconds >= 1 && milliseconds <= kDay)) break;
+    return std::chrono::milliseconds(std::llround(milliseconds));
+  }
+  return absl::InvalidArgumentError(
+      absl::StrCat(Quoted(text), " is not a time from 1ms to 24h, such as 500ms, 30s or 2m"));
+}
+
+absl::Status ValidateServer(const std::string& server) {
+  if (server.rfind("unix:", 0) == 0 || server.find(":///") != std::string::npos) {
+    return absl::OkStatus();
+  }
+  const size_t colon = server.rfind(':');
+  uint64_t port = 0;
+  const bool port_ok = colon != std::string::npos && colon > 0 &&
+                       ParseUnsigned(std::string_view(server).substr(colon + 1), &port) &&
+                       port > 0 && port < 65536;
+  const bool host_ok =
+      server.find('/') == std::string::npos && (server.find(':') == colon || server[0] == '[');
+  if (port_ok && host_ok) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(Quoted(server), " is not HOST:PORT, such as 127.0.0.1:50551"));
+}
+
+absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
+  absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
+  if (!numbers.ok()) return numbers.status();
+  if (numbers->size() != 3) {
+    return absl::InvalidArgumentError(absl::StrCat(Quoted(text), " is not three numbers x,y,z"));
+  }
+  return std::array<double, 3>{(*numbers)[0], (*numbers)[1], (*numbers)[2]};
+}
+
+absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers) {
+  if (numbers.size() != 3 && numbers.size() != 7) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "a pose is 3 numbers tx ty tz or 7 numbers w x y z tx ty tz, here are ", numbers.size()));
+  }
+  v1::Pose pose;
+  const double* t = numbers.data();
+  if (numbers.size() == 7) {
+    v1::Quaternion& q = *pose.mutable_rotation();
+    q.set_w(t[0]);
+    q.set_x(t[1]);
+    q.set_y(t[2]);
+    q.set_z(t[3]);
+    if (t[0] == 0 && t[1] == 0 && t[2] == 0 && t[3] == 0) {
+      return absl::InvalidArgumentError("the quaternion w x y z is zero; none is 1 0 0 0");
+    }
+    t += 4;
+  }
+  pose.mutable_translation()->set_x(t[0]);
+  pose.mutable_translation()->set_y(t[1]);
+  pose.mutable_translation()->set_z(t[2]);
+  return pose;
+}
+
+absl::StatusOr<v1::Pose> ParsePose(const std::string& text) {
+  absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
+  if (!numbers.ok()) return numbers.status();
+  return PoseFromNumbers(*numbers);
+}
+
+}  // namespace hulld

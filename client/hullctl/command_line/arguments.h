@@ -1,0 +1,34 @@
+#ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_ARGUMENTS_H_
+#define HULLD_CLIENT_HULLCTL_COMMAND_LINE_ARGUMENTS_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <array>
+#include <chrono>
+#include <string>
+#include <string_view>
+
+#include "hulld/v1/geometry.pb.h"
+
+namespace hulld {
+
+// "30s", "500ms", "2m"; a number alone is seconds. Positive, at most a day.
+absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text);
+
+// HOST:PORT, [IPV6]:PORT, or one of gRPC's own schemes such as unix:PATH and dns:///NAME.
+absl::Status ValidateServer(const std::string& server);
+
+// "x,y,z".
+absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text);
+
+// "w,x,y,z,tx,ty,tz", or "tx,ty,tz" for a pose without rotation. Each number becomes the nearest
+// double.
+absl::StatusOr<v1::Pose> ParsePose(const std::string& text);
+
+// The same from numbers: 3 or 7.
+absl::StatusOr<v1::Pose> PoseFromNumbers(const std::vector<double>& numbers);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_COMMAND_LINE_ARGUMENTS_H_

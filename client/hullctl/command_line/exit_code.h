@@ -1,0 +1,35 @@
+#ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_EXIT_CODE_H_
+#define HULLD_CLIENT_HULLCTL_COMMAND_LINE_EXIT_CODE_H_
+
+namespace hulld {
+
+// What hullctl tells the shell. A collision is an answer, not an error.
+enum class ExitCode {
+  kDone = 0,
+  // The server refused the request or failed, or an audit found something.
+  kRequestFailed = 1,
+  // The command line or an input file is wrong, or an output file cannot be written.
+  kUsage = 2,
+  // No answer: the server is not there, is draining, or did not answer in time.
+  kUnreachable = 3,
+  // Of many items, some have no answer; the others have.
+  kSomeFailed = 4,
+  // A certificate does not prove its answer.
+  kInvalidCertificate = 5,
+  // A certificate could not be checked, as its hulls have changed or there is none.
+  kCannotCheck = 6,
+};
+
+inline constexpr char kExitCodeHelp[] =
+    "Exit codes:\n"
+    "  0  done (a collision is an answer, not an error)\n"
+    "  1  the request failed: the server refused it, or an audit found something\n"
+    "  2  the command line or an input file is wrong, or a file cannot be written\n"
+    "  3  no answer: the server cannot be reached, is draining, or took longer than --timeout\n"
+    "  4  some items of a batch have no answer\n"
+    "  5  a certificate does not prove its answer\n"
+    "  6  a certificate cannot be checked: there is none, or its hulls have changed\n";
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_COMMAND_LINE_EXIT_CODE_H_

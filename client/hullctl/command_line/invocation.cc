@@ -1,0 +1,114 @@
+#include "client/hullctl/command_line/invocation.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "client/grpc_status.h"
+#include "client/hullctl/command_line/tls_diagnosis.h"
+
+namespace hulld {
+namespace {
+
+bool Contains(const std::string& text, const char* part) {
+  return text.find(part) != std::string::npos;
+}
+
+// gRPC uses one code for "nobody there" and for a server that says so itself.
+bool IsConnectionFailure(const std::string& message) {
+  for (const char* part :
+       {"connect", "Connect", "resolution", "resolve", "Socket closed", "reset"}) {
+    if (Contains(message, part)) return true;
+  }
+  return false;
+}
+
+std::string WithHint(const std::string& message, const std::string& hint) {
+  return absl::StrCat(message, " (", hint, ")");
+}
+
+std::string ExplainConnectionFailure(const std::string& message, const std::string& server,
+                                     const ConnectionSecurity& security) {
+  const std::string reason = DiagnoseTls(server, security);
+  if (!reason.empty()) {
+    return absl::StrCat("no connection to the server at ", server, ": ", reason);
+  }
+  return absl::StrCat("cannot reach hulld at ", server,
+                      ": start it with 'hulld', or name another with --server (", message, ")");
+}
+
+std::string Explain(const absl::Status& status, const std::string& server,
+                    std::chrono::milliseconds timeout, const ConnectionSecurity& security) {
+  const std::string message(status.message().data(), status.message().size());
+  switch (status.code()) {
+    case absl::StatusCode::kUnavailable:
+      if (IsConnectionFailure(message)) return ExplainConnectionFailure(message, server, security);
+      return absl::StrCat("hulld at ", server, " is not available: ", message, "; try again later");
+    case absl::StatusCode::kDeadlineExceeded:
+      return absl::StrCat("no answer from hulld at ", server, " within ", timeout.count(),
+                          " ms: raise --timeout, or see whether it is well with 'hullctl status' (",
+                          message, ")");
+    case absl::StatusCode::kUnauthenticated:
+      return WithHint(message, "give it with --token-file or $HULLD_TOKEN");
+    case absl::StatusCode::kNotFound:
+      return WithHint(message, "see 'hullctl list'");
+    case absl::StatusCode::kAlreadyExists:
+      return WithHint(message, "accept it with --if-absent, or see 'hullctl delete'");
+    case absl::StatusCode::kAborted:
+      return WithHint(message, "see its revision with 'hullctl get'");
+    case absl::StatusCode::kUnimplemented:
+      return absl::StrCat(server, " does not know this call; is it a hulld of this version? (",
+                          message, ")");
+    case absl::StatusCode::kInternal:
+    case absl::StatusCode::kUnknown:
+    case absl::StatusCode::kDataLoss: {
+      const std::string id = RequestIdOf(status);
+      return absl::StrCat("hulld at ", server, " failed: ", message, "; see its log",
+                          id.empty() ? "" : " for request ", id);
+    }
+    case absl::StatusCode::kResourceExhausted:
+      // gRPC refuses these before the server can name its limit.
+      if (Contains(message, "Received message larger than max")) {
+        return WithHint(message, "the server's --max-message-bytes; send less at once");
+      }
+      return message;
+    default:
+      return message;
+  }
+}
+
+}  // namespace
+
+Client Invocation::MakeClient() const {
+  ClientOptions options;
+  options.server = server;
+  options.timeout = timeout;
+  options.security = security;
+  return Client(std::move(options));
+}
+
+ExitCode Invocation::Fail(const absl::Status& status) const {
+  err << "hullctl: " << Explain(status, server, timeout, security) << "\n";
+  const bool unreachable = absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status);
+  return unreachable ? ExitCode::kUnreachable : ExitCode::kRequestFailed;
+}
+
+ExitCode Invocation::FailUsage(const absl::Status& status) const {
+  err << "hullctl: " << std::string(status.message().data(), status.message().size()) << "\n";
+  return ExitCode::kUsage;
+}
+
+ExitCode Invocation::Judge(const Verification& verification) const {
+  switch (verification.verdict) {
+    case Verdict::kValid:
+      return ExitCode::kDone;
+    case Verdict::kInvalid:
+      err << "hullctl: the certificate does not prove the answer: " << verification.reason << "\n";
+      return ExitCode::kInvalidCertificate;
+    case Verdict::kCannotCheck:
+    case Verdict::kMoved:
+      break;
+  }
+  err << "hullctl: the certificate cannot be checked: " << verification.reason << "\n";
+  return ExitCode::kCannotCheck;
+}
+
+}  // namespace hulld

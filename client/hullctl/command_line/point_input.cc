@@ -1,0 +1,69 @@
+#include "client/hullctl/command_line/point_input.h"
+
+#include <sys/stat.h>
+
+#include <CLI/CLI.hpp>
+#include <utility>
+
+#include "client/hullctl/command_line/number_option.h"
+
+namespace hulld {
+
+void AddPointInput(CLI::App* command, PointInput* input) {
+  command->add_option("FILE", input->files, "Files of points; - is standard input")->required();
+  command->add_flag("--skip-nonfinite", input->skip_nonfinite,
+                    "Leave out and count points with a coordinate that is NaN or infinite");
+  command
+      ->add_option("--format", input->format,
+                   "Format of the files (default: by extension; standard input: xyz)")
+      ->check(CLI::IsMember(PointFormatNames()))
+      ->type_name("FORMAT");
+  AddNumberOption(command, "--chunk-points", 1, uint64_t{100} << 20,
+                  "Points per message (default: about 1 MiB)",
+                  [input](uint64_t number) { input->chunk_points = number; });
+}
+
+v1::PointBlock ToProto(const PointBlock& block) {
+  v1::PointBlock points;
+  points.mutable_xyz()->Add(block.xyz.begin(), block.xyz.end());
+  points.mutable_xyz_float()->Add(block.xyz_float.begin(), block.xyz_float.end());
+  return points;
+}
+
+namespace {
+
+absl::StatusOr<PointFormat> FormatOf(const std::string& path, const std::string& named) {
+  if (!named.empty()) return PointFormatFromName(named);
+  if (path == "-") return PointFormat::kXyz;
+  return PointFormatOfPath(path);
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint64_t* total_bytes) {
+  std::vector<ReadRequest> plan;
+  *total_bytes = 0;
+  bool known = true;
+  for (const std::string& path : input.files) {
+    const absl::StatusOr<PointFormat> format = FormatOf(path, input.format);
+    if (!format.ok()) return format.status();
+    struct stat info = {};
+    if (path != "-" && stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode)) {
+      *total_bytes += static_cast<uint64_t>(info.st_size);
+    } else {
+      known = false;
+    }
+    // A pipe is opened once only: its writer would see it closed.
+    if (path != "-" && !S_ISFIFO(info.st_mode)) {
+      if (auto source = ByteSource::Open(path); !source.ok()) return source.status();
+    }
+    ReadRequest request{path, *format, {}, {}};
+    request.options.points_per_block = input.chunk_points;
+    request.options.skip_nonfinite = input.skip_nonfinite;
+    plan.push_back(std::move(request));
+  }
+  if (!known) *total_bytes = 0;
+  return plan;
+}
+
+}  // namespace hulld

@@ -1,0 +1,31 @@
+#ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_QUERY_OPTIONS_H_
+#define HULLD_CLIENT_HULLCTL_COMMAND_LINE_QUERY_OPTIONS_H_
+
+#include <CLI/App.hpp>
+#include <functional>
+#include <string>
+
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+// What a command asks for beyond the relation, as options that several commands share.
+struct QueryWishes {
+  v1::Wanted wanted;
+  double tolerance = 0;
+  v1::Method method = v1::METHOD_UNSPECIFIED;
+  // Check each answer's certificate; it is wanted then.
+  bool verify = false;
+};
+
+// Declares --textbook, --axis, --report, --certificate, --separation, --max-error, --witness,
+// --clearance, --tolerance and --verify. `wishes` must outlive the parsing.
+void AddQueryOptions(CLI::App* command, QueryWishes* wishes);
+
+// An option that takes a finite length of at least 0.
+CLI::Option* AddLengthOption(CLI::App* command, const std::string& name, const std::string& help,
+                             std::function<void(double)> take);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_COMMAND_LINE_QUERY_OPTIONS_H_

@@ -1,0 +1,351 @@
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <random>
+#include <utility>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/number_option.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/load/load.h"
+#include "client/hullctl/load/load_subjects.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+constexpr std::chrono::seconds kDefaultDuration(10);
+constexpr double kPercentiles[] = {0.5, 0.9, 0.99, 0.999};
+constexpr const char* kPercentileNames[] = {"p50", "p90", "p99", "p99.9"};
+
+struct LoadArguments {
+  LoadSettings settings;
+  LoadPlan plan;
+};
+
+const std::map<std::string, LoadMode>& ModeNames() {
+  static const auto* const names =
+      new std::map<std::string, LoadMode>{{"check", LoadMode::kCheck},
+                                          {"batch", LoadMode::kBatch},
+                                          {"append", LoadMode::kAppend},
+                                          {"mixed", LoadMode::kMixed}};
+  return *names;
+}
+
+// What an item of a request is.
+const char* ItemName(LoadMode mode) {
+  switch (mode) {
+    case LoadMode::kCheck:
+    case LoadMode::kBatch:
+      return "pairs";
+    case LoadMode::kAppend:
+      return "points";
+    case LoadMode::kMixed:
+      break;
+  }
+  return "pairs and points";
+}
+
+// Notes SIGINT and SIGTERM while it lives, so that hulls can be deleted; a second one ends the
+// program as usual.
+class InterruptWatch {
+ public:
+  InterruptWatch() {
+    interrupted_ = false;
+    struct sigaction action = {};
+    action.sa_handler = [](int) { interrupted_ = true; };
+    action.sa_flags = SA_RESETHAND;
+    sigaction(SIGINT, &action, &old_int_);
+    sigaction(SIGTERM, &action, &old_term_);
+  }
+  InterruptWatch(const InterruptWatch&) = delete;
+  InterruptWatch& operator=(const InterruptWatch&) = delete;
+  ~InterruptWatch() {
+    sigaction(SIGINT, &old_int_, nullptr);
+    sigaction(SIGTERM, &old_term_, nullptr);
+  }
+
+  static const std::atomic<bool>& interrupted() { return interrupted_; }
+
+ private:
+  static std::atomic<bool> interrupted_;
+  static_assert(std::atomic<bool>::is_always_lock_free);
+  struct sigaction old_int_ = {};
+  struct sigaction old_term_ = {};
+};
+
+std::atomic<bool> InterruptWatch::interrupted_ = false;
+
+std::string RandomName() {
+  std::random_device device;
+  return absl::StrCat(absl::Hex(device(), absl::kZeroPad8));
+}
+
+double Seconds(std::chrono::nanoseconds time) { return 1e-9 * static_cast<double>(time.count()); }
+
+// With three digits, in the unit that fits: "950 ns", "1.23 ms".
+std::string TimeText(std::chrono::nanoseconds time) {
+  const auto ns = static_cast<double>(time.count());
+  if (ns < 1e3) return absl::StrFormat("%.0f ns", ns);
+  if (ns < 1e6) return absl::StrFormat("%.3g us", 1e-3 * ns);
+  if (ns < 1e9) return absl::StrFormat("%.3g ms", 1e-6 * ns);
+  return absl::StrFormat("%.3g s", 1e-9 * ns);
+}
+
+std::string RateText(double count, double seconds) {
+  const double rate = seconds > 0 ? count / seconds : 0;
+  if (rate < 1e3) return absl::StrFormat("%.1f", rate);
+  return absl::StrFormat("%.0f", rate);
+}
+
+std::string CodeName(absl::StatusCode code) { return absl::StatusCodeToString(code); }
+
+void PrintHistogram(const LatencyHistogram& latencies, std::ostream& out) {
+  constexpr size_t kWidth = 50;
+  const std::vector<LatencyHistogram::Row> rows = latencies.Rows();
+  uint64_t most = 1;
+  for (const LatencyHistogram::Row& row : rows) most = std::max(most, row.count);
+  for (const LatencyHistogram::Row& row : rows) {
+    // Whatever is there is seen.
+    const size_t length = (row.count * kWidth + most - 1) / most;
+    out << absl::StrFormat("  %7s - %-7s %10u  %s\n", TimeText(row.from), TimeText(row.to),
+                           row.count, std::string(length, '#'));
+  }
+}
+
+void PrintTable(const LoadArguments& arguments, const LoadResult& result, std::ostream& out) {
+  const uint64_t succeeded = result.latencies.count();
+  const double seconds = Seconds(result.elapsed);
+  Table table;
+  table
+      .Row({"requests",
+            absl::StrCat(succeeded + result.failed(), ", of which ", result.failed(), " failed")})
+      .Row({"time", absl::StrFormat("%.2f s", seconds)})
+      .Row({"throughput", RateText(static_cast<double>(succeeded), seconds) + " requests/s"});
+  if (arguments.settings.mode != LoadMode::kCheck) {
+    table.Row({"", RateText(static_cast<double>(result.items), seconds) + " " +
+                       ItemName(arguments.settings.mode) + "/s"});
+  }
+  if (result.missed > 0) {
+    table.Row({"missed", absl::StrCat(result.missed,
+                                      " requests were due but never sent: the rate "
+                                      "was not kept")});
+  }
+  for (size_t i = 0; succeeded > 0 && i < std::size(kPercentiles); ++i) {
+    table.Row({absl::StrCat("latency ", kPercentileNames[i]),
+               TimeText(result.latencies.Percentile(kPercentiles[i]))});
+  }
+  if (succeeded > 0) table.Row({"latency max", TimeText(result.latencies.max())});
+  for (const auto& [code, failures] : result.failures) {
+    table.Row({CodeName(code), absl::StrCat(failures.count, ", such as: ", failures.message)});
+  }
+  table.Print(out);
+  if (succeeded == 0) return;
+  out << "\n";
+  PrintHistogram(result.latencies, out);
+}
+
+std::string Number(double value) { return ShortestText(value); }
+
+std::string JsonArray(const std::vector<std::string>& elements) {
+  std::string text = "[";
+  for (const std::string& element : elements) {
+    if (text.size() > 1) text += ",";
+    text += element;
+  }
+  return text + "]";
+}
+
+void PrintJson(const LoadArguments& arguments, const std::string& mode, bool interrupted,
+               const LoadResult& result, std::ostream& out) {
+  const double seconds = Seconds(result.elapsed);
+  JsonObject latency;
+  for (size_t i = 0; i < std::size(kPercentiles); ++i) {
+    latency.AddJson(kPercentileNames[i],
+                    Number(Seconds(result.latencies.Percentile(kPercentiles[i]))));
+  }
+  latency.AddJson("max", Number(Seconds(result.latencies.max())));
+  std::vector<std::string> rows;
+  for (const LatencyHistogram::Row& row : result.latencies.Rows()) {
+    rows.push_back(JsonObject()
+                       .AddJson("fromSeconds", Number(Seconds(row.from)))
+                       .AddJson("toSeconds", Number(Seconds(row.to)))
+                       .Add("count", row.count)
+                       .Close());
+  }
+  std::vector<std::string> failures;
+  for (const auto& [code, failure] : result.failures) {
+    failures.push_back(JsonObject()
+                           .Add("code", CodeName(code))
+                           .Add("count", failure.count)
+                           .Add("message", failure.message)
+                           .Close());
+  }
+  const auto succeeded = static_cast<double>(result.latencies.count());
+  out << JsonObject()
+             .Add("mode", mode)
+             .Add("clients", static_cast<uint64_t>(arguments.settings.clients))
+             .AddJson("ratePerSecond", arguments.plan.rate ? Number(*arguments.plan.rate) : "null")
+             .AddJson("interrupted", interrupted ? "true" : "false")
+             .AddJson("seconds", Number(seconds))
+             .Add("succeeded", result.latencies.count())
+             .Add("failed", result.failed())
+             .Add("missed", result.missed)
+             .AddJson("requestsPerSecond", Number(seconds > 0 ? succeeded / seconds : 0))
+             .Add("item", ItemName(arguments.settings.mode))
+             .AddJson("itemsPerSecond",
+                      Number(seconds > 0 ? static_cast<double>(result.items) / seconds : 0))
+             .AddJson("latencySeconds", latency.Close())
+             .AddJson("histogram", JsonArray(rows))
+             .AddJson("errors", JsonArray(failures))
+             .Close()
+      << "\n";
+}
+
+std::string ModeName(LoadMode mode) {
+  for (const auto& [name, value] : ModeNames()) {
+    if (value == mode) return name;
+  }
+  return "";
+}
+
+LoadResult Drive(const Invocation& run, const LoadArguments& arguments, LoadSubjects* subjects) {
+  ProgressBar bar(run.err, isatty(STDERR_FILENO) != 0, 0);
+  return RunLoad(arguments.plan, subjects->MakeClients(), InterruptWatch::interrupted(),
+                 [&bar](double share, uint64_t requests) {
+                   bar.Show(absl::StrCat(BarText(share), requests, " requests"));
+                 });
+}
+
+// What ends a load whose requests failed.
+ExitCode CodeOf(const LoadResult& result) {
+  if (result.failures.empty()) return ExitCode::kDone;
+  if (result.latencies.count() > 0) return ExitCode::kSomeFailed;
+  const absl::StatusCode code = result.failures.begin()->first;
+  const bool unreachable =
+      result.failures.size() == 1 &&
+      (code == absl::StatusCode::kUnavailable || code == absl::StatusCode::kDeadlineExceeded);
+  return unreachable ? ExitCode::kUnreachable : ExitCode::kRequestFailed;
+}
+
+ExitCode Load(const Invocation& run, LoadArguments arguments) {
+  const InterruptWatch watch;
+  if (!arguments.plan.duration && !arguments.plan.requests)
+    arguments.plan.duration = kDefaultDuration;
+  std::string& prefix = arguments.settings.prefix;
+  if (prefix.empty()) prefix = absl::StrCat("bench-load/", RandomName(), "/");
+  if (prefix.back() != '/') prefix += "/";
+  // A load shows what happens to each request: nothing is retried.
+  ClientOptions connection = run.MakeClient().options();
+  connection.retry.max_attempts = 1;
+  connection.own_connection = true;
+  LoadSubjects subjects(arguments.settings, connection);
+  const absl::Status created = subjects.Create(InterruptWatch::interrupted());
+  LoadResult result;
+  if (created.ok()) result = Drive(run, arguments, &subjects);
+  const bool interrupted = InterruptWatch::interrupted();
+  const absl::Status deleted = subjects.Delete();
+  if (created.ok() && run.json) {
+    PrintJson(arguments, ModeName(arguments.settings.mode), interrupted, result, run.out);
+  } else if (created.ok()) {
+    PrintTable(arguments, result, run.out);
+  }
+  if (!deleted.ok()) {
+    run.err << "hullctl: hulls of the load may be left: see 'hullctl list " << prefix << "'\n";
+    return run.Fail(deleted);
+  }
+  if (!created.ok() && !interrupted) return run.Fail(created);
+  if (interrupted) run.err << "hullctl: interrupted; the hulls of the load are deleted\n";
+  return CodeOf(result);
+}
+
+void AddPlanOptions(CLI::App* command, LoadPlan* plan) {
+  command
+      ->add_option_function<std::string>(
+          "--duration",
+          [plan](const std::string& text) {
+            const auto duration = ParseDuration(text);
+            if (!duration.ok()) {
+              throw CLI::ValidationError("--duration", std::string(duration.status().message()));
+            }
+            plan->duration = *duration;
+          },
+          "How long, such as 30s (default 10s, unless --requests is given)")
+      ->type_name("TIME");
+  AddNumberOption(command, "--requests", 1, uint64_t{1} << 40,
+                  "How many requests, of all clients together",
+                  [plan](uint64_t number) { plan->requests = number; });
+  command
+      ->add_option_function<std::string>(
+          "--rate",
+          [plan](const std::string& text) {
+            double rate = 0;
+            if (ParseDouble(text, &rate) != NumberText::kNumber || !(rate >= 0.01 && rate <= 1e7)) {
+              throw CLI::ValidationError(
+                  "--rate", Quoted(text) + " is not a number of requests a second, 0.01 to 1e7");
+            }
+            plan->rate = rate;
+          },
+          "Requests a second, of all clients together (default: as fast as they are answered)")
+      ->type_name("R");
+}
+
+void AddSettingOptions(CLI::App* command, LoadSettings* settings) {
+  std::vector<std::string> names;
+  for (const auto& [name, mode] : ModeNames()) names.push_back(name);
+  command
+      ->add_option_function<std::string>(
+          "--mode", [settings](const std::string& name) { settings->mode = ModeNames().at(name); },
+          "check (default), batch, append, or mixed: of ten requests eight, one and one")
+      ->check(CLI::IsMember(names))
+      ->type_name("MODE");
+  AddNumberOption(command, "--clients", 1, 1000, "Clients, each with a connection (default 1)",
+                  [settings](uint64_t number) { settings->clients = static_cast<int>(number); });
+  AddNumberOption(command, "--hulls", 1, 10000, "Hulls to ask about (default 16)",
+                  [settings](uint64_t number) { settings->hulls = number; });
+  AddNumberOption(command, "--vertices", 1, 100000, "Vertices of each, on a sphere (default 64)",
+                  [settings](uint64_t number) { settings->vertices = number; });
+  AddNumberOption(command, "--pairs", 1, 1000000, "Pairs of a batch (default 10000)",
+                  [settings](uint64_t number) { settings->pairs = number; });
+  AddNumberOption(command, "--points", 1, 160000, "Points of an append, in a ball (default 10000)",
+                  [settings](uint64_t number) { settings->points = number; });
+  command
+      ->add_option("--prefix", settings->prefix,
+                   "Of the hulls it creates and deletes (default bench-load/RANDOM/)")
+      ->type_name("PREFIX");
+}
+
+}  // namespace
+
+void AddBenchCommand(CLI::App* app, Invocation* invocation) {
+  CLI::App* bench = app->add_subcommand("bench", "Measure a running server");
+  bench->require_subcommand(1);
+  auto arguments = std::make_shared<LoadArguments>();
+  CLI::App* load = bench->add_subcommand(
+      "load", "Ask as many clients would; show throughput, latencies and errors");
+  load->fallthrough();
+  AddSettingOptions(load, &arguments->settings);
+  AddPlanOptions(load, &arguments->plan);
+  load->add_flag_callback(
+      "--json", [invocation] { invocation->json = true; }, "The same as --output json");
+  load->footer(
+      "Creates hulls of its own and deletes them at the end, also after Ctrl-C.\n"
+      "Without --rate each client asks again when it is answered. With --rate requests are due at\n"
+      "fixed times and latencies count from then, so that waiting behind a slow one is not "
+      "hidden.\n"
+      "Nothing is retried; latencies are those of requests that succeeded.");
+  load->callback([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

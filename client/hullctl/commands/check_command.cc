@@ -1,0 +1,173 @@
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/query_options.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/answer_text.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+#include "client/verify/answer_check.h"
+
+namespace hulld {
+namespace {
+
+struct CheckArguments {
+  v1::CheckCollisionRequest request;
+  QueryWishes wishes;
+};
+
+std::string VersionText(const v1::HullVersion& hull) {
+  return hull.hull_id() + "  (revision " + std::to_string(hull.revision()) + ")";
+}
+
+std::string FeatureText(const v1::Feature& feature) {
+  constexpr int kShown = 8;
+  std::string text = feature.vertex_indices_size() == 1 ? "vertex" : "vertices";
+  for (int i = 0; i < feature.vertex_indices_size() && i < kShown; ++i) {
+    text += " " + std::to_string(feature.vertex_indices(i));
+  }
+  if (feature.vertex_indices_size() > kShown) {
+    text += " ... (" + std::to_string(feature.vertex_indices_size()) + " in all)";
+  }
+  if (feature.has_facet_index()) text += ", facet " + std::to_string(feature.facet_index());
+  return text;
+}
+
+void AddAnalysis(const v1::Analysis& analysis, Table* table) {
+  std::string axes = std::to_string(analysis.axes_tested());
+  if (analysis.axes_total() > 0) axes += " of " + std::to_string(analysis.axes_total());
+  table->Row({"time", DurationText(analysis.time())})
+      .Row({"size of A", HullSizeText(analysis.size_a())})
+      .Row({"size of B", HullSizeText(analysis.size_b())})
+      .Row({"axes tested", axes})
+      .Row({"found at", StageText(analysis)});
+}
+
+void AddAxis(const v1::CheckCollisionResponse& response, Table* table) {
+  if (!response.has_axis()) {
+    table->Row({"axis", "none separates or touches"});
+    return;
+  }
+  const v1::Axis& axis = response.axis();
+  table->Row({"axis", DirectionText(axis.direction()) + "  (" + AxisKindText(axis.kind()) + ")"})
+      .Row({"A reaches", FeatureText(axis.feature_a())})
+      .Row({"B reaches", FeatureText(axis.feature_b())});
+}
+
+void AddMeasures(const v1::CheckCollisionRequest& request,
+                 const v1::CheckCollisionResponse& response, Table* table) {
+  if (response.has_separation()) {
+    table->Row({"separation", SeparationText(response.separation())});
+  }
+  if (response.has_witness()) {
+    const v1::Witness& witness = response.witness();
+    table->Row({"point of A", DirectionText(witness.point_a())})
+        .Row({"point of B", DirectionText(witness.point_b())})
+        .Row({"points within", ShortestText(witness.error())});
+  }
+  if (response.has_within_clearance()) {
+    const std::string clearance = ShortestText(request.wanted().clearance());
+    table->Row({"clearance", (response.within_clearance() ? "within " : "more than ") + clearance});
+  }
+}
+
+void PrintTable(const v1::CheckCollisionRequest& request,
+                const v1::CheckCollisionResponse& response, const Verification* verification,
+                std::ostream& out) {
+  Table table;
+  table.Row({"relation", RelationText(response.relation())})
+      .Row({"A", VersionText(response.hull_a())})
+      .Row({"B", VersionText(response.hull_b())})
+      .Row({"decided by", RungText(response.rung())});
+  AddMeasures(request, response, &table);
+  if (request.wanted().axis()) AddAxis(response, &table);
+  if (request.wanted().certificate()) {
+    table.Row({"certificate", CertificateText(response.certificate())});
+  }
+  if (verification != nullptr) table.Row({"verified", VerificationText(*verification)});
+  if (response.has_analysis()) {
+    const bool textbook = request.method() == v1::METHOD_TEXTBOOK_SAT;
+    table.Row({"method", textbook ? "textbook SAT" : "certified search"});
+    AddAnalysis(response.analysis(), &table);
+  }
+  table.Print(out);
+}
+
+// A certificate comes with the question, so that `hullctl verify` has all it needs.
+std::string ResponseJson(const v1::CheckCollisionRequest& request,
+                         const v1::CheckCollisionResponse& response,
+                         const Verification* verification) {
+  const std::string json = MessageJson(response);
+  if (!request.wanted().certificate()) return json;
+  JsonObject object;
+  object.AddJson("request", MessageJson(request));
+  if (verification != nullptr) object.AddJson("verification", VerificationJson(*verification));
+  const std::string front = object.Close();
+  return front.substr(0, front.size() - 1) + "," + json.substr(1);
+}
+
+ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
+  v1::CheckCollisionRequest request = arguments.request;
+  *request.mutable_wanted() = arguments.wishes.wanted;
+  request.set_method(arguments.wishes.method);
+  request.set_tolerance(arguments.wishes.tolerance);
+  const Client client = run.MakeClient();
+  VerifiedResponse answer;
+  const Verification* const verification = arguments.wishes.verify ? &answer.verification : nullptr;
+  if (verification != nullptr) {
+    auto verified = CheckCollisionVerified(client, request);
+    if (!verified.ok()) return run.Fail(verified.status());
+    answer = *std::move(verified);
+  } else {
+    auto response = client.CheckCollision(request);
+    if (!response.ok()) return run.Fail(response.status());
+    answer.response = *std::move(response);
+  }
+  if (run.json) {
+    run.out << ResponseJson(request, answer.response, verification) << "\n";
+  } else {
+    PrintTable(request, answer.response, verification, run.out);
+  }
+  return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
+}
+
+void AddPoseOption(CLI::App* command, const std::string& name, v1::Placement* placement) {
+  command
+      ->add_option_function<std::string>(
+          name,
+          [name, placement](const std::string& text) {
+            const auto pose = ParsePose(text);
+            if (!pose.ok()) {
+              throw CLI::ValidationError(name, std::string(pose.status().message().data(),
+                                                           pose.status().message().size()));
+            }
+            *placement->mutable_pose() = *pose;
+          },
+          "Where it stands: quaternion and translation, or translation alone (default: as built)")
+      ->type_name("[w,x,y,z,]tx,ty,tz");
+}
+
+}  // namespace
+
+void AddCheckCommand(CLI::App* app, Invocation* invocation) {
+  auto arguments = std::make_shared<CheckArguments>();
+  v1::CheckCollisionRequest* const request = &arguments->request;
+  CLI::App* command = app->add_subcommand("check", "Ask whether two hulls collide");
+  command->add_option("A", *request->mutable_a()->mutable_hull_id(), "Name of a hull")->required();
+  command->add_option("B", *request->mutable_b()->mutable_hull_id(), "Name of a hull")->required();
+  AddPoseOption(command, "--pose-a", request->mutable_a());
+  AddPoseOption(command, "--pose-b", request->mutable_b());
+  AddQueryOptions(command, &arguments->wishes);
+  command->footer(
+      "Lengths are in the unit of the points. For example:\n"
+      "  hullctl check arm box --pose-b 0.2,0,0 --separation --witness\n"
+      "  hullctl check arm box --clearance 0.01\n"
+      "  hullctl check arm box --verify\n"
+      "  hullctl check arm box --certificate --output json > answer.json; hullctl verify "
+      "answer.json");
+  command->callback([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

@@ -1,0 +1,116 @@
+#include <absl/strings/str_cat.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/number_option.h"
+#include "client/hullctl/command_line/output_file.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/load/point_generator.h"
+
+namespace hulld {
+namespace {
+
+struct GenerateArguments {
+  std::string shape;
+  CloudOptions cloud;
+  std::string file;
+};
+
+const std::map<std::string, Shape>& ShapeNames() {
+  static const auto* const names = new std::map<std::string, Shape>{{"ball", Shape::kBall},
+                                                                    {"sphere", Shape::kSphere},
+                                                                    {"cube", Shape::kCube},
+                                                                    {"lattice", Shape::kLattice}};
+  return *names;
+}
+
+// True when every coordinate that can come is finite.
+bool IsFinite(const CloudOptions& cloud) {
+  const bool round = cloud.shape == Shape::kBall || cloud.shape == Shape::kSphere;
+  double reach = round ? cloud.radius : cloud.size / 2;
+  if (cloud.shape == Shape::kLattice) {
+    reach = cloud.size * static_cast<double>(LatticeSide(cloud.count));
+  }
+  for (const double center : cloud.center) {
+    if (!std::isfinite(std::abs(center) + reach)) return false;
+  }
+  return true;
+}
+
+ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
+  CloudOptions cloud = arguments.cloud;
+  cloud.shape = ShapeNames().at(arguments.shape);
+  if (!IsFinite(cloud)) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "some points would lie beyond the largest double; choose a smaller --radius, --size or "
+        "--center"));
+  }
+  const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
+    GenerateCloud(cloud, [&out](const std::array<double, 3>& p) {
+      out << ShortestText(p[0]) << ' ' << ShortestText(p[1]) << ' ' << ShortestText(p[2]) << '\n';
+    });
+  });
+  return written.ok() ? ExitCode::kDone : run.FailUsage(written);
+}
+
+void AddLengthOption(CLI::App* command, const char* name, double* length, const char* help) {
+  command
+      ->add_option_function<std::string>(
+          name,
+          [name, length](const std::string& text) {
+            if (ParseDouble(text, length) != NumberText::kNumber || !(*length >= 0) ||
+                !std::isfinite(*length)) {
+              throw CLI::ValidationError(name, Quoted(text) + " is not a length");
+            }
+          },
+          help)
+      ->type_name("LENGTH");
+}
+
+}  // namespace
+
+void AddGenerateCommand(CLI::App* app, Invocation* invocation) {
+  auto arguments = std::make_shared<GenerateArguments>();
+  CloudOptions* const cloud = &arguments->cloud;
+  CLI::App* command = app->add_subcommand("generate", "Write points as XYZ text; needs no server");
+  std::vector<std::string> names;
+  for (const auto& [name, shape] : ShapeNames()) names.push_back(name);
+  command->add_option("SHAPE", arguments->shape, "ball, sphere, cube or lattice")
+      ->required()
+      ->check(CLI::IsMember(names));
+  AddNumberOption(command, "N", 0, uint64_t{1} << 40, "How many points", [cloud](uint64_t number) {
+    cloud->count = number;
+  })->required();
+  AddNumberOption(command, "--seed", 0, kAnyNumber, "Another seed, other points (default 1)",
+                  [cloud](uint64_t number) { cloud->seed = number; });
+  AddLengthOption(command, "--radius", &cloud->radius, "Of ball and sphere (default 1)");
+  AddLengthOption(command, "--size", &cloud->size,
+                  "Edge of the cube, or step of the lattice (default 1)");
+  command
+      ->add_option_function<std::string>(
+          "--center",
+          [cloud](const std::string& text) {
+            const auto center = ParseTriple(text);
+            if (!center.ok()) {
+              throw CLI::ValidationError("--center", std::string(center.status().message().data(),
+                                                                 center.status().message().size()));
+            }
+            cloud->center = *center;
+          },
+          "Centre; of the lattice its first point (default 0,0,0)")
+      ->type_name("x,y,z");
+  command->add_option("-o,--out", arguments->file, "File to write (default: standard output)")
+      ->type_name("FILE");
+  command->footer(
+      "The same options give the same bytes on every machine. A lattice of N points is the first\n"
+      "N of the smallest cube of k*k*k points; take N = k*k*k for a whole one.");
+  command->callback(
+      [=] { invocation->action = [=] { return Generate(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

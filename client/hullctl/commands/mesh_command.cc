@@ -1,0 +1,73 @@
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/number_option.h"
+#include "client/hullctl/command_line/output_file.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/mesh_obj.h"
+
+namespace hulld {
+namespace {
+
+struct MeshArguments {
+  std::string hull_id;
+  std::string file;
+  uint64_t max_vertices = 0;
+  double max_error = 0;
+  bool outside = false;
+};
+
+v1::GetHullMeshRequest RequestFor(const MeshArguments& arguments) {
+  v1::GetHullMeshRequest request;
+  request.set_hull_id(arguments.hull_id);
+  if (arguments.max_vertices == 0 && arguments.max_error == 0) return request;
+  v1::Simplification* simplification = request.mutable_simplification();
+  simplification->set_side(arguments.outside ? v1::SIMPLIFICATION_SIDE_OUTSIDE
+                                             : v1::SIMPLIFICATION_SIDE_INSIDE);
+  simplification->set_max_vertices(arguments.max_vertices);
+  simplification->set_max_error(arguments.max_error);
+  return request;
+}
+
+ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
+  if (arguments.outside && arguments.max_vertices == 0 && arguments.max_error == 0) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--outside says how to simplify; give --max-vertices, --max-error or both as well"));
+  }
+  const auto mesh = run.MakeClient().GetHullMesh(RequestFor(arguments));
+  if (!mesh.ok()) return run.Fail(mesh.status());
+  const absl::Status written =
+      WriteOutput(arguments.file, run.out, [&](std::ostream& out) { WriteObj(*mesh, out); });
+  if (!written.ok()) return run.FailUsage(written);
+  if (!arguments.file.empty() && arguments.file != "-") {
+    run.err << arguments.file << ": " << mesh->vertex_count() << " vertices, "
+            << mesh->facet_sizes.size() << " facets of " << arguments.hull_id << " at revision "
+            << mesh->header.hull().revision() << ErrorText(*mesh) << "\n";
+  }
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddMeshCommand(CLI::App* app, Invocation* invocation) {
+  auto arguments = std::make_shared<MeshArguments>();
+  CLI::App* command = app->add_subcommand("mesh", "Write a hull as OBJ");
+  command->add_option("ID", arguments->hull_id, "Name of the hull")->required();
+  command->add_option("-o,--out", arguments->file, "File to write (default: standard output)")
+      ->type_name("FILE");
+  AddNumberOption(command, "--max-vertices", 1, kAnyNumber, "Simplify to at most so many vertices",
+                  [arguments](uint64_t number) { arguments->max_vertices = number; });
+  command
+      ->add_option("--max-error", arguments->max_error,
+                   "Simplify while the proven distance to the hull stays within this length")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--outside", arguments->outside,
+                    "Simplify to a hull that encloses this one, instead of one inside it");
+  command->footer(
+      "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
+      "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.");
+  command->callback([=] { invocation->action = [=] { return Mesh(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

@@ -1,0 +1,97 @@
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+
+#include "client/hullctl/command_line/number_option.h"
+#include "client/hullctl/command_line/point_input.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+struct ReplaceArguments {
+  std::string hull_id;
+  PointInput input;
+  bool create = false;
+  std::optional<uint64_t> if_revision;
+};
+
+void Print(const Invocation& run, const v1::ReplaceHullResponse& response) {
+  if (run.json) {
+    run.out << MessageJson(response) << "\n";
+    return;
+  }
+  const v1::HullInfo& hull = response.hull();
+  Table table;
+  table.Row({"hull", hull.hull_id() + (response.created() ? " created" : " replaced")})
+      .Row({"points", std::to_string(hull.counts().received())})
+      .Row({"vertices", std::to_string(hull.vertex_count())})
+      .Row({"revision", std::to_string(hull.revision())});
+  table.Print(run.out);
+}
+
+ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
+  uint64_t total_bytes = 0;
+  auto plan = PlanReads(arguments.input, &total_bytes);
+  if (!plan.ok()) return run.FailUsage(plan.status());
+  v1::ReplaceOpen open;
+  open.set_hull_id(arguments.hull_id);
+  open.set_create_if_absent(arguments.create);
+  if (arguments.if_revision.has_value()) open.set_if_revision(*arguments.if_revision);
+  ProgressBar bar(run.err, isatty(STDERR_FILENO) != 0, total_bytes);
+  // A file that cannot be read ends the call, and the hull stays as it was.
+  absl::Status file_error;
+  const auto feed = [&](const Client::PointSink& sink) {
+    uint64_t bytes_before = 0;
+    uint64_t points = 0;
+    for (ReadRequest& request : *plan) {
+      uint64_t file_bytes = 0;
+      absl::Status stream;
+      request.progress = [&](uint64_t bytes) {
+        file_bytes = bytes;
+        bar.Update(bytes_before + bytes, points);
+      };
+      const auto counts = ReadPoints(request, [&](const PointBlock& block) {
+        points += block.size();
+        stream = sink(ToProto(block));
+        return stream;
+      });
+      bytes_before += file_bytes;
+      if (!stream.ok()) return stream;
+      if (!counts.ok()) return file_error = counts.status();
+    }
+    return absl::OkStatus();
+  };
+  const auto response = run.MakeClient().ReplaceHull(open, feed, run.given_timeout);
+  bar.Clear();
+  if (!file_error.ok()) return run.FailUsage(file_error);
+  if (!response.ok()) return run.Fail(response.status());
+  Print(run, *response);
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddReplaceCommand(CLI::App* app, Invocation* invocation) {
+  auto arguments = std::make_shared<ReplaceArguments>();
+  CLI::App* command = app->add_subcommand(
+      "replace", "Put a hull of the points of files in the place of another, all at once");
+  command->add_option("ID", arguments->hull_id, "Name of the hull")->required();
+  AddPointInput(command, &arguments->input);
+  command->add_flag("--create", arguments->create, "Create the hull when it does not exist");
+  AddNumberOption(command, "--if-revision", 0, std::numeric_limits<uint64_t>::max(),
+                  "Only if the hull is at this revision; 0: only if it does not exist",
+                  [arguments](uint64_t number) { arguments->if_revision = number; });
+  command->footer(
+      "However long that takes, unless --timeout is given, which then bounds all of it. A call "
+      "that\n"
+      "ends early leaves the hull as it was, or, when all points were sent, may have replaced it.");
+  command->callback([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

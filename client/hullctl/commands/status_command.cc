@@ -1,0 +1,77 @@
+#include <CLI/CLI.hpp>
+
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/answer_text.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+std::string UptimeText(const google::protobuf::Duration& uptime) {
+  const int64_t seconds = uptime.seconds();
+  if (seconds < 60) return std::to_string(seconds) + " s";
+  if (seconds < 3600) return std::to_string(seconds / 60) + " min";
+  return std::to_string(seconds / 3600) + " h " + std::to_string(seconds / 60 % 60) + " min";
+}
+
+void Print(const v1::GetStatusResponse& status, const std::string& server, const char* health,
+           std::ostream& out) {
+  const v1::Limits& limits = status.limits();
+  Table table;
+  table.Row({"server", server})
+      .Row({"health", health})
+      .Row({"version", status.version()})
+      .Row({"uptime", UptimeText(status.uptime())})
+      .Row({"store", status.store_kind() + "  " + status.header().store_id()})
+      .Row({"revision", std::to_string(status.header().revision())})
+      .Row({"hulls", status.has_hull_count() ? std::to_string(status.hull_count()) : "-"})
+      .Row({"vertices", status.has_vertex_count() ? std::to_string(status.vertex_count()) : "-"})
+      .Row({"max points per chunk", std::to_string(limits.max_points_per_chunk())})
+      .Row({"max vertices per hull", std::to_string(limits.max_vertices_per_hull())})
+      .Row({"max hulls", std::to_string(limits.max_hulls())})
+      .Row({"max pairs per batch", std::to_string(limits.max_pairs_per_batch())})
+      .Row({"max textbook axes", std::to_string(limits.max_textbook_axes())});
+  table.Print(out);
+}
+
+ExitCode Status(const Invocation& run) {
+  const Client client = run.MakeClient();
+  const auto status = client.GetStatus();
+  if (!status.ok()) return run.Fail(status.status());
+  const absl::Status health = client.CheckHealth();
+  // A server without the health service is healthy when it answers at all.
+  const bool serving = health.ok() || absl::IsUnimplemented(health);
+  const char* const text = health.ok() ? "SERVING" : serving ? "UNKNOWN" : "NOT_SERVING";
+  if (run.json) {
+    run.out << JsonObject().Add("health", text).AddJson("status", MessageJson(*status)).Close()
+            << "\n";
+  } else {
+    Print(*status, run.server, text, run.out);
+  }
+  if (serving) return ExitCode::kDone;
+  return run.Fail(health);
+}
+
+ExitCode Health(const Invocation& run) {
+  const absl::Status health = run.MakeClient().CheckHealth();
+  if (!health.ok()) return run.Fail(health);
+  run.out << "SERVING\n";
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddStatusCommand(CLI::App* app, Invocation* invocation) {
+  CLI::App* command =
+      app->add_subcommand("status", "Show what the server is and whether it is serving");
+  command->footer("Exits with 0 only when the server answers and is serving.");
+  command->callback([=] { invocation->action = [=] { return Status(*invocation); }; });
+
+  CLI::App* health =
+      app->add_subcommand("health", "Ask whether the server is serving; needs no token");
+  health->footer("Exits with 0 only when it is.");
+  health->callback([=] { invocation->action = [=] { return Health(*invocation); }; });
+}
+
+}  // namespace hulld

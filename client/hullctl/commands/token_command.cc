@@ -1,0 +1,130 @@
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <openssl/sha.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+struct TokenArguments {
+  std::string name;
+  std::string role;
+  std::string prefix;
+  std::string file;
+};
+
+// As hulld's file of tokens holds it.
+std::string HashText(const std::string& token) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> hash = {};
+  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash.data());
+  return absl::StrCat("sha256:", absl::BytesToHexString(absl::string_view(
+                                     reinterpret_cast<const char*>(hash.data()), hash.size())));
+}
+
+// 256 random bits, so that a plain hash of them gives nothing away.
+absl::StatusOr<std::string> RandomToken() {
+  std::array<char, 32> bytes = {};
+  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
+    return absl::InternalError("the system gives no random bytes");
+  }
+  return absl::StrCat("hulld_",
+                      absl::WebSafeBase64Escape(absl::string_view(bytes.data(), bytes.size())));
+}
+
+// A new file, so that no token is overwritten and nobody has it open already.
+absl::Status WriteTokenFile(const std::string& path, const std::string& token) {
+  const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (fd < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--token-out ", path, ": ", std::strerror(errno)));
+  }
+  const std::string line = token + "\n";
+  const bool written = write(fd, line.data(), line.size()) == static_cast<ssize_t>(line.size());
+  if (close(fd) == 0 && written) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("--token-out ", path, ": cannot be written"));
+}
+
+ExitCode NewToken(const Invocation& run, const TokenArguments& arguments) {
+  const absl::StatusOr<std::string> token = RandomToken();
+  if (!token.ok()) return run.FailUsage(token.status());
+  const std::string line =
+      absl::StrCat(arguments.name, " ", arguments.role, " ",
+                   arguments.prefix.empty() ? "*" : arguments.prefix, " ", HashText(*token));
+  if (!arguments.file.empty()) {
+    const absl::Status written = WriteTokenFile(arguments.file, *token);
+    if (!written.ok()) return run.FailUsage(written);
+    run.out << line << "\n";
+  } else if (run.json) {
+    run.out << JsonObject().Add("token", *token).Add("line", line).Close() << "\n";
+  } else {
+    Table().Row({"token", *token}).Row({"line", line}).Print(run.out);
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode HashToken(const Invocation& run) {
+  std::string token;
+  if (!(std::cin >> token)) {
+    return run.FailUsage(absl::InvalidArgumentError("standard input holds no token"));
+  }
+  run.out << HashText(token) << "\n";
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddTokenCommand(CLI::App* app, Invocation* invocation) {
+  CLI::App* const command =
+      app->add_subcommand("token", "Make a token and its line for hulld's --tokens-file");
+  command->require_subcommand(1);
+  const auto arguments = std::make_shared<TokenArguments>();
+  CLI::App* const make = command->add_subcommand("new", "Make a random token");
+  make->add_option("name", arguments->name, "Whose it is; the server's messages say it")
+      ->required()
+      ->check(CLI::Validator(
+          [](const std::string& name) -> std::string {
+            const bool valid = name.size() <= 64 && !name.empty() && std::isalnum(name[0]) != 0 &&
+                               name.find_first_not_of(
+                                   "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+                                   "0123456789._-") == std::string::npos;
+            return valid ? "" : "not up to 64 of [A-Za-z0-9._-] that start with a letter or digit";
+          },
+          "NAME"));
+  make->add_option("--role", arguments->role, "What it allows")
+      ->required()
+      ->check(CLI::IsMember({"read-only", "read-write", "admin"}));
+  make->add_option("--prefix", arguments->prefix,
+                   "What the IDs that it sees start with, ending in \"/\" (default: all)")
+      ->check(CLI::Validator(
+          [](const std::string& prefix) -> std::string {
+            const bool valid = prefix.size() > 1 && prefix.back() == '/' &&
+                               prefix.find_first_of(" \t") == std::string::npos;
+            return valid ? "" : "a prefix ends in \"/\", as in cell-1/";
+          },
+          "PREFIX"));
+  make->add_option("--token-out", arguments->file,
+                   "Write the token to this new file, which only you can read, and print only the "
+                   "line")
+      ->type_name("FILE");
+  make->callback([=] { invocation->action = [=] { return NewToken(*invocation, *arguments); }; });
+  CLI::App* const hash =
+      command->add_subcommand("hash", "Print the hash of a token read from standard input");
+  hash->callback([=] { invocation->action = [=] { return HashToken(*invocation); }; });
+  for (CLI::App* part : {make, hash}) part->fallthrough();
+}
+
+}  // namespace hulld

@@ -1,0 +1,195 @@
+#include "client/hullctl/load/load_subjects.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+#include <utility>
+
+#include "client/hullctl/load/point_generator.h"
+
+namespace hulld {
+namespace {
+
+// Distinct requests that a client takes in turn, made before the clock starts.
+constexpr size_t kDistinctRequests = 256;
+// Placements of one batch, at most: a scene whose parts meet again and again.
+constexpr uint64_t kMostPlacements = 256;
+// Half the edge of the cube that hulls of radius 1 are placed in: about one pair in three collides.
+constexpr double kHalfRoom = 1.3;
+
+v1::PointBlock MakePoints(Shape shape, uint64_t count, uint64_t seed) {
+  CloudOptions cloud;
+  cloud.shape = shape;
+  cloud.count = count;
+  cloud.seed = seed;
+  v1::PointBlock block;
+  block.mutable_xyz()->Reserve(static_cast<int>(3 * count));
+  GenerateCloud(cloud, [&block](const std::array<double, 3>& p) {
+    block.mutable_xyz()->Add(p.begin(), p.end());
+  });
+  return block;
+}
+
+void FillPlacement(const std::string& hull_id, Xoshiro256& random, v1::Placement* placement) {
+  placement->set_hull_id(hull_id);
+  v1::Quaternion* const q = placement->mutable_pose()->mutable_rotation();
+  q->set_w(1.5 + random.NextSigned());  // never zero
+  q->set_x(random.NextSigned());
+  q->set_y(random.NextSigned());
+  q->set_z(random.NextSigned());
+  v1::Vector3* const t = placement->mutable_pose()->mutable_translation();
+  t->set_x(kHalfRoom * random.NextSigned());
+  t->set_y(kHalfRoom * random.NextSigned());
+  t->set_z(kHalfRoom * random.NextSigned());
+}
+
+}  // namespace
+
+// One client: its connection, its requests, its stream.
+class LoadSubjects::LoadClient {
+ public:
+  LoadClient(const LoadSubjects& subjects, int index)
+      : settings_(subjects.settings_),
+        client_(subjects.connection_),
+        append_id_(absl::StrCat(settings_.prefix, "append-", index)),
+        random_(static_cast<uint64_t>(index) + 1) {
+    const auto hull = [&] { return subjects.HullId(random_.Next() % settings_.hulls); };
+    if (Asks(LoadMode::kCheck)) {
+      for (v1::CheckCollisionRequest& request : checks_) {
+        FillPlacement(hull(), random_, request.mutable_a());
+        FillPlacement(hull(), random_, request.mutable_b());
+      }
+    }
+    if (Asks(LoadMode::kBatch)) {
+      const uint64_t placements = std::min(kMostPlacements, 2 * settings_.pairs);
+      for (uint64_t i = 0; i < placements; ++i) {
+        FillPlacement(hull(), random_, batch_.add_placements());
+      }
+      for (uint64_t i = 0; i < 2 * settings_.pairs; ++i) {
+        batch_.add_pairs(static_cast<uint32_t>(random_.Next() % placements));
+      }
+    }
+    if (Asks(LoadMode::kAppend)) {
+      points_ = MakePoints(Shape::kBall, settings_.points, static_cast<uint64_t>(index) + 1);
+    }
+  }
+
+  absl::StatusOr<uint64_t> Ask(uint64_t i) {
+    switch (settings_.mode) {
+      case LoadMode::kCheck:
+        return Check(i);
+      case LoadMode::kBatch:
+        return Batch();
+      case LoadMode::kAppend:
+        return Append();
+      case LoadMode::kMixed:
+        break;
+    }
+    // Of ten requests eight check, one is a batch and one appends.
+    if (i % 10 == 4) return Batch();
+    if (i % 10 == 9) return Append();
+    return Check(i);
+  }
+
+ private:
+  bool Asks(LoadMode mode) const {
+    return settings_.mode == mode || settings_.mode == LoadMode::kMixed;
+  }
+
+  absl::StatusOr<uint64_t> Check(uint64_t i) const {
+    const auto response = client_.CheckCollision(checks_[i % kDistinctRequests]);
+    if (!response.ok()) return response.status();
+    return 1;
+  }
+
+  absl::StatusOr<uint64_t> Batch() const {
+    uint64_t answered = 0;
+    const absl::Status status = client_.BatchCheckCollisions(
+        batch_, [&answered](const v1::BatchCheckCollisionsResponse& part) {
+          answered += static_cast<uint64_t>(part.relations_size());
+          return absl::OkStatus();
+        });
+    if (!status.ok()) return status;
+    return answered;
+  }
+
+  // Waits until the chunk is acknowledged.
+  absl::StatusOr<uint64_t> Append() {
+    absl::Status status;
+    if (appender_ == nullptr) {
+      AppendOptions options;
+      options.create_if_absent = true;
+      options.max_in_flight_chunks = 1;
+      auto opened = client_.OpenAppend(append_id_, options);
+      if (!opened.ok()) return opened.status();
+      appender_ = *std::move(opened);
+    }
+    status = appender_->Append(points_);
+    if (status.ok()) return settings_.points;
+    appender_ = nullptr;
+    return status;
+  }
+
+  const LoadSettings& settings_;
+  const Client client_;
+  const std::string append_id_;
+  Xoshiro256 random_;
+  std::vector<v1::CheckCollisionRequest> checks_{kDistinctRequests};
+  v1::BatchCheckCollisionsRequest batch_;
+  v1::PointBlock points_;
+  std::unique_ptr<Appender> appender_;
+};
+
+LoadSubjects::LoadSubjects(LoadSettings settings, ClientOptions connection)
+    : settings_(std::move(settings)), connection_(std::move(connection)), client_(connection_) {}
+
+std::string LoadSubjects::HullId(uint64_t i) const {
+  return absl::StrCat(settings_.prefix, "hull-", i);
+}
+
+absl::Status LoadSubjects::Create(const std::atomic<bool>& stop) {
+  const auto there = client_.ListAllHulls(settings_.prefix, 1);
+  if (!there.ok()) return there.status();
+  if (there->hulls_size() > 0) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "hull \"", there->hulls(0).hull_id(), "\" is there already, and the load would delete it; ",
+        "choose another --prefix"));
+  }
+  owns_prefix_ = true;
+  if (settings_.mode == LoadMode::kAppend) return absl::OkStatus();
+  for (uint64_t i = 0; i < settings_.hulls; ++i) {
+    if (stop) return absl::CancelledError("interrupted");
+    AppendOptions options;
+    options.create_if_absent = true;
+    auto appender = client_.OpenAppend(HullId(i), options);
+    if (!appender.ok()) return appender.status();
+    absl::Status status =
+        (*appender)->Append(MakePoints(Shape::kSphere, settings_.vertices, i + 1));
+    if (status.ok()) status = (*appender)->Finish();
+    if (!status.ok()) return status;
+  }
+  return absl::OkStatus();
+}
+
+std::vector<LoadRequest> LoadSubjects::MakeClients() {
+  std::vector<LoadRequest> clients;
+  for (int i = 0; i < settings_.clients; ++i) {
+    const auto client = std::make_shared<LoadClient>(*this, i);
+    clients.emplace_back([client](uint64_t request) { return client->Ask(request); });
+  }
+  return clients;
+}
+
+absl::Status LoadSubjects::Delete() {
+  if (!owns_prefix_) return absl::OkStatus();
+  const auto hulls = client_.ListAllHulls(settings_.prefix);
+  absl::Status first = hulls.status();
+  if (!hulls.ok()) return first;
+  for (const v1::HullInfo& hull : hulls->hulls()) {
+    const absl::Status deleted = client_.DeleteHull(hull.hull_id()).status();
+    if (!deleted.ok() && !absl::IsNotFound(deleted)) first.Update(deleted);
+  }
+  return first;
+}
+
+}  // namespace hulld

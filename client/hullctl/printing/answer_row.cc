@@ -1,0 +1,104 @@
+#include "client/hullctl/printing/answer_row.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <vector>
+
+#include "client/hullctl/printing/answer_text.h"
+
+namespace hulld {
+namespace {
+
+constexpr int kWitnessNumbers = 6;
+
+v1::Vector3 VectorOf(const double* xyz) {
+  v1::Vector3 vector;
+  vector.set_x(xyz[0]);
+  vector.set_y(xyz[1]);
+  vector.set_z(xyz[2]);
+  return vector;
+}
+
+}  // namespace
+
+template <typename Columns>
+bool AreParallel(const Columns& columns, size_t count) {
+  const auto fits = [count](int size, size_t each = 1) {
+    return size == 0 || static_cast<size_t>(size) == each * count;
+  };
+  return static_cast<size_t>(columns.relations_size()) == count && fits(columns.rungs_size()) &&
+         fits(columns.axes_size()) && fits(columns.analyses_size()) &&
+         fits(columns.certificates_size()) && fits(columns.separations_size()) &&
+         columns.separations_size() == columns.separation_bounds_size() &&
+         fits(columns.witness_xyz_size(), kWitnessNumbers) &&
+         columns.witness_xyz_size() == kWitnessNumbers * columns.witness_errors_size() &&
+         fits(columns.within_clearance_size());
+}
+
+template <typename Columns>
+AnswerRow RowAt(const Columns& columns, int i) {
+  AnswerRow row;
+  row.relation = columns.relations(i);
+  if (columns.rungs_size() > 0) row.rung = columns.rungs(i);
+  if (columns.axes_size() > 0) row.axis = &columns.axes(i);
+  if (columns.analyses_size() > 0) row.analysis = &columns.analyses(i);
+  if (columns.certificates_size() > 0) row.certificate = &columns.certificates(i);
+  if (columns.separations_size() > 0) {
+    row.separation.emplace();
+    row.separation->set_value(columns.separations(i));
+    row.separation->set_bound(columns.separation_bounds(i));
+  }
+  if (columns.witness_errors_size() > 0) {
+    const double* const xyz = columns.witness_xyz().data() + ptrdiff_t{kWitnessNumbers} * i;
+    row.witness.emplace();
+    *row.witness->mutable_point_a() = VectorOf(xyz);
+    *row.witness->mutable_point_b() = VectorOf(xyz + 3);
+    row.witness->set_error(columns.witness_errors(i));
+  }
+  if (columns.within_clearance_size() > 0) row.within_clearance = columns.within_clearance(i);
+  return row;
+}
+
+template bool AreParallel(const v1::AnswerColumns&, size_t);
+template bool AreParallel(const v1::BatchCheckCollisionsResponse&, size_t);
+template AnswerRow RowAt(const v1::AnswerColumns&, int);
+template AnswerRow RowAt(const v1::BatchCheckCollisionsResponse&, int);
+
+std::string RowText(const AnswerRow& row) {
+  std::vector<std::string> cells = {RelationText(row.relation)};
+  if (row.separation) cells.push_back(SeparationText(*row.separation));
+  if (row.witness) {
+    cells.push_back(DirectionText(row.witness->point_a()));
+    cells.push_back(DirectionText(row.witness->point_b()));
+  }
+  if (row.within_clearance) cells.emplace_back(*row.within_clearance ? "within" : "beyond");
+  if (row.axis != nullptr) {
+    const bool found = row.axis->kind() != v1::AXIS_KIND_UNSPECIFIED;
+    cells.push_back(found ? absl::StrCat(AxisKindText(row.axis->kind()), " ",
+                                         DirectionText(row.axis->direction()))
+                          : "no axis");
+  }
+  if (row.certificate != nullptr) cells.push_back(CertificateText(*row.certificate));
+  if (row.analysis != nullptr) {
+    cells.push_back(DurationText(row.analysis->time()));
+    cells.push_back(absl::StrCat(row.analysis->axes_tested(), " axes"));
+    cells.push_back(StageText(*row.analysis));
+  }
+  return absl::StrJoin(cells, "\t");
+}
+
+void AddRow(const AnswerRow& row, JsonObject* object) {
+  object->Add("relation", v1::Relation_Name(row.relation));
+  object->Add("rung", v1::Rung_Name(row.rung));
+  if (row.separation) object->AddJson("separation", MessageJson(*row.separation));
+  if (row.witness) object->AddJson("witness", MessageJson(*row.witness));
+  if (row.within_clearance) {
+    object->AddJson("withinClearance", *row.within_clearance ? "true" : "false");
+  }
+  if (row.axis != nullptr) object->AddJson("axis", MessageJson(*row.axis));
+  if (row.certificate != nullptr) object->AddJson("certificate", MessageJson(*row.certificate));
+  if (row.analysis != nullptr) object->AddJson("analysis", MessageJson(*row.analysis));
+}
+
+}  // namespace hulld

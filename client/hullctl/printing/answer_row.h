@@ -1,0 +1,43 @@
+#ifndef HULLD_CLIENT_HULLCTL_PRINTING_ANSWER_ROW_H_
+#define HULLD_CLIENT_HULLCTL_PRINTING_ANSWER_ROW_H_
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "client/hullctl/printing/json.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+// One entry of each column of answers; null or none where the column is empty.
+struct AnswerRow {
+  v1::Relation relation = v1::RELATION_UNSPECIFIED;
+  v1::Rung rung = v1::RUNG_UNSPECIFIED;
+  const v1::Axis* axis = nullptr;
+  const v1::Analysis* analysis = nullptr;
+  const v1::Certificate* certificate = nullptr;
+  std::optional<v1::Separation> separation;
+  std::optional<v1::Witness> witness;
+  std::optional<bool> within_clearance;
+};
+
+// Columns: v1::AnswerColumns, or v1::BatchCheckCollisionsResponse, whose fields are named alike.
+
+// Whether each column is empty or holds `count` entries.
+template <typename Columns>
+bool AreParallel(const Columns& columns, size_t count);
+
+// Requires parallel columns and i below their number of entries.
+template <typename Columns>
+AnswerRow RowAt(const Columns& columns, int i);
+
+// For people, separated by tabs, the relation first.
+std::string RowText(const AnswerRow& row);
+
+// Adds a member for each field that there is.
+void AddRow(const AnswerRow& row, JsonObject* object);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_PRINTING_ANSWER_ROW_H_

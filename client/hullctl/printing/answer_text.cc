@@ -1,0 +1,116 @@
+#include "client/hullctl/printing/answer_text.h"
+
+#include <cstdio>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/printing/json.h"
+
+namespace hulld {
+namespace {
+
+std::string WithoutPrefix(const std::string& name, const std::string& prefix) {
+  return name.rfind(prefix, 0) == 0 ? name.substr(prefix.size()) : name;
+}
+
+std::string IntegerText(const std::string& digits) {
+  constexpr size_t kShown = 24;
+  if (digits.size() <= kShown) return digits;
+  return digits.substr(0, 8) + "...(" + std::to_string(digits.size()) + " digits)";
+}
+
+}  // namespace
+
+std::string RelationText(v1::Relation relation) {
+  if (relation == v1::RELATION_UNSPECIFIED) return "-";
+  return WithoutPrefix(v1::Relation_Name(relation), "RELATION_");
+}
+
+std::string AxisKindText(v1::AxisKind kind) {
+  return WithoutPrefix(v1::AxisKind_Name(kind), "AXIS_KIND_");
+}
+
+std::string RungText(v1::Rung rung) {
+  switch (rung) {
+    case v1::RUNG_BOUNDS:
+      return "bounds round the hulls";
+    case v1::RUNG_CACHED:
+      return "what decided the step before";
+    case v1::RUNG_FLOATING_POINT:
+      return "floating point with a proven bound";
+    case v1::RUNG_EXACT:
+      return "exact arithmetic";
+    default:
+      return WithoutPrefix(v1::Rung_Name(rung), "RUNG_");
+  }
+}
+
+std::string DurationText(const google::protobuf::Duration& duration) {
+  double value = static_cast<double>(duration.seconds()) + 1e-9 * duration.nanos();
+  const char* unit = "s";
+  for (const char* smaller : {"ms", "us", "ns"}) {
+    if (value >= 1 || value == 0) break;
+    value *= 1000;
+    unit = smaller;
+  }
+  char text[48];
+  std::snprintf(text, sizeof(text), "%.3g %s", value, unit);
+  return text;
+}
+
+std::string HullSizeText(const v1::HullSize& size) {
+  return std::to_string(size.vertices()) + " vertices, " + std::to_string(size.edges()) +
+         " edges, " + std::to_string(size.facets()) + " facets";
+}
+
+std::string StageText(const v1::Analysis& analysis) {
+  if (analysis.stage() == v1::AXIS_KIND_UNSPECIFIED) return "nowhere";
+  std::string text = AxisKindText(analysis.stage());
+  if (analysis.has_axis_index()) text += ", axis " + std::to_string(analysis.axis_index());
+  return text;
+}
+
+std::string DirectionText(const v1::Vector3& direction) {
+  return ShortestText(direction.x()) + " " + ShortestText(direction.y()) + " " +
+         ShortestText(direction.z());
+}
+
+std::string CertificateText(const v1::Certificate& certificate) {
+  std::string text;
+  if (certificate.has_direction()) text = "n = " + DirectionText(certificate.direction());
+  if (certificate.has_integer_direction()) {
+    const v1::IntegerDirection& n = certificate.integer_direction();
+    text = "n = " + IntegerText(n.x()) + " " + IntegerText(n.y()) + " " + IntegerText(n.z());
+  }
+  for (int i = 0; i < certificate.pairs_size(); ++i) {
+    if (!text.empty()) text += i == 0 ? "; " : ", ";
+    text += "A " + std::to_string(certificate.pairs(i).index_a()) + " with B " +
+            std::to_string(certificate.pairs(i).index_b());
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::string SeparationText(const v1::Separation& separation) {
+  return ShortestText(separation.value()) + " within " + ShortestText(separation.bound());
+}
+
+std::string VerificationText(const Verification& verification) {
+  switch (verification.verdict) {
+    case Verdict::kValid:
+      return "valid";
+    case Verdict::kInvalid:
+      return "INVALID: " + verification.reason;
+    case Verdict::kCannotCheck:
+    case Verdict::kMoved:
+      break;
+  }
+  return "cannot check: " + verification.reason;
+}
+
+std::string VerificationJson(const Verification& verification) {
+  const char* const verdict = verification.verdict == Verdict::kValid     ? "VALID"
+                              : verification.verdict == Verdict::kInvalid ? "INVALID"
+                                                                          : "CANNOT_CHECK";
+  return JsonObject().Add("verdict", verdict).Add("reason", verification.reason).Close();
+}
+
+}  // namespace hulld

@@ -1,0 +1,30 @@
+#include "client/hullctl/printing/table.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hulld {
+
+Table& Table::Row(std::vector<std::string> cells) {
+  rows_.push_back(std::move(cells));
+  return *this;
+}
+
+void Table::Print(std::ostream& out) const {
+  std::vector<size_t> widths;
+  for (const auto& row : rows_) {
+    widths.resize(std::max(widths.size(), row.size()));
+    // The last cell of a row has nothing to its right.
+    for (size_t i = 0; i + 1 < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+  }
+  for (const auto& row : rows_) {
+    std::string line;
+    for (size_t i = 0; i < row.size(); ++i) {
+      line += row[i];
+      if (i + 1 < row.size()) line.append(widths[i] + 2 - row[i].size(), ' ');
+    }
+    out << line << "\n";
+  }
+}
+
+}  // namespace hulld

@@ -1,0 +1,22 @@
+#ifndef HULLD_CLIENT_HULLCTL_PRINTING_TABLE_H_
+#define HULLD_CLIENT_HULLCTL_PRINTING_TABLE_H_
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace hulld {
+
+// Rows of text in columns that are as wide as their widest cell.
+class Table {
+ public:
+  Table& Row(std::vector<std::string> cells);
+  void Print(std::ostream& out) const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_PRINTING_TABLE_H_

@@ -1,0 +1,26 @@
+#ifndef HULLD_CORE_HULL_GROWTH_CANONICAL_SNAPSHOT_H_
+#define HULLD_CORE_HULL_GROWTH_CANONICAL_SNAPSHOT_H_
+
+#include <optional>
+#include <span>
+
+#include "core/base/stop_poll.h"
+#include "core/hull/growth/surface.h"
+#include "core/hull/growth/vertex_table.h"
+#include "core/hull/hull.h"
+
+namespace hulld {
+
+// Turn the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles merged
+// exactly, facets and edges sorted. Cost: O(V log V), and one exact sign for each edge of a
+// surface; that of a surface is stopped by the poll, and nullopt then.
+
+// At most two vertices, in lexicographic order.
+Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);
+// A strictly convex polygon, its vertices in order, either way round.
+Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop);
+std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface, StopPoll& poll);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_GROWTH_CANONICAL_SNAPSHOT_H_

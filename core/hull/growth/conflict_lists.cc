@@ -1,0 +1,231 @@
+#include "core/hull/growth/conflict_lists.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hulld {
+namespace {
+
+// Insertions between two polls of should_stop.
+constexpr size_t kInsertionsPerPoll = 64;
+// Insertions after which it is clear whether most points are inside.
+constexpr size_t kTrialInsertions = 24;
+// Moves of a point, on average, from which on another order of insertion is better. Observed: at
+// most 8 for clouds and meshes most of which is inside.
+constexpr size_t kMostMoves = 32;
+
+}  // namespace
+
+void ConflictLists::Take(std::span<const Vector> points) {
+  CountTaken(points);
+  std::vector<TriangleId> targets;
+  surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { targets.push_back(id); });
+  sources_.clear();
+  Reserve(BlocksFor(points.size()));
+  const List all = {static_cast<uint32_t>(end_), static_cast<uint32_t>(points.size())};
+  end_ += BlocksFor(points.size());
+  if (!points.empty()) blocks_[end_ - 1] = {};
+  for (size_t i = 0; i < points.size(); ++i) {
+    blocks_[all.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, points[i]);
+  }
+  sources_.push_back(all);
+  Distribute(targets);
+  is_trial_ = true;
+}
+
+void ConflictLists::Take(std::span<const Vector> points, std::span<const TriangleId> seen) {
+  CountTaken(points);
+  is_trial_ = false;
+  std::vector<TriangleId> targets;
+  // By triangle: its place among the targets, from 1.
+  std::vector<uint32_t> place(surface_.id_bound(), 0);
+  counts_.assign(1, 0);
+  for (const TriangleId id : seen) {
+    if (place[id] == 0) {
+      targets.push_back(id);
+      place[id] = static_cast<uint32_t>(targets.size());
+      counts_.push_back(0);
+    }
+    ++counts_[place[id]];
+  }
+  sources_.clear();
+  Reserve(BlocksFor(points.size()) + targets.size() + 1);
+  AllocateLists(targets);
+  for (size_t i = 0; i < points.size(); ++i) {
+    const size_t at = cursors_[place[seen[i]]]++;
+    blocks_[at / PointBlock::kSize].Set(at % PointBlock::kSize, points[i]);
+  }
+}
+
+void ConflictLists::CountTaken(std::span<const Vector> points) {
+  for (const Vector& p : points) size_ = std::max(size_, p.cwiseAbs().maxCoeff());
+  taken_ += points.size();
+  waiting_ += points.size();
+  lists_.resize(surface_.id_bound());
+}
+
+ConflictLists::Outcome ConflictLists::InsertAll(const std::function<bool()>& should_stop) {
+  size_t insertions = 0;
+  for (; next_in_queue_ < queue_.size(); ++next_in_queue_) {
+    const TriangleId id = queue_[next_in_queue_];
+    if (lists_[id].count == 0) continue;
+    if (insertions++ % kInsertionsPerPoll == 0 && should_stop && should_stop()) {
+      return Outcome::kStopped;
+    }
+    InsertFrom(id);
+    if (moved_ > kMostMoves * taken_ || IsMostlyOutside(insertions)) return Outcome::kGaveUp;
+  }
+  return Outcome::kDone;
+}
+
+// After some insertions, all of them far out, most of a cloud is inside or will never be.
+bool ConflictLists::IsMostlyOutside(size_t insertions) {
+  if (insertions != kTrialInsertions || !is_trial_) return false;
+  return 8 * (waiting_ + insertions) > 7 * taken_;
+}
+
+std::vector<Vector> ConflictLists::TakeRest() {
+  std::vector<Vector> rest;
+  for (List& list : lists_) {
+    for (size_t i = 0; i < list.count; ++i) rest.push_back(PointOf(list, i));
+    list.count = 0;
+  }
+  return rest;
+}
+
+// Adds the farthest point of a triangle's list.
+void ConflictLists::InsertFrom(TriangleId id) {
+  const Vector apex = RemoveFarthest(id);
+  sources_.clear();
+  for (const TriangleId gone : surface_.RemoveVisible(vertices_, apex, id)) {
+    List& list = lists_[gone];
+    if (list.count > 0) sources_.push_back(std::exchange(list, {}));
+  }
+  const std::span<const TriangleId> targets = surface_.JoinToBoundary(vertices_, apex);
+  if (lists_.size() < surface_.id_bound()) lists_.resize(surface_.id_bound());
+  if (!sources_.empty()) Distribute(targets);
+}
+
+Vector ConflictLists::RemoveFarthest(TriangleId id) {
+  List& list = lists_[id];
+  const size_t i = FarthestAlong(BlocksOf(list), list.count, surface_.triangle(id).normal);
+  const Vector farthest = PointOf(list, i);
+  const Vector last = PointOf(list, list.count - 1);
+  blocks_[list.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, last);
+  --list.count;
+  --waiting_;
+  return farthest;
+}
+
+// Moves the points of sources_ to the targets that they see; those that see none are inside.
+void ConflictLists::Distribute(std::span<const TriangleId> targets) {
+  size_t points = 0;
+  for (const List& source : sources_) points += source.count;
+  moved_ += points;
+  waiting_ -= points;
+  // One block beyond the lists takes the points that are inside.
+  Reserve(BlocksFor(points) + targets.size() + 1);
+  Match(targets);
+  counts_.assign(targets.size() + 1, 0);
+  const int64_t* matches = matches_.data();
+  for (const List& source : sources_) {
+    for (size_t i = 0; i < source.count; ++i) ++counts_[static_cast<size_t>(matches[i] + 1)];
+    matches += BlocksFor(source.count) * PointBlock::kSize;
+  }
+  waiting_ += points - counts_[0];
+  AllocateLists(targets);
+  Scatter();
+}
+
+// Fills matches_, block by block of the sources, with indices of targets or kBelowAll.
+void ConflictLists::Match(std::span<const TriangleId> targets) {
+  const double size = surface_.SizeWith(vertices_, Vector::Constant(size_));
+  planes_.clear();
+  for (const TriangleId id : targets) {
+    const SurfaceTriangle& t = surface_.triangle(id);
+    planes_.push_back({{t.normal.x(), t.normal.y(), t.normal.z()},
+                       t.offset,
+                       static_cast<double>(t.slope) * size});
+  }
+  size_t blocks = 0;
+  for (const List& source : sources_) blocks += BlocksFor(source.count);
+  if (matches_.size() < blocks * PointBlock::kSize) matches_.resize(2 * blocks * PointBlock::kSize);
+  int64_t* matches = matches_.data();
+  for (const List& source : sources_) {
+    const std::span<const PointBlock> of_source = BlocksOf(source);
+    if (MatchPlanes(of_source, planes_, matches)) {
+      for (size_t i = 0; i < source.count; ++i) {
+        if (matches[i] == kUncertain) matches[i] = MatchExactly(PointOf(source, i), targets);
+      }
+    }
+    matches += of_source.size() * PointBlock::kSize;
+  }
+}
+
+// Copies the points of sources_ to the lists of their matches, without branching on the match: what
+// is inside goes to a place that never advances.
+void ConflictLists::Scatter() {
+  const int64_t* matches = matches_.data();
+  for (const List& source : sources_) {
+    for (size_t i = 0; i < source.count; ++i) {
+      const auto match = static_cast<size_t>(matches[i] + 1);
+      const size_t at = cursors_[match];
+      cursors_[match] += match != 0;
+      blocks_[at / PointBlock::kSize].Set(at % PointBlock::kSize, PointOf(source, i));
+    }
+    matches += BlocksFor(source.count) * PointBlock::kSize;
+  }
+}
+
+// The index of a target that the point sees, else kBelowAll. Counts the point when it equals a
+// vertex.
+int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const TriangleId> targets) {
+  for (size_t k = 0; k < targets.size(); ++k) {
+    if (IsCertainlyBelow(planes_[k], point)) continue;
+    if (const auto corner = surface_.CornerAt(vertices_, targets[k], point)) {
+      vertices_.CountDuplicate(*corner);
+      return kBelowAll;
+    }
+    if (surface_.IsSeenFrom(vertices_, targets[k], point)) return static_cast<int64_t>(k);
+  }
+  return kBelowAll;
+}
+
+// Gives each target a list with room for counts_[k + 1] points, and points cursors_[k + 1] to it;
+// cursors_[0] to a block beyond all lists. Requires that Reserve has made room.
+void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
+  cursors_.resize(targets.size() + 1);
+  for (size_t k = 0; k < targets.size(); ++k) {
+    const uint32_t count = counts_[k + 1];
+    cursors_[k + 1] = end_ * PointBlock::kSize;
+    if (count == 0) continue;
+    lists_[targets[k]] = {static_cast<uint32_t>(end_), count};
+    queue_.push_back(targets[k]);
+    end_ += BlocksFor(count);
+    // The last may be partly filled.
+    blocks_[end_ - 1] = {};
+  }
+  cursors_[0] = end_ * PointBlock::kSize;
+}
+
+// Makes room for so many blocks at the end, by leaving out the gaps.
+void ConflictLists::Reserve(size_t blocks) {
+  if (end_ + blocks <= capacity_) return;
+  size_t kept = 0;
+  for (const List& list : lists_) kept += BlocksFor(list.count);
+  for (const List& list : sources_) kept += BlocksFor(list.count);
+  capacity_ = 2 * (kept + blocks);
+  auto packed = std::make_unique_for_overwrite<PointBlock[]>(capacity_);
+  end_ = 0;
+  const auto move = [&](List& list) {
+    const std::span<const PointBlock> old = BlocksOf(list);
+    std::copy(old.begin(), old.end(), packed.get() + end_);
+    list.first_block = static_cast<uint32_t>(end_);
+    end_ += old.size();
+  };
+  for (List& list : lists_) move(list);
+  for (List& list : sources_) move(list);
+  blocks_ = std::move(packed);
+}
+
+}  // namespace hulld

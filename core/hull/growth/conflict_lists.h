@@ -1,0 +1,104 @@
+#ifndef HULLD_CORE_HULL_GROWTH_CONFLICT_LISTS_H_
+#define HULLD_CORE_HULL_GROWTH_CONFLICT_LISTS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/hull/growth/point_blocks.h"
+#include "core/hull/growth/surface.h"
+#include "core/hull/growth/vertex_table.h"
+
+namespace hulld {
+
+// Points to be added to a surface, each in the list of one triangle that it sees strictly.
+//
+// Idea: add the point of a list that is farthest from the list's triangle; the points of the
+// triangles that go are tested against the new triangles alone, and one that sees none of them is
+// inside. That holds exactly: what a point sees strictly is connected, so a point that saw a
+// triangle that went and still sees one that stayed, sees both sides of an edge of the horizon,
+// hence the new triangle there. Source: Barber, Dobkin and Huhdanpaa 1996, The Quickhull Algorithm
+// for Convex Hulls.
+class ConflictLists {
+ public:
+  enum class Outcome {
+    kDone,
+    // should_stop said so.
+    kStopped,
+    // The points are moved so often that another order of insertion does better: see TakeRest.
+    kGaveUp
+  };
+
+  ConflictLists(Surface& surface, VertexTable& vertices) : surface_(surface), vertices_(vertices) {}
+
+  // Both require that no point is waiting.
+  // Takes points that may lie anywhere; those inside are counted and forgotten. Cost: as many tests
+  // a point as the surface has triangles.
+  void Take(std::span<const Vector> points);
+  // Takes points that see seen[i] strictly.
+  void Take(std::span<const Vector> points, std::span<const TriangleId> seen);
+
+  // Adds all points that were taken. should_stop may be empty.
+  Outcome InsertAll(const std::function<bool()>& should_stop);
+  // The points not yet added.
+  std::vector<Vector> TakeRest();
+
+ private:
+  // A range of blocks_, the last of which may be partly filled.
+  struct List {
+    uint32_t first_block = 0;
+    uint32_t count = 0;
+  };
+
+  std::span<const PointBlock> BlocksOf(const List& list) const {
+    return {blocks_.get() + list.first_block, BlocksFor(list.count)};
+  }
+  Vector PointOf(const List& list, size_t i) const {
+    return blocks_[list.first_block + i / PointBlock::kSize].point(i % PointBlock::kSize);
+  }
+  bool IsMostlyOutside(size_t insertions);
+  void CountTaken(std::span<const Vector> points);
+  void InsertFrom(TriangleId id);
+  Vector RemoveFarthest(TriangleId id);
+  void Distribute(std::span<const TriangleId> targets);
+  void Match(std::span<const TriangleId> targets);
+  int64_t MatchExactly(const Vector& point, std::span<const TriangleId> targets);
+  void AllocateLists(std::span<const TriangleId> targets);
+  void Scatter();
+  void Reserve(size_t blocks);
+
+  Surface& surface_;
+  VertexTable& vertices_;
+  // All lists, with gaps where lists were.
+  std::unique_ptr<PointBlock[]> blocks_;
+  size_t end_ = 0;
+  size_t capacity_ = 0;
+  // By triangle.
+  std::vector<List> lists_;
+  // Triangles that have had a list, in the order in which they are looked at.
+  std::vector<TriangleId> queue_;
+  size_t next_in_queue_ = 0;
+  // How many points are in lists, how many were taken in all, and how often one was moved.
+  size_t waiting_ = 0;
+  size_t taken_ = 0;
+  size_t moved_ = 0;
+  // Points were taken that may lie anywhere.
+  bool is_trial_ = false;
+  // Largest absolute coordinate of a point.
+  double size_ = 0;
+
+  // Of one distribution: the lists to empty, the targets' planes, what MatchPlanes says, and, by
+  // match + 1, how many points there are and where the next one goes.
+  std::vector<List> sources_;
+  std::vector<PlaneWithBound> planes_;
+  std::vector<int64_t> matches_;
+  std::vector<uint32_t> counts_;
+  std::vector<size_t> cursors_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_GROWTH_CONFLICT_LISTS_H_

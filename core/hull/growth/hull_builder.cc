@@ -1,0 +1,272 @@
+#include "core/hull/growth/hull_builder.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/stop_poll.h"
+#include "core/hull/growth/block_insertion.h"
+#include "core/hull/growth/canonical_snapshot.h"
+#include "core/hull/growth/polygon_boundary.h"
+#include "core/hull/growth/surface.h"
+#include "core/hull/growth/vertex_table.h"
+#include "core/numeric/orientation.h"
+
+namespace hulld {
+namespace {
+
+// A block of at most this many points is not worth a copy of the builder for the sake of stopping
+// within it.
+constexpr size_t kUninterruptedPoints = 1024;
+// Points between two polls of should_stop.
+constexpr size_t kPointsPerPoll = 256;
+// Points looked at for some that are extreme along the axes, at most twice.
+constexpr size_t kExtremesSample = 4096;
+// From this many points on, threads save more than they cost.
+constexpr size_t kWorthThreads = 65536;
+constexpr double kLargest = std::numeric_limits<double>::max();
+// From this many points on, the order of insertion is worth choosing.
+constexpr size_t kWorthOrdering = 128;
+
+// No branch but the loop's, so that the compiler tests several at a time.
+bool AreFinite(std::span<const Vector> points) {
+  int64_t bad = 0;
+  for (const Vector& p : points) {
+    for (int k = 0; k < 3; ++k) bad |= std::abs(p[k]) <= kLargest ? 0 : 1;
+  }
+  return bad == 0;
+}
+
+absl::Status DescribeNotFinite(std::span<const Vector> points) {
+  constexpr const char* kNames[] = {"x", "y", "z"};
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (int k = 0; k < 3; ++k) {
+      if (std::isfinite(points[i][k])) continue;
+      return absl::InvalidArgumentError(absl::StrCat(
+          "points[", i, "].", kNames[k], " is ", std::isnan(points[i][k]) ? "NaN" : "infinite"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckFinite(std::span<const Vector> points, int threads) {
+  // A parallel region costs more than a small block, even with one thread.
+  if (threads <= 1 || points.size() < kWorthThreads) {
+    return AreFinite(points) ? absl::OkStatus() : DescribeNotFinite(points);
+  }
+  const auto parts = static_cast<size_t>(threads);
+  int64_t bad = 0;
+#pragma omp parallel for num_threads(parts) schedule(static, 1) reduction(| : bad)
+  for (size_t k = 0; k < parts; ++k) {
+    const size_t first = points.size() * k / parts;
+    const size_t end = points.size() * (k + 1) / parts;
+    bad |= AreFinite(points.subspan(first, end - first)) ? 0 : 1;
+  }
+  return bad == 0 ? absl::OkStatus() : DescribeNotFinite(points);
+}
+
+// Where the lowest and the highest coordinates are, along each axis, among some points spread over
+// all; each index once. Points to start a hull from.
+std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
+  const size_t stride = points.size() / kExtremesSample + 1;
+  std::array<uint32_t, 6> extremes{};
+  for (size_t i = 0; i < points.size(); i += stride) {
+    for (size_t k = 0; k < 3; ++k) {
+      if (points[i][k] < points[extremes[k]][k]) extremes[k] = static_cast<uint32_t>(i);
+      if (points[i][k] > points[extremes[k + 3]][k]) extremes[k + 3] = static_cast<uint32_t>(i);
+    }
+  }
+  std::vector<uint32_t> distinct(extremes.begin(), extremes.end());
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  return distinct;
+}
+
+bool LexicographicallyLess(const Vector& a, const Vector& b) {
+  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+}
+
+}  // namespace
+
+// The hull in the stage of its dimension: loose vertices up to dimension 1, then a polygon, then a
+// surface.
+class HullBuilder::State {
+ public:
+  void BeginBlock() { vertices_.BeginBlock(); }
+  void Insert(const Vector& point) {
+    if (surface_) return surface_->Insert(vertices_, point);
+    switch (dimension()) {
+      case -1:
+        return GrowToPoint(point);
+      case 0:
+        return GrowToSegment(point);
+      case 1:
+        return InsertIntoSegment(point);
+      default:
+        return InsertIntoPolygon(point);
+    }
+  }
+
+  // Inserts all points; false when should_stop, which may be empty, said so.
+  bool InsertAll(std::span<const Vector> points, int threads,
+                 const std::function<bool()>& should_stop) {
+    if (points.size() < kWorthOrdering) {
+      for (const Vector& point : points) Insert(point);
+      return true;
+    }
+    std::vector<uint32_t> done;
+    if (dimension() < 0) done = AxisExtremes(points);
+    for (const uint32_t i : done) Insert(points[i]);
+    for (size_t i = 0; i < points.size(); ++i) {
+      if (surface_) {
+        std::erase_if(done, [i](uint32_t index) { return index < i; });
+        for (uint32_t& index : done) index -= static_cast<uint32_t>(i);
+        return InsertBlock(*surface_, vertices_, points.subspan(i), done, threads, should_stop);
+      }
+      if (std::find(done.begin(), done.end(), i) != done.end()) continue;
+      if (i % kPointsPerPoll == 0 && should_stop && should_stop()) return false;
+      Insert(points[i]);
+    }
+    return true;
+  }
+
+  int dimension() const {
+    if (surface_) return 3;
+    if (polygon_) return 2;
+    return static_cast<int>(ends_.size()) - 1;
+  }
+  const VertexTable& vertices() const { return vertices_; }
+  size_t MemoryBytes() const {
+    size_t bytes = sizeof(State) + vertices_.MemoryBytes() + ends_.capacity() * sizeof(VertexId);
+    if (polygon_) bytes += polygon_->MemoryBytes();
+    if (surface_) bytes += surface_->MemoryBytes();
+    return bytes;
+  }
+  uint64_t housekeeping_steps() const { return surface_ ? surface_->work() : 0; }
+
+  // nullopt when stopped.
+  std::optional<Hull> Snapshot(StopPoll& poll) const {
+    if (surface_) return SnapshotOf(vertices_, *surface_, poll);
+    if (polygon_) return SnapshotOfPolygon(vertices_, polygon_->Loop());
+    return SnapshotOfEnds(vertices_, ends_);
+  }
+
+ private:
+  void GrowToPoint(const Vector& point) { ends_.push_back(vertices_.Add(point)); }
+
+  void GrowToSegment(const Vector& point) {
+    if (point == vertices_[ends_[0]]) return vertices_.CountDuplicate(ends_[0]);
+    ends_.push_back(vertices_.Add(point));
+    if (LexicographicallyLess(point, vertices_[ends_[0]])) std::swap(ends_[0], ends_[1]);
+  }
+
+  // On one line, order along it and lexicographic order agree.
+  void InsertIntoSegment(const Vector& point) {
+    const CoordinatePlane plane = ProjectionOf(vertices_[ends_[0]], vertices_[ends_[1]], point);
+    if (plane.first >= 0) {
+      const VertexId id = vertices_.Add(point);
+      plane_ = {vertices_[ends_[0]], vertices_[ends_[1]], point};
+      polygon_.emplace(vertices_, plane, ends_[0], ends_[1], id);
+      return;
+    }
+    for (const VertexId end : ends_) {
+      if (point == vertices_[end]) return vertices_.CountDuplicate(end);
+    }
+    if (LexicographicallyLess(point, vertices_[ends_[0]])) return ReplaceEnd(0, point);
+    if (LexicographicallyLess(vertices_[ends_[1]], point)) return ReplaceEnd(1, point);
+  }
+
+  void ReplaceEnd(int end, const Vector& point) {
+    vertices_.Remove(ends_[end]);
+    ends_[end] = vertices_.Add(point);
+  }
+
+  void InsertIntoPolygon(const Vector& point) {
+    if (Orient3d(plane_[0], plane_[1], plane_[2], point) == 0) {
+      return polygon_->Insert(vertices_, point);
+    }
+    const std::vector<VertexId> loop = polygon_->Loop();
+    surface_.emplace(vertices_, loop, vertices_.Add(point));
+    polygon_.reset();
+  }
+
+  VertexTable vertices_;
+  // Dimensions 0 and 1: the vertices, in lexicographic order.
+  std::vector<VertexId> ends_;
+  std::optional<PolygonBoundary> polygon_;
+  // Dimension 2: three points, not collinear, that span the plane.
+  std::array<Vector, 3> plane_;
+  std::optional<Surface> surface_;
+};
+
+HullBuilder::HullBuilder() : state_(std::make_unique<State>()) {}
+HullBuilder::HullBuilder(const HullBuilder& other)
+    : state_(std::make_unique<State>(*other.state_)) {}
+HullBuilder& HullBuilder::operator=(const HullBuilder& other) {
+  if (this != &other) state_ = std::make_unique<State>(*other.state_);
+  return *this;
+}
+HullBuilder::HullBuilder(HullBuilder&&) noexcept = default;
+HullBuilder& HullBuilder::operator=(HullBuilder&&) noexcept = default;
+HullBuilder::~HullBuilder() = default;
+
+absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
+                                             const AddLimits& limits) {
+  if (absl::Status status = CheckFinite(points, limits.threads); !status.ok()) return status;
+  const bool may_stop = limits.should_stop && points.size() > kUninterruptedPoints;
+  const bool may_exceed = vertex_count() + points.size() > limits.max_vertices;
+  std::unique_ptr<State> before;
+  if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
+
+  state_->BeginBlock();
+  static const std::function<bool()> kNeverStop;
+  if (!state_->InsertAll(points, limits.threads, may_stop ? limits.should_stop : kNeverStop)) {
+    state_ = std::move(before);
+    return absl::CancelledError("stopped while adding points; the hull is as before");
+  }
+  if (vertex_count() > limits.max_vertices) {
+    const size_t reached = vertex_count();
+    state_ = std::move(before);
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the hull would have ", reached, " vertices; the limit is ", limits.max_vertices));
+  }
+  PointCounts counts;
+  counts.received = points.size();
+  counts.outside = state_->vertices().outside();
+  counts.duplicate = state_->vertices().duplicate();
+  counts.inside = counts.received - counts.outside - counts.duplicate;
+  return counts;
+}
+
+int HullBuilder::dimension() const { return state_->dimension(); }
+
+size_t HullBuilder::vertex_count() const { return state_->vertices().size(); }
+
+std::vector<Vector> HullBuilder::Vertices() const { return state_->vertices().Vertices(); }
+
+std::vector<Vector> HullBuilder::NewVertices() const { return state_->vertices().NewVertices(); }
+
+size_t HullBuilder::MemoryBytes() const { return sizeof(*this) + state_->MemoryBytes(); }
+
+uint64_t HullBuilder::housekeeping_steps() const { return state_->housekeeping_steps(); }
+
+Hull HullBuilder::Snapshot() const {
+  static const std::function<bool()> kNeverStop;
+  StopPoll poll(kNeverStop);
+  return *state_->Snapshot(poll);
+}
+
+absl::StatusOr<Hull> HullBuilder::Snapshot(const std::function<bool()>& should_stop) const {
+  StopPoll poll(should_stop);
+  std::optional<Hull> snapshot = state_->Snapshot(poll);
+  if (!snapshot.has_value()) return absl::CancelledError("stopped while making a snapshot");
+  return *std::move(snapshot);
+}
+
+}  // namespace hulld

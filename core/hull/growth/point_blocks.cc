@@ -1,0 +1,86 @@
+#include "core/hull/growth/point_blocks.h"
+
+#include "core/numeric/simd_path.h"
+
+namespace hulld {
+namespace {
+
+// Four doubles, and four truth values; the compiler cuts them into what the target has.
+using Lanes = double __attribute__((vector_size(32)));
+using Mask = int64_t __attribute__((vector_size(32)));
+
+// One body for both instruction sets. Not contracted to FMA, so both round alike.
+__attribute__((always_inline)) inline bool MatchPlanesBody(std::span<const PointBlock> blocks,
+                                                           std::span<const PlaneWithBound> planes,
+                                                           int64_t* matches) {
+  Mask are_uncertain = {0, 0, 0, 0};
+  for (const PointBlock& block : blocks) {
+    Lanes x;
+    Lanes y;
+    Lanes z;
+    __builtin_memcpy(&x, block.x, sizeof(x));
+    __builtin_memcpy(&y, block.y, sizeof(y));
+    __builtin_memcpy(&z, block.z, sizeof(z));
+    Lanes best = {0, 0, 0, 0};
+    Mask match = {kBelowAll, kBelowAll, kBelowAll, kBelowAll};
+    Mask is_maybe_above = {0, 0, 0, 0};
+    int64_t index = 0;
+    for (const PlaneWithBound& plane : planes) {
+      const Lanes value =
+          (plane.normal[0] * x + plane.normal[1] * y + plane.normal[2] * z) - plane.offset;
+      const Mask is_better = (value > plane.bound) & (value > best);
+      best = is_better ? value : best;
+      match = is_better ? Mask{index, index, index, index} : match;
+      is_maybe_above |= ~(value < -plane.bound);
+      ++index;
+    }
+    const Mask is_uncertain = is_maybe_above & (match == kBelowAll);
+    are_uncertain |= is_uncertain;
+    match += is_uncertain;
+    __builtin_memcpy(matches, &match, sizeof(match));
+    matches += PointBlock::kSize;
+  }
+  return (are_uncertain[0] | are_uncertain[1] | are_uncertain[2] | are_uncertain[3]) != 0;
+}
+static_assert(kUncertain == kBelowAll - 1);
+
+bool MatchPlanesBaseline(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
+                         int64_t* matches) {
+  return MatchPlanesBody(blocks, planes, matches);
+}
+
+#ifdef HULLD_HAS_AVX2_PATH
+__attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock> blocks,
+                                                     std::span<const PlaneWithBound> planes,
+                                                     int64_t* matches) {
+  return MatchPlanesBody(blocks, planes, matches);
+}
+#endif
+
+}  // namespace
+
+bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
+                 int64_t* matches) {
+#ifdef HULLD_HAS_AVX2_PATH
+  if (CurrentSimdPath() == SimdPath::kAvx2) return MatchPlanesAvx2(blocks, planes, matches);
+#endif
+  return MatchPlanesBaseline(blocks, planes, matches);
+}
+
+size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction) {
+  size_t farthest = 0;
+  double most = -INFINITY;
+  for (size_t i = 0; i < count; ++i) {
+    const PointBlock& block = blocks[i / PointBlock::kSize];
+    const size_t k = i % PointBlock::kSize;
+    const double value =
+        direction.x() * block.x[k] + direction.y() * block.y[k] + direction.z() * block.z[k];
+    if (value > most) {
+      most = value;
+      farthest = i;
+    }
+  }
+  return farthest;
+}
+
+}  // namespace hulld

@@ -1,0 +1,63 @@
+#ifndef HULLD_CORE_HULL_GROWTH_POINT_BLOCKS_H_
+#define HULLD_CORE_HULL_GROWTH_POINT_BLOCKS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/numeric/vector.h"
+
+namespace hulld {
+
+// Points in fours, each coordinate together, for testing four at a time against planes. The last
+// block of a list may hold points that do not count; they are tested as well, so they must be
+// initialized.
+struct PointBlock {
+  static constexpr size_t kSize = 4;
+
+  double x[kSize];
+  double y[kSize];
+  double z[kSize];
+
+  Vector point(size_t i) const { return {x[i], y[i], z[i]}; }
+  void Set(size_t i, const Vector& p) {
+    x[i] = p.x();
+    y[i] = p.y();
+    z[i] = p.z();
+  }
+};
+
+inline size_t BlocksFor(size_t points) {
+  return (points + PointBlock::kSize - 1) / PointBlock::kSize;
+}
+
+// A plane in floating point: points with normal . p - offset > bound are certainly above it, those
+// with less than -bound certainly below. An infinite bound leaves all uncertain.
+struct PlaneWithBound {
+  double normal[3];
+  double offset;
+  double bound;
+};
+
+inline bool IsCertainlyBelow(const PlaneWithBound& plane, const Vector& p) {
+  const double value =
+      (plane.normal[0] * p.x() + plane.normal[1] * p.y() + plane.normal[2] * p.z()) - plane.offset;
+  return value < -plane.bound;
+}
+
+// What MatchPlanes says of a point that is certainly above no plane: certainly below all, or not.
+inline constexpr int64_t kBelowAll = -1;
+inline constexpr int64_t kUncertain = -2;
+
+// For each point of the blocks, the index of a plane that it is certainly above, the one with the
+// largest normal . p - offset, else kBelowAll or kUncertain. matches: 4 per block. True when some
+// are uncertain. The same bits with AVX2 and without.
+bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
+                 int64_t* matches);
+
+// The index of the point, of the first `count`, with the largest component along the direction.
+size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_GROWTH_POINT_BLOCKS_H_

@@ -1,0 +1,283 @@
+#ifndef HULLD_CORE_HULL_GROWTH_SURFACE_H_
+#define HULLD_CORE_HULL_GROWTH_SURFACE_H_
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/hull/growth/chunked_vector.h"
+#include "core/hull/growth/direction_map.h"
+#include "core/hull/growth/vertex_table.h"
+#include "core/numeric/error_bounds.h"
+
+namespace hulld {
+
+using TriangleId = uint32_t;
+
+// A triangle of the surface, counter-clockwise seen from outside, in one cache line. neighbours[i]
+// lies across the edge from corners[i] to corners[(i + 1) % 3].
+struct alignas(64) SurfaceTriangle {
+  // The plane, rounded: normal . p - offset, which errs by at most slope * (|p| + |corner|), |.|
+  // the largest component.
+  Vector normal;
+  double offset;
+  std::array<VertexId, 3> corners;
+  std::array<TriangleId, 3> neighbours;
+  float slope;
+  // The last insertion whose region this triangle was in.
+  uint32_t mark;
+};
+static_assert(sizeof(SurfaceTriangle) == 64);
+
+// The triangulated boundary of a growing convex polytope of dimension 3, exactly.
+//
+// Idea: to add a point that sees some triangle strictly from outside, remove every triangle that it
+// sees strictly or whose plane it lies in, and join the point to the horizon, the boundary of what
+// was removed. Removing the coplanar triangles too is what keeps the vertex set minimal: it is the
+// visible region of the point moved outwards by an infinitesimal amount, hence a disk; a vertex
+// that the new point makes non-extreme has only such triangles around it and goes with them; and
+// every triangle beyond the horizon is strictly invisible, so that no new triangle is degenerate
+// and no horizon vertex redundant.
+//
+// The triangle to start from is found by walking on the surface, towards the one that the ray from
+// a fixed interior point through the new point pierces; a map of directions round that point
+// rejects points that are certainly inside and tells where to start. Source: Clarkson and Shor 1989
+// for the incremental hull; Devillers, Pion and Teillaud 2002 for the walk.
+class Surface {
+ public:
+  // The cone from `apex` over a polygon whose plane does not hold it. `polygon`: vertices in order,
+  // either way round.
+  Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex);
+
+  // Adds a point. Cost: the triangles removed and created, and a walk of a few exact signs; a scan
+  // of all triangles where no double lies strictly inside the polytope.
+  void Insert(VertexTable& vertices, const Vector& point) {
+    size_t cell = 0;
+    if (directions_) {
+      const DirectionMap::Place place = directions_->PlaceOf(point);
+      ++asked_;
+      if (directions_->IsCertainlyInside(place)) {
+        ++rejected_;
+        return;
+      }
+      cell = place.cell;
+    }
+    InsertSurvivor(vertices, point, cell);
+  }
+
+  // Where a point lies, and a triangle that it sees strictly (outside) or whose cone holds it
+  // (inside).
+  enum class Side { kInside, kOutside };
+  struct Location {
+    Side side;
+    TriangleId triangle;
+  };
+  // Finds where a point lies and changes nothing. `start`: where to start walking. Requires that an
+  // interior point is known; empty when the walk is longer than the surface warrants.
+  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
+                                 TriangleId start) const {
+    uint64_t steps = 0;
+    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), 0, steps);
+  }
+  // True when the point lies strictly outside the triangle's plane, exactly.
+  bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
+    return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
+  }
+  // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
+  // returns the triangles that go, for the caller to move what it keeps by triangle; the second
+  // joins the point to their boundary and returns the triangles that come, which take over IDs.
+  // The spans hold until the next insertion.
+  std::span<const TriangleId> RemoveVisible(VertexTable& vertices, const Vector& point,
+                                            TriangleId seen);
+  std::span<const TriangleId> JoinToBoundary(VertexTable& vertices, const Vector& point);
+  // The corner of the triangle that the point equals.
+  std::optional<VertexId> CornerAt(const VertexTable& vertices, TriangleId id,
+                                   const Vector& point) const;
+  // Does what insertions in two steps leave undone: housekeeping for what comes.
+  void FinishInsertions(const VertexTable& vertices);
+
+  // Adds points, in the order given, by threads that each have a zone of the surface: the triangles
+  // with all corners in one part of space. Returns those that would change anything else, few,
+  // which are not added. zones: 2 or 4. Requires that an interior point is known.
+  // Empty when should_stop, which may be empty, said so: then the surface is of no use any more.
+  std::optional<std::vector<Vector>> InsertInZones(VertexTable& vertices,
+                                                   std::span<const Vector> points, uint32_t zones,
+                                                   const std::function<bool()>& should_stop);
+
+  // The map of directions, for choosing what to insert and in which order; null where no interior
+  // point is known.
+  const DirectionMap* directions() const { return directions_ ? &*directions_ : nullptr; }
+  // True when an interior point is known and no scale is extreme.
+  bool IsMeasurable() const {
+    return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
+  }
+  // Measures the surface anew when that pays for so many points to be inserted. Does nothing where
+  // no interior point is known. Cost: at most some walks per ten points.
+  void MeasureBefore(const VertexTable& vertices, size_t points);
+  // Tells how many points were looked up in the map and how many it rejected: what it is worth.
+  void CountRejected(size_t asked, size_t rejected) {
+    asked_ += asked;
+    rejected_ += rejected;
+  }
+
+  // Steps of all walks and scans, corners measured, and cells made, since this surface began: the
+  // work of insertions beyond the triangles that they remove and create.
+  uint64_t work() const { return work_; }
+  // What it holds in memory. Cost: O(1).
+  size_t MemoryBytes() const;
+
+  // Calls visit(id, triangle) for every triangle.
+  template <typename Visitor>
+  void ForEachTriangle(Visitor&& visit) const {
+    for (TriangleId id = 0; id < triangles_.size(); ++id) {
+      if (IsAlive(id)) visit(id, triangles_[id]);
+    }
+  }
+  const SurfaceTriangle& triangle(TriangleId id) const { return triangles_[id]; }
+  // IDs of triangles lie below this.
+  size_t id_bound() const { return triangles_.size(); }
+  // What a plane's slope is relative to; infinite where the bound would not hold.
+  double SizeWith(const VertexTable& vertices, const Vector& point) const;
+  size_t triangle_count() const { return alive_; }
+
+ private:
+  // An edge of the horizon, its triangle beyond, and which edge it is there.
+  struct HorizonEdge {
+    VertexId tail;
+    VertexId head;
+    TriangleId beyond;
+    uint32_t edge_beyond;
+  };
+  // What the steps of a walk share: the point from the center, and what a triple product of it and
+  // two vertices from the center errs by.
+  struct Ray {
+    Vector y;
+    double bound;
+  };
+  // A triangle of the region under traversal, the edge to cross next, and how many are left.
+  struct Visit {
+    TriangleId triangle;
+    uint8_t edge;
+    uint8_t left;
+  };
+  // What one insertion works with. Marks hold a count of insertions and, in the lowest bits, a
+  // zone.
+  struct Editor {
+    std::vector<TriangleId> region;
+    std::vector<HorizonEdge> horizon;
+    std::vector<Visit> visits;
+    uint32_t mark = 0;
+    // Where the last insertion was.
+    TriangleId last = 0;
+    // 0 for the whole surface. Otherwise only triangles marked with this zone may be changed, and
+    // new IDs come from `free`, then from `next` on, up to `end`.
+    uint32_t zone = 0;
+    std::vector<TriangleId> free;
+    TriangleId next = 0;
+    TriangleId end = 0;
+    int64_t alive = 0;
+    VertexTable::Zone vertices;
+    uint64_t work = 0;
+  };
+  // A map of directions in the making. Its corners are measured some at a time, so that no
+  // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
+  struct Measurement {
+    DirectionMap map;
+    // Of the corners of the last row up to the one to measure, and of the row before from there on:
+    // how far the surface is, and where the direction leaves it.
+    std::vector<double> reach;
+    std::vector<TriangleId> hint;
+    // Both of the corner that stood before in the last one's place.
+    double reach_before = 0;
+    TriangleId hint_before = 0;
+    // The corner to measure: its face, row and column.
+    int face = 0;
+    int i = 0;
+    int j = 0;
+    double least = INFINITY;
+    double largest = 0;
+  };
+
+  bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
+  // A dead triangle's first neighbour is one that came in its place.
+  TriangleId Alive(TriangleId id) const {
+    if (id >= triangles_.size()) return editor_.last;
+    while (!IsAlive(id)) id = triangles_[id].neighbours[0];
+    return id;
+  }
+  // +1 when the point sees the triangle from outside, 0 when it lies in its plane.
+  int SideOf(const VertexTable& vertices, TriangleId id, const Vector& point, double size) const {
+    const SurfaceTriangle& t = triangles_[id];
+    const double value = t.normal.dot(point) - t.offset;
+    const double bound = static_cast<double>(t.slope) * size;
+    if (value > bound) return 1;
+    if (value < -bound) return -1;
+    return ExactSideOf(vertices, t, point);
+  }
+  int ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point) const;
+  void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
+  TriangleId NewId(Editor& editor);
+  void FreeId(Editor& editor, TriangleId id);
+  void LinkAll();
+
+  std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
+                               TriangleId start, uint32_t zone, uint64_t& steps) const;
+  Ray RayTo(const Vector& point) const;
+  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
+             const Ray& ray) const;
+  Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
+  void Update(const VertexTable& vertices);
+  bool IsWorthMeasuring() const;
+  bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
+  void SetCenter(const VertexTable& vertices);
+  void StartMeasuring(const VertexTable& vertices, int resolution);
+  void ContinueMeasuring(const VertexTable& vertices, size_t corners);
+  void MeasureCorner(const VertexTable& vertices);
+  std::optional<Vector> FindInterior(const VertexTable& vertices) const;
+  double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
+
+  bool CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                     double size, Editor& editor);
+  void InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell);
+  void RemoveVertices(VertexTable& vertices, Editor& editor);
+  void JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor);
+  void ResetMarks();
+
+  void MarkZones(const VertexTable& vertices, std::span<Editor> zones);
+  bool InsertInZone(VertexTable& vertices, const Vector& point, double size, Editor& zone);
+  void LeaveZones(VertexTable& vertices, std::span<Editor> zones);
+
+  static constexpr VertexId kDead = UINT32_MAX;
+  static constexpr uint32_t kZoneMask = 7;
+
+  ChunkedVector<SurfaceTriangle> triangles_;
+  ChunkedVector<TriangleId> free_;
+  size_t alive_ = 0;
+  // By vertex: the last insertion whose region it was in.
+  ChunkedVector<uint32_t> vertex_mark_;
+
+  // Round a point strictly inside, when one is known: it stays so while the polytope grows.
+  std::optional<DirectionMap> directions_;
+  std::optional<Measurement> measuring_;
+  // Largest distance, by components, of a vertex from that point.
+  double extent_ = 0;
+  // The count of triangles at which measuring the surface anew starts.
+  size_t next_update_ = 0;
+  // Of the points since the last measurement, how many were looked up in the map and rejected by
+  // it.
+  size_t asked_ = 0;
+  size_t rejected_ = 0;
+  // The count of triangles when it was last measured.
+  size_t measured_at_ = 0;
+  uint64_t work_ = 0;
+
+  Editor editor_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_GROWTH_SURFACE_H_

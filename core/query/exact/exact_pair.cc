@@ -1,0 +1,135 @@
+#include "core/query/exact/exact_pair.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace hulld {
+namespace {
+
+// A quaternion as integers without common power of two, its homogeneous matrix and squared norm.
+struct IntegerRotation {
+  IntegerVector rows[3];
+  Integer norm_squared;
+};
+
+IntegerRotation RotationOf(const std::array<double, 4>& q) {
+  int exponent = kAboveAllExponents;
+  for (const double component : q) {
+    if (component != 0) exponent = std::min(exponent, LowestBitExponent(component));
+  }
+  const Integer w = ToInteger(q[0], exponent);
+  const Integer x = ToInteger(q[1], exponent);
+  const Integer y = ToInteger(q[2], exponent);
+  const Integer z = ToInteger(q[3], exponent);
+  const Integer ww = w * w;
+  const Integer xx = x * x;
+  const Integer yy = y * y;
+  const Integer zz = z * z;
+  const Integer wx = 2 * (w * x);
+  const Integer wy = 2 * (w * y);
+  const Integer wz = 2 * (w * z);
+  const Integer xy = 2 * (x * y);
+  const Integer xz = 2 * (x * z);
+  const Integer yz = 2 * (y * z);
+  return {{{ww + xx - yy - zz, xy - wz, xz + wy},
+           {xy + wz, ww - xx + yy - zz, yz - wx},
+           {xz - wy, yz + wx, ww - xx - yy + zz}},
+          ww + xx + yy + zz};
+}
+
+}  // namespace
+
+ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
+  const Pose& X_WA = filter.a().X_WH();
+  const Pose& X_WB = filter.b().X_WH();
+  const IntegerRotation R_A = RotationOf(X_WA.q);
+  const IntegerRotation R_B = RotationOf(X_WB.q);
+  a_ = {&filter.a().query_hull(), {}, {}, {}};
+  b_ = {&filter.b().query_hull(), {}, {}, {}};
+  const int exponent_a = a_.hull->exponent();
+  const int exponent_b = b_.hull->exponent();
+  const int shift_exponent =
+      LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents));
+  const int common = std::min({exponent_a, exponent_b, shift_exponent});
+  for (int i = 0; i < 3; ++i) {
+    a_.rows[i] = (R_B.norm_squared << (exponent_a - common)) * R_A.rows[i];
+    b_.rows[i] = (R_A.norm_squared << (exponent_b - common)) * R_B.rows[i];
+  }
+  exponent_ = common;
+  norm_ = R_A.norm_squared * R_B.norm_squared;
+  a_.shift = {0, 0, 0};
+  b_.shift = norm_ * (ToInteger(X_WB.t, common) - ToInteger(X_WA.t, common));
+}
+
+IntegerVector ExactPair::TranslationA() const {
+  return norm_ * ToInteger(filter_->a().X_WH().t, exponent_);
+}
+
+IntegerVector ExactPair::ToWorld(const Side& side, const IntegerVector& own) {
+  return {Dot(side.rows[0], own), Dot(side.rows[1], own), Dot(side.rows[2], own)};
+}
+
+const IntegerVector& ExactPair::Vertex(Side& side, uint32_t i) {
+  if (const auto found = side.vertices.find(i); found != side.vertices.end()) return found->second;
+  const IntegerVector own = ToInteger(side.hull->hull().vertices()[i], side.hull->exponent());
+  return side.vertices.emplace(i, ToWorld(side, own) + side.shift).first->second;
+}
+
+void ExactPair::CacheAllVertices() {
+  for (uint32_t i = 0; i < a().vertices().size(); ++i) VertexA(i);
+  for (uint32_t i = 0; i < b().vertices().size(); ++i) VertexB(i);
+}
+
+std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
+  std::vector<uint32_t> all(side.hull->hull().vertices().size());
+  std::iota(all.begin(), all.end(), 0u);
+  return all;
+}
+
+std::vector<uint32_t> ExactPair::Farthest(Side& side, const std::vector<uint32_t>& candidates,
+                                          const IntegerVector& n) {
+  if (candidates.size() == 1) return candidates;
+  std::vector<uint32_t> farthest;
+  Integer best;
+  for (const uint32_t i : candidates) {
+    const Integer value = Dot(n, Vertex(side, i));
+    if (!farthest.empty() && value < best) continue;
+    if (farthest.empty() || value > best) {
+      farthest.clear();
+      best = value;
+    }
+    farthest.push_back(i);
+  }
+  return farthest;
+}
+
+std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n) {
+  if (!filter_->usable() || IsZero(n)) return Farthest(a_, AllOf(a_), n);
+  const Vector n_W = ToScaledDoubles(n);
+  return Farthest(a_, filter_->CandidatesA(n_W, kScaledDoublesError * n_W.cwiseAbs().maxCoeff()),
+                  n);
+}
+
+std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n) {
+  if (!filter_->usable() || IsZero(n)) return Farthest(b_, AllOf(b_), -n);
+  const Vector n_W = ToScaledDoubles(n);
+  return Farthest(b_, filter_->CandidatesB(n_W, kScaledDoublesError * n_W.cwiseAbs().maxCoeff()),
+                  -n);
+}
+
+IntegerVector ExactPair::SumOfInnerVertices(const Side& side) {
+  const auto vertices = side.hull->hull().vertices();
+  IntegerVector own = {0, 0, 0};
+  for (const uint32_t i : side.hull->inner_vertices()) {
+    own = own + ToInteger(vertices[i], side.hull->exponent());
+  }
+  return ToWorld(side, own) + Integer(side.hull->inner_vertices().size()) * side.shift;
+}
+
+IntegerVector ExactPair::CenterDifference() const {
+  return Integer(b_.hull->inner_vertices().size()) * SumOfInnerVertices(a_) -
+         Integer(a_.hull->inner_vertices().size()) * SumOfInnerVertices(b_);
+}
+
+}  // namespace hulld

@@ -1,0 +1,87 @@
+#ifndef HULLD_CORE_QUERY_EXACT_EXACT_PAIR_H_
+#define HULLD_CORE_QUERY_EXACT_EXACT_PAIR_H_
+
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/numeric/integer.h"
+#include "core/query/floating/float_pair.h"
+#include "core/query/terms/pose.h"
+
+namespace hulld {
+
+// A pair of posed hulls in integers, exactly.
+//
+// With Q the quaternions' integers and N = |Q|^2, the world coordinates, shifted by -t_A and
+// multiplied by N_A N_B and a power of two, are integers: N_B R(Q_A) P_A for A, and N_A R(Q_B) P_B
+// + N_A N_B (T_B - T_A) for B. Degree 5 in the input; some 280 bits at a common exponent. The
+// floating-point pair, where it is usable, narrows down which vertices can be farthest, so that
+// only these are multiplied out.
+class ExactPair {
+ public:
+  // Of the hulls and poses of `filter`, which must outlive the pair.
+  explicit ExactPair(const FloatPair& filter);
+
+  const FloatPair& filter() const { return *filter_; }
+  const Hull& a() const { return a_.hull->hull(); }
+  const Hull& b() const { return b_.hull->hull(); }
+
+  // The scale: an integer coordinate times 2^exponent() / norm() is the length. norm() > 0.
+  int exponent() const { return exponent_; }
+  const Integer& norm() const { return norm_; }
+  // t_A in the same unit: what turns the shifted coordinates into world coordinates.
+  IntegerVector TranslationA() const;
+
+  const IntegerVector& VertexA(uint32_t i) { return Vertex(a_, i); }
+  const IntegerVector& VertexB(uint32_t i) { return Vertex(b_, i); }
+  // Multiplies out every vertex: from then on all functions may be called by several threads at
+  // once.
+  void CacheAllVertices();
+
+  // The vertices of A farthest along n, ascending.
+  std::vector<uint32_t> FeatureA(const IntegerVector& n);
+  // The vertices of B farthest against n, ascending.
+  std::vector<uint32_t> FeatureB(const IntegerVector& n);
+  // The lowest of them.
+  uint32_t FarthestA(const IntegerVector& n) { return FeatureA(n).front(); }
+  uint32_t FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
+  // The same when it is known to be among `candidates`, ascending.
+  uint32_t FarthestA(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
+    return Farthest(a_, candidates, n).front();
+  }
+  uint32_t FarthestB(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
+    return Farthest(b_, candidates, -n).front();
+  }
+
+  // A positive multiple of a point in the relative interior of A - B: the difference of the means
+  // of the hulls' inner vertices.
+  IntegerVector CenterDifference() const;
+
+ private:
+  struct Side {
+    const QueryHull* hull;
+    // world = matrix * own + shift.
+    IntegerVector rows[3];
+    IntegerVector shift;
+    std::unordered_map<uint32_t, IntegerVector> vertices;
+  };
+
+  static IntegerVector ToWorld(const Side& side, const IntegerVector& own);
+  static const IntegerVector& Vertex(Side& side, uint32_t i);
+  static IntegerVector SumOfInnerVertices(const Side& side);
+  static std::vector<uint32_t> Farthest(Side& side, const std::vector<uint32_t>& candidates,
+                                        const IntegerVector& n);
+  std::vector<uint32_t> AllOf(const Side& side) const;
+
+  const FloatPair* filter_;
+  int exponent_;
+  Integer norm_;
+  Side a_;
+  Side b_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_EXACT_EXACT_PAIR_H_

@@ -1,0 +1,103 @@
+#ifndef HULLD_CORE_QUERY_EXACT_PORTAL_SEARCH_H_
+#define HULLD_CORE_QUERY_EXACT_PORTAL_SEARCH_H_
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+
+#include "core/query/exact/exact_pair.h"
+#include "core/query/terms/certificate.h"
+
+namespace hulld {
+
+// Where the origin lies relative to a convex set C of dimension 3, by shooting a ray from a point
+// inside C through the origin and looking for the facet of C through which it leaves. C is A - B,
+// or A - B thickened along a coordinate axis.
+//
+// A portal is a triangle of vertices of C that the ray crosses. Its plane's far side is explored by
+// the support vertex w along its normal n, pointing away from the centre: if n.w < 0, all of C is
+// below the origin and n separates; if the portal itself lies beyond the origin, the origin is
+// interior; if w is no farther than the portal, the plane supports C there and the origin, which is
+// not below the plane, lies on it. Otherwise w replaces the corner of the portal that leaves the
+// ray crossing it, and the crossing moves outwards.
+//
+// Ties: the centre c is taken to be c + (e, e^2, e^3) for an infinitesimal e, the ray's direction d
+// = -c being kept. Then the ray crosses no edge, unless the edge is parallel to it; every
+// refinement moves the crossing strictly outwards, so that with exact signs the search ends for
+// every input. All signs are exact: floating point with a proven bound decides most, integers the
+// rest. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals; Edelsbrunner
+// and Mücke 1990 (simulation of simplicity) for the ties.
+class PortalSearch {
+ public:
+  // `pair` and `should_stop`, which may be empty, must outlive the search. Requires C to have
+  // dimension 3.
+  PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop);
+
+  // Thickens C: by +-half along a coordinate axis.
+  void Thicken(int axis, Integer half);
+
+  enum class Verdict { kSeparated, kTouching, kOverlapping, kStopped };
+  struct Result {
+    Verdict verdict = Verdict::kStopped;
+    // Separated and touching: from A towards B, n.w <= 0 for all w in C.
+    std::optional<IntegerVector> axis;
+    // Touching: pairs whose vertices of C are a triangle, possibly degenerate, that holds the
+    // origin.
+    std::optional<std::array<VertexPair, 3>> portal;
+  };
+  Result Run();
+
+  uint64_t directions_tried() const { return directions_tried_; }
+
+ private:
+  // A vertex of C, or the centre; in floating point within kMinkowskiErrorFactor of the pair's size
+  // where there is a filter.
+  struct Point {
+    VertexPair pair = {};
+    // The end of C's thickness, -1 or 1; 0 when C is not thickened.
+    int side = 0;
+    Vector w = Vector::Zero();
+  };
+  // What a direction is made of.
+  enum class Kind {
+    kRay,            // the ray's
+    kAcrossPoint,    // ray x p
+    kAcrossSegment,  // ray x (p - q)
+    kNormal,         // (q - p) x (r - p)
+    kOther,          // given
+  };
+  class Direction;
+
+  IntegerVector Exact(const Point& point) const;
+  const IntegerVector& ExactRay() const;
+  int Sign3(const Point& p, const Point& q, const Point& r) const;
+  int TurnOf(const Point& p, const Point& q) const;
+  bool IsOnRay(const Point& p) const;
+  int SignAlong(Direction& n, const Point& w) const;
+  int SignOfAdvance(Direction& n, const Point& p, const Point& q, const Point& r,
+                    const Point& w) const;
+  Point Farthest(Direction& n);
+  std::optional<Result> Explore(Direction& n, Point* farthest);
+  std::optional<Result> FindPortal();
+  Result RefinePortal();
+  void Replace(const Point& w);
+
+  ExactPair& pair_;
+  const std::function<bool()>& should_stop_;
+  // Whether floating point may decide.
+  bool filtered_;
+  // Bound of the error of a point's components, where filtered.
+  double position_error_;
+  int axis_ = -1;
+  Integer half_;
+  // From the centre through the origin; exactly once it is asked for.
+  mutable std::optional<IntegerVector> exact_ray_;
+  Vector ray_ = Vector::Zero();
+  std::array<Point, 3> portal_;
+  uint64_t directions_tried_ = 0;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_EXACT_PORTAL_SEARCH_H_

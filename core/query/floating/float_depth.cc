@@ -1,0 +1,268 @@
+#include "core/query/floating/float_depth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/orientation.h"
+#include "core/query/floating/expanding_surface.h"
+#include "core/query/floating/nearest_part.h"
+
+namespace hulld {
+namespace {
+
+// A vertex this little above a facet leaves it in place; relative to the pair's size. Far below the
+// default error, far above rounding: flat parts of A - B are not cut into slivers.
+constexpr double kRelativeVisibility = 0x1p-46;
+// Where memory is set aside. Observed: links of a robot's arm need 15 vertices.
+constexpr size_t kUsualVertices = 32;
+constexpr size_t kUsualFacets = 192;
+constexpr size_t kMaxVertices = size_t{1} << 18;
+
+struct Corner {
+  PlainVector w;
+  VertexPair pair;
+};
+
+// The plane of a facet.
+struct Plane {
+  PlainVector n;  // unit length, outward
+  // The least n . p over its corners p.
+  double distance = 0;
+  // Whether the corners are certain to turn left as seen from outside, about the origin.
+  bool outward = false;
+};
+
+class Expansion {
+ public:
+  Expansion(const FloatPair& pair, const SeparationGoal& goal)
+      : pair_(pair), goal_(goal), unit_(UnitOf(pair.size())), per_unit_(1 / unit_) {
+    corners_.reserve(kUsualVertices);
+    planes_.reserve(kUsualFacets);
+    heap_.reserve(kUsualFacets);
+    surface_.Reserve(kUsualFacets);
+  }
+
+  SeparationBounds Run(std::span<const VertexPair> start, bool want_point) {
+    if (Start(start)) {
+      while (Step()) {
+      }
+    }
+    bounds_.low = ProvenLow();
+    if (want_point && bounds_.low > 0) FindPoint();
+    return bounds_;
+  }
+
+  void AppendVertices(std::vector<VertexPair>& vertices) const {
+    for (const Corner& corner : corners_) vertices.push_back(corner.pair);
+  }
+
+ private:
+  using Entry = std::pair<double, uint32_t>;  // a facet by its distance
+
+  Corner At(VertexPair pair) const { return {per_unit_ * pair_.Difference(pair), pair}; }
+
+  double HighOf(const FloatPair::Support& farthest) const {
+    return farthest.value + kReachErrorFactor * pair_.size();
+  }
+
+  // Flat parts of A - B make it dear to be certain; that is put off until it may end the expansion.
+  FloatPair::Support Reach(const PlainVector& n, double low) {
+    FloatPair::Support farthest = pair_.Farthest(n);
+    if (!farthest.certain && goal_.Met(low, std::min(bounds_.high, HighOf(farthest)))) {
+      farthest = pair_.CertainFarthest(n, farthest);
+    }
+    if (farthest.certain) bounds_.high = std::min(bounds_.high, HighOf(farthest));
+    return farthest;
+  }
+
+  // A tetrahedron, its corner 3 inside of its facet 0, 1, 2.
+  bool Start(std::span<const VertexPair> start) {
+    if (start.size() == 4) {
+      for (const VertexPair& pair : start) corners_.push_back(At(pair));
+    } else if (!SpanTetrahedron()) {
+      return false;
+    }
+    const PlainVector n = Cross(corners_[1].w - corners_[0].w, corners_[2].w - corners_[0].w);
+    if (Dot(n, corners_[3].w - corners_[0].w) > 0) std::swap(corners_[1], corners_[2]);
+    surface_.Start();
+    return AddPlanes(0);
+  }
+
+  // The farther of the two vertices farthest along and against n, as seen from the corner 0.
+  bool AddFarther(PlainVector n) {
+    const double length = Norm(n);
+    if (!(length > 0)) return false;
+    n = (1 / length) * n;
+    const VertexPair pairs[2] = {Reach(n, 0).pair, Reach(-n, 0).pair};
+    double heights[2];
+    for (int i = 0; i < 2; ++i) {
+      heights[i] = std::abs(Dot(n, At(pairs[i]).w - corners_[0].w));
+    }
+    const int farther = heights[1] > heights[0];
+    corners_.push_back(At(pairs[farther]));
+    return heights[farther] > kRelativeVisibility;
+  }
+
+  bool SpanTetrahedron() {
+    corners_.push_back(At(Reach({1, 0, 0}, 0).pair));
+    if (!AddFarther({1, 0, 0})) return false;
+    const PlainVector e = corners_[1].w - corners_[0].w;
+    const PlainVector across = Cross(e, {0, 1, 0});
+    const PlainVector other = Cross(e, {0, 0, 1});
+    if (!AddFarther(SquaredNorm(across) > SquaredNorm(other) ? across : other)) return false;
+    return AddFarther(Cross(e, corners_[2].w - corners_[0].w));
+  }
+
+  // For all facets from `first` on.
+  bool AddPlanes(uint32_t first) {
+    planes_.resize(surface_.facets().size());
+    for (uint32_t i = first; i < planes_.size(); ++i) {
+      const auto& corners = surface_.facets()[i].corners;
+      const PlainVector& p = corners_[corners[0]].w;
+      const PlainVector& q = corners_[corners[1]].w;
+      const PlainVector& r = corners_[corners[2]].w;
+      const PlainVector normal = Cross(q - p, r - p);
+      const double length = Norm(normal);
+      if (!(length > 0)) return false;
+      const PlainVector n = (1 / length) * normal;
+      const double distance = std::min(Dot(n, p), std::min(Dot(n, q), Dot(n, r)));
+      planes_[i] = {n, distance, length * distance > kLeastOutward};
+      // One beyond the upper bound never becomes the nearest.
+      if (distance * unit_ > bounds_.high) continue;
+      heap_.emplace_back(distance, i);
+      std::push_heap(heap_.begin(), heap_.end(), std::greater<>());
+    }
+    return true;
+  }
+
+  // The nearest facet; none when all are beyond the upper bound.
+  std::optional<uint32_t> Nearest() {
+    while (!heap_.empty() && !surface_.facets()[heap_.front().second].alive) {
+      std::pop_heap(heap_.begin(), heap_.end(), std::greater<>());
+      heap_.pop_back();
+    }
+    if (heap_.empty()) return std::nullopt;
+    return heap_.front().second;
+  }
+
+  double Low(const std::optional<uint32_t>& nearest) const {
+    if (!nearest) return bounds_.high;
+    const double distance = planes_[*nearest].distance * unit_;
+    return std::min(bounds_.high, distance - kTriangleDistanceErrorFactor * pair_.size());
+  }
+
+  bool Contains(VertexPair pair) const {
+    return std::any_of(corners_.begin(), corners_.end(),
+                       [&](const Corner& corner) { return corner.pair == pair; });
+  }
+
+  bool IsAbove(uint32_t facet, const Corner& corner) const {
+    return Dot(planes_[facet].n, corner.w) > planes_[facet].distance + kRelativeVisibility;
+  }
+
+  // Expands the nearest facet; false when the goal is met or nothing is gained.
+  bool Step() {
+    const std::optional<uint32_t> nearest = Nearest();
+    if (!nearest || corners_.size() >= kMaxVertices) return false;
+    const PlainVector n = planes_[*nearest].n;
+    const double low = std::max(0.0, Low(nearest));
+    FloatPair::Support farthest = Reach(n, low);
+    if (goal_.Met(low, bounds_.high)) return false;
+    Corner corner = At(farthest.pair);
+    if (!farthest.certain && !IsAbove(*nearest, corner)) {
+      farthest = pair_.CertainFarthest(n, farthest);
+      bounds_.high = std::min(bounds_.high, HighOf(farthest));
+      corner = At(farthest.pair);
+    }
+    // One of its own vertices: the surface is not convex up to rounding.
+    if (!IsAbove(*nearest, corner) || Contains(farthest.pair)) return false;
+    corners_.push_back(corner);
+    const PlainVector w = corner.w;
+    const auto apex = static_cast<uint32_t>(corners_.size() - 1);
+    const std::optional<uint32_t> first = surface_.Expand(*nearest, apex, [&](uint32_t i) {
+      return Dot(planes_[i].n, w) > planes_[i].distance + kRelativeVisibility;
+    });
+    intact_ = first && AddPlanes(*first);
+    return intact_;
+  }
+
+  // The proven lower bound; 0 when there is none.
+  double ProvenLow() {
+    if (!intact_ || planes_.empty()) return 0;
+    const double low = Low(Nearest());
+    if (!(low > 0)) return 0;
+    bool some = false;
+    for (uint32_t i = 0; i < planes_.size(); ++i) {
+      if (!surface_.facets()[i].alive) continue;
+      if (planes_[i].outward) {
+        some = true;
+        continue;
+      }
+      const auto& corners = surface_.facets()[i].corners;
+      const int side = Orient3d(corners_[corners[0]].w, corners_[corners[1]].w,
+                                corners_[corners[2]].w, Vector::Zero());
+      if (side > 0) return 0;
+      some |= side < 0;
+    }
+    return some ? low : 0;
+  }
+
+  // The point of the surface that is nearest to the origin: on one of the triangles of the nearest
+  // facet, if that is flat.
+  void FindPoint() {
+    double least = INFINITY;
+    uint32_t nearest = 0;
+    for (uint32_t i = 0; i < planes_.size(); ++i) {
+      if (!surface_.facets()[i].alive || planes_[i].distance * unit_ > bounds_.high) continue;
+      const double length = Norm(NearestOn(i).point);
+      if (!(length < least)) continue;
+      least = length;
+      nearest = i;
+    }
+    if (least == INFINITY) return;
+    const NearestPart part = NearestOn(nearest);
+    const auto& corners = surface_.facets()[nearest].corners;
+    bounds_.point_length = least * unit_;
+    bounds_.point.count = part.count;
+    for (uint32_t i = 0; i < part.count; ++i) {
+      bounds_.point.pairs[i] = corners_[corners[part.corners[i]]].pair;
+      bounds_.point.weights[i] = part.weights[i];
+    }
+  }
+
+  NearestPart NearestOn(uint32_t facet) const {
+    const auto& corners = surface_.facets()[facet].corners;
+    return NearestOnTriangle(corners_[corners[0]].w, corners_[corners[1]].w,
+                             corners_[corners[2]].w);
+  }
+
+  const FloatPair& pair_;
+  const SeparationGoal& goal_;
+  const double unit_;
+  const double per_unit_;
+  std::vector<Corner> corners_;
+  ExpandingSurface surface_;
+  std::vector<Plane> planes_;
+  std::vector<Entry> heap_;
+  bool intact_ = true;
+  SeparationBounds bounds_;
+};
+
+}  // namespace
+
+SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
+                            const SeparationGoal& goal, bool want_point,
+                            std::vector<VertexPair>& vertices) {
+  Expansion expansion(pair, goal);
+  const SeparationBounds bounds = expansion.Run(start, want_point);
+  if (!goal.Met(bounds.low, bounds.high)) expansion.AppendVertices(vertices);
+  return bounds;
+}
+
+}  // namespace hulld

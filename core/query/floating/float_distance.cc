@@ -1,0 +1,123 @@
+#include "core/query/floating/float_distance.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/numeric/error_bounds.h"
+#include "core/query/floating/nearest_part.h"
+
+namespace hulld {
+namespace {
+
+// More steps than this are spent only where rounding hinders the walk. Observed: random pairs of up
+// to 10000 vertices need fewer than 40.
+constexpr int kMaxSteps = 128;
+
+struct Corner {
+  Vector w;
+  VertexPair pair;
+};
+
+// The corners of the part of A - B that is nearest to the origin so far.
+class Walk {
+ public:
+  Walk(const FloatPair& pair, const SeparationGoal& goal)
+      : pair_(pair), goal_(goal), unit_(UnitOf(pair.size())), per_unit_(1 / unit_) {}
+
+  SeparationBounds Run(Vector n) {
+    n /= n.cwiseAbs().maxCoeff();
+    for (int step = 0; step < kMaxSteps; ++step) {
+      const double length = n.norm();
+      if (!(length > 0)) break;
+      n /= length;
+      FloatPair::Support farthest = pair_.Farthest(n);
+      // Flat parts of A - B make it dear to be certain; that is put off until it may end the walk.
+      if (!farthest.certain &&
+          (goal_.Met(LowOf(farthest), bounds_.high) || Contains(farthest.pair))) {
+        farthest = pair_.CertainFarthest(n, farthest);
+      }
+      if (farthest.certain) bounds_.low = std::max(bounds_.low, LowOf(farthest));
+      if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
+      corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
+      const NearestPart part = Nearest();
+      // In exact arithmetic every step is nearer.
+      if (count_ == 0 || !Accept(part)) break;
+      n = part.towards;
+      if (goal_.Met(bounds_.low, bounds_.high)) break;
+    }
+    bounds_.low = std::min(bounds_.low, bounds_.high);
+    return bounds_;
+  }
+
+ private:
+  double LowOf(const FloatPair::Support& farthest) const {
+    return -farthest.value - kReachErrorFactor * pair_.size();
+  }
+
+  bool Contains(VertexPair pair) const {
+    return std::any_of(corners_.begin(), corners_.begin() + count_,
+                       [&](const Corner& corner) { return corner.pair == pair; });
+  }
+
+  NearestPart OnFace(uint8_t i, uint8_t j, uint8_t k) const {
+    NearestPart part = NearestOnTriangle(corners_[i].w, corners_[j].w, corners_[k].w);
+    const uint8_t corners[3] = {i, j, k};
+    for (uint32_t c = 0; c < part.count; ++c) part.corners[c] = corners[part.corners[c]];
+    return part;
+  }
+
+  NearestPart Nearest() const {
+    if (count_ == 1) return NearestOfVertex(corners_[0].w);
+    if (count_ == 2) return NearestOnEdge(corners_[0].w, corners_[1].w, 0, 1);
+    if (count_ == 3) return OnFace(0, 1, 2);
+    // The newest corner is part of the nearest; a face away from the origin is not nearer than one
+    // that faces it.
+    NearestPart best = OnFace(3, 0, 1);
+    double least = best.point.squaredNorm();
+    for (const NearestPart& part : {OnFace(3, 1, 2), OnFace(3, 2, 0)}) {
+      const double squared = part.point.squaredNorm();
+      if (squared < least) {
+        least = squared;
+        best = part;
+      }
+    }
+    return best;
+  }
+
+  // Keeps the part; false when it is not nearer than the last.
+  bool Accept(const NearestPart& part) {
+    const double length = part.point.norm();
+    if (!(length < nearest_)) return false;
+    nearest_ = length;
+    std::array<Corner, 4> kept;
+    for (uint32_t i = 0; i < part.count; ++i) kept[i] = corners_[part.corners[i]];
+    corners_ = kept;
+    count_ = part.count;
+    bounds_.point_length = length * unit_;
+    bounds_.high = bounds_.point_length + kCombinationErrorFactor * pair_.size();
+    bounds_.point.count = count_;
+    for (uint32_t i = 0; i < count_; ++i) {
+      bounds_.point.pairs[i] = corners_[i].pair;
+      bounds_.point.weights[i] = part.weights[i];
+    }
+    return true;
+  }
+
+  const FloatPair& pair_;
+  const SeparationGoal& goal_;
+  const double unit_;
+  const double per_unit_;
+  std::array<Corner, 4> corners_;
+  uint32_t count_ = 0;
+  double nearest_ = INFINITY;
+  SeparationBounds bounds_;
+};
+
+}  // namespace
+
+SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal) {
+  return Walk(pair, goal).Run(n);
+}
+
+}  // namespace hulld

@@ -1,0 +1,147 @@
+#ifndef HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_
+#define HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_
+
+#include <cstdint>
+#include <vector>
+
+#include "core/numeric/error_bounds.h"
+#include "core/query/placed/placed_hull.h"
+#include "core/query/placed/plain_vector.h"
+#include "core/query/terms/certificate.h"
+
+namespace hulld {
+
+// A pair of placed hulls in floating point, with proven error bounds (core/numeric/error_bounds.h).
+// Everything is relative to the world shifted by -t_A: A is rotated only, B is rotated and moved by
+// t_B - t_A, so a common offset costs no accuracy.
+class FloatPair {
+ public:
+  // The hulls must outlive the pair. Requires both not empty.
+  FloatPair(const PlacedHull& a, const PlacedHull& b)
+      : a_(&a),
+        b_(&b),
+        offset_(PlainVector(b.X_WH().t) - a.X_WH().t),
+        size_(a.hull().max_abs_coordinate() + b.hull().max_abs_coordinate() +
+              LargestComponent(offset_)),
+        usable_(size_ >= kFilterMinSize && size_ <= kFilterMaxSize) {}
+
+  const PlacedHull& a() const { return *a_; }
+  const PlacedHull& b() const { return *b_; }
+  // Whether the bounds below hold: false when the pair's size is beyond [kFilterMinSize,
+  // kFilterMaxSize].
+  bool usable() const { return usable_; }
+  // The size S of the pair that the bounds are relative to.
+  double size() const { return size_; }
+
+  // A vertex of A - B far along a direction.
+  struct Support {
+    VertexPair pair;
+    // n . (a - b): where certain, within SupportError of the largest over A - B.
+    double value;
+    bool certain;
+  };
+  // A vertex of A far along n_W, and of B far against it.
+  Support Farthest(const PlainVector& n_W) const;
+  // The farthest, from what Farthest(n_W) found.
+  Support CertainFarthest(const PlainVector& n_W, const Support& found) const;
+  // The farthest.
+  Support CertainFarthest(const PlainVector& n_W) const {
+    return CertainFarthest(n_W, Farthest(n_W));
+  }
+  // How far a certain value may be from the true maximum. Requires the largest component of n_W
+  // between kDirectionMin and kDirectionMax.
+  double SupportError(const PlainVector& n_W) const {
+    return kSupportErrorFactor * LargestComponent(n_W) * size_;
+  }
+
+  // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
+  // up to `error`.
+  std::vector<uint32_t> CandidatesA(const Vector& n_W, double error) const;
+  // All vertices of B that may be farthest against n_W.
+  std::vector<uint32_t> CandidatesB(const Vector& n_W, double error) const;
+
+  // Positions, each component within kMinkowskiErrorFactor * size().
+  PlainVector PositionA(uint32_t i) const { return Rotated(*a_, i); }
+  PlainVector PositionB(uint32_t i) const { return Rotated(*b_, i) + offset_; }
+  // The vertex a - b of A - B, within the same bound.
+  PlainVector Difference(VertexPair pair) const { return PositionA(pair.a) - PositionB(pair.b); }
+  // A point of A - B, within the same bound.
+  PlainVector CenterDifference() const {
+    return PlainVector(a_->rotated_center()) - (PlainVector(b_->rotated_center()) + offset_);
+  }
+  // What the hulls' bounds about their centres say along n_W.
+  class CenterView;
+  CenterView ViewCenters(const PlainVector& n_W) const;
+  // The difference of the means of the hulls' inner vertices, within the same bound.
+  Vector InnerDifference() const { return InnerPoint(*a_) - (InnerPoint(*b_) + Vector(offset_)); }
+
+ private:
+  static Vector InnerPoint(const PlacedHull& placed);
+  double Slack(const Vector& n_W, double error) const {
+    return 2 * SupportError(n_W) + kDirectionErrorFactor * error * size_;
+  }
+  static PlainVector Rotated(const PlacedHull& placed, uint32_t i) {
+    return OutOfOwnFrame(placed, placed.hull().vertices()[i]);
+  }
+  static PlainVector OutOfOwnFrame(const PlacedHull& placed, const PlainVector& v) {
+    const double* const R = placed.R_WH().data();  // column by column
+    return {R[0] * v.x + R[3] * v.y + R[6] * v.z, R[1] * v.x + R[4] * v.y + R[7] * v.z,
+            R[2] * v.x + R[5] * v.y + R[8] * v.z};
+  }
+  // n_W in a hull's own frame.
+  static PlainVector InOwnFrame(const PlacedHull& placed, const PlainVector& n_W) {
+    const double* const R = placed.R_WH().data();
+    return {R[0] * n_W.x + R[1] * n_W.y + R[2] * n_W.z, R[3] * n_W.x + R[4] * n_W.y + R[5] * n_W.z,
+            R[6] * n_W.x + R[7] * n_W.y + R[8] * n_W.z};
+  }
+  PlainVector InA(const PlainVector& n_W) const { return InOwnFrame(*a_, n_W); }
+  PlainVector InB(const PlainVector& n_W) const { return InOwnFrame(*b_, n_W); }
+
+  const PlacedHull* a_;
+  const PlacedHull* b_;
+  PlainVector offset_;
+  double size_;
+  bool usable_;
+};
+
+class FloatPair::CenterView {
+ public:
+  CenterBounds::Bounds bounds_a() const { return center_bounds_a().At(place_a_); }
+  CenterBounds::Bounds bounds_b() const { return center_bounds_b().At(place_b_); }
+  // About the direction from A's surface to B's, where the line of the centres crosses them; zero
+  // where unknown.
+  PlainVector LikelyAxis() const {
+    return OutOfOwnFrame(*pair_->a_, center_bounds_a().NormalAt(place_a_)) -
+           OutOfOwnFrame(*pair_->b_, center_bounds_b().NormalAt(place_b_));
+  }
+
+ private:
+  friend class FloatPair;
+  CenterView(const FloatPair& pair, const PlainVector& n_W)
+      : pair_(&pair),
+        place_a_(center_bounds_a().PlaceOf(pair.InA(n_W))),
+        place_b_(center_bounds_b().PlaceOf(-pair.InB(n_W))) {}
+
+  const CenterBounds& center_bounds_a() const { return pair_->a_->query_hull().center_bounds(); }
+  const CenterBounds& center_bounds_b() const { return pair_->b_->query_hull().center_bounds(); }
+
+  const FloatPair* pair_;
+  CenterBounds::Place place_a_;
+  CenterBounds::Place place_b_;
+};
+
+inline FloatPair::CenterView FloatPair::ViewCenters(const PlainVector& n_W) const {
+  return CenterView(*this, n_W);
+}
+
+// In the header, as it is the step of every search. The values are those that the support maps
+// found in the hulls' own frames, so that the bound on the maximum holds for them.
+inline FloatPair::Support FloatPair::Farthest(const PlainVector& n_W) const {
+  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W));
+  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W));
+  return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), a.certain && b.certain};
+}
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_

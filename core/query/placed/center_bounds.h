@@ -1,0 +1,172 @@
+#ifndef HULLD_CORE_QUERY_PLACED_CENTER_BOUNDS_H_
+#define HULLD_CORE_QUERY_PLACED_CENTER_BOUNDS_H_
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/query/placed/plain_vector.h"
+#include "core/query/placed/support_map.h"
+
+namespace hulld {
+
+// How far a hull reaches as seen from its centre c, bounded from above and from below for every
+// direction, without a look at its vertices.
+//
+// From above, the support function h(n): the largest n . (v - c). From below, the gauge g(d): the
+// least g with c + d / g in the hull. Both are convex and grow in proportion to their argument, so
+// that a value between others is at most their interpolation. They are kept at the corners of the
+// cells of a cube map; on a face of the cube a direction is the bilinear mean of the corners of its
+// cell, and the same mean of their values bounds its own. Where the hull is round, what is lost
+// shrinks with the square of a cell's width.
+class CenterBounds {
+ public:
+  // None: every bound is unknown.
+  CenterBounds() = default;
+  // None for a hull that is flat. The gauge is unknown unless c is certain to be strictly inside.
+  // Cost: O(C F) for C corners, which are O(V) and at most 6 x 81, and F facets.
+  CenterBounds(const Hull& hull, const SupportMap& support);
+
+  // Not a number where unknown.
+  struct Bounds {
+    double support = std::numeric_limits<double>::quiet_NaN();
+    double gauge = std::numeric_limits<double>::quiet_NaN();
+  };
+  // Where a direction is among the corners; nowhere where there are none.
+  class Place;
+  // Requires the largest component of n positive, and n in the range of FloatPair's directions.
+  Place PlaceOf(const PlainVector& n) const;
+  // Upper bounds of h(n) and g(n) for the n of a place, but for errors of the hull's coordinates
+  // and of n (see kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h).
+  Bounds At(const Place& place) const;
+  Bounds Along(const PlainVector& n) const;
+  // About the outward normal of the hull where the ray from c along the n of a place leaves it,
+  // longer where the hull is narrow. Zero where that is coarse or unknown.
+  PlainVector NormalAt(const Place& place) const;
+  // Whether there are few corners, or none: then the bounds say little but of what is deep inside,
+  // and the normals nothing.
+  bool coarse() const { return side_ < kLeastFineSide; }
+  // At least g(d) for all d with components of at most 1; infinite where unknown.
+  double largest_gauge() const { return largest_gauge_; }
+
+  size_t MemoryBytes() const { return corners_.capacity() * sizeof(Corner); }
+
+ private:
+  // Cells along a side of a face. Observed: guessing a normal from fewer does not pay.
+  static constexpr uint32_t kLeastFineSide = 4;
+  // Of directions whose largest component is 1: the support function in units, the gauge per unit.
+  struct Corner {
+    float support;
+    float gauge;
+  };
+
+  void AddSupports(const Hull& hull, const SupportMap& support, double radius);
+  void AddGauges(const Hull& hull);
+  Vector DirectionOf(uint32_t corner) const;
+
+  // (side_ + 1)^2 corners for each of the six faces.
+  std::vector<Corner> corners_;
+  uint32_t side_ = 0;
+  double half_ = 0;
+  // A power of two near the hull's radius.
+  double unit_ = 1;
+  double per_unit_ = 1;
+  double largest_gauge_ = std::numeric_limits<double>::infinity();
+};
+
+class CenterBounds::Place {
+ private:
+  friend class CenterBounds;
+  double largest = 0;     // component of n
+  uint32_t axis = 0;      // of that component
+  bool negative = false;  // its sign
+  // The other components over the largest, in cells.
+  double across_s = 0;
+  double across_t = 0;
+  double s = 0;  // from low[0] to high[0]
+  double t = 0;  // from low[0] to low[1]
+  const Corner* low = nullptr;
+  const Corner* high = nullptr;
+};
+
+inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
+  Place place;
+  if (corners_.empty()) return place;
+  const double components[5] = {n.x, n.y, n.z, n.x, n.y};
+  const double x = std::abs(n.x);
+  const double y = std::abs(n.y);
+  const double z = std::abs(n.z);
+  const double larger = std::max(x, y);
+  place.largest = std::max(larger, z);
+  const double factor = half_ / place.largest;
+  // Arithmetic of truth values, as compilers turn conditions into branches.
+  const uint32_t is_y = y > x;
+  const uint32_t is_z = z > larger;
+  place.axis = (is_y & (is_z - 1)) | (2 * is_z);
+  place.negative = std::signbit(components[place.axis]);
+  place.across_s = components[place.axis + 1] * factor;
+  place.across_t = components[place.axis + 2] * factor;
+  const double u = place.across_s + half_;
+  const double v = place.across_t + half_;
+  const uint32_t face = 2 * place.axis + static_cast<uint32_t>(place.negative);
+  const uint32_t last = side_ - 1;
+  const uint32_t i = std::min(static_cast<uint32_t>(static_cast<int32_t>(u)), last);
+  const uint32_t j = std::min(static_cast<uint32_t>(static_cast<int32_t>(v)), last);
+  const uint32_t row = side_ + 1;
+  place.low = corners_.data() + (face * row + i) * row + j;
+  place.high = place.low + row;
+  // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
+  place.s = std::clamp(u - i, 0.0, 1.0);
+  place.t = std::clamp(v - j, 0.0, 1.0);
+  return place;
+}
+
+inline CenterBounds::Bounds CenterBounds::At(const Place& place) const {
+  if (place.low == nullptr) return {};
+  const double s = place.s;
+  const double t = place.t;
+  const auto mean = [&](float a, float b, float c, float d) {
+    return (1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * c + t * d);
+  };
+  const Corner* const low = place.low;
+  const Corner* const high = place.high;
+  return {
+      mean(low[0].support, low[1].support, high[0].support, high[1].support) *
+          (place.largest * unit_),
+      mean(low[0].gauge, low[1].gauge, high[0].gauge, high[1].gauge) * (place.largest * per_unit_)};
+}
+
+inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
+  return At(PlaceOf(n));
+}
+
+// The gradient of the gauge per unit, which on a face is the largest component times a function of
+// the others over it.
+inline PlainVector CenterBounds::NormalAt(const Place& place) const {
+  if (coarse() || !(largest_gauge_ < std::numeric_limits<double>::infinity())) {
+    return {0, 0, 0};
+  }
+  const double corner = place.low[0].gauge;
+  const double along_low = place.low[1].gauge - corner;
+  const double along_high = double{place.high[1].gauge} - place.high[0].gauge;
+  const double twist = along_high - along_low;
+  const double slope_s = place.high[0].gauge - corner + place.t * twist;
+  const double slope_t = along_low + place.s * twist;
+  const double value = corner + place.t * along_low + place.s * slope_s;
+  const double slope = value - (place.across_s * slope_s + place.across_t * slope_t);
+  // After the component along the axis come the next two, the first after the last.
+  double normal[5];
+  normal[place.axis] = place.negative ? -slope : slope;
+  normal[place.axis + 1] = half_ * slope_s;
+  normal[place.axis + 2] = half_ * slope_t;
+  return {place.axis == 0 ? normal[0] : normal[3], place.axis == 2 ? normal[4] : normal[1],
+          normal[2]};
+}
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_PLACED_CENTER_BOUNDS_H_

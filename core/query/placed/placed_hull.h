@@ -1,0 +1,36 @@
+#ifndef HULLD_CORE_QUERY_PLACED_PLACED_HULL_H_
+#define HULLD_CORE_QUERY_PLACED_PLACED_HULL_H_
+
+#include <absl/status/statusor.h>
+
+#include "core/query/placed/query_hull.h"
+#include "core/query/terms/pose.h"
+
+namespace hulld {
+
+// A hull at a pose, and what every query of it needs of the pose: made once, used for many pairs.
+class PlacedHull {
+ public:
+  // `hull` must outlive the result. INVALID_ARGUMENT: ValidatePose.
+  static absl::StatusOr<PlacedHull> Make(const QueryHull& hull, const Pose& X_WH);
+
+  const QueryHull& query_hull() const { return *hull_; }
+  const Hull& hull() const { return hull_->hull(); }
+  const Pose& X_WH() const { return X_WH_; }
+  // The rotation R(q) / |q|^2, each entry within kRotationEntryError.
+  const Eigen::Matrix3d& R_WH() const { return R_WH_; }
+  // The hull's centre rotated, R_WH * center, before the translation.
+  const Vector& rotated_center() const { return rotated_center_; }
+
+ private:
+  PlacedHull(const QueryHull& hull, const Pose& X_WH);
+
+  const QueryHull* hull_;
+  Pose X_WH_;
+  Eigen::Matrix3d R_WH_;
+  Vector rotated_center_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_PLACED_PLACED_HULL_H_

@@ -1,0 +1,25 @@
+#ifndef HULLD_CORE_QUERY_TERMS_POSE_H_
+#define HULLD_CORE_QUERY_TERMS_POSE_H_
+
+#include <absl/status/status.h>
+
+#include <array>
+
+#include "core/hull/hull.h"
+
+namespace hulld {
+
+// X_WA, the pose of frame A in the world: p_W = R(q) p_A / |q|^2 + t over the reals for the doubles
+// given, where R(q) is the homogeneous matrix of the quaternion q = (w, x, y, z). q and s q mean
+// the same rotation, exactly.
+struct Pose {
+  std::array<double, 4> q = {1, 0, 0, 0};
+  Vector t = Vector::Zero();
+};
+
+// OK, or INVALID_ARGUMENT "rotation.x is NaN", "translation.z is infinite", "rotation is zero".
+absl::Status ValidatePose(const Pose& pose);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_TERMS_POSE_H_

@@ -1,0 +1,54 @@
+#ifndef HULLD_CORE_QUERY_TERMS_SEPARATION_BOUNDS_H_
+#define HULLD_CORE_QUERY_TERMS_SEPARATION_BOUNDS_H_
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/query/terms/certificate.h"
+
+namespace hulld {
+
+// When bounds of a length are close enough.
+struct SeparationGoal {
+  // Half the width may be absolute_error + relative_error * (size + length).
+  double absolute_error = 0;
+  double relative_error = 0;
+  double size = 0;
+  // Or it shows on which side of this the length is. NaN: no such way.
+  double threshold = std::numeric_limits<double>::quiet_NaN();
+
+  bool Met(double low, double high) const {
+    // Where nothing is known yet, both sides below would be infinite.
+    if (!(high < std::numeric_limits<double>::infinity())) return low > threshold;
+    const double middle = low + (high - low) / 2;
+    return (high - low) / 2 <= absolute_error + relative_error * (size + middle) ||
+           low > threshold || high < threshold;
+  }
+};
+
+// A point of A - B as a convex combination of vertices, up to rounding.
+struct FloatCombination {
+  uint32_t count = 0;
+  std::array<VertexPair, 3> pairs = {};
+  std::array<double, 3> weights = {};
+};
+
+// What floating point proves of the distance of the origin from A - B, or from its boundary.
+struct SeparationBounds {
+  double low = 0;
+  double high = std::numeric_limits<double>::infinity();
+  // Where it is attained, as far as found; count 0 when unknown.
+  FloatCombination point;
+  // The length of that point as a vector, within kCombinationErrorFactor times the pair's size.
+  double point_length = 0;
+};
+
+// An integer power of two near a positive size: lengths divided by it are near 1.
+inline double UnitOf(double size) { return std::ldexp(1.0, std::ilogb(size)); }
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_TERMS_SEPARATION_BOUNDS_H_

@@ -1,0 +1,54 @@
+#include "server/access/authenticator.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/match.h>
+
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace hulld::server {
+namespace {
+
+constexpr char kKey[] = "authorization";
+constexpr char kScheme[] = "Bearer ";
+
+}  // namespace
+
+std::shared_ptr<const TokenTable> Authenticator::tokens() const {
+  const std::lock_guard lock(mutex_);
+  return tokens_;
+}
+
+void Authenticator::SetTokens(TokenTable tokens) {
+  auto table = std::make_shared<const TokenTable>(std::move(tokens));
+  const std::lock_guard lock(mutex_);
+  tokens_ = std::move(table);
+}
+
+absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc rpc) const {
+  const std::shared_ptr<const TokenTable> table = tokens();
+  if (table == nullptr) return Caller();
+  const auto [first, last] = metadata.equal_range(kKey);
+  if (first == last) {
+    return absl::UnauthenticatedError(
+        "the call carries no token; send one as metadata \"authorization: Bearer TOKEN\"");
+  }
+  if (std::next(first) != last) {
+    return absl::UnauthenticatedError("the call carries \"authorization\" twice; send one");
+  }
+  const std::string value(first->second.data(), first->second.size());
+  if (!absl::StartsWithIgnoreCase(value, kScheme)) {
+    return absl::UnauthenticatedError(
+        "the metadata \"authorization\" is not \"Bearer TOKEN\"; write it so");
+  }
+  const std::optional<Caller> caller = table->Find(value.substr(sizeof kScheme - 1));
+  if (!caller.has_value()) {
+    return absl::UnauthenticatedError(
+        "the call's token is unknown or no longer valid; ask whoever runs the server for another");
+  }
+  if (absl::Status s = CheckPermission(*caller, rpc); !s.ok()) return s;
+  return *caller;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,39 @@
+#ifndef HULLD_SERVER_ACCESS_AUTHENTICATOR_H_
+#define HULLD_SERVER_ACCESS_AUTHENTICATOR_H_
+
+#include <absl/status/statusor.h>
+#include <grpcpp/grpcpp.h>
+
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "server/access/caller.h"
+#include "server/access/token_table.h"
+
+namespace hulld::server {
+
+// Tells who calls, by "authorization: Bearer TOKEN" in the call's metadata. Without tokens everyone
+// may do everything. Any thread.
+class Authenticator {
+ public:
+  using Metadata = std::multimap<grpc::string_ref, grpc::string_ref>;
+
+  // UNAUTHENTICATED: no token, or none that is known; the message never repeats it.
+  // PERMISSION_DENIED: the token's role does not allow the call.
+  absl::StatusOr<Caller> Authenticate(const Metadata& metadata, Rpc rpc) const;
+
+  // From now on callers need one of these tokens; calls that run go on.
+  void SetTokens(TokenTable tokens);
+
+ private:
+  std::shared_ptr<const TokenTable> tokens() const;
+
+  mutable std::mutex mutex_;
+  // Null: no tokens are needed. Guarded by the mutex.
+  std::shared_ptr<const TokenTable> tokens_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_ACCESS_AUTHENTICATOR_H_

@@ -1,0 +1,82 @@
+#include "server/access/caller.h"
+
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+
+#include "server/contract/hull_id.h"
+#include "server/contract/rpc.h"
+#include "server/settings/config.h"
+
+namespace hulld::server {
+namespace {
+
+absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
+                           const std::string& value) {
+  return absl::PermissionDeniedError(
+      absl::StrCat(field, " \"", absl::CEscape(value), "\" is outside of \"", caller.prefix,
+                   "\", which token \"", caller.name,
+                   "\" is limited to; use an ID that starts with it, or another token"));
+}
+
+}  // namespace
+
+const char* RoleName(Permission permission) {
+  switch (permission) {
+    case Permission::kRead:
+      return "read-only";
+    case Permission::kWrite:
+      return "read-write";
+    case Permission::kAdmin:
+      return "admin";
+  }
+  return "admin";
+}
+
+Permission PermissionFor(Rpc rpc) {
+  switch (rpc) {
+    case Rpc::kGetHull:
+    case Rpc::kGetHullMesh:
+    case Rpc::kListHulls:
+    case Rpc::kCheckCollision:
+    case Rpc::kBatchCheckCollisions:
+    case Rpc::kStreamCollisions:
+    case Rpc::kFindCollisions:
+    case Rpc::kGetStatus:
+      return Permission::kRead;
+    case Rpc::kCreateHull:
+    case Rpc::kAppendPoints:
+    case Rpc::kDeleteHull:
+    case Rpc::kReplaceHull:
+      return Permission::kWrite;
+    case Rpc::kSaveSnapshot:
+      return Permission::kAdmin;
+  }
+  return Permission::kAdmin;
+}
+
+absl::Status CheckPermission(const Caller& caller, Rpc rpc) {
+  const Permission needed = PermissionFor(rpc);
+  if (caller.permission >= needed) return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      absl::StrCat("token \"", caller.name, "\" has the role ", RoleName(caller.permission),
+                   ", but this call needs ", RoleName(needed), "; use another token"));
+}
+
+absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field) {
+  if (absl::Status s = CheckHullIdSyntax(id, field); !s.ok()) return s;
+  if (id.starts_with(caller.prefix)) return absl::OkStatus();
+  return OutsidePrefix(caller, field, id);
+}
+
+absl::StatusOr<std::string> PrefixToList(const Caller& caller, const std::string& prefix) {
+  if (prefix.size() > Config::kMaxIdCharacters) {
+    return absl::InvalidArgumentError(absl::StrCat("prefix holds ", prefix.size(),
+                                                   " characters; an ID holds at most ",
+                                                   Config::kMaxIdCharacters));
+  }
+  if (prefix.starts_with(caller.prefix)) return prefix;
+  if (caller.prefix.starts_with(prefix)) return caller.prefix;
+  return OutsidePrefix(caller, "prefix", prefix);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,102 @@
+#include "server/access/guard.h"
+
+#include <absl/status/status.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "server/access/token_table.h"
+
+namespace hulld::server {
+namespace {
+
+// Says once what is wrong with a file, and once that it is well again.
+void Complain(const char* what, const absl::Status& status, std::string* complaint) {
+  const std::string message(status.message());
+  if (message == *complaint) return;
+  *complaint = message;
+  if (status.ok()) {
+    spdlog::info("{} can be read again", what);
+  } else {
+    spdlog::error("{} stay as they were: {}", what, message);
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Guard>> Guard::Load(const Config& config) {
+  std::unique_ptr<Guard> guard(new Guard(config));
+  if (absl::Status s = guard->LoadAll(); !s.ok()) return s;
+  if (config.has_tls() || !config.tokens_file.empty()) {
+    guard->watcher_ = std::thread([guard = guard.get()] { guard->Watch(); });
+  }
+  return guard;
+}
+
+Guard::~Guard() {
+  if (!watcher_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  end_.notify_all();
+  watcher_.join();
+}
+
+std::shared_ptr<grpc::ServerCredentials> Guard::credentials() const {
+  if (tls_ != nullptr) return tls_;
+  return grpc::InsecureServerCredentials();
+}
+
+absl::Status Guard::LoadAll() {
+  const std::lock_guard lock(mutex_);
+  if (config_.has_tls()) {
+    if (absl::Status s = ReloadTls(); !s.ok()) return s;
+  }
+  if (!config_.tokens_file.empty()) return ReloadTokens();
+  return absl::OkStatus();
+}
+
+void Guard::Reload() {
+  const std::lock_guard lock(mutex_);
+  if (config_.has_tls()) Complain("the TLS certificates", ReloadTls(), &tls_complaint_);
+  if (!config_.tokens_file.empty()) Complain("the tokens", ReloadTokens(), &tokens_complaint_);
+}
+
+absl::Status Guard::ReloadTls() {
+  absl::StatusOr<TlsIdentity> loaded = LoadTlsIdentity(config_);
+  if (!loaded.ok()) return loaded.status();
+  if (*loaded == identity_) return absl::OkStatus();
+  identity_ = *loaded;
+  if (tls_ == nullptr) {
+    tls_ = std::make_shared<TlsCredentials>(*std::move(loaded));
+  } else {
+    tls_->SetIdentity(*std::move(loaded));
+  }
+  spdlog::info("TLS certificate of {} in force, valid until {}", identity_.subject,
+               FormatTime(identity_.not_after));
+  const absl::Status valid = CheckValidity(identity_, std::chrono::system_clock::now());
+  if (!valid.ok()) spdlog::warn("{}", std::string(valid.message()));
+  return absl::OkStatus();
+}
+
+absl::Status Guard::ReloadTokens() {
+  absl::StatusOr<TokenTable> table = ReadTokensFile(config_.tokens_file);
+  if (!table.ok()) return table.status();
+  if (*table == tokens_) return absl::OkStatus();
+  tokens_ = *std::move(table);
+  authenticator_.SetTokens(tokens_);
+  spdlog::info("{} tokens in force", tokens_.size());
+  return absl::OkStatus();
+}
+
+void Guard::Watch() {
+  std::unique_lock lock(mutex_);
+  while (!end_.wait_for(lock, Config::kReloadInterval, [this] { return ending_; })) {
+    lock.unlock();
+    Reload();
+    lock.lock();
+  }
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,77 @@
+#include "server/access/secret_file.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_format.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace hulld::server {
+namespace {
+
+constexpr size_t kMostBytes = 1 << 20;
+
+absl::Status Problem(const std::string& setting, const std::string& path, const std::string& what) {
+  return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
+}
+
+// Empty when only we, and the group of a file of root's, can get at it.
+std::string CheckAccess(const struct stat& info) {
+  if (info.st_uid != 0 && info.st_uid != geteuid()) {
+    return absl::StrFormat(
+        "it belongs to user %d; make it root's or that of the user who runs hulld (%d)",
+        info.st_uid, geteuid());
+  }
+  const mode_t allowed = info.st_uid == 0 ? 0740 : 0700;
+  const mode_t mode = info.st_mode & 07777;
+  if ((mode & ~allowed & 0077) == 0) return "";
+  return absl::StrFormat("its permissions %04o are too open; others could use it: chmod %s", mode,
+                         info.st_uid == 0 ? "640 (or tighter)" : "600 (or tighter)");
+}
+
+absl::StatusOr<std::string> ReadOpen(int fd, const std::string& path, const std::string& setting,
+                                     bool secret) {
+  struct stat info = {};
+  if (fstat(fd, &info) != 0) return Problem(setting, path, std::strerror(errno));
+  if (!S_ISREG(info.st_mode)) return Problem(setting, path, "it is no regular file");
+  if (secret) {
+    const std::string problem = CheckAccess(info);
+    if (!problem.empty()) return Problem(setting, path, problem);
+  }
+  std::string text;
+  char buffer[4096];
+  for (;;) {
+    const ssize_t count = read(fd, buffer, sizeof buffer);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return Problem(setting, path, std::strerror(errno));
+    if (count == 0) return text;
+    text.append(buffer, static_cast<size_t>(count));
+    if (text.size() > kMostBytes) return Problem(setting, path, "it holds more than 1 MiB");
+  }
+}
+
+absl::StatusOr<std::string> ReadFile(const std::string& path, const std::string& setting,
+                                     bool secret) {
+  // Not blocking, so that a pipe is seen for what it is.
+  const int fd = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (fd < 0) return Problem(setting, path, std::strerror(errno));
+  absl::StatusOr<std::string> text = ReadOpen(fd, path, setting, secret);
+  close(fd);
+  return text;
+}
+
+}  // namespace
+
+absl::StatusOr<std::string> ReadSettingFile(const std::string& path, const std::string& setting) {
+  return ReadFile(path, setting, false);
+}
+
+absl::StatusOr<std::string> ReadSecretFile(const std::string& path, const std::string& setting) {
+  return ReadFile(path, setting, true);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,152 @@
+#include "server/access/tls_identity.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <openssl/asn1.h>
+#include <openssl/bio.h>
+#include <openssl/err.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+
+#include <ctime>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "server/access/secret_file.h"
+
+namespace hulld::server {
+namespace {
+
+struct Free {
+  void operator()(BIO* bio) const { BIO_free(bio); }
+  void operator()(X509* certificate) const { X509_free(certificate); }
+  void operator()(EVP_PKEY* key) const { EVP_PKEY_free(key); }
+};
+using Bio = std::unique_ptr<BIO, Free>;
+using Certificate = std::unique_ptr<X509, Free>;
+using Key = std::unique_ptr<EVP_PKEY, Free>;
+
+Bio Open(const std::string& text) {
+  return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
+}
+
+absl::Status Problem(const char* setting, const std::string& path, const std::string& what) {
+  return absl::InvalidArgumentError(absl::StrCat(setting, " ", path, ": ", what));
+}
+
+// All certificates of a file; never none.
+absl::StatusOr<std::vector<Certificate>> ParseCertificates(const std::string& text,
+                                                           const char* setting,
+                                                           const std::string& path) {
+  ERR_clear_error();
+  const Bio bio = Open(text);
+  std::vector<Certificate> certificates;
+  while (X509* certificate = PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr)) {
+    certificates.emplace_back(certificate);
+  }
+  const unsigned long error = ERR_peek_last_error();
+  ERR_clear_error();
+  const bool at_end =
+      ERR_GET_LIB(error) == ERR_LIB_PEM && ERR_GET_REASON(error) == PEM_R_NO_START_LINE;
+  if (!at_end) {
+    return Problem(setting, path,
+                   absl::StrCat("PEM certificate ", certificates.size() + 1, " is damaged"));
+  }
+  if (certificates.empty()) return Problem(setting, path, "it holds no PEM certificate");
+  return certificates;
+}
+
+// Asked for the passphrase of an encrypted key: there is none.
+int NoPassphrase(char*, int, int, void*) { return -1; }
+
+absl::StatusOr<Key> ParseKey(const std::string& text, const std::string& path) {
+  ERR_clear_error();
+  const Bio bio = Open(text);
+  Key key(PEM_read_bio_PrivateKey(bio.get(), nullptr, NoPassphrase, nullptr));
+  ERR_clear_error();
+  if (key != nullptr) return key;
+  const bool encrypted = text.find("ENCRYPTED") != std::string::npos;
+  return Problem("--tls-key", path,
+                 encrypted ? "the key is encrypted; give one without a passphrase"
+                           : "it holds no PEM private key, or a damaged one");
+}
+
+std::chrono::system_clock::time_point TimeOf(const ASN1_TIME* time) {
+  std::tm utc = {};
+  if (ASN1_TIME_to_tm(time, &utc) != 1) return {};
+  return std::chrono::system_clock::from_time_t(timegm(&utc));
+}
+
+std::string SubjectOf(const X509* certificate) {
+  const Bio bio(BIO_new(BIO_s_mem()));
+  X509_NAME_print_ex(bio.get(), X509_get_subject_name(certificate), 0, XN_FLAG_ONELINE);
+  char* text = nullptr;
+  const long length = BIO_get_mem_data(bio.get(), &text);
+  return std::string(text, static_cast<size_t>(length));
+}
+
+}  // namespace
+
+absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config) {
+  if (config.tls_cert.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        config.tls_key.empty() ? "--tls-client-ca" : "--tls-key",
+        " needs --tls-cert, the certificate that this server shows; give all of them or none"));
+  }
+  if (config.tls_key.empty()) {
+    return absl::InvalidArgumentError("--tls-cert needs --tls-key, its private key; give both");
+  }
+  TlsIdentity identity;
+  absl::StatusOr<std::string> certificates = ReadSettingFile(config.tls_cert, "--tls-cert");
+  if (!certificates.ok()) return certificates.status();
+  identity.certificates = *std::move(certificates);
+  const auto chain = ParseCertificates(identity.certificates, "--tls-cert", config.tls_cert);
+  if (!chain.ok()) return chain.status();
+  absl::StatusOr<std::string> key_text = ReadSecretFile(config.tls_key, "--tls-key");
+  if (!key_text.ok()) return key_text.status();
+  identity.key = *std::move(key_text);
+  const absl::StatusOr<Key> key = ParseKey(identity.key, config.tls_key);
+  if (!key.ok()) return key.status();
+  X509* const leaf = chain->front().get();
+  if (X509_check_private_key(leaf, key->get()) != 1) {
+    ERR_clear_error();
+    return Problem("--tls-key", config.tls_key,
+                   absl::StrCat("it does not belong to the first certificate of --tls-cert ",
+                                config.tls_cert));
+  }
+  if (!config.tls_client_ca.empty()) {
+    absl::StatusOr<std::string> authorities =
+        ReadSettingFile(config.tls_client_ca, "--tls-client-ca");
+    if (!authorities.ok()) return authorities.status();
+    identity.client_authorities = *std::move(authorities);
+    const auto parsed =
+        ParseCertificates(identity.client_authorities, "--tls-client-ca", config.tls_client_ca);
+    if (!parsed.ok()) return parsed.status();
+  }
+  identity.subject = SubjectOf(leaf);
+  identity.not_before = TimeOf(X509_get0_notBefore(leaf));
+  identity.not_after = TimeOf(X509_get0_notAfter(leaf));
+  return identity;
+}
+
+absl::Status CheckValidity(const TlsIdentity& identity, std::chrono::system_clock::time_point now) {
+  const bool expired = now > identity.not_after;
+  if (!expired && now >= identity.not_before) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "--tls-cert: the certificate of ", identity.subject, expired ? " expired on " : " starts on ",
+      FormatTime(expired ? identity.not_after : identity.not_before),
+      "; clients refuse it until it is renewed"));
+}
+
+std::string FormatTime(std::chrono::system_clock::time_point time) {
+  const std::time_t seconds = std::chrono::system_clock::to_time_t(time);
+  std::tm utc = {};
+  gmtime_r(&seconds, &utc);
+  char text[64];
+  const size_t length = std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return std::string(text, length);
+}
+
+}  // namespace hulld::server

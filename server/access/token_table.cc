@@ -1,0 +1,140 @@
+#include "server/access/token_table.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <openssl/crypto.h>
+#include <openssl/sha.h>
+
+#include <algorithm>
+#include <sstream>
+
+#include "server/access/secret_file.h"
+#include "server/contract/hull_id.h"
+#include "server/contract/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr size_t kMostNameCharacters = 64;
+constexpr char kHashScheme[] = "sha256:";
+
+bool IsName(const std::string& text) {
+  return !text.empty() && text.size() <= kMostNameCharacters &&
+         CheckHullIdSyntax(text, "name").ok() && text.find('/') == std::string::npos;
+}
+
+std::optional<Permission> ReadRole(const std::string& text) {
+  for (const Permission p : {Permission::kRead, Permission::kWrite, Permission::kAdmin}) {
+    if (text == RoleName(p)) return p;
+  }
+  return std::nullopt;
+}
+
+absl::StatusOr<std::string> ReadPrefix(const std::string& text) {
+  if (text == "*") return "";
+  if (!text.ends_with("/")) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "the prefix \"", absl::CEscape(text), "\" does not end in \"/\"; \"*\" stands for all"));
+  }
+  const absl::Status valid = CheckHullIdSyntax(text.substr(0, text.size() - 1), "the prefix");
+  if (!valid.ok()) return valid;
+  return text;
+}
+
+bool IsHex(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+  });
+}
+
+}  // namespace
+
+absl::StatusOr<TokenTable> TokenTable::Parse(const std::string& text) {
+  TokenTable table;
+  std::istringstream lines(text);
+  std::string line;
+  for (size_t number = 1; std::getline(lines, line); ++number) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    const absl::Status added = table.AddLine(line);
+    if (!added.ok()) return Prefixed(absl::StrCat("line ", number, ": "), added);
+  }
+  if (table.entries_.empty()) {
+    return absl::InvalidArgumentError(
+        "it holds no token, so that nobody could call; add one with 'hullctl token new'");
+  }
+  return table;
+}
+
+absl::Status TokenTable::AddLine(const std::string& line) {
+  std::istringstream words(line);
+  std::string name;
+  if (!(words >> name) || name.starts_with("#")) return absl::OkStatus();
+  std::string role;
+  std::string prefix;
+  std::string hash;
+  std::string more;
+  if (!(words >> role >> prefix >> hash) || words >> more) {
+    return absl::InvalidArgumentError(
+        "it is not four words: name, role, prefix and sha256:HASH, as 'hullctl token new' prints "
+        "them");
+  }
+  if (!IsName(name)) {
+    return absl::InvalidArgumentError(
+        "the name, its first word, is not up to 64 of [A-Za-z0-9._-] that start with a letter or "
+        "digit");
+  }
+  Entry entry;
+  entry.caller.name = name;
+  const std::optional<Permission> permission = ReadRole(role);
+  if (!permission.has_value()) {
+    return absl::InvalidArgumentError(
+        "the role, its second word, is none of read-only, read-write and admin");
+  }
+  entry.caller.permission = *permission;
+  absl::StatusOr<std::string> checked = ReadPrefix(prefix);
+  if (!checked.ok()) return checked.status();
+  entry.caller.prefix = *std::move(checked);
+  const bool is_hash = hash.starts_with(kHashScheme) &&
+                       hash.size() == sizeof kHashScheme - 1 + 2 * entry.hash.size() &&
+                       IsHex(hash.substr(sizeof kHashScheme - 1));
+  if (!is_hash) {
+    return absl::InvalidArgumentError(
+        "the hash, its last word, is not sha256: and 64 hexadecimal digits; never store the token "
+        "itself ('hullctl token hash' gives its hash)");
+  }
+  const std::string bytes = absl::HexStringToBytes(hash.substr(sizeof kHashScheme - 1));
+  std::copy(bytes.begin(), bytes.end(), entry.hash.begin());
+  for (const Entry& other : entries_) {
+    if (other.caller.name == name) {
+      return absl::InvalidArgumentError(absl::StrCat("the name \"", name, "\" is taken above"));
+    }
+    if (other.hash == entry.hash) {
+      return absl::InvalidArgumentError(absl::StrCat("\"", name, "\" has the token of \"",
+                                                     other.caller.name, "\"; give each its own"));
+    }
+  }
+  entries_.push_back(std::move(entry));
+  return absl::OkStatus();
+}
+
+std::optional<Caller> TokenTable::Find(const std::string& token) const {
+  Hash hash;
+  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash.data());
+  const Entry* found = nullptr;
+  for (const Entry& entry : entries_) {
+    if (CRYPTO_memcmp(entry.hash.data(), hash.data(), hash.size()) == 0) found = &entry;
+  }
+  if (found == nullptr) return std::nullopt;
+  return found->caller;
+}
+
+absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path) {
+  const absl::StatusOr<std::string> text = ReadSecretFile(path, "--tokens-file");
+  if (!text.ok()) return text.status();
+  absl::StatusOr<TokenTable> table = TokenTable::Parse(*text);
+  if (!table.ok()) return Prefixed(absl::StrCat("--tokens-file ", path, ": "), table.status());
+  return table;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,145 @@
+#include "server/admin/doctor.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include "core/hull/audit.h"
+#include "core/hull/growth/hull_builder.h"
+#include "server/process/log.h"
+#include "server/settings/config.h"
+#include "server/store/rocksdb_store.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr int kExitDamaged = 1;
+constexpr int kExitUsage = 2;
+
+struct Finding {
+  std::string hull_id;
+  std::string what;
+};
+
+struct Report {
+  std::string store_id;
+  uint64_t revision = 0;
+  uint64_t hulls = 0;
+  uint64_t vertices = 0;
+  std::vector<Finding> findings;
+  // Not of a hull: what kept the hulls from being read.
+  std::string failure;
+};
+
+absl::Status Examine(RocksDbStore& store, const StoredHull& stored) {
+  const absl::StatusOr<std::vector<Vector>> points = store.LoadVertices(stored);
+  if (!points.ok()) return points.status();
+  HullBuilder builder;
+  if (const auto added = builder.Add(*points); !added.ok()) return added.status();
+  const HullRecord& record = stored.record;
+  if (builder.vertex_count() != record.vertex_count || builder.dimension() != record.dimension) {
+    return absl::DataLossError(absl::StrCat(
+        "hull \"", record.hull_id, "\": its points make a hull of dimension ", builder.dimension(),
+        " with ", builder.vertex_count(), " vertices, its record says ", record.dimension, " and ",
+        record.vertex_count));
+  }
+  return AuditHull(builder.Snapshot());
+}
+
+Report ExamineAll(RocksDbStore& store) {
+  Report report;
+  report.store_id = store.id();
+  report.revision = store.revision();
+  std::vector<std::pair<std::string, absl::StatusOr<StoredHull>>> hulls;
+  const absl::Status read =
+      store.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
+        hulls.emplace_back(id, std::move(stored));
+      });
+  for (const auto& [id, stored] : hulls) {
+    ++report.hulls;
+    const absl::Status status = stored.ok() ? Examine(store, *stored) : stored.status();
+    if (stored.ok()) report.vertices += stored->record.vertex_count;
+    if (!status.ok()) report.findings.push_back({id, std::string(status.message())});
+  }
+  if (!read.ok()) report.failure = std::string(read.message());
+  return report;
+}
+
+std::string JsonText(const std::string& text) { return "\"" + JsonEscape(text) + "\""; }
+
+void PrintJson(const Report& report) {
+  std::string findings;
+  for (const Finding& finding : report.findings) {
+    absl::StrAppend(&findings, findings.empty() ? "" : ",",
+                    "{\"hullId\":", JsonText(finding.hull_id),
+                    ",\"finding\":", JsonText(finding.what), "}");
+  }
+  std::printf(
+      "{\"storeId\":%s,\"revision\":\"%llu\",\"hulls\":\"%llu\",\"vertices\":\"%llu\",\"damaged\":["
+      "%s]"
+      ",\"failure\":%s}\n",
+      JsonText(report.store_id).c_str(), static_cast<unsigned long long>(report.revision),
+      static_cast<unsigned long long>(report.hulls),
+      static_cast<unsigned long long>(report.vertices), findings.c_str(),
+      JsonText(report.failure).c_str());
+}
+
+void PrintText(const Report& report) {
+  for (const Finding& finding : report.findings) {
+    std::printf("DAMAGED  %s\n         %s\n", finding.hull_id.c_str(), finding.what.c_str());
+  }
+  if (!report.failure.empty()) std::printf("FAILED   %s\n", report.failure.c_str());
+  std::printf("store %s at revision %llu: %llu hulls with %llu vertices, %zu damaged\n",
+              report.store_id.c_str(), static_cast<unsigned long long>(report.revision),
+              static_cast<unsigned long long>(report.hulls),
+              static_cast<unsigned long long>(report.vertices), report.findings.size());
+}
+
+absl::Status CutLog(RocksDbOptions options) {
+  options.read_only = false;
+  options.cut_log = true;
+  return RocksDbStore::Open(std::move(options)).status();
+}
+
+}  // namespace
+
+int RunDoctor(const std::vector<std::string>& arguments) {
+  CLI::App app("Audits every hull of a store that no hulld has open.", "hulld doctor");
+  RocksDbOptions options;
+  options.read_only = true;
+  bool json = false;
+  bool cut_log = false;
+  app.add_option("--data-dir", options.data_dir, "Directory of the store")
+      ->envname("HULLD_DATA_DIR")
+      ->required();
+  app.add_flag("--json", json, "Print one JSON object");
+  app.add_flag(
+      "--cut-log", cut_log,
+      "If the log is damaged, cut it before its first damaged record: what was acknowledged "
+      "after that is lost, and the store takes a new ID. Without it nothing is changed");
+  app.footer("Exit status: 0 all is well, 1 something is damaged, 2 there is nothing to look at.");
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  try {
+    app.parse(std::move(reversed));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
+  if (cut_log && absl::IsDataLoss(store.status())) {
+    const absl::Status cut = CutLog(options);
+    store = cut.ok() ? RocksDbStore::Open(options) : cut;
+  }
+  if (!store.ok()) {
+    std::fprintf(stderr, "hulld doctor: %s\n", std::string(store.status().message()).c_str());
+    return absl::IsDataLoss(store.status()) ? kExitDamaged : kExitUsage;
+  }
+  const Report report = ExamineAll(**store);
+  json ? PrintJson(report) : PrintText(report);
+  return report.findings.empty() && report.failure.empty() ? 0 : kExitDamaged;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,34 @@
+#ifndef HULLD_SERVER_ADMIN_MAINTENANCE_SERVICE_H_
+#define HULLD_SERVER_ADMIN_MAINTENANCE_SERVICE_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include "hulld/v1/maintenance.grpc.pb.h"
+#include "server/call/admission.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+#include "server/store/store.h"
+
+namespace hulld::server {
+
+// hulld.v1.MaintenanceService: the contract in maintenance.proto.
+class MaintenanceService : public v1::MaintenanceService::CallbackService {
+ public:
+  // Snapshots are read on `readers`. All must outlive this.
+  MaintenanceService(Store& store, const Registry& registry, Admission& admission,
+                     WorkerPool& readers)
+      : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
+
+  grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SaveSnapshot(
+      grpc::CallbackServerContext* context, const v1::SaveSnapshotRequest* request) override;
+
+ private:
+  Store& store_;
+  const Registry& registry_;
+  Admission& admission_;
+  WorkerPool& readers_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_ADMIN_MAINTENANCE_SERVICE_H_

@@ -1,0 +1,122 @@
+#include "server/admin/snapshot_stream.h"
+
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "server/settings/config.h"
+#include "server/store/store_keys.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+// A snapshot holds everybody's hulls.
+absl::Status CheckSeesAll(const Caller& caller) {
+  if (caller.sees_all()) return absl::OkStatus();
+  return absl::PermissionDeniedError(
+      absl::StrCat("token \"", caller.name, "\" is limited to \"", caller.prefix,
+                   "\", and a snapshot holds the whole store; use a token without a prefix"));
+}
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SnapshotStream::Start(
+    grpc::CallbackServerContext& context, Admission& admission, Store& store,
+    const Registry& registry, WorkerPool& readers) {
+  auto* stream = new SnapshotStream(context, admission, readers);
+  absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) begun = CheckSeesAll(stream->call_.caller());
+  if (begun.ok()) {
+    readers.Submit([stream, &store, &registry] { stream->Open(store, registry); });
+  } else {
+    stream->Finish(stream->call_.End(begun));
+  }
+  return stream;
+}
+
+SnapshotStream::~SnapshotStream() {
+  std::error_code error;
+  if (!directory_.empty()) std::filesystem::remove_all(directory_, error);
+}
+
+void SnapshotStream::Open(Store& store, const Registry& registry) {
+  absl::StatusOr<std::string> directory = store.MakeCopy();
+  if (!directory.ok()) return Finish(call_.End(directory.status()));
+  directory_ = *std::move(directory);
+  std::error_code error;
+  for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
+       !error && entry != std::filesystem::recursive_directory_iterator(); entry.increment(error)) {
+    if (entry->is_regular_file()) {
+      files_.push_back(std::filesystem::relative(entry->path(), directory_).generic_string());
+    }
+  }
+  if (error) {
+    return Finish(
+        call_.End(absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()))));
+  }
+  std::sort(files_.rbegin(), files_.rend());
+  spdlog::info("a snapshot of the store is being saved");
+  v1::SnapshotBegin* begin = message_.mutable_begin();
+  EncodeHeader(store, registry.Sizes().store_revision, begin->mutable_header());
+  begin->set_version(HULLD_VERSION);
+  begin->set_store_format(kStoreFormat);
+  StartWrite(&message_);
+}
+
+void SnapshotStream::OnWriteDone(bool ok) {
+  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
+  if (!ok) return Finish(call_.End(absl::CancelledError("the client is gone")));
+  readers_.Submit([this] { SendNext(); });
+}
+
+void SnapshotStream::SendNext() {
+  const absl::StatusOr<bool> more = NextMessage();
+  if (!more.ok()) return Finish(call_.End(more.status()));
+  if (!*more) return Finish(call_.End(absl::OkStatus()));
+  StartWrite(&message_);
+}
+
+absl::StatusOr<bool> SnapshotStream::NextMessage() {
+  message_.Clear();
+  if (!files_.empty()) return NextPiece();
+  if (std::exchange(ended_, true)) return false;
+  *message_.mutable_end() = totals_;
+  return true;
+}
+
+absl::StatusOr<bool> SnapshotStream::NextPiece() {
+  const std::string& path = files_.back();
+  const auto failure = [&] {
+    return absl::UnavailableError(absl::StrCat("cannot read ", path, " of the copy"));
+  };
+  if (offset_ == 0) {
+    file_ = std::ifstream(directory_ + "/" + path, std::ios::binary);
+    if (!file_) return failure();
+  }
+  v1::SnapshotPiece* piece = message_.mutable_piece();
+  std::string& data = *piece->mutable_data();
+  data.resize(Config::kReplyMessageBytes);
+  file_.read(data.data(), static_cast<std::streamsize>(data.size()));
+  if (file_.bad()) return failure();
+  data.resize(static_cast<size_t>(file_.gcount()));
+  piece->set_path(path);
+  piece->set_offset(offset_);
+  piece->set_crc32(
+      static_cast<uint32_t>(crc32_z(0, reinterpret_cast<const Bytef*>(data.data()), data.size())));
+  offset_ += data.size();
+  totals_.set_piece_count(totals_.piece_count() + 1);
+  totals_.set_byte_count(totals_.byte_count() + data.size());
+  if (file_.eof() || file_.peek() == std::ifstream::traits_type::eof()) {
+    totals_.set_file_count(totals_.file_count() + 1);
+    files_.pop_back();
+    offset_ = 0;
+  }
+  return true;
+}
+
+}  // namespace hulld::server

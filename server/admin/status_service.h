@@ -1,0 +1,33 @@
+#ifndef HULLD_SERVER_ADMIN_STATUS_SERVICE_H_
+#define HULLD_SERVER_ADMIN_STATUS_SERVICE_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+
+#include "hulld/v1/status.grpc.pb.h"
+#include "server/call/admission.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// hulld.v1.StatusService: the contract in status.proto.
+class StatusService : public v1::StatusService::CallbackService {
+ public:
+  StatusService(Registry& registry, Admission& admission)
+      : registry_(registry), admission_(admission) {}
+
+  grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
+                                      const v1::GetStatusRequest* request,
+                                      v1::GetStatusResponse* response) override;
+
+ private:
+  Registry& registry_;
+  Admission& admission_;
+  const std::chrono::system_clock::time_point started_ = std::chrono::system_clock::now();
+  const std::chrono::steady_clock::time_point started_steady_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_ADMIN_STATUS_SERVICE_H_

@@ -1,0 +1,134 @@
+#ifndef HULLD_SERVER_CALL_ADMISSION_H_
+#define HULLD_SERVER_CALL_ADMISSION_H_
+
+#include <absl/status/statusor.h>
+#include <grpc/grpc.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unordered_map>
+
+#include "server/contract/rpc.h"
+#include "server/process/metrics.h"
+#include "server/settings/config.h"
+
+namespace hulld::server {
+
+// How a call loads the server, which decides what bounds it.
+enum class CallKind {
+  // One request, one short answer.
+  kUnary,
+  // Pairs by the thousand, for the executor: --max-concurrent-batches.
+  kBatch,
+  // One request, an answer of many messages.
+  kDownload,
+  // Lasts as long as its client or the size of the store demands: --max-streams-per-client.
+  kStream,
+};
+
+CallKind KindOf(Rpc rpc);
+
+class Authenticator;
+
+// Lets calls in while the limits leave room and until the server drains, counts those that run, and
+// cancels those that neither end nor poll for their end, as when a client reads no more.
+class Admission {
+ public:
+  // Who tells who calls; set before the first call, and outlives this. Without one everyone may do
+  // everything.
+  void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
+  const Authenticator* authenticator() const { return authenticator_; }
+
+  // One admitted call; it ends with its ticket.
+  class Ticket {
+   public:
+    Ticket(Ticket&& other) noexcept;
+    Ticket& operator=(Ticket&&) = delete;
+    ~Ticket();
+
+   private:
+    friend class Admission;
+    struct Watched {
+      std::chrono::steady_clock::time_point end;
+      grpc_call* call;
+      bool is_cancelled = false;
+    };
+    Ticket(Admission* admission, CallKind kind) : admission_(admission), kind_(kind) {}
+
+    Admission* admission_;
+    CallKind kind_;
+    // Of streams alone.
+    std::string client_;
+    // Of downloads and batches under --max-request-time.
+    std::list<Watched>::iterator watched_;
+    bool is_watched_ = false;
+  };
+
+  // The metrics must outlive this.
+  Admission(const Limits& limits, Metrics& metrics);
+  Admission(const Admission&) = delete;
+  Admission& operator=(const Admission&) = delete;
+  // Requires that no call runs.
+  ~Admission();
+
+  const Limits& limits() const { return limits_; }
+  Metrics& metrics() { return metrics_; }
+
+  // What waits for a thread, bounded by --max-waiting-calls. Set before the first call.
+  void SetBacklog(std::function<size_t()> backlog) { backlog_ = std::move(backlog); }
+
+  // Lets a call in. client: who calls, asked for streams alone. call: gRPC's.
+  // UNAVAILABLE once the server drains; RESOURCE_EXHAUSTED naming the limit, with a time to retry.
+  absl::StatusOr<Ticket> Admit(Rpc rpc, const std::function<std::string()>& client,
+                               grpc_call* call);
+
+  void BeginDrain();
+
+  // Waits until no call runs; false when some still run at `deadline`.
+  bool WaitIdle(std::chrono::steady_clock::time_point deadline);
+
+  // Calls that run now.
+  size_t running() const { return running_.load(std::memory_order_relaxed); }
+
+ private:
+  // Both require the mutex.
+  absl::Status CheckRoom(CallKind kind, const std::string& client);
+  void Watch(grpc_call* call, Ticket* ticket);
+
+  void Leave(Ticket& ticket);
+  // The watchman's thread.
+  void CancelOverdue();
+
+  const Limits limits_;
+  Metrics& metrics_;
+  std::function<size_t()> backlog_;
+
+  const Authenticator* authenticator_ = nullptr;
+
+  std::mutex mutex_;
+  // The rest is guarded by the mutex, `running_` for changes.
+  std::condition_variable idle_;
+  bool draining_ = false;
+  std::atomic<size_t> running_ = 0;
+  size_t batches_ = 0;
+  std::unordered_map<std::string, uint64_t> streams_;
+  // In the order in which they end, as all are given the same time.
+  std::list<Ticket::Watched> watched_;
+  // Those of which the time was up: nothing more is done about them.
+  std::list<Ticket::Watched> cancelled_;
+  std::condition_variable watched_changed_;
+  bool ending_ = false;
+  std::thread watchman_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CALL_ADMISSION_H_

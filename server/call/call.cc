@@ -1,0 +1,134 @@
+#include "server/call/call.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "server/access/authenticator.h"
+#include "server/call/error_details.h"
+#include "server/call/request_id.h"
+#include "server/contract/limit_error.h"
+#include "server/contract/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr char kRequestIdKey[] = "x-request-id";
+// What gRPC's own retries honour, too.
+constexpr char kRetryKey[] = "grpc-retry-pushback-ms";
+
+double Milliseconds(std::chrono::steady_clock::duration duration) {
+  return std::chrono::duration<double, std::milli>(duration).count();
+}
+
+// Whether the server itself is to blame.
+bool IsFault(absl::StatusCode code) {
+  return code == absl::StatusCode::kInternal || code == absl::StatusCode::kUnknown ||
+         code == absl::StatusCode::kDataLoss;
+}
+
+}  // namespace
+
+absl::Status Call::Begin() {
+  const auto& metadata = context_.client_metadata();
+  const auto given = metadata.find(kRequestIdKey);
+  if (given != metadata.end()) {
+    const std::string id(given->second.data(), given->second.size());
+    request_id_told_ = true;
+    if (IsRequestId(id)) std::call_once(request_id_made_, [&] { request_id_ = id; });
+  }
+  if (absl::Status s = Authenticate(); !s.ok()) return s;
+
+  absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
+      rpc_, [this] { return Client(); }, context_.c_call());
+  if (!ticket.ok()) return ticket.status();
+  ticket_.emplace(*std::move(ticket));
+  if (KindOf(rpc_) != CallKind::kStream) lifetime_.LimitTime(admission_.limits().max_request_time);
+  return absl::OkStatus();
+}
+
+const std::string& Call::request_id() const {
+  std::call_once(request_id_made_, [this] { request_id_ = NextRequestId(); });
+  request_id_told_ = true;
+  return request_id_;
+}
+
+absl::Status Call::Authenticate() {
+  if (admission_.authenticator() == nullptr) return absl::OkStatus();
+  absl::StatusOr<Caller> caller =
+      admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_);
+  if (!caller.ok()) return caller.status();
+  caller_ = *std::move(caller);
+  return absl::OkStatus();
+}
+
+// The token's name; without tokens the address, without the port, which differs for each
+// connection.
+std::string Call::Client() const {
+  if (!caller_.name.empty()) return "token:" + caller_.name;
+  const std::string peer = context_.peer();
+  if (!peer.starts_with("ipv4:") && !peer.starts_with("ipv6:")) return peer;
+  return peer.substr(0, peer.rfind(':'));
+}
+
+void Call::BeginMessage() {
+  message_arrival_ = Clock::now();
+  if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(admission_.limits().max_request_time);
+}
+
+void Call::EndMessage(Clock::time_point arrival) {
+  const Clock::duration duration = Clock::now() - arrival;
+  metrics().CountMessage(rpc_, duration);
+  if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(std::chrono::milliseconds::zero());
+  LogSlow(duration, absl::OkStatus(), "slow message");
+}
+
+void Call::CountLimit(const absl::Status& status) const {
+  const std::optional<std::string> limit = ExceededLimit(status);
+  if (limit.has_value()) metrics().CountLimit(*limit);
+}
+
+void Call::Log(LogLevel level, const std::string& message, LogFields fields) const {
+  if (!IsLogged(level)) return;
+  fields.insert(fields.begin(),
+                {LogField("rpc", RpcName(rpc_)), LogField("request_id", request_id())});
+  LogEvent(level, message, fields);
+}
+
+void Call::LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const {
+  const auto threshold = admission_.limits().slow_request;
+  if (threshold == std::chrono::milliseconds::zero() || duration < threshold) return;
+  Log(LogLevel::kWarn, what,
+      {{"peer", context_.peer()},
+       {"code", absl::StatusCodeToString(status.code())},
+       {"milliseconds", Milliseconds(duration)},
+       {"pairs", pairs_.load(std::memory_order_relaxed)},
+       {"points", points_.load(std::memory_order_relaxed)}});
+}
+
+grpc::Status Call::End(const absl::Status& status) {
+  const Clock::duration duration = Clock::now() - arrival_;
+  metrics().CountCall(rpc_, status.code(), duration);
+  if (KindOf(rpc_) != CallKind::kStream) LogSlow(duration, status, "slow request");
+  if (!status.ok() || request_id_told_) context_.AddTrailingMetadata(kRequestIdKey, request_id());
+  if (status.ok()) return grpc::Status::OK;
+  CountLimit(status);
+  if (absl::IsUnauthenticated(status)) metrics().CountAuthFailure("unauthenticated");
+  if (absl::IsPermissionDenied(status)) metrics().CountAuthFailure("permission_denied");
+  const LogLevel level = IsFault(status.code()) ? LogLevel::kError : LogLevel::kDebug;
+  if (IsLogged(level)) {
+    Log(level, "request failed",
+        {{"peer", context_.peer()},
+         {"code", absl::StatusCodeToString(status.code())},
+         {"milliseconds", Milliseconds(duration)},
+         {"error", std::string(status.message())}});
+  }
+  if (const auto retry = RetryAfter(status); retry.has_value()) {
+    context_.AddTrailingMetadata(kRetryKey, absl::StrCat(retry->count()));
+  }
+  const grpc::Status plain = ToGrpc(status);
+  return grpc::Status(plain.error_code(), plain.error_message(),
+                      EncodeErrorDetails(status, request_id()));
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,99 @@
+#ifndef HULLD_SERVER_CALL_CALL_H_
+#define HULLD_SERVER_CALL_CALL_H_
+
+#include <absl/status/status.h>
+#include <grpcpp/grpcpp.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "server/access/caller.h"
+#include "server/call/admission.h"
+#include "server/call/call_lifetime.h"
+#include "server/contract/rpc.h"
+#include "server/process/log.h"
+
+namespace hulld::server {
+
+// What every running call has, unary or stream: one part of each reactor, as long-lived as that.
+//
+// Begin comes first and End last, each once; both may be called on any thread, and so may the rest
+// between them.
+class Call {
+ public:
+  // Context and admission must outlive this.
+  Call(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
+      : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
+
+  Rpc rpc() const { return rpc_; }
+  // Who calls. Requires that Begin succeeded.
+  const Caller& caller() const { return caller_; }
+  // The client's (metadata x-request-id), or ours, made when it is first needed: most calls succeed
+  // and have nothing said of them. All that is logged about the call carries it, and the reply of a
+  // call that is logged or fails, or whose client gave one.
+  const std::string& request_id() const;
+  Metrics& metrics() const { return admission_.metrics(); }
+
+  const CallLifetime& lifetime() const { return lifetime_; }
+  bool ShouldStop() const { return lifetime_.ShouldStop(); }
+  // Requires ShouldStop().
+  absl::Status StopStatus() const { return lifetime_.StopStatus(); }
+  void Cancel() { lifetime_.Cancel(); }
+
+  // Finds out who calls and lets the call in; it must be ended with the error if there is one.
+  // UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate. UNAVAILABLE: the server
+  // drains. RESOURCE_EXHAUSTED: a limit on calls.
+  absl::Status Begin();
+
+  // Counts what the call asked for.
+  void AddPairs(uint64_t pairs) { pairs_.fetch_add(pairs, std::memory_order_relaxed); }
+  void AddPoints(uint64_t points) { points_.fetch_add(points, std::memory_order_relaxed); }
+
+  // A stream took up a message, and made its answer ready: messages are timed one by one, as the
+  // stream itself lasts as long as its client likes.
+  void BeginMessage();
+  void EndMessage() { EndMessage(message_arrival_); }
+  // The same where several messages are under way: `arrival` is that of the one.
+  void EndMessage(std::chrono::steady_clock::time_point arrival);
+
+  // Counts a limit that was met without ending the call, as by one pair of a batch.
+  void CountLimit(const absl::Status& status) const;
+
+  // Logs one line about this call.
+  void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
+
+  // What the reactor is to finish with.
+  grpc::Status End(const absl::Status& status);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  // Fills caller_.
+  absl::Status Authenticate();
+  std::string Client() const;
+  void LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const;
+
+  grpc::CallbackServerContext& context_;
+  Admission& admission_;
+  const Rpc rpc_;
+  const Clock::time_point arrival_ = Clock::now();
+  mutable std::string request_id_;
+  mutable std::once_flag request_id_made_;
+  // The client gave one, or something names it: the reply is to carry it.
+  mutable std::atomic<bool> request_id_told_ = false;
+  CallLifetime lifetime_;
+  std::atomic<uint64_t> pairs_ = 0;
+  std::atomic<uint64_t> points_ = 0;
+  Clock::time_point message_arrival_;
+  Caller caller_;
+  // Taken by Begin, given back when the reactor goes.
+  std::optional<Admission::Ticket> ticket_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CALL_CALL_H_

@@ -1,0 +1,22 @@
+#ifndef HULLD_SERVER_CALL_ERROR_DETAILS_H_
+#define HULLD_SERVER_CALL_ERROR_DETAILS_H_
+
+#include <absl/status/status.h>
+
+#include <string>
+
+namespace hulld::server {
+
+// What the trailing metadata grpc-status-details-bin of an error holds: a serialized
+// google.rpc.Status (google/rpc/status.proto) with the details of google/rpc/error_details.proto
+// that apply:
+//   RequestInfo   always: request_id
+//   QuotaFailure  when a limit caused the error: subject is its flag
+//   RetryInfo     when the same request may soon do: retry_delay
+// Debian has no generated code for these files, and code of our own under their names would clash
+// with a program's that links it; hence the encoding by hand.
+std::string EncodeErrorDetails(const absl::Status& status, const std::string& request_id);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CALL_ERROR_DETAILS_H_

@@ -1,0 +1,51 @@
+#ifndef HULLD_SERVER_COLLISIONS_COLLISION_SERVICE_H_
+#define HULLD_SERVER_COLLISIONS_COLLISION_SERVICE_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include "hulld/v1/collision.grpc.pb.h"
+#include "server/call/admission.h"
+#include "server/process/executor.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
+// answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
+// of moderate size and ready; else by one of the `readers`, so that it never waits for a batch, and
+// so are the few pairs of a stream's step; steps that take longer, and the placements of batches
+// and scenes, are the work of `long_readers`; TEXTBOOK_SAT, whose loop over axes is parallel,
+// batches and scenes that of the executor.
+class CollisionService : public v1::CollisionService::CallbackService {
+ public:
+  CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
+                   WorkerPool& long_readers, Executor& executor)
+      : registry_(registry),
+        admission_(admission),
+        readers_(readers),
+        long_readers_(long_readers),
+        executor_(executor) {}
+
+  grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
+                                           const v1::CheckCollisionRequest* request,
+                                           v1::CheckCollisionResponse* response) override;
+  grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchCheckCollisions(
+      grpc::CallbackServerContext* context,
+      const v1::BatchCheckCollisionsRequest* request) override;
+  grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
+  StreamCollisions(grpc::CallbackServerContext* context) override;
+  grpc::ServerWriteReactor<v1::FindCollisionsResponse>* FindCollisions(
+      grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) override;
+
+ private:
+  Registry& registry_;
+  Admission& admission_;
+  WorkerPool& readers_;
+  WorkerPool& long_readers_;
+  Executor& executor_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_COLLISION_SERVICE_H_

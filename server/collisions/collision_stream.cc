@@ -1,0 +1,304 @@
+#include "server/collisions/collision_stream.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "server/call/stream_message.h"
+#include "server/collisions/query_settings.h"
+#include "server/contract/status_map.h"
+#include "server/settings/config.h"
+#include "server/wire/answer_columns.h"
+#include "server/wire/decode.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+// A step that takes longer than this moves to the threads for long tasks, where other calls get
+// their turn after each slice.
+constexpr std::chrono::milliseconds kFirstSliceTime(2);
+constexpr std::chrono::milliseconds kSliceTime(20);
+// The clock is read once for so many pairs.
+constexpr size_t kPairsPerLook = 64;
+// Of an update that is answered where it arrives.
+constexpr int kMostQuickPairs = 8;
+// An index among the pairs, as a varint.
+constexpr size_t kIndexBytes = 5;
+
+}  // namespace
+
+grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
+CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                       Registry& registry, WorkerPool& readers, WorkerPool& long_readers) {
+  const std::shared_ptr<CollisionStream> stream(
+      new CollisionStream(context, admission, registry, readers, long_readers));
+  stream->self_ = stream;
+  const absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) {
+    stream->ReadNext();
+  } else {
+    stream->Finish(stream->call_.End(begun));
+  }
+  return stream.get();
+}
+
+void CollisionStream::ReadNext() {
+  PrepareToRead(&request_);
+  StartRead(&request_);
+}
+
+void CollisionStream::OnReadDone(bool ok) {
+  // Without a message the client has said all, or is gone, or speaks another language.
+  if (!ok) return End(WhyNotRead(request_));
+  call_.BeginMessage();
+  if (IsQuick()) return Handle();
+  // The first message resolves hulls, and answers all pairs with cold caches.
+  WorkerPool& pool = open_ ? readers_ : long_readers_;
+  pool.Submit([self = shared_from_this()] { self->Handle(); });
+}
+
+void CollisionStream::OnWriteDone(bool ok) {
+  if (!ok) return End(absl::CancelledError("the client is gone"));
+  const bool answered = response_.last();
+  response_.Clear();
+  response_bytes_ = 0;
+  if (answered) return ReadNext();
+  long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
+}
+
+void CollisionStream::End(const absl::Status& status) {
+  Finish(call_.End(call_.ShouldStop() ? call_.StopStatus() : status));
+}
+
+// Whether the message can be answered here and now, on gRPC's thread.
+bool CollisionStream::IsQuick() const {
+  if (!open_ || !request_.has_update() || !IsRelationOnly(wanted_)) return false;
+  const v1::CollisionStreamUpdate& update = request_.update();
+  if (update.refresh_hulls() || update.placements_size() > kMostQuickPairs) return false;
+  int pairs = 0;
+  for (const uint32_t placement : update.placements()) {
+    if (placement >= table_.size()) return true;  // an error
+    for (size_t k = pairs_begin_[placement]; k < pairs_begin_[placement + 1]; ++k) {
+      if (++pairs > kMostQuickPairs) return false;
+      const PairState& pair = pairs_[pairs_of_[k]];
+      for (const uint32_t part : {pair.a, pair.b}) {
+        if (!IsQuickToRelate(table_.placed()[part].hull())) return false;
+      }
+    }
+  }
+  return true;
+}
+
+void CollisionStream::Handle() {
+  asked_.clear();
+  next_asked_ = 0;
+  const absl::Status status = HandleMessage();
+  if (!status.ok()) return End(status);
+  request_.Clear();
+  std::sort(asked_.begin(), asked_.end());
+  for (const uint32_t pair : asked_) is_asked_[pair] = false;
+  table_.EncodeHeader(registry_.store(), response_.mutable_header());
+  response_bytes_ = response_.ByteSizeLong();
+  call_.AddPairs(asked_.size());
+  AnswerSlice(kFirstSliceTime);
+}
+
+absl::Status CollisionStream::HandleMessage() {
+  switch (request_.message_case()) {
+    case v1::StreamCollisionsRequest::kOpen:
+      if (open_) {
+        return absl::InvalidArgumentError(
+            "open came twice; other placements or pairs need another stream");
+      }
+      return HandleOpen();
+    case v1::StreamCollisionsRequest::kUpdate:
+      if (!open_) return absl::InvalidArgumentError("the first message must be open, not update");
+      ++messages_;
+      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request_.update()));
+    case v1::StreamCollisionsRequest::MESSAGE_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError("the message is empty; set open or update");
+}
+
+absl::Status CollisionStream::HandleOpen() {
+  const v1::CollisionStreamOpen& open = request_.open();
+  absl::StatusOr<QueryOptions> options =
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
+                       call_.lifetime());
+  if (!options.ok()) return Prefixed("open: ", options.status());
+  absl::StatusOr<PlacementTable> table =
+      PlacementTable::Make(open.placements(), open.packed_placements(), call_.caller(),
+                           registry_.limits().max_placements, "the stream");
+  if (!table.ok()) return Prefixed("open: ", table.status());
+  const absl::Status valid = ValidatePairs(open.pairs(), table->size(),
+                                           registry_.limits().max_pairs_per_batch, "the stream");
+  if (!valid.ok()) return Prefixed("open: ", valid);
+  options_ = *std::move(options);
+  wanted_ = open.wanted();
+  only_changes_ = open.only_changes();
+  table_ = *std::move(table);
+
+  if (absl::Status s = ChargeFor(static_cast<size_t>(open.pairs_size()) / 2); !s.ok()) {
+    return Prefixed("open: ", s);
+  }
+
+  pairs_.reserve(static_cast<size_t>(open.pairs_size()) / 2);
+  pairs_begin_.assign(table_.size() + 1, 0);
+  for (int i = 0; i < open.pairs_size(); i += 2) {
+    pairs_.push_back({open.pairs(i), open.pairs(i + 1), {}, v1::RELATION_UNSPECIFIED});
+    ++pairs_begin_[pairs_.back().a];
+    ++pairs_begin_[pairs_.back().b];
+  }
+  size_t sum = 0;
+  for (size_t& begin : pairs_begin_) begin = sum += begin;
+  pairs_of_.resize(sum);
+  for (size_t i = pairs_.size(); i-- > 0;) {
+    pairs_of_[--pairs_begin_[pairs_[i].a]] = static_cast<uint32_t>(i);
+    pairs_of_[--pairs_begin_[pairs_[i].b]] = static_cast<uint32_t>(i);
+  }
+  open_ = true;
+  is_asked_.assign(pairs_.size(), false);
+  for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
+  return Refresh();
+}
+
+// Counts what the stream is to hold against --memory-limit, before it is held. RESOURCE_EXHAUSTED:
+// there is no room for it.
+absl::Status CollisionStream::ChargeFor(size_t pairs) {
+  // A pair among the pairs of two placements, and among those that are asked about.
+  constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
+  charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
+  return registry_.CheckMemory();
+}
+
+// Checks all of the update before it applies any.
+absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& update) {
+  const int moved = update.placements_size();
+  if (update.poses_size() != kPoseNumbers * moved) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("poses holds ", update.poses_size(), " numbers for ", moved,
+                     " placements; each needs seven: w x y z and x y z"));
+  }
+  std::vector<char> named(table_.size());
+  std::vector<Pose> poses;
+  for (int i = 0; i < moved; ++i) {
+    const uint32_t placement = update.placements(i);
+    if (placement >= table_.size()) {
+      return absl::InvalidArgumentError(absl::StrCat("placements[", i, "] is ", placement,
+                                                     ", but the stream has ", table_.size(),
+                                                     "; indices start at 0"));
+    }
+    if (named[placement]) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
+    }
+    named[placement] = true;
+    const absl::StatusOr<Pose> pose = DecodePoseAt(update.poses(), i);
+    if (!pose.ok()) return Prefixed(absl::StrCat("poses[", i, "]."), pose.status());
+    poses.push_back(*pose);
+  }
+  if (update.refresh_hulls()) {
+    if (absl::Status s = Refresh(); !s.ok()) return s;
+  }
+  for (int i = 0; i < moved; ++i) {
+    table_.Move(update.placements(i), poses[i]);
+    AskAboutPairsOf(update.placements(i));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CollisionStream::Refresh() {
+  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  for (size_t i = 0; i < table_.size(); ++i) {
+    if (!table_.hull_changed(i)) continue;
+    AskAboutPairsOf(i);
+    // The vertices that a cache names are those of the hull before.
+    for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) pairs_[pairs_of_[k]].cache = {};
+  }
+  next_row_ = 0;
+  return absl::OkStatus();
+}
+
+void CollisionStream::AskAbout(uint32_t pair) {
+  if (is_asked_[pair]) return;
+  is_asked_[pair] = true;
+  asked_.push_back(pair);
+}
+
+void CollisionStream::AskAboutPairsOf(size_t placement) {
+  for (size_t k = pairs_begin_[placement]; k < pairs_begin_[placement + 1]; ++k) {
+    AskAbout(pairs_of_[k]);
+  }
+}
+
+absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
+  const PlacedHull& a = table_.placed()[pair.a];
+  const PlacedHull& b = table_.placed()[pair.b];
+  if (options_.tolerance != 0 || !IsRelationOnly(wanted_)) {
+    return CheckCollision(a, b, options_, &pair.cache);
+  }
+  const RelationAnswer found = FindRelation(a, b, &pair.cache);
+  Answer answer;
+  answer.relation = found.relation;
+  answer.rung = found.rung;
+  return answer;
+}
+
+void CollisionStream::AddAnswer(uint32_t index) {
+  PairState& pair = pairs_[index];
+  const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
+  absl::StatusOr<Answer> answer;
+  if (answerable) answer = AnswerPair(pair);
+  if (answerable && answer.ok()) rungs_.Add(answer->rung);
+  const v1::Relation relation =
+      answerable && answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
+  const bool changed = relation != pair.relation;
+  pair.relation = relation;
+  if (only_changes_ && messages_ > 0 && !changed) return;
+  v1::AnswerColumns* const columns = response_.mutable_columns();
+  const auto position = static_cast<uint64_t>(response_.pairs_size());
+  response_.add_pairs(index);
+  response_bytes_ += kIndexBytes;
+  if (!answerable) {
+    response_bytes_ += AddUnanswered(wanted_, columns);
+    return;
+  }
+  response_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
+                                       table_.placed()[pair.b].hull(), wanted_, position, columns);
+}
+
+void CollisionStream::Send(bool last) {
+  response_.set_update(messages_);
+  response_.set_last(last);
+  StartWrite(&response_);
+}
+
+// Computes until the answer is complete, a message is full, or it is the turn of others.
+void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
+  if (next_row_ < table_.table_rows()) {
+    next_row_ = table_.EncodeHulls(next_row_, response_.mutable_hulls(),
+                                   response_.mutable_placement_problems());
+    if (next_row_ < table_.table_rows()) return Send(false);
+    response_bytes_ = response_.ByteSizeLong();
+  }
+  const auto end = std::chrono::steady_clock::now() + time;
+  while (next_asked_ < asked_.size()) {
+    if (response_bytes_ >= Config::kReplyMessageBytes) break;
+    AddAnswer(asked_[next_asked_++]);
+    if (next_asked_ % kPairsPerLook != 0) continue;
+    if (call_.ShouldStop()) break;
+    if (std::chrono::steady_clock::now() >= end) {
+      return long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
+    }
+  }
+  call_.metrics().CountPairs(std::exchange(rungs_, {}));
+  if (call_.ShouldStop()) return End(call_.StopStatus());
+  if (next_asked_ == asked_.size()) call_.EndMessage();
+  Send(next_asked_ == asked_.size());
+}
+
+}  // namespace hulld::server

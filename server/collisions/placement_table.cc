@@ -1,0 +1,235 @@
+#include "server/collisions/placement_table.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <unordered_map>
+#include <utility>
+
+#include "server/contract/limit_error.h"
+#include "server/contract/status_map.h"
+#include "server/settings/config.h"
+#include "server/wire/decode.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+// Tag and length of an entry within its message.
+constexpr size_t kEntryBytes = 4;
+
+// Stands in for the hull of placements that cannot be answered for.
+const QueryHull& NoHull() {
+  static const Hull empty;
+  static const QueryHull no_hull(empty);
+  return no_hull;
+}
+
+bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b) {
+  if (!a.ok() || !b.ok()) return a.ok() == b.ok();
+  return a->record.revision == b->record.revision &&
+         a->record.create_revision == b->record.create_revision;
+}
+
+absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
+  if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
+  return LimitExceeded(absl::StrCat(what, " holds ", count, of), max_placements, "max-placements");
+}
+
+// Whether the lists fit each other.
+absl::Status CheckPacked(const v1::PackedPlacements& packed) {
+  if (packed.poses_size() / kPoseNumbers != packed.hulls_size() ||
+      packed.poses_size() % kPoseNumbers != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packed_placements.poses holds ", packed.poses_size(), " numbers for ",
+                     packed.hulls_size(), " placements; each needs seven: w x y z and x y z"));
+  }
+  const auto hulls = static_cast<uint32_t>(packed.hull_ids_size());
+  for (int i = 0; i < packed.hulls_size(); ++i) {
+    if (packed.hulls(i) >= hulls) {
+      return absl::InvalidArgumentError(absl::StrCat("packed_placements.hulls[", i, "] is ",
+                                                     packed.hulls(i), ", but hull_ids holds ",
+                                                     hulls, "; indices start at 0"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::StatusOr<PlacementTable> PlacementTable::Make(
+    const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+    const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
+    const char* what) {
+  const bool is_packed = packed.hull_ids_size() + packed.hulls_size() + packed.poses_size() > 0;
+  if (is_packed && !placements.empty()) {
+    return absl::InvalidArgumentError(
+        "placements and packed_placements are both set; give one of them");
+  }
+  const absl::Status few = CheckCount(is_packed ? packed.hulls_size() : placements.size(),
+                                      " placements", max_placements, what);
+  if (!few.ok()) return few;
+  if (!is_packed) return PlacementTable(placements, caller);
+  const absl::Status few_hulls =
+      CheckCount(packed.hull_ids_size(), " hull_ids", max_placements, what);
+  if (!few_hulls.ok()) return few_hulls;
+  if (absl::Status s = CheckPacked(packed); !s.ok()) return s;
+  return PlacementTable(packed, caller);
+}
+
+PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller& caller)
+    : is_packed_(true) {
+  std::vector<absl::Status> malformed(packed.hull_ids_size());
+  named_.resize(malformed.size());
+  for (size_t k = 0; k < named_.size(); ++k) {
+    const std::string& id = packed.hull_ids(static_cast<int>(k));
+    malformed[k] =
+        Prefixed("packed_placements.", CheckHullId(caller, id, absl::StrCat("hull_ids[", k, "]")));
+    if (!malformed[k].ok()) continue;
+    named_[k] = ids_.size();
+    ids_.push_back(id);
+  }
+  entries_.resize(packed.hulls_size());
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    Entry& entry = entries_[i];
+    const uint32_t hull = packed.hulls(static_cast<int>(i));
+    entry.hull = named_[hull];
+    entry.malformed = malformed[hull];
+    if (!entry.malformed.ok()) continue;
+    const absl::StatusOr<Pose> pose = DecodePoseAt(packed.poses(), static_cast<int>(i));
+    if (pose.ok()) {
+      entry.pose = *pose;
+    } else {
+      entry.malformed = Prefixed(absl::StrCat("packed_placements.poses[", i, "]."), pose.status());
+    }
+  }
+}
+
+PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                               const Caller& caller) {
+  std::unordered_map<std::string, size_t> index_of;
+  entries_.resize(placements.size());
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    const v1::Placement& placement = placements[static_cast<int>(i)];
+    Entry& entry = entries_[i];
+    auto known = index_of.find(placement.hull_id());
+    if (known == index_of.end()) {
+      entry.malformed = Prefixed(absl::StrCat("placements[", i, "]."),
+                                 CheckHullId(caller, placement.hull_id(), "hull_id"));
+      if (!entry.malformed.ok()) continue;
+      known = index_of.emplace(placement.hull_id(), ids_.size()).first;
+      ids_.push_back(placement.hull_id());
+    }
+    entry.hull = known->second;
+    const absl::StatusOr<Pose> pose = DecodePose(placement.pose());
+    if (pose.ok()) {
+      entry.pose = *pose;
+    } else {
+      entry.malformed = Prefixed(absl::StrCat("placements[", i, "].pose."), pose.status());
+    }
+  }
+}
+
+size_t PlacementTable::MemoryBytes() const {
+  size_t of_ids = 0;
+  for (const std::string& id : ids_) of_ids += id.capacity();
+  return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull) + sizeof(char)) +
+         named_.size() * sizeof named_[0] +
+         ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>)) + of_ids;
+}
+
+absl::Status PlacementTable::Resolve(Registry& registry, const std::function<bool()>& should_stop) {
+  absl::StatusOr<Resolved> resolved = registry.Resolve(ids_, should_stop);
+  if (!resolved.ok()) return resolved.status();
+  changed_.assign(ids_.size(), true);
+  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved->hulls[i]);
+  const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
+  hulls_ = std::move(resolved->hulls);
+  store_revision_ = resolved->store_revision;
+  placed_.clear();
+  placed_.reserve(entries_.size());
+  for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
+  return absl::OkStatus();
+}
+
+PlacedHull PlacementTable::Place(size_t i) const {
+  if (!is_answerable(i)) return *PlacedHull::Make(NoHull(), Pose());
+  const Entry& entry = entries_[i];
+  return *PlacedHull::Make(hulls_[*entry.hull]->snapshot->query_hull(), entry.pose);
+}
+
+const absl::Status& PlacementTable::problem(size_t i) const {
+  const Entry& entry = entries_[i];
+  return entry.malformed.ok() ? hulls_[*entry.hull].status() : entry.malformed;
+}
+
+bool PlacementTable::all_answerable() const {
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    if (!is_answerable(i)) return false;
+  }
+  return true;
+}
+
+bool PlacementTable::hull_changed(size_t i) const {
+  return entries_[i].hull.has_value() && changed_[*entries_[i].hull];
+}
+
+void PlacementTable::Move(size_t i, const Pose& X_WH) {
+  Entry& entry = entries_[i];
+  if (!entry.hull.has_value()) return;
+  entry.pose = X_WH;
+  entry.malformed = absl::OkStatus();
+  placed_[i] = Place(i);
+}
+
+void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
+  server::EncodeHeader(store, store_revision_, header);
+}
+
+size_t PlacementTable::EncodeHulls(
+    size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
+    google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const {
+  size_t bytes = 0;
+  size_t row = first;
+  for (; row < table_rows() && bytes < Config::kReplyMessageBytes; ++row) {
+    bytes += kEntryBytes;
+    const bool is_name = row < named_.size();
+    const size_t i = is_name ? 0 : row - named_.size();
+    if (is_name || !is_packed_) {
+      v1::HullVersion* const version = hulls->Add();
+      const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
+      const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
+      if (known) EncodeVersion(hulls_[*hull]->record, version);
+      bytes += version->ByteSizeLong();
+    }
+    if (is_name || problem(i).ok()) continue;
+    v1::PlacementProblem* const encoded = problems->Add();
+    encoded->set_placement(static_cast<uint32_t>(i));
+    encoded->set_code(ToGrpc(problem(i).code()));
+    encoded->set_message(std::string(problem(i).message()));
+    bytes += kEntryBytes + encoded->ByteSizeLong();
+  }
+  return row;
+}
+
+absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
+                           size_t placements, uint64_t max_pairs, const char* what) {
+  if (pairs.size() % 2 != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("pairs holds ", pairs.size(), " indices; each pair needs two"));
+  }
+  const auto count = static_cast<uint64_t>(pairs.size()) / 2;
+  if (count > max_pairs) {
+    return LimitExceeded(absl::StrCat(what, " holds ", count, " pairs"), max_pairs,
+                         "max-pairs-per-batch");
+  }
+  for (int i = 0; i < pairs.size(); ++i) {
+    if (pairs[i] >= placements) {
+      return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", pairs[i],
+                                                     ", but placements holds ", placements,
+                                                     "; indices start at 0"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,100 @@
+#ifndef HULLD_SERVER_COLLISIONS_PLACEMENT_TABLE_H_
+#define HULLD_SERVER_COLLISIONS_PLACEMENT_TABLE_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <google/protobuf/repeated_field.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/query/placed/placed_hull.h"
+#include "core/query/terms/pose.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/access/caller.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// The placements of one call, by index: each ready for queries, or with the reason why it cannot be
+// answered for. One that cannot stands in as an empty hull.
+class PlacementTable {
+ public:
+  PlacementTable() = default;
+  // Of a request that has one of the two forms. Notes what is malformed and what is not the
+  // caller's; no hull is known before Resolve. INVALID_ARGUMENT: both forms, or packed ones whose
+  // lists do not fit each other. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
+  // `what` holds them, as in "the batch".
+  static absl::StatusOr<PlacementTable> Make(
+      const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+      const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
+      const char* what);
+
+  // Resolves every hull once, all at one revision of the store. Not for gRPC's threads.
+  // CANCELLED: should_stop said so.
+  absl::Status Resolve(Registry& registry, const std::function<bool()>& should_stop);
+
+  size_t size() const { return entries_.size(); }
+  // About what this holds once it is resolved, in bytes, hulls apart.
+  size_t MemoryBytes() const;
+  std::span<const PlacedHull> placed() const { return placed_; }
+  bool is_answerable(size_t i) const { return problem(i).ok(); }
+  // Whether all are.
+  bool all_answerable() const;
+  // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
+  bool hull_changed(size_t i) const;
+
+  // Requires a valid pose.
+  void Move(size_t i, const Pose& X_WH);
+
+  // The store's revision of the last Resolve.
+  void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
+  // A version per placement, or per hull that packed placements name, and the problems: the rows of
+  // a table, from row `first` on, as many as fill a message. Returns where the next message goes
+  // on, which is table_rows() after the last.
+  size_t EncodeHulls(size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
+                     google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
+  size_t table_rows() const { return named_.size() + entries_.size(); }
+
+ private:
+  struct Entry {
+    // Index into hulls_; none when the ID is malformed or not the caller's.
+    std::optional<size_t> hull;
+    // Of the ID or the pose.
+    absl::Status malformed;
+    Pose pose;
+  };
+
+  PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
+                 const Caller& caller);
+  PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
+
+  const absl::Status& problem(size_t i) const;
+  PlacedHull Place(size_t i) const;
+
+  std::vector<Entry> entries_;
+  // Of packed placements: each that was named, as an index into ids_; none when it is malformed or
+  // not the caller's.
+  bool is_packed_ = false;
+  std::vector<std::optional<size_t>> named_;
+  std::vector<std::string> ids_;
+  // Parallel to ids_.
+  std::vector<absl::StatusOr<HullView>> hulls_;
+  std::vector<char> changed_;
+  uint64_t store_revision_ = 0;
+  std::vector<PlacedHull> placed_;
+};
+
+// INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
+// max_pairs (--max-pairs-per-batch).
+absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
+                           size_t placements, uint64_t max_pairs, const char* what);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_PLACEMENT_TABLE_H_

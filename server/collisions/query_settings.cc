@@ -1,0 +1,82 @@
+#include "server/collisions/query_settings.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+#include "server/contract/limit_error.h"
+#include "server/wire/decode.h"
+
+namespace hulld::server {
+namespace {
+
+absl::Status CheckLength(const char* field, double length) {
+  if (length >= 0) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(field, " is ",
+                                                 std::isnan(length) ? "NaN" : absl::StrCat(length),
+                                                 "; it is a length of at least 0"));
+}
+
+// What a tolerance leaves open, these need.
+absl::Status CheckTolerance(Method method, const v1::Wanted& wanted, double tolerance) {
+  if (absl::Status s = CheckLength("tolerance", tolerance); !s.ok()) return s;
+  if (tolerance == 0) return absl::OkStatus();
+  const char* const excluded = method == Method::kTextbookSat ? "METHOD_TEXTBOOK_SAT"
+                               : wanted.certificate()         ? "wanted.certificate"
+                               : wanted.separation()          ? "wanted.separation"
+                               : wanted.witness()             ? "wanted.witness"
+                               : wanted.has_clearance()       ? "wanted.clearance"
+                                                              : nullptr;
+  if (excluded == nullptr) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat("tolerance is ", tolerance, ", but ", excluded,
+                                                 " needs the exact relation; leave out one of "
+                                                 "them"));
+}
+
+}  // namespace
+
+absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
+                                              double tolerance, const Limits& limits,
+                                              const CallLifetime& lifetime) {
+  const absl::StatusOr<Method> decoded = DecodeMethod(method);
+  if (!decoded.ok()) return decoded.status();
+  QueryOptions options;
+  options.method = *decoded;
+  options.want_axis = wanted.axis();
+  options.want_analysis = wanted.analysis();
+  options.want_certificate = wanted.certificate();
+  options.want_separation = wanted.separation();
+  options.want_witness = wanted.witness();
+  if (wanted.has_max_error()) {
+    if (absl::Status s = CheckLength("wanted.max_error", wanted.max_error()); !s.ok()) return s;
+    options.max_error = wanted.max_error();
+  }
+  if (wanted.has_clearance()) {
+    if (absl::Status s = CheckLength("wanted.clearance", wanted.clearance()); !s.ok()) return s;
+    options.clearance = wanted.clearance();
+  }
+  if (absl::Status s = CheckTolerance(*decoded, wanted, tolerance); !s.ok()) return s;
+  options.tolerance = tolerance;
+  options.max_textbook_axes = limits.max_textbook_axes;
+  options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
+  return options;
+}
+
+bool IsRelationOnly(const v1::Wanted& wanted) {
+  return !wanted.axis() && !wanted.analysis() && !wanted.certificate() && !wanted.separation() &&
+         !wanted.witness() && !wanted.has_clearance();
+}
+
+bool IsQuickToRelate(const Hull& hull) {
+  // Observed: exact contact of hulls of 10000 vertices takes 60 us
+  // (tests/bench/results/query_relation_*.csv).
+  constexpr size_t kMostVertices = 10000;
+  return hull.vertices().size() <= kMostVertices;
+}
+
+absl::Status NameQueryLimit(const absl::Status& status) {
+  if (status.code() != absl::StatusCode::kResourceExhausted) return status;
+  return AtLimit(status, "max-textbook-axes");
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,32 @@
+#ifndef HULLD_SERVER_COLLISIONS_QUERY_SETTINGS_H_
+#define HULLD_SERVER_COLLISIONS_QUERY_SETTINGS_H_
+
+#include <absl/status/statusor.h>
+
+#include "core/query/collision.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/call/call_lifetime.h"
+#include "server/settings/config.h"
+
+namespace hulld::server {
+
+// The options of core for what a request wants; the query ends with `lifetime`, which must outlive
+// it. INVALID_ARGUMENT, naming the field: a number that stands for no method, a length that is
+// negative or NaN, or wishes that exclude each other.
+absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
+                                              double tolerance, const Limits& limits,
+                                              const CallLifetime& lifetime);
+
+// Whether nothing but the relation is wanted.
+bool IsRelationOnly(const v1::Wanted& wanted);
+
+// Whether the relation of this hull and another such takes no longer than moving the bytes of the
+// question and of the answer does, so that one of gRPC's threads may find it.
+bool IsQuickToRelate(const Hull& hull);
+
+// An error of core's query in the words of the server: RESOURCE_EXHAUSTED names the limit's flag.
+absl::Status NameQueryLimit(const absl::Status& status);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_QUERY_SETTINGS_H_

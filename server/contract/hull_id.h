@@ -1,0 +1,17 @@
+#ifndef HULLD_SERVER_CONTRACT_HULL_ID_H_
+#define HULLD_SERVER_CONTRACT_HULL_ID_H_
+
+#include <absl/status/status.h>
+
+#include <string>
+
+namespace hulld::server {
+
+// OK when `id` is segments of [A-Za-z0-9][A-Za-z0-9._-]* joined by "/", 256 characters at most;
+// otherwise INVALID_ARGUMENT, which names `field` (as in "a.hull_id") and the offending character.
+// IDs of requests go through CheckHullId (caller.h), which also asks whether they are the caller's.
+absl::Status CheckHullIdSyntax(const std::string& id, const std::string& field);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CONTRACT_HULL_ID_H_

@@ -1,0 +1,37 @@
+#include "server/contract/rpc.h"
+
+namespace hulld::server {
+
+const char* RpcName(Rpc rpc) {
+  switch (rpc) {
+    case Rpc::kCreateHull:
+      return "CreateHull";
+    case Rpc::kAppendPoints:
+      return "AppendPoints";
+    case Rpc::kGetHull:
+      return "GetHull";
+    case Rpc::kGetHullMesh:
+      return "GetHullMesh";
+    case Rpc::kListHulls:
+      return "ListHulls";
+    case Rpc::kDeleteHull:
+      return "DeleteHull";
+    case Rpc::kCheckCollision:
+      return "CheckCollision";
+    case Rpc::kBatchCheckCollisions:
+      return "BatchCheckCollisions";
+    case Rpc::kStreamCollisions:
+      return "StreamCollisions";
+    case Rpc::kFindCollisions:
+      return "FindCollisions";
+    case Rpc::kGetStatus:
+      return "GetStatus";
+    case Rpc::kReplaceHull:
+      return "ReplaceHull";
+    case Rpc::kSaveSnapshot:
+      return "SaveSnapshot";
+  }
+  return "unknown";
+}
+
+}  // namespace hulld::server

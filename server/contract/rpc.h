@@ -1,0 +1,32 @@
+#ifndef HULLD_SERVER_CONTRACT_RPC_H_
+#define HULLD_SERVER_CONTRACT_RPC_H_
+
+#include <cstddef>
+
+namespace hulld::server {
+
+// What a client may call.
+enum class Rpc {
+  kCreateHull,
+  kAppendPoints,
+  kGetHull,
+  kGetHullMesh,
+  kListHulls,
+  kDeleteHull,
+  kCheckCollision,
+  kBatchCheckCollisions,
+  kStreamCollisions,
+  kFindCollisions,
+  kGetStatus,
+  kReplaceHull,
+  kSaveSnapshot,
+};
+
+inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kSaveSnapshot) + 1;
+
+// As in the contract: "CheckCollision".
+const char* RpcName(Rpc rpc);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CONTRACT_RPC_H_

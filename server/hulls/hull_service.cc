@@ -1,0 +1,163 @@
+#include "server/hulls/hull_service.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "core/hull/audit.h"
+#include "server/call/unary_call.h"
+#include "server/hulls/append_stream.h"
+#include "server/hulls/mesh_stream.h"
+#include "server/hulls/replace_stream.h"
+#include "server/settings/config.h"
+#include "server/wire/encode.h"
+#include "server/wire/page_token.h"
+
+namespace hulld::server {
+namespace {
+
+void EncodeBox(const Hull& hull, v1::GetHullResponse* response) {
+  if (hull.empty()) return;
+  Vector low = hull.vertices().front();
+  Vector high = low;
+  for (const Vector& vertex : hull.vertices()) {
+    low = low.cwiseMin(vertex);
+    high = high.cwiseMax(vertex);
+  }
+  EncodeVector(low, response->mutable_box_min());
+  EncodeVector(high, response->mutable_box_max());
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* context,
+                                                  const v1::CreateHullRequest* request,
+                                                  v1::CreateHullResponse* response) {
+  return UnaryCall::Start(*context, admission_, Rpc::kCreateHull,
+                          [&](UnaryCall* call) { Create(*request, response, call); });
+}
+
+grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>*
+HullService::AppendPoints(grpc::CallbackServerContext* context) {
+  return AppendStream::Start(*context, admission_, registry_);
+}
+
+grpc::ServerReadReactor<v1::ReplaceHullRequest>* HullService::ReplaceHull(
+    grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) {
+  return ReplaceStream::Start(*context, admission_, registry_, writers_, response);
+}
+
+grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
+                                               const v1::GetHullRequest* request,
+                                               v1::GetHullResponse* response) {
+  // An audit takes as long as the hull is large.
+  return UnaryCall::AnswerOn(
+      request->audit() ? long_readers_ : readers_, *context, admission_, Rpc::kGetHull,
+      [this, request, response](const Call& call) { return Get(*request, call, response); });
+}
+
+grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
+    grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) {
+  return MeshStream::Start(*context, admission_, registry_, long_readers_, *request);
+}
+
+grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
+                                                 const v1::ListHullsRequest* request,
+                                                 v1::ListHullsResponse* response) {
+  return UnaryCall::Answer(*context, admission_, Rpc::kListHulls,
+                           [&](const Call& call) { return List(*request, call, response); });
+}
+
+grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
+                                                  const v1::DeleteHullRequest* request,
+                                                  v1::DeleteHullResponse* response) {
+  return UnaryCall::Start(*context, admission_, Rpc::kDeleteHull,
+                          [&](UnaryCall* call) { Delete(*request, response, call); });
+}
+
+void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,
+                         UnaryCall* call) {
+  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return call->End(s);
+  }
+  registry_.Create(request.hull_id(), request.if_absent(),
+                   [this, response, call](const absl::StatusOr<CreateResult>& created) {
+                     if (!created.ok()) return call->End(created.status());
+                     const HullRecord& hull = created->hull;
+                     if (created->created) {
+                       call->call().Log(LogLevel::kInfo, "hull created", {{"hull", hull.hull_id}});
+                     }
+                     EncodeHeader(registry_.store(), created->store_revision,
+                                  response->mutable_header());
+                     EncodeRecord(hull, response->mutable_hull());
+                     response->set_created(created->created);
+                     call->End(absl::OkStatus());
+                   });
+}
+
+absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
+                              v1::GetHullResponse* response) {
+  if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return s;
+  }
+  const auto resolved = registry_.Resolve(request.hull_id(), [&call] { return call.ShouldStop(); });
+  if (!resolved.ok()) return resolved.status();
+  const auto& [revision, view] = *resolved;
+  EncodeHeader(registry_.store(), revision, response->mutable_header());
+  EncodeRecord(view.record, response->mutable_hull());
+  response->set_edge_count(view.snapshot->hull().edges().size());
+  response->set_facet_count(view.snapshot->hull().facet_count());
+  EncodeBox(view.snapshot->hull(), response);
+  if (request.audit()) {
+    const absl::Status finding =
+        AuditHull(view.snapshot->hull(), [&call] { return call.ShouldStop(); });
+    if (absl::IsCancelled(finding)) return finding;
+    response->mutable_audit()->set_ok(finding.ok());
+    if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& call,
+                               v1::ListHullsResponse* response) {
+  if (request.page_size() > Config::kMaxPageSize) {
+    return absl::InvalidArgumentError(absl::StrCat("page_size is ", request.page_size(),
+                                                   "; the limit is ", Config::kMaxPageSize));
+  }
+  const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
+  if (!prefix.ok()) return prefix.status();
+  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
+  if (!after.ok()) return after.status();
+  const HullPage page = registry_.List(
+      *prefix, *after, request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
+  EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
+  for (const ListedHull& hull : page.hulls) {
+    v1::HullInfo* info = response->add_hulls();
+    EncodeRecord(hull.record, info);
+    info->set_damaged(hull.damaged);
+  }
+  if (page.more) {
+    response->set_next_page_token(EncodePageToken(*prefix, page.hulls.back().record.hull_id));
+  }
+  return absl::OkStatus();
+}
+
+void HullService::Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
+                         UnaryCall* call) {
+  if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
+    return call->End(s);
+  }
+  const auto if_revision =
+      request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
+  registry_.Delete(
+      request.hull_id(), if_revision,
+      [this, &request, response, call](const absl::StatusOr<uint64_t>& revision) {
+        if (!revision.ok()) return call->End(revision.status());
+        call->call().Log(LogLevel::kInfo, "hull deleted", {{"hull", request.hull_id()}});
+        EncodeHeader(registry_.store(), *revision, response->mutable_header());
+        call->End(absl::OkStatus());
+      });
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,131 @@
+#include "server/hulls/replace_stream.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <chrono>
+#include <utility>
+
+#include "server/call/stream_message.h"
+#include "server/contract/limit_error.h"
+#include "server/contract/status_map.h"
+#include "server/wire/decode.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+
+grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceStream::Start(
+    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+    WorkerPool& writers, v1::ReplaceHullResponse* response) {
+  auto* stream = new ReplaceStream(context, admission, registry, writers, response);
+  const absl::Status begun = stream->call_.Begin();
+  if (begun.ok()) {
+    stream->Read();
+  } else {
+    stream->End(begun);
+  }
+  return stream;
+}
+
+void ReplaceStream::Read() {
+  PrepareToRead(&request_);
+  StartRead(&request_);
+}
+
+void ReplaceStream::OnReadDone(bool ok) {
+  if (call_.ShouldStop()) return End(call_.StopStatus());
+  const bool opened = replacement_.builder != nullptr;
+  if (!ok) {
+    if (absl::Status s = WhyNotRead(request_); !s.ok()) return End(s);
+    // Only the empty block tells a client that has said all from one that is gone.
+    if (opened && complete_) return writers_.Submit([this] { Commit(); });
+    if (opened) {
+      return End(absl::InvalidArgumentError(
+          "the stream ended without an empty block of points, which says that nothing is missing; "
+          "the hull is as it was"));
+    }
+    return End(absl::InvalidArgumentError("the stream ended before its first message, open"));
+  }
+  ++messages_;
+  switch (request_.message_case()) {
+    case v1::ReplaceHullRequest::kOpen: {
+      const absl::Status status =
+          opened ? absl::InvalidArgumentError("open came twice; start another stream")
+                 : HandleOpen(request_.open());
+      if (!status.ok()) return End(status);
+      Read();
+      return;
+    }
+    case v1::ReplaceHullRequest::kPoints:
+      if (!opened) {
+        return End(absl::InvalidArgumentError("the first message must be open, not points"));
+      }
+      complete_ = request_.points().xyz().empty() && request_.points().xyz_float().empty();
+      if (complete_) return Read();
+      writers_.Submit([this, arrival = std::chrono::steady_clock::now()] {
+        const absl::Status built = Build();
+        if (!built.ok()) return End(call_.ShouldStop() ? call_.StopStatus() : built);
+        call_.EndMessage(arrival);
+        Read();
+      });
+      return;
+    case v1::ReplaceHullRequest::MESSAGE_NOT_SET:
+      return End(absl::InvalidArgumentError("the message is empty; set open or points"));
+  }
+}
+
+absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
+  if (absl::Status s = CheckHullId(call_.caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
+    return s;
+  }
+  replacement_.hull_id = open.hull_id();
+  if (open.has_if_revision()) replacement_.if_revision = open.if_revision();
+  replacement_.create_if_absent = open.create_if_absent();
+  replacement_.builder = std::make_shared<HullBuilder>();
+  return absl::OkStatus();
+}
+
+absl::Status ReplaceStream::Build() {
+  const std::string name = absl::StrCat("message ", messages_, ": ");
+  const Limits& limits = registry_.limits();
+  const absl::StatusOr<std::vector<Vector>> points =
+      DecodePoints(request_.points(), limits.max_points_per_chunk);
+  if (!points.ok()) return Prefixed(name, points.status());
+  call_.AddPoints(points->size());
+  const uint64_t received = replacement_.counts.received + points->size();
+  if (received > limits.max_points_per_hull) {
+    return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
+                         limits.max_points_per_hull, "max-points-per-hull");
+  }
+  if (absl::Status s = registry_.CheckMemory(); !s.ok()) return Prefixed(name, s);
+  const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
+      *points,
+      {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call_.ShouldStop(); }});
+  if (absl::IsResourceExhausted(added.status())) {
+    return LimitExceeded(name + "the hull would hold too many vertices",
+                         limits.max_vertices_per_hull, "max-vertices-per-hull");
+  }
+  if (!added.ok()) return Prefixed(name, added.status());
+  charge_.Set(replacement_.builder->MemoryBytes());
+  replacement_.counts += *added;
+  return absl::OkStatus();
+}
+
+void ReplaceStream::Commit() {
+  registry_.Replace(std::move(replacement_), [this](const absl::StatusOr<ReplaceResult>& result) {
+    // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
+    charge_.Set(0);
+    if (!result.ok()) return End(result.status());
+    call_.Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
+              {{"hull", result->hull.hull_id}});
+    call_.metrics().CountPoints(result->hull.counts);
+    EncodeHeader(registry_.store(), result->store_revision, response_->mutable_header());
+    EncodeRecord(result->hull, response_->mutable_hull());
+    response_->set_created(result->created);
+    response_->set_durability(EncodeDurability(registry_.store().durability()));
+    End(absl::OkStatus());
+  });
+}
+
+void ReplaceStream::End(const absl::Status& status) { Finish(call_.End(status)); }
+
+}  // namespace hulld::server

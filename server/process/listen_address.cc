@@ -1,0 +1,151 @@
+#include "server/process/listen_address.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+
+namespace hulld::server {
+namespace {
+
+// A file descriptor that closes itself.
+class Socket {
+ public:
+  Socket(int family, int protocol) : fd_(socket(family, SOCK_STREAM | SOCK_CLOEXEC, protocol)) {}
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+  ~Socket() {
+    if (fd_ >= 0) close(fd_);
+  }
+  int fd() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+bool IsPort(const std::string& text) {
+  int port = -1;
+  const char* end = text.data() + text.size();
+  const auto [parsed, error] = std::from_chars(text.data(), end, port);
+  return error == std::errc() && parsed == end && port >= 0 && port <= 65535;
+}
+
+absl::Status Malformed(const char* flag, const std::string& text, const char* why) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(flag, " is \"", text, "\": ", why, "; give host:port, [v6]:port or unix:path"));
+}
+
+// 0, or the errno of binding.
+int TryBind(const addrinfo& info) {
+  const Socket socket(info.ai_family, info.ai_protocol);
+  if (socket.fd() < 0) return errno;
+  const int yes = 1;
+  setsockopt(socket.fd(), SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  if (bind(socket.fd(), info.ai_addr, info.ai_addrlen) != 0) return errno;
+  return listen(socket.fd(), 1) == 0 ? 0 : errno;
+}
+
+}  // namespace
+
+bool ListenAddress::is_local() const {
+  if (is_unix() || host == "localhost") return true;
+  in_addr v4;
+  if (inet_pton(AF_INET, host.c_str(), &v4) == 1) return (ntohl(v4.s_addr) >> 24) == 127;
+  in6_addr v6;
+  return inet_pton(AF_INET6, host.c_str(), &v6) == 1 && IN6_IS_ADDR_LOOPBACK(&v6);
+}
+
+std::string ListenAddress::Format(int bound_port) const {
+  if (is_unix()) return absl::StrCat("unix:", path);
+  const bool v6 = host.find(':') != std::string::npos;
+  return absl::StrCat(v6 ? "[" : "", host, v6 ? "]:" : ":", bound_port);
+}
+
+absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text, const char* flag) {
+  ListenAddress address;
+  if (text.starts_with("unix:")) {
+    address.path = text.substr(5);
+    if (address.path.starts_with("//")) address.path = address.path.substr(2);
+    if (address.path.empty()) return Malformed(flag, text, "the socket has no path");
+    if (address.path.size() >= sizeof(sockaddr_un::sun_path)) {
+      return Malformed(flag, text, "the path of a unix socket holds at most 107 characters");
+    }
+    return address;
+  }
+  const size_t colon = text.rfind(':');
+  if (colon == std::string::npos) return Malformed(flag, text, "the port is missing");
+  address.host = text.substr(0, colon);
+  address.port = text.substr(colon + 1);
+  if (address.host.starts_with("[") && address.host.ends_with("]")) {
+    address.host = address.host.substr(1, address.host.size() - 2);
+  } else if (address.host.find(':') != std::string::npos) {
+    return Malformed(flag, text, "an IPv6 address stands in brackets");
+  }
+  if (address.host.empty()) return Malformed(flag, text, "the host is missing");
+  if (!IsPort(address.port)) return Malformed(flag, text, "the port is not a number up to 65535");
+  return address;
+}
+
+absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool insecure) {
+  if (has_tls || insecure || address.is_local()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(
+      "--listen ", address.host, ":", address.port,
+      " can be reached from other machines, which could read and change everything that passes, "
+      "tokens included; encrypt it with --tls-cert and --tls-key, listen on 127.0.0.1, [::1] or "
+      "unix:path, or allow it with --insecure"));
+}
+
+absl::Status CheckSocketFree(const ListenAddress& address) {
+  if (!address.is_unix()) return absl::OkStatus();
+  const Socket socket(AF_UNIX, 0);
+  sockaddr_un name = {};
+  name.sun_family = AF_UNIX;
+  std::memcpy(name.sun_path, address.path.c_str(), address.path.size() + 1);
+  if (connect(socket.fd(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0) {
+    return absl::OkStatus();
+  }
+  return absl::UnavailableError(
+      absl::StrCat("cannot listen on unix:", address.path,
+                   ": another server does; stop it or choose another path with --listen"));
+}
+
+absl::Status ExplainBindFailure(const ListenAddress& address, const char* flag) {
+  const std::string what = absl::StrCat(
+      "cannot listen on ",
+      address.is_unix() ? "unix:" + address.path : address.host + ":" + address.port, ": ");
+  if (address.is_unix()) {
+    return absl::UnavailableError(
+        absl::StrCat(what, "check that the directory of the socket exists and can be written"));
+  }
+  addrinfo hints = {};
+  hints.ai_socktype = SOCK_STREAM;
+  hints.ai_flags = AI_PASSIVE;
+  addrinfo* found = nullptr;
+  const int resolved = getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &found);
+  if (resolved != 0) {
+    return absl::UnavailableError(
+        absl::StrCat(what, gai_strerror(resolved), "; give an address of this machine to ", flag));
+  }
+  int error = 0;
+  for (const addrinfo* info = found; info != nullptr && error == 0; info = info->ai_next) {
+    error = TryBind(*info);
+  }
+  freeaddrinfo(found);
+  const char* advice = "give an address of this machine to ";
+  if (error == EADDRINUSE || error == 0) {
+    return absl::UnavailableError(
+        absl::StrCat(what, "the port is taken; stop the other server or choose another port with ",
+                     flag, " (port 0 picks a free one)"));
+  }
+  if (error == EACCES) advice = "choose a port above 1023 with ";
+  return absl::UnavailableError(absl::StrCat(what, std::strerror(error), "; ", advice, flag));
+}
+
+}  // namespace hulld::server

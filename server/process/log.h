@@ -1,0 +1,73 @@
+#ifndef HULLD_SERVER_PROCESS_LOG_H_
+#define HULLD_SERVER_PROCESS_LOG_H_
+
+#include <chrono>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace hulld::server {
+
+// Makes spdlog's default logger write to standard error, and gRPC and protobuf to that logger.
+// level: debug, info, warn or error. format: text, or json for one JSON object per line with time
+// (UTC, RFC 3339), level and message, and the fields of LogEvent.
+void SetUpLog(const std::string& level, const std::string& format);
+
+// How many lines may be written in each stretch of time: clients that send malformed messages make
+// libraries log a line for each. Thread-safe.
+class LineBudget {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  LineBudget(int lines, Clock::duration stretch) : lines_(lines), stretch_(stretch) {}
+
+  // Whether a line may be written at `now`; if so, how many before it might not since the last that
+  // might.
+  std::optional<uint64_t> Spend(Clock::time_point now);
+
+ private:
+  const int lines_;
+  const Clock::duration stretch_;
+  std::mutex mutex_;
+  std::optional<Clock::time_point> begin_;
+  int spent_ = 0;
+  uint64_t left_out_ = 0;
+};
+
+// Sends what gRPC and protobuf log to spdlog's default logger, each within a budget of
+// kLibraryLines a minute. For the whole process; before any other thread logs.
+inline constexpr int kLibraryLines = 20;
+void RouteLibraryLogs();
+
+enum class LogLevel { kDebug, kInfo, kWarn, kError };
+
+// One fact of a line, as in code=NOT_FOUND.
+struct LogField {
+  LogField(const char* field, std::string text) : name(field), value(std::move(text)) {}
+  LogField(const char* field, uint64_t number)
+      : name(field), value(std::to_string(number)), is_number(true) {}
+  // Of milliseconds: to the microsecond.
+  LogField(const char* field, double number);
+
+  const char* name;
+  std::string value;
+  bool is_number = false;
+};
+using LogFields = std::vector<LogField>;
+
+bool IsLogged(LogLevel level);
+
+// Logs a message with fields: as " name=value" after it, quoted where spaces or quotes ask for it,
+// or as members of the JSON object.
+void LogEvent(LogLevel level, const std::string& message, const LogFields& fields);
+
+// `text` as the inside of a JSON string: quotes, backslashes and control characters escaped, bytes
+// that are not UTF-8 replaced by U+FFFD.
+std::string JsonEscape(const std::string& text);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_PROCESS_LOG_H_

@@ -1,0 +1,231 @@
+#include "server/process/metrics.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <memory>
+#include <utility>
+
+#include "server/contract/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+using prometheus::Family;
+using Buckets = prometheus::Histogram::BucketBoundaries;
+
+// Of rungs, in the order of the enum.
+constexpr std::array<const char*, 4> kRungNames = {"bounds", "cached", "floating_point", "exact"};
+constexpr std::array<Rpc, 3> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
+                                              Rpc::kStreamCollisions};
+
+// Seconds: from what a loopback round trip takes to what a patient client waits.
+Buckets LatencyBuckets() {
+  return {50e-6,  100e-6, 200e-6, 500e-6, 1e-3, 2e-3, 5e-3, 10e-3, 20e-3, 50e-3,
+          100e-3, 200e-3, 500e-3, 1,      2,    5,    10,   20,    60};
+}
+
+Buckets CountBuckets() { return {1, 2, 5, 10, 20, 50, 100, 200, 500, 1000}; }
+
+Family<prometheus::Counter>& AddCounters(prometheus::Registry& registry, const char* name,
+                                         const char* help) {
+  return prometheus::BuildCounter().Name(name).Help(help).Register(registry);
+}
+
+Family<prometheus::Gauge>& AddGauges(prometheus::Registry& registry, const std::string& name,
+                                     const std::string& help) {
+  return prometheus::BuildGauge().Name(name).Help(help).Register(registry);
+}
+
+Family<prometheus::Histogram>& AddHistograms(prometheus::Registry& registry, const char* name,
+                                             const char* help) {
+  return prometheus::BuildHistogram().Name(name).Help(help).Register(registry);
+}
+
+StoreMetrics AddStore(prometheus::Registry& registry) {
+  auto& failures = AddCounters(registry, "hulld_store_failures_total",
+                               "Operations of the store that failed, by operation.");
+  auto& lookups = AddCounters(registry, "hulld_cache_lookups_total",
+                              "Hulls asked for, by whether they were in memory.");
+  return {
+      AddHistograms(registry, "hulld_store_commit_duration_seconds",
+                    "From handing a change to the store until it is acknowledged.")
+          .Add({}, LatencyBuckets()),
+      AddHistograms(registry, "hulld_store_commit_changes",
+                    "Changes that one write to the store commits together.")
+          .Add({}, CountBuckets()),
+      failures.Add({{"operation", "write"}}),
+      failures.Add({{"operation", "sync"}}),
+      failures.Add({{"operation", "read"}}),
+      AddCounters(registry, "hulld_store_damaged_records_total",
+                  "Records of the store whose checksum or content was wrong.")
+          .Add({}),
+      AddGauges(registry, "hulld_store_read_only", "1 while the store refuses changes, else 0.")
+          .Add({}),
+      lookups.Add({{"result", "hit"}}),
+      lookups.Add({{"result", "miss"}}),
+      AddCounters(registry, "hulld_cache_evictions_total", "Hulls that made room for others.")
+          .Add({}),
+      AddGauges(registry, "hulld_cache_bytes", "Bytes that the hulls in memory take, estimated.")
+          .Add({}),
+      AddGauges(registry, "hulld_cache_limit_bytes",
+                "Bytes that the hulls in memory may take (--memory-limit); 0: no limit.")
+          .Add({}),
+  };
+}
+
+// Resident memory of this process; 0 when /proc is not there.
+double ResidentBytes() {
+  const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen("/proc/self/statm", "r"),
+                                                   [](FILE* f) { return f ? fclose(f) : 0; });
+  unsigned long long total = 0;
+  unsigned long long resident = 0;
+  if (file == nullptr || std::fscanf(file.get(), "%llu %llu", &total, &resident) != 2) return 0;
+  return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
+double ProcessorSeconds() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+double Seconds(std::chrono::steady_clock::duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+}  // namespace
+
+Metrics::Metrics()
+    : calls_(AddCounters(registry_, "hulld_requests_total", "Calls that ended, by rpc and code.")),
+      limits_hit_(AddCounters(registry_, "hulld_limits_hit_total",
+                              "Calls and pairs refused because of a limit, by the limit's flag.")),
+      auth_failures_(AddCounters(registry_, "hulld_auth_failures_total",
+                                 "Calls refused for who called, by reason.")),
+      queue_tasks_(AddGauges(registry_, "hulld_queue_tasks", "Tasks that wait for a thread.")),
+      queue_wait_(AddHistograms(registry_, "hulld_queue_wait_seconds",
+                                "How long tasks waited for a thread.")),
+      exact_fallbacks_(AddCounters(registry_, "hulld_exact_fallbacks_total",
+                                   "Pairs that floating point left open for exact arithmetic.")
+                           .Add({})),
+      points_received_(
+          AddCounters(registry_, "hulld_points_received_total", "Points of committed chunks.")
+              .Add({})),
+      points_outside_(AddCounters(registry_, "hulld_points_kept_total",
+                                  "Points of committed chunks that became vertices.")
+                          .Add({})),
+      points_duplicate_(AddCounters(registry_, "hulld_points_duplicate_total",
+                                    "Points of committed chunks that were vertices already.")
+                            .Add({})),
+      points_inside_(AddCounters(registry_, "hulld_points_inside_total",
+                                 "Points of committed chunks that were no vertices.")
+                         .Add({})),
+      store_(AddStore(registry_)) {
+  auto& call_seconds = AddHistograms(registry_, "hulld_request_duration_seconds",
+                                     "How long calls took, from their arrival to their end.");
+  for (size_t i = 0; i < kRpcCount; ++i) {
+    const std::string rpc = RpcName(static_cast<Rpc>(i));
+    calls_ok_[i] = &calls_.Add({{"rpc", rpc}, {"code", "OK"}});
+    call_seconds_[i] = &call_seconds.Add({{"rpc", rpc}}, LatencyBuckets());
+    message_seconds_[i] = nullptr;
+  }
+  auto& message_seconds =
+      AddHistograms(registry_, "hulld_message_duration_seconds",
+                    "How long messages of open streams took, from arrival to answer.");
+  for (const Rpc rpc : kStreamedRpcs) {
+    message_seconds_[static_cast<size_t>(rpc)] =
+        &message_seconds.Add({{"rpc", RpcName(rpc)}}, LatencyBuckets());
+  }
+  auto& pairs =
+      AddCounters(registry_, "hulld_pairs_total", "Pairs answered, by the rung that decided.");
+  for (size_t i = 0; i < kRungNames.size(); ++i) pairs_[i] = &pairs.Add({{"rung", kRungNames[i]}});
+  AddProcess();
+}
+
+void Metrics::AddProcess() {
+  AddGauges(registry_, "hulld_build_info", "1, with the version as a label.")
+      .Add({{"version", HULLD_VERSION}})
+      .Set(1);
+  AddGauges(registry_, "process_start_time_seconds", "When this server started, Unix time.")
+      .Add({})
+      .SetToCurrentTime();
+  AddGauge("process_resident_memory_bytes", "Resident memory of the process.", ResidentBytes);
+  prometheus::Counter& processor =
+      AddCounters(registry_, "process_cpu_seconds_total", "Processor time of the process.").Add({});
+  refresh_.push_back([&processor] {
+    const double passed = ProcessorSeconds() - processor.Value();
+    if (passed > 0) processor.Increment(passed);
+  });
+}
+
+void Metrics::CountCall(Rpc rpc, absl::StatusCode code,
+                        std::chrono::steady_clock::duration duration) {
+  const auto i = static_cast<size_t>(rpc);
+  if (code == absl::StatusCode::kOk) {
+    calls_ok_[i]->Increment();
+  } else {
+    calls_.Add({{"rpc", RpcName(rpc)}, {"code", absl::StatusCodeToString(code)}}).Increment();
+  }
+  call_seconds_[i]->Observe(Seconds(duration));
+}
+
+void Metrics::CountMessage(Rpc rpc, std::chrono::steady_clock::duration duration) {
+  prometheus::Histogram* const seconds = message_seconds_[static_cast<size_t>(rpc)];
+  if (seconds != nullptr) seconds->Observe(Seconds(duration));
+}
+
+void Metrics::CountLimit(const std::string& limit) {
+  limits_hit_.Add({{"limit", limit}}).Increment();
+}
+
+void Metrics::CountAuthFailure(const std::string& reason) {
+  auth_failures_.Add({{"reason", reason}}).Increment();
+}
+
+void Metrics::CountPoints(const PointCounts& counts) {
+  const auto add = [](prometheus::Counter& counter, uint64_t count) {
+    if (count > 0) counter.Increment(static_cast<double>(count));
+  };
+  add(points_received_, counts.received);
+  add(points_outside_, counts.outside);
+  add(points_duplicate_, counts.duplicate);
+  add(points_inside_, counts.inside);
+}
+
+void Metrics::CountPairs(const RungCounts& counts) {
+  for (size_t i = 0; i < pairs_.size(); ++i) {
+    if (counts.by_rung[i] > 0) pairs_[i]->Increment(static_cast<double>(counts.by_rung[i]));
+  }
+  const uint64_t exact = counts.by_rung[static_cast<size_t>(Rung::kExact)];
+  if (exact > 0) exact_fallbacks_.Increment(static_cast<double>(exact));
+}
+
+PoolMetrics Metrics::AddPool(const std::string& pool) {
+  return {queue_tasks_.Add({{"pool", pool}}), queue_wait_.Add({{"pool", pool}}, LatencyBuckets())};
+}
+
+void Metrics::AddGauge(const std::string& name, const std::string& help,
+                       std::function<double()> read) {
+  prometheus::Gauge& gauge = AddGauges(registry_, name, help).Add({});
+  const std::lock_guard lock(refresh_mutex_);
+  refresh_.push_back([&gauge, read = std::move(read)] { gauge.Set(read()); });
+}
+
+void Metrics::AddRefresh(std::function<void()> refresh) {
+  const std::lock_guard lock(refresh_mutex_);
+  refresh_.push_back(std::move(refresh));
+}
+
+std::vector<prometheus::MetricFamily> Metrics::Collect() const {
+  {
+    const std::lock_guard lock(refresh_mutex_);
+    for (const std::function<void()>& refresh : refresh_) refresh();
+  }
+  return registry_.Collect();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,58 @@
+#include "server/process/worker_pool.h"
+
+#include <utility>
+
+#include "server/process/thread_priority.h"
+
+namespace hulld::server {
+
+WorkerPool::WorkerPool(int threads, std::optional<PoolMetrics> metrics, int niceness)
+    : metrics_(metrics) {
+  threads_.reserve(threads);
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, niceness] { Work(niceness); });
+}
+
+WorkerPool::~WorkerPool() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  ready_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void WorkerPool::Submit(std::function<void()> task) {
+  {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back({std::move(task), std::chrono::steady_clock::now()});
+    NoteWaiting();
+  }
+  ready_.notify_one();
+}
+
+void WorkerPool::NoteWaiting() {
+  waiting_.store(tasks_.size(), std::memory_order_relaxed);
+  if (metrics_.has_value()) metrics_->waiting.Set(static_cast<double>(tasks_.size()));
+}
+
+void WorkerPool::Work(int niceness) {
+  if (niceness > 0) LowerPriority(niceness);
+  std::unique_lock lock(mutex_);
+  while (true) {
+    ready_.wait(lock, [this] { return ending_ || !tasks_.empty(); });
+    if (tasks_.empty()) return;
+    Task task = std::move(tasks_.front());
+    tasks_.pop_front();
+    NoteWaiting();
+    lock.unlock();
+    if (metrics_.has_value()) {
+      const auto waited = std::chrono::steady_clock::now() - task.submitted;
+      metrics_->wait_seconds.Observe(std::chrono::duration<double>(waited).count());
+    }
+    task.run();
+    task.run = nullptr;  // what it holds goes before the lock is taken again
+    lock.lock();
+  }
+}
+
+}  // namespace hulld::server

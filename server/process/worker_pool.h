@@ -1,0 +1,59 @@
+#ifndef HULLD_SERVER_PROCESS_WORKER_POOL_H_
+#define HULLD_SERVER_PROCESS_WORKER_POOL_H_
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "server/process/metrics.h"
+
+namespace hulld::server {
+
+// A few threads that run tasks in the order in which they came. gRPC calls back on as few as two
+// threads, which must stay free to move bytes; whatever may take longer than that runs here.
+class WorkerPool {
+ public:
+  // metrics: where to report what waits. niceness: added to that of the process, so that the system
+  // runs other threads first when there is too much to do; inherited by the threads that these
+  // start.
+  explicit WorkerPool(int threads, std::optional<PoolMetrics> metrics = std::nullopt,
+                      int niceness = 0);
+  WorkerPool(const WorkerPool&) = delete;
+  WorkerPool& operator=(const WorkerPool&) = delete;
+  // Runs what is queued, then ends.
+  ~WorkerPool();
+
+  void Submit(std::function<void()> task);
+
+  // Tasks that wait for a thread.
+  size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Task {
+    std::function<void()> run;
+    std::chrono::steady_clock::time_point submitted;
+  };
+
+  void Work(int niceness);
+  // Requires the mutex.
+  void NoteWaiting();
+
+  std::optional<PoolMetrics> metrics_;
+  std::mutex mutex_;
+  std::condition_variable ready_;
+  std::deque<Task> tasks_;
+  std::atomic<size_t> waiting_ = 0;
+  bool ending_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_PROCESS_WORKER_POOL_H_

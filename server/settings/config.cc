@@ -1,0 +1,282 @@
+#include "server/settings/config.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+
+namespace hulld::server {
+namespace {
+
+constexpr uint64_t kMaxVertexIndex = std::numeric_limits<uint32_t>::max();
+constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
+
+std::string EnvironmentName(std::string flag) {
+  for (char& c : flag) c = c == '-' ? '_' : static_cast<char>(std::toupper(c));
+  return "HULLD_" + flag;
+}
+
+// Empty when `text` is a number of seconds up to a day; NaN is none.
+std::string CheckSeconds(const std::string& text) {
+  double seconds = -1;
+  const char* end = text.data() + text.size();
+  const auto [parsed, error] = std::from_chars(text.data(), end, seconds);
+  if (error == std::errc() && parsed == end && seconds >= 0 && seconds <= 86400) return "";
+  return absl::StrCat("\"", text, "\" is not a number of seconds from 0 to 86400");
+}
+
+// The settings of a Config bound to the options of one parser.
+class Parser {
+ public:
+  Parser()
+      : app_("hulld keeps 3D convex hulls by ID and answers exact collision queries.", "hulld") {
+    AddServing();
+    AddGuard();
+    AddLimits();
+    app_.set_config("--config", "", "TOML file with the same settings, as in: max-hulls = 1000")
+        ->envname(EnvironmentName("config"))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    app_.allow_config_extras(CLI::config_extras_mode::error);
+    app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
+    app_.footer(
+        "Precedence: flag, environment variable, file, default.\n"
+        "'hulld doctor --help' tells how to audit a store.");
+  }
+
+  // The arguments that stand for the variables that are set.
+  std::vector<std::string> FromEnvironment(const Environment& environment) const {
+    std::vector<std::string> arguments;
+    for (const CLI::Option* option : app_.get_options()) {
+      const std::string variable = option->get_envname();
+      if (variable.empty()) continue;
+      const std::optional<std::string> value = environment(variable);
+      if (value.has_value() && !value->empty()) {
+        arguments.push_back(option->get_name() + "=" + *value);
+      }
+    }
+    return arguments;
+  }
+
+  // OK with print set for --help and --version; INVALID_ARGUMENT with the parser's words.
+  absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
+    std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
+    try {
+      app_.parse(std::move(arguments));
+    } catch (const CLI::CallForVersion& version) {
+      result->print = std::string(version.what()) + "\n";
+      return absl::OkStatus();
+    } catch (const CLI::CallForHelp&) {
+      result->print = app_.help();
+      return absl::OkStatus();
+    } catch (const CLI::ConfigError& error) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--config: the file holds an unknown key: ", error.what()));
+    } catch (const CLI::FileError& error) {
+      return absl::InvalidArgumentError(absl::StrCat("--config: ", error.what()));
+    } catch (const CLI::Error& error) {
+      return absl::InvalidArgumentError(error.what());
+    }
+    config_.drain_timeout = ToMilliseconds(drain_timeout_seconds_);
+    config_.limits.max_request_time = ToMilliseconds(max_request_seconds_);
+    config_.limits.slow_request = ToMilliseconds(slow_request_seconds_);
+    result->config = config_;
+    result->check = check_;
+    result->settings = app_.config_to_str(/*default_also=*/true, /*write_description=*/false);
+    return absl::OkStatus();
+  }
+
+ private:
+  template <typename T>
+  CLI::Option* Add(const std::string& name, T& value, const std::string& description) {
+    return app_.add_option("--" + name, value, description)
+        ->envname(EnvironmentName(name))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)
+        ->capture_default_str();
+  }
+
+  static std::chrono::milliseconds ToMilliseconds(double seconds) {
+    return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000));
+  }
+
+  static double ToSeconds(std::chrono::milliseconds time) {
+    return static_cast<double>(time.count()) / 1000;
+  }
+
+  void AddServing() {
+    Add("listen", config_.listen,
+        "Where to listen: host:port, [v6]:port or unix:path; port 0 picks a free port");
+    app_.add_flag("--insecure", config_.insecure,
+                  "Allow --listen on addresses that other machines can reach without TLS: whoever "
+                  "is between can read and change what passes, tokens included")
+        ->envname(EnvironmentName("insecure"))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
+        ->check(CLI::Range(0, 1024));
+    AddStore();
+    Add("drain-timeout", drain_timeout_seconds_,
+        "Seconds that running calls may take after SIGTERM or SIGINT")
+        ->check(CLI::Validator(CheckSeconds, ""));
+    AddObservation();
+    Add("log-level", config_.log_level, "Least severe messages to log")
+        ->check(CLI::IsMember({"debug", "info", "warn", "error"}));
+    Add("log-format", config_.log_format, "Log as text or as one JSON object per line")
+        ->check(CLI::IsMember({"text", "json"}));
+  }
+
+  void AddStore() {
+    Add("store", config_.store, "Where hulls live: on disk, or in memory until the server ends")
+        ->check(CLI::IsMember({"rocksdb", "memory"}));
+    Add("data-dir", config_.data_dir,
+        "Directory of the store; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
+        "~/.local/state, or else ./hulld-data");
+    Add("durability", config_.durability,
+        "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
+        "outage of the machine can lose (relaxed)")
+        ->check(CLI::IsMember({"sync", "relaxed"}));
+  }
+
+  void AddObservation() {
+    Add("metrics-address", config_.metrics_address,
+        "Where Prometheus reads metrics over HTTP (/metrics): host:port; empty: nowhere");
+    app_.add_flag("--metrics-insecure", config_.metrics_insecure,
+                  "Allow --metrics-address on addresses that other machines can reach, although "
+                  "metrics are neither encrypted nor authenticated")
+        ->envname(EnvironmentName("metrics-insecure"))
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
+    Add("slow-request", slow_request_seconds_,
+        "Log requests that take longer than so many seconds; 0: none")
+        ->check(CLI::Validator(CheckSeconds, ""));
+  }
+
+  void AddGuard() {
+    Add("tls-cert", config_.tls_cert,
+        "PEM file of the server's certificate and those that lead to its authority; read again "
+        "when it changes, as are the next three");
+    Add("tls-key", config_.tls_key, "PEM file of its private key, which only hulld may read");
+    Add("tls-client-ca", config_.tls_client_ca,
+        "PEM file of the authorities of clients: clients then need a certificate");
+    Add("tokens-file", config_.tokens_file,
+        "File of the tokens that callers need, made by 'hullctl token new'");
+    app_.add_flag("--check-config", check_,
+                  "Check the settings and the files that they name, print them and end: 0 or 2")
+        ->configurable(false);
+  }
+
+  void AddLimits() {
+    Limits& limits = config_.limits;
+    constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
+    AddLimit("max-points-per-chunk", limits.max_points_per_chunk,
+             "Points in one message of AppendPoints", kAny);
+    AddLimit("max-vertices-per-hull", limits.max_vertices_per_hull, "Vertices of one hull",
+             kMaxVertexIndex);
+    AddLimit("max-hulls", limits.max_hulls, "Hulls in the store", kAny);
+    AddLimit("max-pairs-per-batch", limits.max_pairs_per_batch, "Pairs in one BatchCheckCollisions",
+             kAny);
+    AddLimit("max-textbook-axes", limits.max_textbook_axes,
+             "Candidate axes of one pair under TEXTBOOK_SAT", kAny);
+    AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
+             "Writers whose sequences are kept for one hull", kAny);
+    AddLimit(
+        "memory-limit", limits.memory_limit,
+        "Bytes of memory that hulls, points on their way to them, replacements under way and the "
+        "pairs of streams may hold, beside messages of calls and the store's own buffers; 0: half "
+        "of what the machine or the control group has",
+        kAny, 0);
+    AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
+             kMaxGrpcMessageBytes);
+    AddLimit("max-points-per-hull", limits.max_points_per_hull,
+             "Points that one hull takes in its life", kAny);
+    AddLimit("max-placements", limits.max_placements,
+             "Placements of one batch, scene or stream of poses", kAny);
+    AddCallLimits();
+  }
+
+  void AddCallLimits() {
+    Limits& limits = config_.limits;
+    constexpr uint64_t kAny = std::numeric_limits<uint64_t>::max();
+    AddLimit("max-calls", limits.max_calls, "Calls that run at a time, open streams included",
+             kAny);
+    AddLimit("max-waiting-calls", limits.max_waiting_calls,
+             "Calls that wait for a thread before others are refused", kAny);
+    AddLimit("max-streams-per-client", limits.max_streams_per_client,
+             "Streams of points or poses that one client has open", kAny);
+    AddLimit("max-concurrent-batches", limits.max_concurrent_batches,
+             "Batches and scenes that run at a time", kAny);
+    Add("max-request-time", max_request_seconds_,
+        "Seconds that one request may take; streams of points are exempt, streams of poses may "
+        "take so long per message; 0: unlimited")
+        ->check(CLI::Validator(CheckSeconds, ""));
+  }
+
+  // CLI::Range alone would take -1 for the largest number.
+  void AddLimit(const std::string& name, uint64_t& value, const std::string& description,
+                uint64_t most, uint64_t least = 1) {
+    const auto check = [most, least](const std::string& text) -> std::string {
+      uint64_t number = 0;
+      const char* end = text.data() + text.size();
+      const auto [parsed, error] = std::from_chars(text.data(), end, number);
+      if (error == std::errc() && parsed == end && number >= least && number <= most) return "";
+      return absl::StrCat("\"", text, "\" is not a whole number from ", least, " to ", most);
+    };
+    Add(name, value, description)->check(CLI::Validator(check, ""));
+  }
+
+  CLI::App app_;
+  Config config_;
+  bool check_ = false;
+  double drain_timeout_seconds_ = ToSeconds(Config().drain_timeout);
+  double max_request_seconds_ = ToSeconds(Limits().max_request_time);
+  double slow_request_seconds_ = ToSeconds(Limits().slow_request);
+};
+
+std::string DefaultDataDir(const Environment& environment) {
+  const std::optional<std::string> state = environment("XDG_STATE_HOME");
+  if (state.has_value() && !state->empty()) return *state + "/hulld";
+  const std::optional<std::string> home = environment("HOME");
+  if (home.has_value() && !home->empty()) return *home + "/.local/state/hulld";
+  return "hulld-data";
+}
+
+absl::Status WithAdvice(const absl::Status& status, const char* where) {
+  return absl::InvalidArgumentError(
+      absl::StrCat(where, status.message(), " (hulld --help lists the settings)"));
+}
+
+}  // namespace
+
+std::optional<std::string> ProcessEnvironment(const std::string& name) {
+  const char* value = std::getenv(name.c_str());
+  if (value == nullptr) return std::nullopt;
+  return value;
+}
+
+absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments,
+                                             const Environment& environment) {
+  CommandLine result;
+  const std::vector<std::string> variables = Parser().FromEnvironment(environment);
+  // Each variable alone first, so that an error can say where the value came from.
+  for (const std::string& variable : variables) {
+    if (variable.starts_with("--config=")) continue;
+    const absl::Status status = Parser().Parse({variable}, &result);
+    if (!status.ok()) {
+      const std::string flag = variable.substr(2, variable.find('=') - 2);
+      return WithAdvice(status, absl::StrCat(EnvironmentName(flag), ": ").c_str());
+    }
+  }
+  // The last value of an option wins and a file only fills what is still unset, hence this order.
+  std::vector<std::string> all = variables;
+  all.insert(all.end(), arguments.begin(), arguments.end());
+  result = CommandLine();
+  const absl::Status status = Parser().Parse(std::move(all), &result);
+  if (!status.ok()) return WithAdvice(status, "");
+  if (result.config.data_dir.empty()) result.config.data_dir = DefaultDataDir(environment);
+  return result;
+}
+
+}  // namespace hulld::server

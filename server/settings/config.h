@@ -1,0 +1,137 @@
+#ifndef HULLD_SERVER_SETTINGS_CONFIG_H_
+#define HULLD_SERVER_SETTINGS_CONFIG_H_
+
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace rocksdb {
+class Env;
+}
+
+namespace hulld::server {
+
+// What one caller may ask for; the error that names a limit names its flag.
+struct Limits {
+  // Largest message taken from a client: holds max_points_per_chunk doubles and max_pairs_per_batch
+  // pairs at their defaults.
+  uint64_t max_message_bytes = 16 << 20;
+  uint64_t max_points_per_chunk = 200'000;
+  // Points that one hull takes in its life; what a double counts exactly, which is no limit.
+  uint64_t max_points_per_hull = uint64_t{1} << 53;
+  uint64_t max_vertices_per_hull = 1'000'000;
+  uint64_t max_hulls = 100'000;
+  uint64_t max_pairs_per_batch = 1'000'000;
+  // Of one batch, scene or stream; each takes about 500 bytes while it runs.
+  uint64_t max_placements = 200'000;
+  uint64_t max_textbook_axes = 10'000'000;
+  uint64_t max_writers_per_hull = 100'000;
+  // Bytes that builders and snapshots may hold, those of replacements under way too, and points
+  // that wait to be built or stored; beside messages of calls and the store's own buffers. 0: half
+  // of what the machine or the control group of the process has.
+  uint64_t memory_limit = 0;
+  // Calls that run, open streams included, and those of them that wait for a thread.
+  uint64_t max_calls = 4096;
+  uint64_t max_waiting_calls = 1024;
+  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveSnapshot. A client is a token or,
+  // without tokens, a peer address.
+  uint64_t max_streams_per_client = 256;
+  // BatchCheckCollisions and FindCollisions that run; they take turns.
+  uint64_t max_concurrent_batches = 32;
+  // Of one request, or one message of a stream of StreamCollisions; zero: unlimited.
+  std::chrono::milliseconds max_request_time{300'000};
+  // Requests that take longer are logged; zero: none.
+  std::chrono::milliseconds slow_request{1000};
+};
+
+// Every setting and default of the server.
+struct Config {
+  // "host:port", "[v6]:port" or "unix:path"; port 0 picks a free one.
+  std::string listen = "127.0.0.1:50551";
+  // Allows addresses that other machines can reach without TLS.
+  bool insecure = false;
+  // PEM files: the certificate that the server shows with those that lead to its authority, its
+  // private key, and the authorities of clients; the last makes clients need a certificate.
+  std::string tls_cert;
+  std::string tls_key;
+  std::string tls_client_ca;
+  // Who may call (server/access/token_table.h); empty: everyone who can connect.
+  std::string tokens_file;
+  // Threads of parallel queries; 0: one per core.
+  int threads = 0;
+  // Where hulls live: "rocksdb" or "memory".
+  std::string store = "rocksdb";
+  // The directory of a durable store. Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state, or
+  // else hulld-data where the server is started; ParseCommandLine puts that in its place.
+  std::string data_dir;
+  // What an acknowledged change survives: "sync" (on disk) or "relaxed" (written; synced within
+  // kRelaxedSyncInterval).
+  std::string durability = "sync";
+  // Of a durable store; null: the operating system's. For tests.
+  rocksdb::Env* store_env = nullptr;
+  // How long running calls may take after SIGTERM before they are cancelled.
+  std::chrono::milliseconds drain_timeout{10'000};
+  // debug, info, warn or error.
+  std::string log_level = "info";
+  // text or json (one object per line).
+  std::string log_format = "text";
+  // "host:port" where Prometheus reads metrics over HTTP; empty: nowhere.
+  std::string metrics_address;
+  // Allows a metrics address that other machines can reach.
+  bool metrics_insecure = false;
+  Limits limits;
+
+  bool has_tls() const { return !tls_cert.empty() || !tls_key.empty() || !tls_client_ca.empty(); }
+
+  // How often the files of certificates and tokens are looked at.
+  static constexpr std::chrono::milliseconds kReloadInterval{1000};
+  static constexpr std::chrono::milliseconds kRelaxedSyncInterval{500};
+  // Lists: hulls per page when the request says 0, and at most.
+  static constexpr uint32_t kDefaultPageSize = 100;
+  static constexpr uint32_t kMaxPageSize = 1000;
+  // What gRPC may hold of messages that are on their way, before it slows down or ends their
+  // calls; more where --max-message-bytes is large.
+  static constexpr size_t kTransportBytes = size_t{256} << 20;
+  // Calls that one connection may have open; its client makes others wait.
+  static constexpr int kCallsPerConnection = 1024;
+  // Long replies are cut into messages of about this size.
+  static constexpr size_t kReplyMessageBytes = 1 << 20;
+  // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC
+  // client takes: 2 features x 65536 x (24 bytes of coordinates + at most 5 of index) = 3.6 MiB.
+  static constexpr size_t kMaxFeatureVertices = 1 << 16;
+  // Length of hull IDs and writer IDs.
+  static constexpr size_t kMaxIdCharacters = 256;
+};
+
+// What a command line asks for: to run with `config`; or, when `print` is not empty, to print
+// it and end (--help, --version).
+struct CommandLine {
+  Config config;
+  std::string print;
+  // --check-config: to check the settings, print them and end.
+  bool check = false;
+  // Every setting in force, as lines of the TOML file.
+  std::string settings;
+};
+
+// Looks up an environment variable; nullopt when it is not set.
+using Environment = std::function<std::optional<std::string>(const std::string&)>;
+
+// The variables of this process.
+std::optional<std::string> ProcessEnvironment(const std::string& name);
+
+// Reads the settings: a flag beats its environment variable (HULLD_MAX_HULLS for --max-hulls),
+// which beats the TOML file named by --config, which beats the default. arguments: without the
+// program's name. INVALID_ARGUMENT: names the flag, variable or file key that is wrong.
+absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arguments,
+                                             const Environment& environment);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_SETTINGS_CONFIG_H_

@@ -1,0 +1,49 @@
+#ifndef HULLD_SERVER_STORE_HULL_RECORD_H_
+#define HULLD_SERVER_STORE_HULL_RECORD_H_
+
+#include <cstdint>
+#include <string>
+
+#include "core/hull/growth/hull_builder.h"
+
+namespace hulld::server {
+
+// A hull without its geometry, as of its last committed change.
+struct HullRecord {
+  std::string hull_id;
+  // The store's revision at which this incarnation was created.
+  uint64_t create_revision = 0;
+  // The store's revision of the last change of its vertex set.
+  uint64_t revision = 0;
+  int dimension = -1;
+  uint64_t vertex_count = 0;
+  // Sums over all chunks.
+  PointCounts counts;
+  friend bool operator==(const HullRecord&, const HullRecord&) = default;
+};
+
+// How a store keeps the vertices of a hull: as a base, and a delta for each change since, which
+// holds what the change added. The hull is that of base and deltas together.
+struct VertexLayout {
+  // 0: no base.
+  uint64_t base_revision = 0;
+  uint64_t base_vertices = 0;
+  uint64_t delta_count = 0;
+  uint64_t delta_vertices = 0;
+
+  bool empty() const { return base_revision == 0 && delta_count == 0; }
+  friend bool operator==(const VertexLayout&, const VertexLayout&) = default;
+};
+
+// What a store keeps of a hull beside its vertices and its writers' sequences.
+struct StoredHull {
+  HullRecord record;
+  // Writers that committed a chunk.
+  uint64_t writer_count = 0;
+  VertexLayout layout;
+  friend bool operator==(const StoredHull&, const StoredHull&) = default;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_HULL_RECORD_H_

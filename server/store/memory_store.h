@@ -1,0 +1,44 @@
+#ifndef HULLD_SERVER_STORE_MEMORY_STORE_H_
+#define HULLD_SERVER_STORE_MEMORY_STORE_H_
+
+#include <string>
+#include <vector>
+
+#include "server/process/random_id.h"
+#include "server/store/store.h"
+
+namespace hulld::server {
+
+// Keeps nothing beside what the registry holds in memory; a new store at each start.
+class MemoryStore : public Store {
+ public:
+  std::string kind() const override { return "memory"; }
+  std::string id() const override { return id_; }
+  Durability durability() const override { return Durability::kMemory; }
+  bool keeps_hulls() const override { return false; }
+  uint64_t revision() const override { return 0; }
+  absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
+  absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
+    return KeepsNothing();
+  }
+  absl::StatusOr<uint64_t> LoadSequence(const HullRecord&, const std::string&) override {
+    return 0;
+  }
+  absl::Status Commit(std::span<const Change* const>) override { return absl::OkStatus(); }
+  absl::Status Recover() override { return absl::OkStatus(); }
+  absl::StatusOr<std::string> MakeCopy() override {
+    return absl::FailedPreconditionError(
+        "the store is memory (--store=memory), of which no snapshot can be saved");
+  }
+
+ private:
+  static absl::Status KeepsNothing() {
+    return absl::NotFoundError("the store is memory, which keeps nothing to read back");
+  }
+
+  const std::string id_ = RandomId();
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_MEMORY_STORE_H_

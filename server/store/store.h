@@ -1,0 +1,121 @@
+#ifndef HULLD_SERVER_STORE_STORE_H_
+#define HULLD_SERVER_STORE_STORE_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "server/store/hull_record.h"
+
+namespace hulld::server {
+
+// What a committed change survives.
+enum class Durability {
+  kMemory,   // nothing: it is lost when the server ends
+  kRelaxed,  // the end of the server, but not that of the machine within some time
+  kSync,     // both: it is on disk
+};
+
+struct WriterSequence {
+  std::string writer_id;
+  uint64_t sequence = 0;
+};
+
+// What a change means for the vertices that are kept of its hull.
+enum class VertexChange {
+  kNone,
+  // Change::vertices are one more delta.
+  kAdded,
+  // Change::vertices are the new base and take the place of all that is kept.
+  kReplaced,
+};
+
+// One hull, created, changed or deleted.
+struct Change {
+  // The hull after the change; what is deleted if it is.
+  StoredHull hull;
+  // The store's revision after the change; hull.record.revision is lower where no vertex changed.
+  uint64_t revision = 0;
+  bool deleted = false;
+  // How the hull's vertices were kept before.
+  VertexLayout former_layout;
+  VertexChange vertex_change = VertexChange::kNone;
+  std::vector<Vector> vertices;
+  // Of a chunk: who wrote it.
+  std::optional<WriterSequence> writer;
+  // The incarnation that this one takes the place of, if there is one.
+  std::optional<StoredHull> replaced;
+};
+
+// A hull that a store holds: its ID, and the rest, or DATA_LOSS naming the hull when what is kept
+// of it is damaged.
+using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<StoredHull>)>;
+
+// Operations that failed so far, each counted once, by what the system refused.
+struct StoreFailures {
+  // Writing, and opening anew after an error.
+  uint64_t write = 0;
+  uint64_t sync = 0;
+  // What could not be read; what was read and is damaged is not among them.
+  uint64_t read = 0;
+};
+
+// Where changes are kept, beside the registry that serves them. Reading is for any thread.
+class Store {
+ public:
+  virtual ~Store() = default;
+
+  // As in --store.
+  virtual std::string kind() const = 0;
+  // Random per store.
+  virtual std::string id() const = 0;
+  virtual Durability durability() const = 0;
+  // Whether hulls can be read back: what the registry holds of them is then a copy.
+  virtual bool keeps_hulls() const = 0;
+  // The last one committed when the store was opened.
+  virtual uint64_t revision() const = 0;
+
+  // Every hull, in byte order of the IDs.
+  virtual absl::Status ForEachHull(const StoredHullVisitor& visit) = 0;
+  // Points whose hull `hull` is. DATA_LOSS naming the hull: something is missing or damaged.
+  virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
+  // The writer's last committed sequence; 0 when there is none.
+  virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
+                                                const std::string& writer_id) = 0;
+
+  // Keeps changes, all or none, before anyone can see them: one call at a time, in the order in
+  // which they take effect. An error refuses them all, and what is kept is as before. (Should this
+  // process be killed before Recover, the next one may find them, if the error was UNAVAILABLE.)
+  virtual absl::Status Commit(std::span<const Change* const> changes) = 0;
+  // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
+  virtual absl::Status Recover() = 0;
+
+  virtual StoreFailures failures() const { return {}; }
+
+  // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
+  // directory: whoever asked removes that. FAILED_PRECONDITION: nothing is kept.
+  virtual absl::StatusOr<std::string> MakeCopy() = 0;
+
+  // Whether the next change is to bring a new base instead of a delta of `new_vertices`: once the
+  // deltas outgrew the base, so that all bases together are as large as all deltas, a few times at
+  // most. Each kept delta costs kDeltaBytes beside its vertices.
+  static bool WantsBase(const VertexLayout& layout, uint64_t new_vertices) {
+    constexpr uint64_t kDeltaBytes = 64;
+    constexpr uint64_t kSmallBytes = 64 << 10;
+    const uint64_t base = layout.base_vertices * sizeof(Vector);
+    const uint64_t deltas = (layout.delta_vertices + new_vertices) * sizeof(Vector) +
+                            (layout.delta_count + 1) * kDeltaBytes;
+    return deltas > (base > kSmallBytes ? base : kSmallBytes);
+  }
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_STORE_H_

@@ -1,0 +1,69 @@
+#ifndef HULLD_SERVER_STORE_STORE_KEYS_H_
+#define HULLD_SERVER_STORE_STORE_KEYS_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/store/hull_record.h"
+
+namespace hulld::server {
+
+// Keys and values of the durable store, format version 1. Numbers in keys are big endian, so that
+// byte order is theirs; numbers in values are little endian.
+//
+//   m/format, m/store_id, m/revision     of the store
+//   m/relaxed                            while --durability=relaxed has it open; without a value
+//   h<hull ID>                           a StoredHull
+//   w<incarnation><writer ID>            the writer's last committed sequence
+//   b<incarnation><revision><part>       vertices of a base, in parts
+//   d<incarnation><revision>             vertices of a delta
+//
+// An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that a
+// value that was damaged, or that belongs to another key, is found out where it is used.
+
+inline constexpr uint64_t kStoreFormat = 1;
+inline constexpr char kFormatKey[] = "m/format";
+inline constexpr char kStoreIdKey[] = "m/store_id";
+inline constexpr char kRevisionKey[] = "m/revision";
+inline constexpr char kRelaxedKey[] = "m/relaxed";
+inline constexpr char kHullPrefix = 'h';
+inline constexpr char kWriterPrefix = 'w';
+inline constexpr char kBasePrefix = 'b';
+inline constexpr char kDeltaPrefix = 'd';
+// Vertices of one part of a base: 768 KiB.
+inline constexpr size_t kBasePartVertices = 32768;
+
+std::string HullKey(std::string_view hull_id);
+// Where an incarnation's keys of one kind start; they end before those of incarnation + 1.
+std::string IncarnationKey(char prefix, uint64_t incarnation);
+// The incarnation in any of the keys below.
+uint64_t IncarnationOf(std::string_view key);
+std::string WriterKey(uint64_t incarnation, std::string_view writer_id);
+std::string BaseKey(uint64_t incarnation, uint64_t revision, uint32_t part);
+std::string DeltaKey(uint64_t incarnation, uint64_t revision);
+// The revision in a DeltaKey.
+uint64_t DeltaRevision(std::string_view key);
+
+// A value with its checksum.
+std::string Seal(std::string_view key, std::string value);
+// The value without its checksum; DATA_LOSS when it does not match.
+absl::StatusOr<std::string_view> Unseal(std::string_view key, std::string_view sealed);
+
+std::string EncodeNumber(uint64_t number);
+// DATA_LOSS when the size does not fit; so the others.
+absl::StatusOr<uint64_t> DecodeNumber(std::string_view value);
+// All but the hull's ID, which is the key.
+std::string EncodeStoredHull(const StoredHull& hull);
+absl::StatusOr<StoredHull> DecodeStoredHull(std::string_view hull_id, std::string_view value);
+std::string EncodeVertices(std::span<const Vector> vertices);
+absl::Status AppendVertices(std::string_view value, std::vector<Vector>* vertices);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_STORE_KEYS_H_

@@ -1,0 +1,125 @@
+#include "server/wire/answer_columns.h"
+
+#include <absl/status/status.h>
+
+#include <limits>
+#include <string>
+
+#include "server/contract/status_map.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+// What an element of a repeated message field takes beside its own bytes: a tag and its length.
+constexpr size_t kElementOverhead = 5;
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr int kWitnessNumbers = 6;
+
+template <typename Columns>
+size_t AddProblem(const absl::Status& status, uint64_t pair, Columns* columns) {
+  v1::PairProblem* const problem = columns->add_pair_problems();
+  problem->set_pair(pair);
+  problem->set_code(ToGrpc(status.code()));
+  problem->set_message(std::string(status.message()));
+  return problem->ByteSizeLong() + kElementOverhead;
+}
+
+template <typename Columns>
+void AddWitness(const Witness& witness, Columns* columns) {
+  for (const Vector& point : {witness.p_WA, witness.p_WB}) {
+    for (int i = 0; i < 3; ++i) columns->add_witness_xyz(point[i]);
+  }
+  columns->add_witness_errors(witness.error);
+}
+
+// The columns of fixed size.
+template <typename Columns>
+size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, Columns* columns) {
+  size_t bytes = 0;
+  if (wanted.separation()) {
+    const bool known = answer != nullptr && answer->separation.has_value();
+    columns->add_separations(known ? answer->separation->value : kNone);
+    columns->add_separation_bounds(known ? answer->separation->bound : kNone);
+    bytes += 2 * sizeof(double);
+  }
+  if (wanted.witness()) {
+    const Vector none = Vector::Constant(kNone);
+    const bool known = answer != nullptr && answer->witness.has_value();
+    AddWitness(known ? *answer->witness : Witness{none, none, kNone}, columns);
+    bytes += (kWitnessNumbers + 1) * sizeof(double);
+  }
+  if (wanted.has_clearance()) {
+    columns->add_within_clearance(answer != nullptr && answer->within_clearance.value_or(false));
+    bytes += 1;
+  }
+  return bytes;
+}
+
+// EncodeAxis, but a feature that is too large leaves the pair without answer.
+template <typename Columns>
+size_t AddAxis(const SeparatingAxis& found, const Hull& a, const Hull& b, uint64_t pair,
+               Columns* columns) {
+  v1::Axis* const axis = columns->mutable_axes(columns->axes_size() - 1);
+  const absl::Status encoded = EncodeAxis(found, a, b, axis);
+  if (encoded.ok()) return axis->ByteSizeLong();
+  axis->Clear();
+  columns->set_relations(columns->relations_size() - 1, v1::RELATION_UNSPECIFIED);
+  return AddProblem(encoded, pair, columns);
+}
+
+template <typename Columns>
+size_t AddRow(v1::Relation relation, v1::Rung rung, const v1::Wanted& wanted, Columns* columns) {
+  columns->add_relations(relation);
+  columns->add_rungs(rung);
+  if (wanted.axis()) columns->add_axes();
+  if (wanted.analysis()) columns->add_analyses();
+  if (wanted.certificate()) columns->add_certificates();
+  return 2 + kElementOverhead *
+                 (size_t{wanted.axis()} + size_t{wanted.analysis()} + size_t{wanted.certificate()});
+}
+
+}  // namespace
+
+template <typename Columns>
+size_t AddUnanswered(const v1::Wanted& wanted, Columns* columns) {
+  const size_t bytes = AddRow(v1::RELATION_UNSPECIFIED, v1::RUNG_UNSPECIFIED, wanted, columns);
+  return bytes + AddNumbers(nullptr, wanted, columns);
+}
+
+template <typename Columns>
+size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b,
+                 const v1::Wanted& wanted, uint64_t pair, Columns* columns) {
+  if (!answer.ok()) {
+    const size_t bytes = AddUnanswered(wanted, columns);
+    return bytes + AddProblem(answer.status(), pair, columns);
+  }
+  size_t bytes =
+      AddRow(EncodeRelation(answer->relation), EncodeRung(answer->rung), wanted, columns);
+  bytes += AddNumbers(&*answer, wanted, columns);
+  if (wanted.analysis()) {
+    v1::Analysis* const analysis = columns->mutable_analyses(columns->analyses_size() - 1);
+    EncodeAnalysis(answer->analysis, a, b, analysis);
+    bytes += analysis->ByteSizeLong();
+  }
+  if (wanted.certificate() && answer->certificate.has_value()) {
+    v1::Certificate* const certificate =
+        columns->mutable_certificates(columns->certificates_size() - 1);
+    EncodeCertificate(*answer->certificate, a, b, certificate);
+    bytes += certificate->ByteSizeLong();
+  }
+  if (wanted.axis() && answer->axis.has_value()) {
+    bytes += AddAxis(*answer->axis, a, b, pair, columns);
+  }
+  return bytes;
+}
+
+#define HULLD_ANSWER_COLUMNS(Columns)                                                         \
+  template size_t AddAnswer<Columns>(const absl::StatusOr<Answer>&, const Hull&, const Hull&, \
+                                     const v1::Wanted&, uint64_t, Columns*);                  \
+  template size_t AddUnanswered<Columns>(const v1::Wanted&, Columns*);
+HULLD_ANSWER_COLUMNS(v1::AnswerColumns)
+HULLD_ANSWER_COLUMNS(v1::BatchCheckCollisionsResponse)
+#undef HULLD_ANSWER_COLUMNS
+
+}  // namespace hulld::server

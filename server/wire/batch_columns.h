@@ -1,0 +1,46 @@
+#ifndef HULLD_SERVER_WIRE_BATCH_COLUMNS_H_
+#define HULLD_SERVER_WIRE_BATCH_COLUMNS_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/query/collision.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld::server {
+
+// Encodes consecutive answers of a batch as columns, cut into messages of about 1 MiB.
+class BatchColumns {
+ public:
+  // head: the message that the columns start in. first_pair: the pair that comes first.
+  BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
+               uint64_t first_pair);
+
+  // The answer of the next pair, of hulls a and b, or why there is none.
+  void Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b);
+  // The answers of the next pairs, of which nothing else is wanted.
+  void Add(std::span<const RelationAnswer> answers);
+  // The next pair has no answer, for a reason that stands elsewhere.
+  void AddUnanswered();
+
+  std::vector<v1::BatchCheckCollisionsResponse> Take();
+
+ private:
+  // The message that takes the next row.
+  v1::BatchCheckCollisionsResponse* MessageForNext();
+
+  const v1::Wanted wanted_;
+  uint64_t next_pair_;
+  std::vector<v1::BatchCheckCollisionsResponse> messages_;
+  // Of the last message, estimated.
+  size_t bytes_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_WIRE_BATCH_COLUMNS_H_

@@ -1,0 +1,110 @@
+#include "server/wire/decode.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <cstring>
+
+#include "server/contract/limit_error.h"
+#include "server/contract/status_map.h"
+
+namespace hulld::server {
+namespace {
+
+// Three numbers each.
+std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<double>& xyz) {
+  static_assert(sizeof(Vector) == 3 * sizeof(double));
+  std::vector<Vector> points(static_cast<size_t>(xyz.size()) / 3);
+  if (!points.empty())
+    std::memcpy(points.data()->data(), xyz.data(), points.size() * sizeof(Vector));
+  return points;
+}
+
+std::vector<Vector> ToPoints(const google::protobuf::RepeatedField<float>& xyz) {
+  std::vector<Vector> points;
+  points.reserve(static_cast<size_t>(xyz.size()) / 3);
+  const float* const end = xyz.data() + xyz.size();
+  for (const float* p = xyz.data(); p != end; p += 3) points.emplace_back(p[0], p[1], p[2]);
+  return points;
+}
+
+template <typename Coordinates>
+absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates, const char* field,
+                                                 uint64_t max_points) {
+  if (coordinates.size() % 3 != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(field, " holds ", coordinates.size(), " numbers; each point needs three"));
+  }
+  const size_t count = coordinates.size() / 3;
+  if (count > max_points) {
+    return LimitExceeded(absl::StrCat("message holds ", count, " points"), max_points,
+                         "max-points-per-chunk");
+  }
+  return ToPoints(coordinates);
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points) {
+  if (!block.xyz().empty() && !block.xyz_float().empty()) {
+    return absl::InvalidArgumentError("points holds both xyz and xyz_float; use one of them");
+  }
+  if (!block.xyz_float().empty()) {
+    return DecodePoints(block.xyz_float(), "points.xyz_float", max_points);
+  }
+  return DecodePoints(block.xyz(), "points.xyz", max_points);
+}
+
+absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points) {
+  if (message.sequence() == 0) {
+    return absl::InvalidArgumentError("chunk 0: sequence is 0 or missing; sequences start at 1");
+  }
+  absl::StatusOr<std::vector<Vector>> points = DecodePoints(message.points(), max_points);
+  if (!points.ok()) {
+    return Prefixed(absl::StrCat("chunk ", message.sequence(), ": "), points.status());
+  }
+  Chunk chunk;
+  chunk.sequence = message.sequence();
+  chunk.points = *std::move(points);
+  if (message.has_if_revision()) chunk.if_revision = message.if_revision();
+  return chunk;
+}
+
+absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
+  Pose pose;
+  if (message.has_rotation()) {
+    const v1::Quaternion& q = message.rotation();
+    pose.q = {q.w(), q.x(), q.y(), q.z()};
+  }
+  if (message.has_translation()) {
+    const v1::Vector3& t = message.translation();
+    pose.t = Vector(t.x(), t.y(), t.z());
+  }
+  if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
+  return pose;
+}
+
+absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i) {
+  const double* const numbers = poses.data() + static_cast<ptrdiff_t>(kPoseNumbers) * i;
+  Pose pose;
+  pose.q = {numbers[0], numbers[1], numbers[2], numbers[3]};
+  pose.t = Vector(numbers[4], numbers[5], numbers[6]);
+  if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
+  return pose;
+}
+
+absl::StatusOr<Method> DecodeMethod(v1::Method method) {
+  switch (method) {
+    case v1::METHOD_UNSPECIFIED:
+    case v1::METHOD_CERTIFIED_SEARCH:
+      return Method::kCertifiedSearch;
+    case v1::METHOD_TEXTBOOK_SAT:
+      return Method::kTextbookSat;
+    default:
+      return absl::InvalidArgumentError(
+          absl::StrCat("method is ", static_cast<int>(method),
+                       "; use METHOD_CERTIFIED_SEARCH (the default) or METHOD_TEXTBOOK_SAT"));
+  }
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,44 @@
+#ifndef HULLD_SERVER_WIRE_DECODE_H_
+#define HULLD_SERVER_WIRE_DECODE_H_
+
+#include <absl/status/statusor.h>
+#include <google/protobuf/repeated_field.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/query/collision.h"
+#include "core/query/terms/pose.h"
+#include "hulld/v1/collision.pb.h"
+#include "hulld/v1/geometry.pb.h"
+#include "hulld/v1/hull.pb.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// The points of a block; they may still hold NaN or infinity, which the builder finds.
+// INVALID_ARGUMENT: both fields of points set, or a number of coordinates that is no multiple of
+// three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
+absl::StatusOr<std::vector<Vector>> DecodePoints(const v1::PointBlock& block, uint64_t max_points);
+
+// The chunk of a message; its points may still hold NaN or infinity, which the builder finds.
+// INVALID_ARGUMENT: sequence 0, both fields of points set, or a number of coordinates that is no
+// multiple of three. RESOURCE_EXHAUSTED: more than max_points (--max-points-per-chunk).
+absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_points);
+
+// A pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in "rotation.w".
+absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
+
+// Of poses in a row: seven numbers each, quaternion w x y z and translation x y z.
+inline constexpr int kPoseNumbers = 7;
+// The i-th of them. INVALID_ARGUMENT as DecodePose.
+absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i);
+
+// INVALID_ARGUMENT: a number that stands for no method.
+absl::StatusOr<Method> DecodeMethod(v1::Method method);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_WIRE_DECODE_H_

@@ -1,0 +1,194 @@
+#include "server/wire/encode.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <variant>
+
+#include "server/settings/config.h"
+
+namespace hulld::server {
+namespace {
+
+absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature* message) {
+  if (feature.vertices.size() > Config::kMaxFeatureVertices) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the axis touches a feature of ", feature.vertices.size(), " vertices; a reply holds ",
+        Config::kMaxFeatureVertices, " at most; ask again without the axis"));
+  }
+  for (const uint32_t index : feature.vertices) {
+    message->add_vertex_indices(index);
+    const Vector& vertex = hull.vertices()[index];
+    for (int i = 0; i < 3; ++i) message->add_xyz(vertex[i]);
+  }
+  if (feature.facet.has_value()) message->set_facet_index(*feature.facet);
+  return absl::OkStatus();
+}
+
+// (Integer::str() trips a false warning of GCC 12.)
+std::string Decimal(const Integer& number) {
+  if (number.is_zero()) return "0";
+  const Integer base = 1'000'000'000'000'000'000;
+  Integer rest = abs(number);
+  std::string digits;  // last first
+  while (!rest.is_zero()) {
+    auto part = static_cast<uint64_t>(Integer(rest % base));
+    rest /= base;
+    for (int i = 0; i < 18 && (part > 0 || !rest.is_zero()); ++i, part /= 10) {
+      digits.push_back(static_cast<char>('0' + part % 10));
+    }
+  }
+  if (number.sign() < 0) digits.push_back('-');
+  return {digits.rbegin(), digits.rend()};
+}
+
+void EncodeSize(const Hull& hull, v1::HullSize* message) {
+  message->set_vertices(hull.vertices().size());
+  message->set_edges(hull.edges().size());
+  message->set_facets(hull.facet_count());
+}
+
+}  // namespace
+
+void EncodeVector(const Vector& vector, v1::Vector3* message) {
+  message->set_x(vector[0]);
+  message->set_y(vector[1]);
+  message->set_z(vector[2]);
+}
+
+void EncodeCounts(const PointCounts& counts, v1::PointCounts* message) {
+  message->set_received(counts.received);
+  message->set_outside(counts.outside);
+  message->set_duplicate(counts.duplicate);
+  message->set_inside(counts.inside);
+}
+
+void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message) {
+  message->set_store_id(store.id());
+  message->set_revision(revision);
+}
+
+void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
+  message->set_hull_id(record.hull_id);
+  message->set_create_revision(record.create_revision);
+  message->set_revision(record.revision);
+  message->set_dimension(record.dimension);
+  message->set_vertex_count(record.vertex_count);
+  EncodeCounts(record.counts, message->mutable_counts());
+}
+
+void EncodeVersion(const HullRecord& record, v1::HullVersion* message) {
+  message->set_hull_id(record.hull_id);
+  message->set_create_revision(record.create_revision);
+  message->set_revision(record.revision);
+}
+
+void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message) {
+  message->set_seconds(duration.count() / 1'000'000'000);
+  message->set_nanos(static_cast<int32_t>(duration.count() % 1'000'000'000));
+}
+
+v1::Relation EncodeRelation(Relation relation) {
+  switch (relation) {
+    case Relation::kSeparated:
+      return v1::RELATION_SEPARATED;
+    case Relation::kTouching:
+      return v1::RELATION_TOUCHING;
+    case Relation::kOverlapping:
+      return v1::RELATION_OVERLAPPING;
+    case Relation::kWithinTolerance:
+      return v1::RELATION_WITHIN_TOLERANCE;
+  }
+  return v1::RELATION_UNSPECIFIED;
+}
+
+v1::Rung EncodeRung(Rung rung) {
+  switch (rung) {
+    case Rung::kBounds:
+      return v1::RUNG_BOUNDS;
+    case Rung::kCached:
+      return v1::RUNG_CACHED;
+    case Rung::kFloatingPoint:
+      return v1::RUNG_FLOATING_POINT;
+    case Rung::kExact:
+      return v1::RUNG_EXACT;
+  }
+  return v1::RUNG_UNSPECIFIED;
+}
+
+v1::AxisKind EncodeAxisKind(AxisKind kind) {
+  switch (kind) {
+    case AxisKind::kFacetA:
+      return v1::AXIS_KIND_FACET_A;
+    case AxisKind::kFacetB:
+      return v1::AXIS_KIND_FACET_B;
+    case AxisKind::kEdgeEdge:
+      return v1::AXIS_KIND_EDGE_EDGE;
+    case AxisKind::kFlat:
+      return v1::AXIS_KIND_FLAT;
+    case AxisKind::kGeneral:
+      return v1::AXIS_KIND_GENERAL;
+  }
+  return v1::AXIS_KIND_UNSPECIFIED;
+}
+
+v1::Durability EncodeDurability(Durability durability) {
+  switch (durability) {
+    case Durability::kMemory:
+      return v1::DURABILITY_MEMORY;
+    case Durability::kRelaxed:
+      return v1::DURABILITY_RELAXED;
+    case Durability::kSync:
+      return v1::DURABILITY_SYNC;
+  }
+  return v1::DURABILITY_UNSPECIFIED;
+}
+
+absl::Status EncodeAxis(const SeparatingAxis& axis, const Hull& a, const Hull& b,
+                        v1::Axis* message) {
+  EncodeVector(axis.direction, message->mutable_direction());
+  message->set_kind(EncodeAxisKind(axis.kind));
+  absl::Status encoded = EncodeFeature(axis.feature_a, a, message->mutable_feature_a());
+  if (!encoded.ok()) return encoded;
+  return EncodeFeature(axis.feature_b, b, message->mutable_feature_b());
+}
+
+void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::Analysis* message) {
+  EncodeDuration(analysis.time, message->mutable_time());
+  EncodeSize(a, message->mutable_size_a());
+  EncodeSize(b, message->mutable_size_b());
+  message->set_axes_tested(analysis.axes_tested);
+  message->set_axes_total(analysis.axes_total);
+  if (analysis.stage.has_value()) message->set_stage(EncodeAxisKind(*analysis.stage));
+  if (analysis.axis_index.has_value()) message->set_axis_index(*analysis.axis_index);
+}
+
+void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
+                       v1::Certificate* message) {
+  if (const Vector* n = std::get_if<Vector>(&certificate.direction)) {
+    EncodeVector(*n, message->mutable_direction());
+  } else if (const auto* integers = std::get_if<IntegerVector>(&certificate.direction)) {
+    message->mutable_integer_direction()->set_x(Decimal(integers->x));
+    message->mutable_integer_direction()->set_y(Decimal(integers->y));
+    message->mutable_integer_direction()->set_z(Decimal(integers->z));
+  }
+  for (const VertexPair& pair : certificate.pairs) {
+    v1::VertexPair* const encoded = message->add_pairs();
+    encoded->set_index_a(pair.a);
+    encoded->set_index_b(pair.b);
+    EncodeVector(a.vertices()[pair.a], encoded->mutable_vertex_a());
+    EncodeVector(b.vertices()[pair.b], encoded->mutable_vertex_b());
+  }
+}
+
+void EncodeSeparation(const Separation& separation, v1::Separation* message) {
+  message->set_value(separation.value);
+  message->set_bound(separation.bound);
+}
+
+void EncodeWitness(const Witness& witness, v1::Witness* message) {
+  EncodeVector(witness.p_WA, message->mutable_point_a());
+  EncodeVector(witness.p_WB, message->mutable_point_b());
+  message->set_error(witness.error);
+}
+
+}  // namespace hulld::server

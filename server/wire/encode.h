@@ -1,0 +1,44 @@
+#ifndef HULLD_SERVER_WIRE_ENCODE_H_
+#define HULLD_SERVER_WIRE_ENCODE_H_
+
+#include <absl/status/status.h>
+
+#include <chrono>
+#include <string>
+
+#include "core/hull/hull.h"
+#include "core/query/collision.h"
+#include "google/protobuf/duration.pb.h"
+#include "hulld/v1/collision.pb.h"
+#include "hulld/v1/geometry.pb.h"
+#include "hulld/v1/hull.pb.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+void EncodeVector(const Vector& vector, v1::Vector3* message);
+void EncodeCounts(const PointCounts& counts, v1::PointCounts* message);
+void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message);
+void EncodeRecord(const HullRecord& record, v1::HullInfo* message);
+void EncodeVersion(const HullRecord& record, v1::HullVersion* message);
+void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message);
+
+v1::Relation EncodeRelation(Relation relation);
+v1::Rung EncodeRung(Rung rung);
+v1::AxisKind EncodeAxisKind(AxisKind kind);
+v1::Durability EncodeDurability(Durability durability);
+
+// a, b: the hulls that the axis separates.
+// RESOURCE_EXHAUSTED: a feature holds more vertices than one message can carry.
+absl::Status EncodeAxis(const SeparatingAxis& axis, const Hull& a, const Hull& b,
+                        v1::Axis* message);
+void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::Analysis* message);
+// a, b: the hulls whose vertices the pairs name.
+void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
+                       v1::Certificate* message);
+void EncodeSeparation(const Separation& separation, v1::Separation* message);
+void EncodeWitness(const Witness& witness, v1::Witness* message);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_WIRE_ENCODE_H_

@@ -1,0 +1,74 @@
+#include "tests/bench/hulls/clouds.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <random>
+#include <sstream>
+
+namespace hulld::bench {
+namespace {
+
+constexpr unsigned kSeed = 20240229;
+
+std::vector<Vector> RandomCloud(const std::string& shape, size_t n) {
+  std::mt19937_64 random(kSeed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::vector<Vector> points;
+  points.reserve(n);
+  for (size_t i = 0; i < n; ++i) {
+    if (shape == "cube") {
+      const double x = unit(random);
+      const double y = unit(random);
+      points.emplace_back(x, y, unit(random));
+      continue;
+    }
+    const double x = normal(random);
+    const double y = normal(random);
+    const double z = normal(random);
+    const double radius = shape == "ball" ? std::cbrt(unit(random)) : 1;
+    points.push_back(Vector(x, y, z).normalized() * radius);
+  }
+  return points;
+}
+
+std::vector<Vector> RotatedLattice(int n) {
+  const Eigen::Matrix3d R =
+      (Eigen::AngleAxisd(1, Vector::UnitZ()) * Eigen::AngleAxisd(1, Vector::UnitX()))
+          .toRotationMatrix();
+  std::vector<Vector> points;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      for (int k = 0; k < n; ++k) points.push_back(R * (0.1 * Vector(i, j, k)));
+    }
+  }
+  return points;
+}
+
+std::vector<Vector> ObjVertices(const std::string& file) {
+  const char* folder = std::getenv("HULLD_DATA");
+  std::ifstream in((folder != nullptr ? folder : HULLD_SOURCE_DIR "/../shared/data") +
+                   std::string("/") + file);
+  std::vector<Vector> points;
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line);
+    std::string key;
+    Vector p;
+    if (words >> key && key == "v" && words >> p.x() >> p.y() >> p.z()) points.push_back(p);
+  }
+  return points;
+}
+
+}  // namespace
+
+std::vector<Vector> MakeCloud(const std::string& name) {
+  const size_t colon = name.find(':');
+  const std::string kind = name.substr(0, colon);
+  const std::string argument = name.substr(colon + 1);
+  if (kind == "mesh") return ObjVertices(argument);
+  if (kind == "lattice") return RotatedLattice(std::stoi(argument));
+  return RandomCloud(kind, std::stoul(argument));
+}
+
+}  // namespace hulld::bench

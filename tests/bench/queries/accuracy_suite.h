@@ -1,0 +1,33 @@
+#ifndef HULLD_TESTS_BENCH_QUERIES_ACCURACY_SUITE_H_
+#define HULLD_TESTS_BENCH_QUERIES_ACCURACY_SUITE_H_
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "tests/bench/queries/query_sets.h"
+
+namespace hulld::bench {
+
+// Questions that are hard to answer rightly, 4640 of them. Small hulls, 4 to 32 vertices:
+// ellipsoids, boxes, prisms, needles, plates, polygons, boxes whose edges are nearly parallel; at
+// contact as near as doubles come, and from 1e-3 down to 1e-15 of their size apart or deep; at
+// sizes of 1e-6, 1 and 1e6, and at 1e6 times their size from the origin. Those of the kind
+// "contact" touch exactly: a vertex, edge or facet meets another.
+//
+// Every library receives the same geometry: rotations are rounded into the points, and a pose is a
+// translation, exact as it stands.
+struct AccuracySuite {
+  std::deque<Hull> hulls;
+  std::vector<QuerySet::Query> queries;
+  // Parallel to queries: what each is about.
+  std::vector<std::string> kinds;
+};
+
+// Fixed seeds: the same suite each time. `stride`: every stride-th question alone.
+AccuracySuite MakeAccuracySuite(size_t stride = 1);
+
+}  // namespace hulld::bench
+
+#endif  // HULLD_TESTS_BENCH_QUERIES_ACCURACY_SUITE_H_

@@ -1,0 +1,337 @@
+// Collision queries against FCL, libccd, Bullet and the textbook's SAT, on the same questions, in
+// one process:
+//
+//   query_benchmark --benchmark_enable_random_interleaving=true --benchmark_repetitions=5
+//       --benchmark_filter='^relation/' --benchmark_out=FILE.csv
+//
+// writes medians (CsvReporter). An iteration answers a block of distinct questions that know
+// nothing of each other. Columns: `questions` in the block; `ns` per question (processor time, real
+// time where several threads work); `wrong`, how many verdicts differ from hulld's exact relation,
+// which the tests hold against an independent oracle. `wrong` is left out of the regime "touch",
+// where a pose means another question to a library that rounds its rotation. Suites:
+//
+//   relation  hulls at their poses -> colliding or not; "from poses": poses converted to the
+//             method's own types each time
+//   contact   depth, normal and witness points of hulls that overlap; `none`: no depth was found
+//   distance  distance and witness points of hulls apart
+//   motion    the same pairs again and again, moved a little each time, with and without a cache
+//   batch     all questions at once on 1 or 2 threads; `ns` is real time, `cpu_ns` the processor
+//   time
+//             of all threads together
+//   scene     all pairs that collide among many hulls (scene_benchmark.h)
+
+#include <benchmark/benchmark.h>
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "core/query/batch.h"
+#include "core/query/collision.h"
+#include "tests/bench/csv_reporter.h"
+#include "tests/bench/queries/query_method.h"
+#include "tests/bench/queries/query_sets.h"
+#include "tests/bench/queries/scene_benchmark.h"
+
+namespace hulld::bench {
+namespace {
+
+constexpr size_t kQuestions = 128;
+
+// Questions, made when the first benchmark asks for them, and their exact answers.
+class Workload {
+ public:
+  Workload(std::string set, Regime regime) : set_(std::move(set)), regime_(regime) {}
+
+  Regime regime() const { return regime_; }
+  const QuerySet& questions() {
+    Make();
+    return questions_;
+  }
+  const std::vector<Verdict>& truth() {
+    Make();
+    return truth_;
+  }
+  const std::vector<double>& separations() {
+    Make();
+    for (size_t i = separations_.size(); i < questions_.queries.size(); ++i) {
+      const QuerySet::Query& query = questions_.queries[i];
+      separations_.push_back(BestSeparation(questions_.hulls[query.hull_a], query.X_WA,
+                                            questions_.hulls[query.hull_b], query.X_WB));
+    }
+    return separations_;
+  }
+
+ private:
+  void Make() {
+    if (made_) return;
+    made_ = true;
+    questions_ = MakeQuerySet(set_, regime_, kQuestions);
+    for (size_t i = 0; i < questions_.a.size(); ++i) {
+      const bool apart =
+          FindRelation(questions_.a[i], questions_.b[i]).relation == Relation::kSeparated;
+      truth_.push_back(apart ? Verdict::kApart : Verdict::kColliding);
+    }
+  }
+
+  std::string set_;
+  Regime regime_;
+  bool made_ = false;
+  QuerySet questions_;
+  std::vector<Verdict> truth_;
+  std::vector<double> separations_;
+};
+
+// A method and the workload that it is prepared for.
+struct Subject {
+  std::shared_ptr<Workload> workload;
+  std::shared_ptr<QueryMethod> method;
+  bool prepared = false;
+
+  bool Prepare(benchmark::State& state) {
+    const QuerySet& set = workload->questions();
+    if (set.queries.empty()) {
+      state.SkipWithError("skipped: no data");
+      return false;
+    }
+    if (!prepared) method->Prepare(set.hulls, set.queries);
+    prepared = true;
+    return true;
+  }
+};
+
+void ReportTime(benchmark::State& state, size_t questions) {
+  state.counters["questions"] = static_cast<double>(questions);
+  // Of the processor's time, but for rows that use real time.
+  state.counters["ns"] = benchmark::Counter(
+      1e-9 * static_cast<double>(questions),
+      benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+}
+
+void ReportWrong(benchmark::State& state, Workload& workload, std::span<const Verdict> verdicts) {
+  if (workload.regime() == Regime::kTouch) return;
+  const std::vector<Verdict>& truth = workload.truth();
+  size_t wrong = 0;
+  for (size_t i = 0; i < truth.size(); ++i) wrong += verdicts[i] != truth[i] ? 1 : 0;
+  state.counters["wrong"] = static_cast<double>(wrong);
+}
+
+template <void (QueryMethod::*kAnswer)(size_t, std::span<Verdict>)>
+void FindRelations(benchmark::State& state, Subject& subject) {
+  if (!subject.Prepare(state)) return;
+  std::vector<Verdict> verdicts(subject.workload->questions().queries.size());
+  for (auto _ : state) {
+    (subject.method.get()->*kAnswer)(0, verdicts);
+    benchmark::DoNotOptimize(verdicts.data());
+    benchmark::ClobberMemory();
+  }
+  ReportTime(state, verdicts.size());
+  ReportWrong(state, *subject.workload, verdicts);
+}
+
+// `none`: how many questions the method found no value for. `largest_error` of those found, in the
+// sets' length unit; hulls are about 1 in size, ur5's about 0.1.
+void ReportValues(benchmark::State& state, Workload& workload,
+                  const std::vector<std::optional<double>>& values) {
+  ReportTime(state, values.size());
+  const std::vector<double>& truth = workload.separations();
+  size_t none = 0;
+  double error = 0;
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (!values[i]) {
+      ++none;
+    } else {
+      error = std::max(error, std::abs(*values[i] - std::abs(truth[i])));
+    }
+  }
+  state.counters["none"] = static_cast<double>(none);
+  state.counters["largest_error"] = error;
+}
+
+template <void (QueryMethod::*kMeasure)(size_t, std::span<std::optional<double>>)>
+void Measure(benchmark::State& state, Subject& subject) {
+  if (!subject.Prepare(state)) return;
+  std::vector<std::optional<double>> values(subject.workload->questions().queries.size());
+  for (auto _ : state) {
+    (subject.method.get()->*kMeasure)(0, values);
+    benchmark::DoNotOptimize(values.data());
+    benchmark::ClobberMemory();
+  }
+  ReportValues(state, *subject.workload, values);
+}
+
+// Frames of a motion: each turns B by about a milliradian and moves it by about a thousandth of
+// its radius. The motion goes to and fro, so that it may last for ever.
+std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set) {
+  constexpr int kFrames = 32;
+  constexpr double kStep = 1e-3;
+  std::vector<std::vector<PlacedHull>> frames(kFrames);
+  for (int frame = 0; frame < kFrames; ++frame) {
+    const double phase = kStep * std::abs(kFrames / 2 - frame);
+    for (size_t i = 0; i < set.queries.size(); ++i) {
+      const QuerySet::Query& query = set.queries[i];
+      const QueryHull& b = set.query_hulls[query.hull_b];
+      Pose X_WB = query.X_WB;
+      X_WB.q[i % 4] += phase;
+      X_WB.t[static_cast<Eigen::Index>(i % 3)] += phase * b.radius();
+      frames[frame].push_back(*PlacedHull::Make(b, X_WB));
+    }
+  }
+  return frames;
+}
+
+void FollowMotion(benchmark::State& state, Workload& workload, bool warm) {
+  const QuerySet& set = workload.questions();
+  if (set.queries.empty()) return state.SkipWithError("skipped: no data");
+  const std::vector<std::vector<PlacedHull>> frames = MakeFrames(set);
+  std::vector<PairCache> caches(set.queries.size());
+  for (size_t i = 0; i < caches.size(); ++i) FindRelation(set.a[i], frames.back()[i], &caches[i]);
+  size_t frame = 0;
+  size_t cached = 0;
+  size_t asked = 0;
+  for (auto _ : state) {
+    const std::vector<PlacedHull>& b = frames[frame];
+    for (size_t i = 0; i < b.size(); ++i) {
+      const RelationAnswer answer = FindRelation(set.a[i], b[i], warm ? &caches[i] : nullptr);
+      cached += answer.rung == Rung::kCached ? 1 : 0;
+    }
+    asked += b.size();
+    frame = (frame + 1) % frames.size();
+  }
+  ReportTime(state, set.queries.size());
+  state.counters["cached_share"] = static_cast<double>(cached) / static_cast<double>(asked);
+}
+
+double ProcessSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// All questions many times over in one call, as a scene of placements and pairs.
+void AnswerBatch(benchmark::State& state, Workload& workload, int threads) {
+  constexpr size_t kCopies = 64;
+  const QuerySet& set = workload.questions();
+  if (set.queries.empty()) return state.SkipWithError("skipped: no data");
+  std::vector<PlacedHull> placements = set.a;
+  placements.insert(placements.end(), set.b.begin(), set.b.end());
+  std::vector<PlacedPair> pairs;
+  const auto count = static_cast<uint32_t>(set.a.size());
+  for (size_t copy = 0; copy < kCopies; ++copy) {
+    for (uint32_t i = 0; i < count; ++i) pairs.push_back({i, count + i});
+  }
+  const double start = ProcessSeconds();
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(CheckCollisions(placements, pairs, {}, threads));
+  }
+  const double seconds = ProcessSeconds() - start;
+  state.counters["cpu_ns"] =
+      1e9 * seconds / static_cast<double>(state.iterations()) / static_cast<double>(pairs.size());
+  ReportTime(state, pairs.size());
+  state.counters["pairs"] = static_cast<double>(pairs.size());
+}
+
+std::vector<std::shared_ptr<QueryMethod>> MakeMethods() {
+  std::vector<std::shared_ptr<QueryMethod>> methods;
+  methods.push_back(MakeHulld());
+  for (std::unique_ptr<QueryMethod>& peer : MakePeers()) methods.push_back(std::move(peer));
+  return methods;
+}
+
+std::string RowName(const std::string& suite, const std::string& set, Regime regime,
+                    const std::string& method, const std::string& how = "") {
+  return suite + "/" + set + " " + Name(regime) + how + "/" + method;
+}
+
+void AddRow(const std::string& name, void (*function)(benchmark::State&, Subject&),
+            const std::shared_ptr<Workload>& workload, const std::shared_ptr<QueryMethod>& method) {
+  auto subject = std::make_shared<Subject>(Subject{workload, method});
+  benchmark::RegisterBenchmark(name.c_str(),
+                               [=](benchmark::State& state) { function(state, *subject); })
+      ->Unit(benchmark::kMicrosecond)
+      ->MinTime(0.01);
+}
+
+// The textbook grows with the cube of the size: left out where a block would take minutes.
+bool TextbookTakesTooLong(const std::string& set, Regime regime) {
+  if (regime == Regime::kFar) return set == "sphere:10000";
+  if (regime == Regime::kClose) return set == "sphere:10000" || set == "sphere:512";
+  return set != "sphere:8" && (set != "sphere:64" || regime != Regime::kGap);
+}
+
+void RegisterRelations(const std::string& set, Regime regime,
+                       const std::shared_ptr<Workload>& workload) {
+  std::vector<std::shared_ptr<QueryMethod>> methods = MakeMethods();
+  if (!TextbookTakesTooLong(set, regime)) methods.push_back(MakeTextbookInDouble());
+  for (const std::shared_ptr<QueryMethod>& method : methods) {
+    AddRow(RowName("relation", set, regime, method->name()), FindRelations<&QueryMethod::Answer>,
+           workload, method);
+    if (set != "sphere:64" && set != "ur5") continue;
+    AddRow(RowName("relation", set, regime, method->name(), " from poses"),
+           FindRelations<&QueryMethod::AnswerFromPoses>, workload, method);
+  }
+}
+
+void RegisterMeasures(const std::string& set, Regime regime,
+                      const std::shared_ptr<Workload>& workload) {
+  const bool deep = regime == Regime::kDeep || regime == Regime::kGraze;
+  const bool apart = regime == Regime::kFar || regime == Regime::kClose || regime == Regime::kGap;
+  for (const std::shared_ptr<QueryMethod>& method : MakeMethods()) {
+    if (deep && method->knows_depth()) {
+      AddRow(RowName("contact", set, regime, method->name()), Measure<&QueryMethod::MeasureDepths>,
+             workload, method);
+    }
+    if (apart && method->knows_distance()) {
+      AddRow(RowName("distance", set, regime, method->name()),
+             Measure<&QueryMethod::MeasureDistances>, workload, method);
+    }
+  }
+}
+
+void RegisterSequences(const std::string& set, Regime regime,
+                       const std::shared_ptr<Workload>& workload) {
+  // A motion leaves contact at once.
+  const bool at_contact =
+      regime == Regime::kTouch || regime == Regime::kContact || regime == Regime::kGraze;
+  for (const bool warm : {true, false}) {
+    if (at_contact) break;
+    benchmark::RegisterBenchmark(
+        RowName("motion", set, regime, "hulld", warm ? " warm" : " cold").c_str(),
+        [=](benchmark::State& state) { FollowMotion(state, *workload, warm); })
+        ->Unit(benchmark::kMicrosecond)
+        ->MinTime(0.01);
+  }
+  if (regime != Regime::kClose && regime != Regime::kDeep) return;
+  for (const int threads : {1, 2}) {
+    benchmark::RegisterBenchmark(
+        RowName("batch", set, regime, "hulld", threads == 1 ? " 1 thread" : " 2 threads").c_str(),
+        [=](benchmark::State& state) { AnswerBatch(state, *workload, threads); })
+        ->Unit(benchmark::kMillisecond)
+        ->MinTime(0.1)
+        ->UseRealTime();
+  }
+}
+
+void Register() {
+  for (const char* set : {"sphere:8", "sphere:64", "sphere:512", "sphere:10000", "ur5"}) {
+    for (const Regime regime : kRegimes) {
+      const auto workload = std::make_shared<Workload>(set, regime);
+      RegisterRelations(set, regime, workload);
+      RegisterMeasures(set, regime, workload);
+      RegisterSequences(set, regime, workload);
+    }
+  }
+  RegisterScenes();
+}
+
+}  // namespace
+}  // namespace hulld::bench
+
+int main(int argc, char** argv) {
+  hulld::bench::Register();
+  return hulld::bench::RunBenchmarks(argc, argv);
+}

@@ -1,0 +1,56 @@
+#ifndef HULLD_TESTS_BENCH_QUERIES_QUERY_SETS_H_
+#define HULLD_TESTS_BENCH_QUERIES_QUERY_SETS_H_
+
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "core/query/placed/placed_hull.h"
+
+namespace hulld::bench {
+
+// How far apart the hulls of a query are, relative to the sum of their radii.
+enum class Regime {
+  kFar,      // spheres round the hulls are 0.5 to 2 apart
+  kClose,    // 1 to 5 % apart along the line of centres
+  kGap,      // 1e-6 apart
+  kTouch,    // as near to contact as doubles come
+  kContact,  // exactly touching, vertex to vertex
+  kGraze,    // 1e-6 deep
+  kDeep,     // half of the way from contact to coinciding centres
+};
+inline constexpr Regime kRegimes[] = {Regime::kFar,   Regime::kClose,   Regime::kGap,
+                                      Regime::kTouch, Regime::kContact, Regime::kGraze,
+                                      Regime::kDeep};
+const char* Name(Regime regime);
+
+// Distinct questions on distinct hulls.
+struct QuerySet {
+  std::string name;
+  std::deque<Hull> hulls;
+  std::deque<QueryHull> query_hulls;
+  struct Query {
+    size_t hull_a;
+    size_t hull_b;
+    Pose X_WA;
+    Pose X_WB;
+  };
+  std::vector<Query> queries;
+  // Parallel to queries.
+  std::vector<PlacedHull> a;
+  std::vector<PlacedHull> b;
+};
+
+// Hulls by name: "sphere:V" (V random points on an ellipsoid with axes between 0.5 and 1.5), or
+// "ur5" (the links of the robot arm in HULLD_DATA, by default ../shared/data; no queries when it is
+// not there). Poses are random. Fixed seeds: the same name and regime give the same questions.
+//
+// In kContact coordinates are multiples of 2^-40 and rotations map the axes onto each other, so
+// that every library receives the same geometry. Elsewhere a rotation matrix is rounded by those
+// that need one; but for kTouch that is far below the distance to contact.
+QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count);
+
+}  // namespace hulld::bench
+
+#endif  // HULLD_TESTS_BENCH_QUERIES_QUERY_SETS_H_

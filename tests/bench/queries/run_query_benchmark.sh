@@ -1,0 +1,49 @@
+#!/bin/bash
+# Measures collision queries and keeps the rows and the plot in tests/bench/results/.
+#
+#   bash tests/bench/queries/run_query_benchmark.sh [MACHINE] [SUITE...]
+#
+# MACHINE names the files, as in query_relation_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
+# default. SUITEs are relation, contact, distance, motion, batch, scene, accuracy and trade; all by
+# default. REPETITIONS (5) of which the median counts. HULLD_DATA: the folder of meshes. Needs what
+# docker/packages.txt lists under [build], [test] and [bench]. Nothing else should run on the
+# machine meanwhile.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
+
+machine=${1:-epyc_gcc12}
+shift || true
+suites=("$@")
+((${#suites[@]})) || suites=(relation contact distance motion batch scene accuracy trade)
+results=tests/bench/results
+programs=build/release/bin
+# Threads that wait leave the core to those that work, also where other programs run.
+export OMP_WAIT_POLICY=passive
+
+cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
+cmake --build --preset release --target query_benchmark query_accuracy hulld-bench
+
+for suite in "${suites[@]}"; do
+  out=$results/query_${suite}_$machine.csv
+  case $suite in
+    # In turn with their peers, against drifts of the machine's speed.
+    relation | contact | distance | motion | batch | scene)
+      "$programs/query_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
+        --benchmark_repetitions="${REPETITIONS:-5}" --benchmark_enable_random_interleaving=true \
+        --benchmark_report_aggregates_only=true
+      { head -1 "$out" && tail -n +2 "$out" | sort -t, -k1,1V -k2,2; } >"$out.sorted"
+      mv "$out.sorted" "$out"
+      ;;
+    # Counts, the same on every machine.
+    accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;
+    trade)
+      "$programs/hulld-bench" trade --csv "$out" --plot "$results/query_trade_$machine.svg"
+      ;;
+    *)
+      echo "run_query_benchmark.sh: unknown suite $suite" >&2
+      exit 2
+      ;;
+  esac
+done
+# For the README.
+bash tests/bench/queries/query_tables.sh "$machine"

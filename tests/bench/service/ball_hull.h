@@ -1,0 +1,21 @@
+#ifndef HULLD_TESTS_BENCH_SERVICE_BALL_HULL_H_
+#define HULLD_TESTS_BENCH_SERVICE_BALL_HULL_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include <string>
+
+#include "hulld/v1/hull.grpc.pb.h"
+
+namespace hulld::bench {
+
+// Ends the program, saying so, when a call failed.
+void Require(const grpc::Status& status, const char* what);
+
+// Creates a hull of points on a sphere round the origin, spread evenly (Fibonacci).
+void MakeBallHull(v1::HullService::Stub& stub, const std::string& hull_id, int points,
+                  double radius);
+
+}  // namespace hulld::bench
+
+#endif  // HULLD_TESTS_BENCH_SERVICE_BALL_HULL_H_

@@ -1,0 +1,230 @@
+#include "tests/bench/trade/trade.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "core/query/collision.h"
+#ifdef HULLD_HAVE_ORACLE
+#include "tests/bench/queries/exact_truth.h"
+#endif
+
+namespace hulld::bench {
+namespace {
+
+double ThreadSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// One method on one range of questions: its answers, and how long they take.
+template <typename Value>
+class Measurement {
+ public:
+  using Ask = void (QueryMethod::*)(size_t first, std::span<Value> values);
+
+  Measurement(QueryMethod* method, Ask ask, TradeQuestions::Range range)
+      : method_(method), ask_(ask), range_(range), values_(range.count) {}
+
+  const std::vector<Value>& values() const { return values_; }
+  bool too_slow() const { return too_slow_; }
+  double nanoseconds() const { return 1e9 * Median(seconds_) / static_cast<double>(range_.count); }
+
+  // Question by question, so that it can be given up.
+  void RunFirst(double max_seconds) {
+    const double start = ThreadSeconds();
+    for (size_t i = 0; i < range_.count && !too_slow_; ++i) {
+      (method_->*ask_)(range_.first + i, std::span(values_).subspan(i, 1));
+      too_slow_ = ThreadSeconds() - start > max_seconds;
+    }
+    constexpr double kShortestRun = 2e-3;
+    const double once = std::max(ThreadSeconds() - start, 1e-7);
+    repetitions_ = std::clamp(static_cast<int>(kShortestRun / once), 1, 1000);
+  }
+
+  void Run() {
+    if (too_slow_) return;
+    const double start = ThreadSeconds();
+    for (int i = 0; i < repetitions_; ++i) (method_->*ask_)(range_.first, values_);
+    seconds_.push_back((ThreadSeconds() - start) / repetitions_);
+  }
+
+ private:
+  QueryMethod* method_;
+  Ask ask_;
+  TradeQuestions::Range range_;
+  std::vector<Value> values_;
+  bool too_slow_ = false;
+  int repetitions_ = 1;
+  std::vector<double> seconds_;
+};
+
+using VerdictMeasurement = Measurement<Verdict>;
+using DepthMeasurement = Measurement<std::optional<double>>;
+
+struct Measured {
+  VerdictMeasurement ordinary;
+  VerdictMeasurement near_contact;
+  std::optional<DepthMeasurement> depth;
+};
+
+std::optional<TradeAnswers> Summarize(const VerdictMeasurement& measured,
+                                      std::span<const Verdict> truth) {
+  if (measured.too_slow()) return std::nullopt;
+  TradeAnswers answers;
+  answers.nanoseconds = measured.nanoseconds();
+  answers.questions = truth.size();
+  for (size_t i = 0; i < truth.size(); ++i) {
+    if (measured.values()[i] == Verdict::kOpen) {
+      ++answers.open;
+    } else if (measured.values()[i] != truth[i]) {
+      ++answers.wrong;
+    }
+  }
+  return answers;
+}
+
+std::optional<TradeDepths> Summarize(const std::optional<DepthMeasurement>& measured,
+                                     const std::vector<std::optional<double>>& truth, double size) {
+  if (!measured || measured->too_slow()) return std::nullopt;
+  TradeDepths depths;
+  depths.nanoseconds = measured->nanoseconds();
+  std::vector<double> errors;
+  for (size_t i = 0; i < truth.size(); ++i) {
+    if (!truth[i]) continue;
+    ++depths.questions;
+    if (const std::optional<double> depth = measured->values()[i]) {
+      errors.push_back(std::abs(*depth - *truth[i]) / size);
+    } else {
+      ++depths.none;
+    }
+  }
+  // It tells no depth at all.
+  if (errors.empty()) return std::nullopt;
+  depths.median_error = Median(errors);
+  depths.largest_error = *std::max_element(errors.begin(), errors.end());
+  return depths;
+}
+
+std::vector<Verdict> ExactVerdicts(const TradeQuestions& questions) {
+  const std::unique_ptr<QueryMethod> exact = MakeHulld();
+  exact->Prepare(questions.hulls, questions.queries);
+  std::vector<Verdict> verdicts(questions.queries.size());
+  exact->Answer(0, verdicts);
+  return verdicts;
+}
+
+// None where hulls are apart.
+std::vector<std::optional<double>> BestDepths(const TradeQuestions& questions) {
+  std::vector<std::optional<double>> depths;
+  for (size_t i = 0; i < questions.depth.count; ++i) {
+    const QuerySet::Query& query = questions.queries[questions.depth.first + i];
+    const double separation = BestSeparation(questions.hulls[query.hull_a], query.X_WA,
+                                             questions.hulls[query.hull_b], query.X_WB);
+    depths.emplace_back();
+    if (separation <= 0) depths.back() = -separation;
+  }
+  return depths;
+}
+
+void CheckByOracle([[maybe_unused]] const TradeQuestions& questions,
+                   [[maybe_unused]] std::span<const Verdict> truth, [[maybe_unused]] Trade& trade) {
+#ifdef HULLD_HAVE_ORACLE
+  constexpr size_t kMaxVertices = 200;
+  constexpr double kMaxSeconds = 60;
+  const double start = ThreadSeconds();
+  for (size_t i = 0; i < truth.size() && ThreadSeconds() - start < kMaxSeconds; ++i) {
+    const QuerySet::Query& query = questions.queries[i];
+    if (questions.hulls[query.hull_a].vertices().size() > kMaxVertices) continue;
+    if (questions.hulls[query.hull_b].vertices().size() > kMaxVertices) continue;
+    ++trade.checked;
+    trade.differing += OracleVerdict(questions.hulls, query) != truth[i] ? 1 : 0;
+  }
+#endif
+}
+
+std::string WithParameter(const char* name, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%s %.0e", name, value);
+  return text;
+}
+
+}  // namespace
+
+std::vector<TradeMethod> MakeTradeMethods(double size) {
+  constexpr double kPerturbation = 1e-9;
+  std::vector<TradeMethod> methods;
+  methods.push_back({TradeFamily::kHulld, MakeHulld()});
+  for (const double tolerance : {1e-12, 1e-9, 1e-6, 1e-3, 1e-1}) {
+    methods.push_back({TradeFamily::kTolerance,
+                       MakeHulldWithin(tolerance * size, WithParameter("hulld, tau", tolerance))});
+  }
+  for (const double error : {1e-3, 1e-2, 5e-2, 2e-1}) {
+    methods.push_back({TradeFamily::kSimplified,
+                       MakeHulldSimplified(error * size, WithParameter("simplified", error))});
+  }
+  methods.push_back({TradeFamily::kTextbook, MakeTextbookInDouble()});
+  methods.push_back({TradeFamily::kTextbook, MakeTextbookInDouble(kPerturbation)});
+  methods.push_back({TradeFamily::kPlainGjk, MakePlainGjkInDouble()});
+  methods.push_back({TradeFamily::kPlainGjk, MakePlainGjkInFloat()});
+  for (std::unique_ptr<QueryMethod>& peer : MakePeers()) {
+    methods.push_back({TradeFamily::kPeer, std::move(peer)});
+  }
+  return methods;
+}
+
+Trade MeasureTrade(const TradeQuestions& questions, std::vector<TradeMethod>& methods,
+                   const TradeSettings& settings) {
+  Trade trade;
+  const std::vector<Verdict> truth = ExactVerdicts(questions);
+  const std::vector<std::optional<double>> depths = BestDepths(questions);
+  trade.questions = truth.size();
+  CheckByOracle(questions, truth, trade);
+
+  std::vector<Measured> measured;
+  for (const TradeMethod& each : methods) {
+    QueryMethod* method = each.method.get();
+    method->Prepare(questions.hulls, questions.queries);
+    measured.push_back({{method, &QueryMethod::Answer, questions.ordinary},
+                        {method, &QueryMethod::Answer, questions.near_contact},
+                        {}});
+    Measured& last = measured.back();
+    // The depth is never less than exact for a tolerance.
+    if (method->knows_depth() && each.family != TradeFamily::kTolerance) {
+      last.depth.emplace(method, &QueryMethod::MeasureDepths, questions.depth);
+      last.depth->RunFirst(settings.max_seconds);
+    }
+    last.ordinary.RunFirst(settings.max_seconds);
+    last.near_contact.RunFirst(settings.max_seconds);
+  }
+  for (int round = 0; round < settings.rounds; ++round) {
+    for (Measured& each : measured) {
+      each.ordinary.Run();
+      each.near_contact.Run();
+      if (each.depth) each.depth->Run();
+    }
+  }
+  for (size_t i = 0; i < methods.size(); ++i) {
+    const auto part = [&](TradeQuestions::Range range) {
+      return std::span(truth).subspan(range.first, range.count);
+    };
+    trade.rows.push_back({methods[i].method->name(), methods[i].family,
+                          Summarize(measured[i].ordinary, part(questions.ordinary)),
+                          Summarize(measured[i].near_contact, part(questions.near_contact)),
+                          Summarize(measured[i].depth, depths, questions.size)});
+  }
+  return trade;
+}
+
+}  // namespace hulld::bench

@@ -1,0 +1,48 @@
+#ifndef HULLD_TESTS_BENCH_TRADE_TRADE_QUESTIONS_H_
+#define HULLD_TESTS_BENCH_TRADE_TRADE_QUESTIONS_H_
+
+#include <cstddef>
+#include <deque>
+#include <vector>
+
+#include "core/hull/hull.h"
+#include "tests/bench/queries/query_sets.h"
+
+namespace hulld::bench {
+
+// Questions about pairs of given hulls, level by level, equally many each. A distance to contact is
+// along a random direction and relative to the sum of the pair's radii.
+//
+//   ordinary:      far, close (1 to 5 %), 1e-3 apart, half-way deep, 1e-3 deep
+//   near contact:  1e-6 deep and apart, likewise 1e-9, 1e-12, 1e-15, and as little as doubles allow
+//   depth:         half-way deep, 1e-3 deep, 1e-6 deep
+//
+// Half of the pairs are at the origin, where translations are finest, half some 100 radii from it,
+// as in a scene. Every method receives the same geometry: random rotations are rounded into the
+// points, and a pose is a translation, exact as it stands.
+struct TradeQuestions {
+  static constexpr size_t kLevels = 15;
+
+  struct Range {
+    size_t first;
+    size_t count;
+  };
+  std::deque<Hull> hulls;
+  std::vector<QuerySet::Query> queries;
+  Range ordinary;
+  Range near_contact;
+  Range depth;
+  // The mean radius of the hulls: what "relative" means where there is no pair.
+  double size;
+};
+
+// Requires hulls that are not empty, at least one. Fixed seeds.
+TradeQuestions MakeTradeQuestions(const std::vector<Hull>& hulls, size_t per_level);
+
+// What is asked about when the user has no hulls: ellipsoids of 64 points, boxes, and prisms of 12
+// sides.
+std::vector<Hull> MakeOwnHulls();
+
+}  // namespace hulld::bench
+
+#endif  // HULLD_TESTS_BENCH_TRADE_TRADE_QUESTIONS_H_

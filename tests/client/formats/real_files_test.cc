@@ -1,0 +1,185 @@
+// Files that others made: the models of Debian's package assimp-testmodels, and the scans that
+// HULLD_DATA names (default: shared/data beside the project). Skipped with a word where they are
+// not installed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+
+#include "client/formats/mesh_file.h"
+#include "tests/client/formats/point_reading.h"
+
+namespace hulld {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+fs::path Models() { return "/usr/share/assimp/models"; }
+
+fs::path Data() {
+  if (const char* named = std::getenv("HULLD_DATA"); named != nullptr) return named;
+  return fs::path(HULLD_SOURCE_DIR) / "../shared/data";
+}
+
+#define SKIP_WITHOUT(path) \
+  if (!fs::exists(path)) GTEST_SKIP() << "skipped: no data at " << (path)
+
+PointsRead ReadPath(const fs::path& path) {
+  return ReadFile(path.string(), *PointFormatOfPath(path.string()));
+}
+
+// The points of the lines that start with "v ", by means that share nothing with the reader.
+std::vector<double> ObjPointsByStream(const fs::path& path) {
+  std::ifstream file(path);
+  std::vector<double> xyz;
+  for (std::string line; std::getline(file, line);) {
+    if (line.rfind("v ", 0) != 0) continue;
+    const char* at = line.c_str() + 2;
+    for (int i = 0; i < 3; ++i) {
+      char* end = nullptr;
+      xyz.push_back(std::strtod(at, &end));
+      at = end;
+    }
+  }
+  return xyz;
+}
+
+void ExpectObjRead(const fs::path& path, size_t points) {
+  const PointsRead read = ReadPath(path);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_EQ(read.counts.points, points) << path;
+  EXPECT_EQ(read.xyz(), ObjPointsByStream(path)) << path;
+}
+
+TEST(RealFiles, ObjModelsOfAssimp) {
+  SKIP_WITHOUT(Models());
+  ExpectObjRead(Models() / "OBJ/spider.obj", 762);
+  ExpectObjRead(Models() / "OBJ/box.obj", 8);
+  ExpectObjRead(Models() / "OBJ/cube_with_vertexcolors.obj", 8);
+  ExpectObjRead(Models() / "OBJ/regr01.obj",
+                ObjPointsByStream(Models() / "OBJ/regr01.obj").size() / 3);
+  const PointsRead wuson = ReadPath(Models() / "OBJ/WusonOBJ.obj");
+  ASSERT_TRUE(wuson.status.ok()) << wuson.status;
+  EXPECT_GT(wuson.counts.points, 1500u);
+}
+
+TEST(RealFiles, OddObjModelsOfAssimp) {
+  SKIP_WITHOUT(Models());
+  EXPECT_THAT(ReadPath(Models() / "OBJ/multiple_spaces.obj").xyz(),
+              ElementsAre(1, 2, 3, 2, 3, 1, 3, 1, 2, 1, 2, 3));
+  EXPECT_EQ(ReadPath(Models() / "OBJ/point_cloud.obj").counts.points, 3u);
+  EXPECT_EQ(ReadPath(Models() / "OBJ/box_without_lineending.obj").counts.points, 8u);
+  EXPECT_THAT(ReadPath(Models() / "OBJ/number_formats.obj").error(),
+              HasSubstr("number_formats.obj:11: \"3.1+e2\" is not a number"));
+  EXPECT_THAT(ReadPath(Models() / "OBJ/box_UTF16BE.obj").error(), HasSubstr("iconv"));
+}
+
+TEST(RealFiles, OffModelsOfAssimp) {
+  SKIP_WITHOUT(Models());
+  EXPECT_EQ(ReadPath(Models() / "OFF/Cube.off").counts.points, 8u);
+  EXPECT_EQ(ReadPath(Models() / "OFF/Wuson.off").counts.points, 3205u);
+  EXPECT_FALSE(ReadPath(Models() / "invalid/OutOfMemory.off").status.ok());
+  EXPECT_FALSE(ReadPath(Models() / "invalid/empty.off").status.ok());
+}
+
+TEST(RealFiles, PlyModelsOfAssimp) {
+  SKIP_WITHOUT(Models());
+  EXPECT_EQ(ReadPath(Models() / "PLY/Wuson.ply").counts.points, 11184u);
+  EXPECT_EQ(ReadPath(Models() / "PLY/cube.ply").counts.points, 8u);
+  EXPECT_EQ(ReadPath(Models() / "PLY/float-color.ply").counts.points, 3u);
+  const PointsRead binary = ReadPath(Models() / "PLY/cube_binary.ply");
+  EXPECT_EQ(binary.counts.points, 8u);
+  EXPECT_TRUE(binary.all_float());
+  // Bytes are missing from the middle of it, so that noise is read before it ends early.
+  ReadOptions options;
+  options.skip_nonfinite = true;
+  const PointsRead cut =
+      ReadFile((Models() / "PLY/pond.0.ply").string(), PointFormat::kPly, options);
+  EXPECT_THAT(cut.error(), HasSubstr("within the element vertex"));
+}
+
+// Every face is three corners, none joined, none lost; text and binary hold the same spider.
+TEST(RealFiles, StlModelsOfAssimp) {
+  SKIP_WITHOUT(Models());
+  const PointsRead binary = ReadPath(Models() / "STL/Spider_binary.stl");
+  ASSERT_TRUE(binary.status.ok()) << binary.status;
+  EXPECT_TRUE(binary.all_float());
+  EXPECT_EQ(binary.counts.points,
+            3 * (fs::file_size(Models() / "STL/Spider_binary.stl") - 84) / 50);
+  const PointsRead text = ReadPath(Models() / "STL/Spider_ascii.stl");
+  ASSERT_TRUE(text.status.ok()) << text.status;
+  EXPECT_EQ(text.counts.points, binary.counts.points);
+  EXPECT_EQ(ReadPath(Models() / "STL/triangle_with_two_solids.stl").counts.points, 6u);
+}
+
+// The box of the file is 1 wide in its own frame; its node turns it by a quarter about x.
+TEST(RealFiles, GltfNodesMoveTheirMeshes) {
+  SKIP_WITHOUT(Models());
+  const fs::path path = Models() / "glTF2/2CylinderEngine-glTF-Binary/2CylinderEngine.glb";
+  SKIP_WITHOUT(path);
+  const PointsRead read = ReadPath(path);
+  ASSERT_TRUE(read.status.ok()) << read.status;
+  EXPECT_GT(read.counts.points, 10000u);
+  EXPECT_FALSE(read.all_float());
+  const PointsRead box = ReadPath(Models() / "glTF2/BoxTextured-glTF-Binary/BoxTextured.glb");
+  ASSERT_TRUE(box.status.ok()) << box.status;
+  EXPECT_EQ(box.counts.points, 24u);
+  for (const double coordinate : box.xyz()) EXPECT_EQ(std::abs(coordinate), 0.5);
+}
+
+TEST(RealFiles, NonFiniteGltfPointsAreFound) {
+  const fs::path path = Models() / "glTF2/BoxWithInfinites-glTF-Binary/BoxWithInfinites.glb";
+  SKIP_WITHOUT(path);
+  const PointsRead read = ReadPath(path);
+  if (read.status.ok()) {
+    for (const double coordinate : read.xyz()) EXPECT_TRUE(std::isfinite(coordinate));
+  } else {
+    EXPECT_THAT(read.error(), HasSubstr("--skip-nonfinite"));
+  }
+}
+
+TEST(RealFiles, EveryModelOfAKnownFormatIsReadOrRefused) {
+  SKIP_WITHOUT(Models());
+  int ok = 0;
+  int refused = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(Models())) {
+    if (!entry.is_regular_file()) continue;
+    const auto format = PointFormatOfPath(entry.path().string());
+    if (!format.ok()) continue;
+    const PointsRead read = ReadFile(entry.path().string(), *format);
+    if (read.status.ok()) {
+      ++ok;
+    } else {
+      ++refused;
+      EXPECT_THAT(read.error(), HasSubstr(entry.path().filename().string()));
+    }
+    (void)ReadMesh(entry.path().string());
+  }
+  EXPECT_GT(ok, 50);
+  EXPECT_GT(refused, 5);
+}
+
+TEST(RealFiles, Scans) {
+  SKIP_WITHOUT(Data());
+  ExpectObjRead(Data() / "stanford-bunny.obj", 35947);
+  ExpectObjRead(Data() / "rocker-arm.obj", 10044);
+  ExpectObjRead(Data() / "spot.obj", 2930);
+  int links = 0;
+  for (const auto& entry : fs::directory_iterator(Data() / "ur5")) {
+    const PointsRead read = ReadPath(entry.path());
+    ASSERT_TRUE(read.status.ok()) << read.status;
+    EXPECT_GT(read.counts.points, 100u);
+    EXPECT_EQ(read.counts.points % 3, 0u);
+    ++links;
+  }
+  EXPECT_EQ(links, 7);
+}
+
+}  // namespace
+}  // namespace hulld

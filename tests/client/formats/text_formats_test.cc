@@ -1,0 +1,249 @@
+// OBJ, OFF, XYZ, CSV, and the text forms of PLY and PCD.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/client/formats/point_reading.h"
+
+namespace hulld {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(ObjFile, TakesEachVLineAndNothingElse) {
+  const PointsRead read = ReadText(
+      "# v 9 9 9\no thing\nv 1 2 3\nvn 5 5 5\nvt 0 1\n  v\t+4 -5e-1 .5 1.0\nv 7 8 9 0.1 0.2 0.3\n"
+      "f 1 2 3\nvp 1 2 3\n",
+      PointFormat::kObj);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3, 4, -0.5, 0.5, 7, 8, 9));
+}
+
+TEST(ObjFile, ABackslashContinuesALine) {
+  EXPECT_THAT(ReadText("v 1 \\\n2 3\nf 1 \\\n 2\nv 4 5 6", PointFormat::kObj).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST(ObjFile, ErrorsNameFileAndLine) {
+  EXPECT_EQ(ReadText("v 1 2 3\n\nv 1 abc 3\n", PointFormat::kObj).error(),
+            "FILE:3: \"abc\" is not a number");
+  EXPECT_EQ(ReadText("v 1 2\n", PointFormat::kObj).error(),
+            "FILE:1: a point needs 3 coordinates, here are 2");
+}
+
+// After malformed.obj, malformed2.obj and empty.obj of assimp-testmodels, which were read as if
+// nothing were wrong with them.
+TEST(ObjFile, FacesOfABrokenFileAreErrors) {
+  const std::string vertices = "v 1 2 3\nv 4 5 6\n";
+  EXPECT_EQ(ReadText(vertices + "f 1 2\nf 1/7 3//1 2\n", PointFormat::kObj).error(),
+            "FILE:4: a face names vertex 3, but the file holds 2");
+  EXPECT_EQ(ReadText(vertices + "f 1 0 2\n", PointFormat::kObj).error(),
+            "FILE:3: \"0\" names no vertex; 2 came before");
+  EXPECT_THAT(ReadText(vertices + "f -1 -3\n", PointFormat::kObj).error(),
+              HasSubstr("FILE:3: \"-3\" names no vertex"));
+  EXPECT_EQ(ReadText(vertices + "f\n", PointFormat::kObj).error(),
+            "FILE:3: a face names no vertex");
+  EXPECT_EQ(ReadText("", PointFormat::kObj).error(),
+            "FILE: holds no vertex: no line starts with v; is it an OBJ file?");
+}
+
+TEST(XyzFile, CoordinatesArriveAsTheNearestDoubles) {
+  const PointsRead read =
+      ReadText("1e-310 0.1 -1e308\n5e-324 9007199254740993 1e-400 extra 7\n", PointFormat::kXyz);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(1e-310, 0.1, -1e308, 0x1p-1074, 9007199254740992.0, 0.0));
+}
+
+TEST(XyzFile, SkipsCommentsAndBlankLines) {
+  EXPECT_THAT(ReadText("# x y z\n\n  1 2 3 # end\r\n\t\n4\t5\t6", PointFormat::kXyz).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST(XyzFile, ANumberTooLargeIsAnErrorEvenWhenNonFinitePointsAreSkipped) {
+  ReadOptions options;
+  options.skip_nonfinite = true;
+  EXPECT_THAT(ReadText("1 2 3\n1 1e999 3\n", PointFormat::kXyz, options).error(),
+              HasSubstr("FILE:2: \"1e999\" is beyond the largest double"));
+}
+
+TEST(XyzFile, NonFinitePointsAreErrorsThatNameFileAndPoint) {
+  EXPECT_EQ(ReadText("1 2 3\n4 nan 6\n", PointFormat::kXyz).error(),
+            "FILE:2: point 2 has y = NaN; leave such points out with --skip-nonfinite");
+  EXPECT_THAT(ReadText("1 2 -inf\n", PointFormat::kXyz).error(), HasSubstr("point 1 has z = inf"));
+}
+
+TEST(XyzFile, NonFinitePointsCanBeSkippedAndCounted) {
+  ReadOptions options;
+  options.skip_nonfinite = true;
+  const PointsRead read =
+      ReadText("nan nan nan\n1 2 3\n1 Inf 3\n4 5 6\n", PointFormat::kXyz, options);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_EQ(read.counts.skipped, 2u);
+  EXPECT_EQ(read.counts.points, 2u);
+}
+
+TEST(Blocks, HoldTheNumberOfPointsAskedFor) {
+  ReadOptions options;
+  options.points_per_block = 2;
+  const PointsRead read =
+      ReadText("1 1 1\n2 2 2\n3 3 3\n4 4 4\n5 5 5\n", PointFormat::kXyz, options);
+  ASSERT_EQ(read.blocks.size(), 3u);
+  EXPECT_EQ(read.blocks[0].size(), 2u);
+  EXPECT_EQ(read.blocks[2].size(), 1u);
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4, 5, 5, 5));
+}
+
+TEST(Blocks, AreAboutOneMebibyteByDefault) {
+  std::string text;
+  for (int i = 0; i < 50000; ++i) text += "1 2 3\n";
+  const PointsRead read = ReadText(text, PointFormat::kXyz);
+  ASSERT_EQ(read.blocks.size(), 2u);
+  EXPECT_EQ(read.blocks[0].size(), (1u << 20) / 24);
+}
+
+TEST(Blocks, TheReceiversErrorEndsTheReading) {
+  const TempFile file("points", "1 2 3\n4 5 6\n7 8 9\n");
+  ReadRequest request{file.path(), PointFormat::kXyz, {}, {}};
+  request.options.points_per_block = 1;
+  int calls = 0;
+  const auto counts = ReadPoints(request, [&](const PointBlock&) {
+    return ++calls == 2 ? absl::AbortedError("enough") : absl::OkStatus();
+  });
+  EXPECT_EQ(counts.status(), absl::AbortedError("enough"));
+  EXPECT_EQ(calls, 2);
+}
+
+TEST(CsvFile, ReadsRowsWithoutAHeader) {
+  EXPECT_THAT(ReadText("1,2,3\n4, 5 ,6,extra\n\n# note\n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST(CsvFile, FindsColumnsByTheHeader) {
+  EXPECT_THAT(ReadText("id,Z,\"x\",Y\n7,3,1,2\n8,\"6\",4,5\n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(ReadText("//X,Y,Z,R\n1,2,3,9\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+}
+
+TEST(CsvFile, KnowsSemicolonsTabsAndQuotes) {
+  EXPECT_THAT(ReadText("x;y;z\n1;2;3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("1\t2\t3\n", PointFormat::kCsv).xyz(), ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadText("name,x,y,z\n\"a,b\",1,2,3\n", PointFormat::kCsv).xyz(),
+              ElementsAre(1, 2, 3));
+}
+
+TEST(CsvFile, ErrorsNameFileAndLine) {
+  EXPECT_EQ(ReadText("x,y,z\n1,2,3\n1,abc,3\n", PointFormat::kCsv).error(),
+            "FILE:3: \"abc\" is not a number");
+  EXPECT_EQ(ReadText("1,2\n", PointFormat::kCsv).error(),
+            "FILE:1: the row has 2 columns; z is column 3");
+  EXPECT_EQ(ReadText("a,b,c\n1,2,3\n", PointFormat::kCsv).error(),
+            "FILE:1: the header names no column \"x\"; it must name x, y and z");
+  EXPECT_EQ(ReadText("1,5;2,5;3,5\n", PointFormat::kCsv).error(),
+            "FILE:1: \"1,5\" is not a number (the decimal mark is a point)");
+  EXPECT_EQ(ReadText("1,,3\n", PointFormat::kCsv).error(), "FILE:1: \"\" is not a number");
+}
+
+TEST(OffFile, ReadsTheVerticesItDeclares) {
+  EXPECT_THAT(
+      ReadText("OFF # head\n# note\n2 1 0\n\n1 2 3\n4 5 6\n3 0 1 1\n", PointFormat::kOff).xyz(),
+      ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(ReadText("OFF 1 0 0\n1 2 3\n", PointFormat::kOff).xyz(), ElementsAre(1, 2, 3));
+  // After OFF/invalid.off of assimp-testmodels.
+  EXPECT_THAT(ReadText("OFF\n1 4\n1 2 3\n", PointFormat::kOff).error(),
+              HasSubstr("after 0 of 4 faces; is it complete?"));
+  EXPECT_THAT(ReadText("STCNOFF\n1 0 0\n1 2 3 9 9 9 0 0 0 1 5 5\n", PointFormat::kOff).xyz(),
+              ElementsAre(1, 2, 3));
+}
+
+TEST(OffFile, RefusesWhatItDoesNotKnow) {
+  EXPECT_THAT(ReadText("4OFF\n1 0 0\n1 2 3 4\n", PointFormat::kOff).error(),
+              HasSubstr("FILE:1: \"4OFF\" is not OFF"));
+  EXPECT_THAT(ReadText("OFF BINARY\n", PointFormat::kOff).error(), HasSubstr("convert it"));
+  EXPECT_THAT(ReadText("OFF\n-1 0 0\n", PointFormat::kOff).error(), HasSubstr("FILE:2: \"-1\""));
+}
+
+constexpr char kAsciiPly[] =
+    "ply\nformat ascii 1.0\ncomment made by hand\nobj_info none\n"
+    "element extra 2\nproperty list uchar int items\nproperty float weight\n"
+    "element vertex 2\nproperty uchar red\nproperty float z\nproperty list int float bag\n"
+    "property double x\nproperty float y\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+TEST(PlyFile, AsciiKeepsWhatTheTextSays) {
+  const PointsRead read = ReadText(
+      std::string(kAsciiPly) + "2 8 9 0.5\n0 0.25\n255 3 2 7 7 1 2\n0 0.1 0 4 5\n3 0 1 1\n",
+      PointFormat::kPly);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  // 0.1 stands in a float property, but it is text: the nearest double is taken.
+  EXPECT_THAT(read.xyz(), ElementsAre(1, 2, 3, 4, 5, 0.1));
+  EXPECT_FALSE(read.all_float());
+}
+
+TEST(PlyFile, AsciiErrorsNameFileAndLine) {
+  EXPECT_EQ(ReadText(std::string(kAsciiPly) + "3 8 9\n", PointFormat::kPly).error(),
+            "FILE:17: the list has 2 items of 3");
+  EXPECT_THAT(ReadText(std::string(kAsciiPly) + "0 1\n0 1\n", PointFormat::kPly).error(),
+              HasSubstr("within the element vertex"));
+  EXPECT_EQ(ReadText("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                     "end_header\n1 2\n",
+                     PointFormat::kPly)
+                .error(),
+            "FILE:6: the element vertex needs the properties x, y and z");
+  EXPECT_THAT(ReadText("ply\nformat binary_middle_endian 1.0\n", PointFormat::kPly).error(),
+              HasSubstr("FILE:2: format \"binary_middle_endian\" is unknown"));
+  EXPECT_THAT(ReadText("plx\n", PointFormat::kPly).error(), HasSubstr("FILE:1: a PLY file starts"));
+}
+
+constexpr char kPcdHead[] =
+    "# .PCD v0.7\nVERSION 0.7\nFIELDS rgb x y z normal\nSIZE 4 4 8 4 4\nTYPE U F F I F\n"
+    "COUNT 1 1 1 1 3\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 5 5 5 1 0 0 0\n";
+
+TEST(PcdFile, AsciiFindsFieldsByName) {
+  const PointsRead read =
+      ReadText(std::string(kPcdHead) + "POINTS 2\nDATA ascii\n0 0.1 2 3 0 0 1\n0 4 5 6 0 0 1\n",
+               PointFormat::kPcd);
+  EXPECT_TRUE(read.status.ok()) << read.status;
+  EXPECT_THAT(read.xyz(), ElementsAre(0.1, 2, 3, 4, 5, 6));
+}
+
+TEST(PcdFile, AsciiErrorsNameFileAndLine) {
+  EXPECT_EQ(
+      ReadText(std::string(kPcdHead) + "POINTS 2\nDATA ascii\n0 1 2\n", PointFormat::kPcd).error(),
+      "FILE:12: the line has 3 of 7 values");
+  EXPECT_THAT(
+      ReadText(std::string(kPcdHead) + "DATA ascii\n0 1 2 3 0 0 0\n", PointFormat::kPcd).error(),
+      HasSubstr("after 1 of 2 points"));
+  EXPECT_EQ(
+      ReadText("FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n1 2\n", PointFormat::kPcd)
+          .error(),
+      "FILE:5: FIELDS must name x, y and z");
+}
+
+TEST(PcdFile, CompressedDataIsRefusedWithAdvice) {
+  EXPECT_THAT(
+      ReadText(std::string(kPcdHead) + "DATA binary_compressed\nxx", PointFormat::kPcd).error(),
+      HasSubstr("pcl_convert_pcd_ascii_binary"));
+}
+
+TEST(Formats, AreKnownByExtensionInAnyCase) {
+  EXPECT_EQ(*PointFormatOfPath("/a.b/C.OBJ"), PointFormat::kObj);
+  EXPECT_EQ(*PointFormatOfPath("x.glb"), PointFormat::kGltf);
+  EXPECT_THAT(std::string(PointFormatOfPath("/a.obj/file").status().message()),
+              HasSubstr("--format"));
+  EXPECT_FALSE(PointFormatOfPath("x.docx").ok());
+}
+
+TEST(Formats, EmptyFilesOfLooseFormatsHoldNoPoints) {
+  for (const PointFormat format : {PointFormat::kXyz, PointFormat::kCsv}) {
+    const PointsRead read = ReadText("", format);
+    EXPECT_TRUE(read.status.ok()) << read.status;
+    EXPECT_THAT(read.blocks, IsEmpty());
+  }
+}
+
+}  // namespace
+}  // namespace hulld

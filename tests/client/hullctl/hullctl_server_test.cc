@@ -1,0 +1,403 @@
+// hullctl's commands against the real server: what they say is what the server decided.
+#include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <random>
+#include <sstream>
+#include <thread>
+
+#include "client/client.h"
+#include "client/hullctl/hullctl.h"
+#include "client/hullctl/printing/json.h"
+#include "client/verify/certificate_check.h"
+#include "tests/client/formats/point_reading.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld {
+namespace {
+
+using ::google::protobuf::Struct;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+struct Ran {
+  int code = -1;
+  std::string out;
+  std::string err;
+};
+
+class HullctlOnServer : public server::ServerTest {
+ protected:
+  Ran Ask(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--server", server_->address()});
+    std::ostringstream out;
+    std::ostringstream err;
+    Ran ran;
+    ran.code = RunHullctl(arguments, out, err);
+    ran.out = out.str();
+    ran.err = err.str();
+    return ran;
+  }
+
+  // A recorded answer, as `check --certificate --output json` writes it.
+  static std::string Recorded(const v1::CheckCollisionRequest& request,
+                              const v1::CheckCollisionResponse& response) {
+    return "{\"request\":" + MessageJson(request) + "," + MessageJson(response).substr(1);
+  }
+
+  // Two cubes that share a face, with a certificate of that.
+  std::pair<v1::CheckCollisionRequest, v1::CheckCollisionResponse> TouchingCubes() {
+    v1::CheckCollisionRequest request;
+    *request.mutable_a() = server::PlacementOf("cube");
+    *request.mutable_b() = server::PlacementOf("cube", 1);
+    v1::CheckCollisionResponse response = Check(request);
+    v1::Certificate* const certificate = response.mutable_certificate();
+    certificate->mutable_direction()->set_x(1);
+    certificate->add_pairs()->set_index_a(4);
+    return {request, response};
+  }
+};
+
+TEST_F(HullctlOnServer, VerifyTellsValidInvalidAndUncheckableApart) {
+  Put("cube", server::Cube());
+  auto [request, response] = TouchingCubes();
+  const TempFile valid("valid.json", Recorded(request, response));
+  Ran ran = Ask({"verify", valid.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out, "TOUCHING: valid\n");
+
+  response.set_relation(v1::RELATION_SEPARATED);
+  const TempFile wrong("wrong.json", Recorded(request, response));
+  ran = Ask({"verify", wrong.path(), "--output", "json"});
+  EXPECT_EQ(ran.code, 5);
+  EXPECT_THAT(ran.out, HasSubstr("\"verdict\":\"INVALID\""));
+  EXPECT_THAT(ran.err, HasSubstr("does not prove the answer: the direction does not separate"));
+
+  response.set_relation(v1::RELATION_WITHIN_TOLERANCE);
+  const TempFile tolerant("tolerant.json", Recorded(request, response));
+  EXPECT_EQ(Ask({"verify", tolerant.path()}).code, 6);
+
+  response.set_relation(v1::RELATION_TOUCHING);
+  response.mutable_header()->set_store_id("another");
+  const TempFile elsewhere("elsewhere.json", Recorded(request, response));
+  ran = Ask({"verify", elsewhere.path()});
+  EXPECT_EQ(ran.code, 6);
+  EXPECT_THAT(ran.err, HasSubstr("another store"));
+
+  server::Appender appender(*hulls_, "cube", "w");
+  ASSERT_TRUE(appender.Append(1, {9, 9, 9}).has_value());
+  ran = Ask({"verify", valid.path()});
+  EXPECT_EQ(ran.code, 6);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("cannot be checked"), HasSubstr("is at revision")));
+  ASSERT_TRUE(Delete("cube").ok());
+  ran = Ask({"verify", valid.path()});
+  EXPECT_EQ(ran.code, 6);
+  EXPECT_THAT(ran.err, HasSubstr("was deleted"));
+}
+
+TEST_F(HullctlOnServer, VerifyRefusesWhatIsNoRecordedAnswer) {
+  const TempFile no_json("no.json", "relation SEPARATED\n");
+  EXPECT_EQ(Ask({"verify", no_json.path()}).code, 2);
+  const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
+  const Ran ran = Ask({"verify", no_request.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("no member \"request\""), HasSubstr("--certificate")));
+  EXPECT_EQ(Ask({"verify", "/no/such/file"}).code, 2);
+}
+
+TEST_F(HullctlOnServer, CheckVerifiesAtOnceAndRecordsForLater) {
+  Put("cube", server::Cube());
+  for (const char* pose : {"0.5,0,0", "1,0,0", "1,1,1", "3,0,0", "1,1,0,0,0,0,1"}) {
+    const Ran ran = Ask({"check", "cube", "cube", "--pose-b", pose, "--verify"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("verified     valid\n"));
+    const Ran recorded =
+        Ask({"check", "cube", "cube", "--pose-b", pose, "--certificate", "--output", "json"});
+    const TempFile file("answer.json", recorded.out);
+    EXPECT_EQ(Ask({"verify", file.path()}).code, 0) << recorded.out;
+  }
+  const Ran json = Ask({"check", "cube", "cube", "--verify", "--output", "json"});
+  EXPECT_THAT(json.out, HasSubstr("\"verification\":{\"verdict\":\"VALID\""));
+}
+
+// Hulls of every dimension on a lattice, turned by quaternions whose squares are 1, 2, 3 and 5.
+std::string LatticeScene(uint32_t seed, int placements) {
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> steps(-3, 3);
+  constexpr const char* kHulls[] = {"cube", "ball", "square", "needle", "point", "empty"};
+  constexpr const char* kTurns[] = {"1 0 0 0", "1 1 0 0", "1 0 1 1", "2 0 0 1"};
+  std::ostringstream text;
+  for (int i = 0; i < placements; ++i) {
+    text << "place p" << i << " " << kHulls[i % 6] << " " << kTurns[random() % 4];
+    for (int axis = 0; axis < 3; ++axis) text << " " << 0.5 * steps(random);
+    text << "\n";
+  }
+  text << "all\n";
+  return text.str();
+}
+
+TEST_F(HullctlOnServer, EveryCertificateOfABatchIsValid) {
+  Put("cube", server::Cube());
+  Put("ball", server::Sphere(40));
+  Put("square", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
+  Put("needle", {-1, -1, -1, 1, 1, 1});
+  Put("point", {0.5, 0.5, 0});
+  Create("empty");
+  constexpr uint32_t kSeed = 11;
+  const TempFile file("scene", LatticeScene(kSeed, 90));
+  for (const char* method : {"--axis", "--textbook"}) {
+    const Ran ran = Ask({"batch", file.path(), "--verify", "--output", "json", method});
+    ASSERT_EQ(ran.code, 0) << "seed " << kSeed << ": " << ran.err;
+    Struct json;
+    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok());
+    const auto& answers = json.fields().at("answers").list_value();
+    ASSERT_EQ(answers.values_size(), 90 * 89 / 2);
+    for (const auto& answer : answers.values()) {
+      const auto& verification = answer.struct_value().fields().at("verification");
+      EXPECT_EQ(verification.struct_value().fields().at("verdict").string_value(), "VALID");
+    }
+    const auto& summary = json.fields().at("summary").struct_value().fields();
+    for (const char* relation : {"separated", "touching", "overlapping"}) {
+      EXPECT_GT(std::stoi(summary.at(relation).string_value()), 40) << relation;
+    }
+  }
+}
+
+TEST_F(HullctlOnServer, CertificatesOfCachedAnswersAreValid) {
+  Put("cube", server::Cube(-0.5, 1));
+  Put("ball", server::Sphere(80));
+  ClientOptions options;
+  options.server = server_->address();
+  const Client client(options);
+  const auto cube = client.GetHullMesh("cube");
+  const auto ball = client.GetHullMesh("ball");
+  ASSERT_TRUE(cube.ok() && ball.ok());
+  v1::CollisionStreamOpen open;
+  open.add_placements()->set_hull_id("cube");
+  open.add_placements()->set_hull_id("ball");
+  open.add_pairs(0);
+  open.add_pairs(1);
+  open.mutable_wanted()->set_certificate(true);
+  const auto stream = client.OpenCollisionStream();
+  ASSERT_TRUE(stream->Open(open).ok());
+  int cached = 0;
+  for (int step = 0; step <= 400; ++step) {
+    v1::Pose pose;
+    pose.mutable_rotation()->set_w(1);
+    pose.mutable_rotation()->set_z(0.001 * step);
+    pose.mutable_translation()->set_x(0.01 * (step - 200));
+    v1::CollisionStreamUpdate update;
+    update.add_placements(1);
+    for (const double number : {1.0, 0.0, 0.0, 0.001 * step, 0.01 * (step - 200), 0.0, 0.0}) {
+      update.add_poses(number);
+    }
+    const auto answer = stream->Update(update);
+    ASSERT_TRUE(answer.ok()) << answer.status().ToString();
+    ASSERT_EQ(answer->columns().certificates_size(), 1);
+    const absl::Status valid =
+        CheckCertificate(answer->columns().relations(0), answer->columns().certificates(0),
+                         {cube->xyz, v1::Pose()}, {ball->xyz, pose});
+    ASSERT_TRUE(valid.ok()) << "step " << step << ": " << valid.ToString();
+    cached += answer->columns().rungs(0) == v1::RUNG_CACHED ? 1 : 0;
+  }
+  EXPECT_GT(cached, 50);
+  EXPECT_TRUE(stream->Close().ok());
+}
+
+TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
+  Put("cube", server::Cube());
+  const std::string placements =
+      R"({"placements":[{"hullId":"cube"},{"hullId":"cube","pose":{"translation":{"x":1}}},
+          {"hullId":"cube","pose":{"translation":{"x":2.25}}}])";
+  const TempFile file("scene.json", placements + "}");
+  Ran ran = Ask({"scene", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
+  ran = Ask({"scene", file.path(), "--output", "json"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  Struct json;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok()) << ran.out;
+  EXPECT_EQ(json.fields().at("collisions").list_value().values_size(), 1);
+  EXPECT_TRUE(json.fields().at("complete").bool_value());
+  const TempFile clear("clear.json", placements + R"(,"wanted":{"clearance":0.25}})");
+  ran = Ask({"scene", clear.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out,
+            "0:cube\t1:cube\tTOUCHING\twithin\n1:cube\t2:cube\tSEPARATED\twithin\n"
+            "# touching 1 overlapping 0 separated 1 failed 0\n");
+  const TempFile packed("packed.json",
+                        R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0],
+                            "poses":[1,0,0,0, 0,0,0,  1,0,0,0, 1,0,0]}})");
+  ran = Ask({"scene", packed.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
+  const TempFile typo("typo.json", R"({"placement":[]})");
+  ran = Ask({"scene", typo.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("placement"));
+  const TempFile groups("groups.json", placements + R"(,"groups":[1]})");
+  ran = Ask({"scene", groups.path()});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("groups holds 1 groups for 3 placements"));
+  const TempFile lost("lost.json", R"({"placements":[{"hullId":"nope"}]})");
+  ran = Ask({"scene", lost.path()});
+  EXPECT_EQ(ran.code, 4);
+  EXPECT_THAT(ran.err, HasSubstr("placement 0: hull \"nope\" not found"));
+}
+
+TEST_F(HullctlOnServer, StreamAnswersEachLineByALine) {
+  Put("cube", server::Cube());
+  const TempFile file("poses.jsonl",
+                      R"({"placements":[{"hullId":"cube"},{"hullId":"cube"}],"pairs":[0,1]})"
+                      "\n\n"
+                      R"({"placements":[1],"poses":[1,0,0,0,1,0,0]})"
+                      "\n"
+                      R"({"placements":[1],"poses":[2,0,0,0,1.5,0,0],"refreshHulls":true})"
+                      "\n");
+  const Ran ran = Ask({"stream", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  std::istringstream lines(ran.out);
+  for (const char* relation : {"RELATION_OVERLAPPING", "RELATION_TOUCHING", "RELATION_SEPARATED"}) {
+    std::string line;
+    ASSERT_TRUE(std::getline(lines, line));
+    Struct json;
+    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &json).ok()) << line;
+    const auto& answers = json.fields().at("answers").list_value();
+    ASSERT_EQ(answers.values_size(), 1);
+    const auto& answer = answers.values(0).struct_value().fields();
+    EXPECT_EQ(answer.at("pair").number_value(), 0);
+    EXPECT_EQ(answer.at("relation").string_value(), relation);
+  }
+  std::string rest;
+  EXPECT_FALSE(std::getline(lines, rest));
+}
+
+TEST_F(HullctlOnServer, StreamErrorsNameTheLineOrTheField) {
+  Put("cube", server::Cube());
+  const std::string open = R"({"placements":[{"hullId":"cube"},{"hullId":"nope"}],"pairs":[0,1]})"
+                           "\n";
+  const TempFile typo("typo.jsonl", open + "{\"placement\":[1]}\n");
+  Ran ran = Ask({"stream", typo.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr(":2: "), HasSubstr("placement")));
+  EXPECT_THAT(ran.out, HasSubstr("hull \\\"nope\\\" not found"));
+  const TempFile range("range.jsonl", open + R"({"placements":[7],"poses":[1,0,0,0,1,0,0]})");
+  ran = Ask({"stream", range.path()});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("update 1: placements[0] is 7"));
+  const TempFile empty("empty.jsonl", "\n");
+  ran = Ask({"stream", empty.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("the first line must say"));
+}
+
+TEST_F(HullctlOnServer, WishesThatExcludeEachOtherAreExplained) {
+  Put("cube", server::Cube());
+  Ran ran = Ask({"check", "cube", "cube", "--tolerance", "0.1", "--separation"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("tolerance is 0.1, but wanted.separation needs the exact"));
+  ran = Ask({"check", "cube", "cube", "--tolerance", "-1"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("--tolerance: \"-1\" is not a length of at least 0"));
+  for (const char* option : {"--clearance", "--max-error"}) {
+    EXPECT_EQ(Ask({"check", "cube", "cube", option, "nan"}).code, 2);
+    EXPECT_EQ(Ask({"check", "cube", "cube", option, "1e999"}).code, 2);
+  }
+}
+
+TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
+  Put("cube", server::Cube());
+  for (const char* mode : {"check", "batch", "append", "mixed"}) {
+    const Ran ran = Ask({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
+                         "--pairs", "50", "--points", "40", "--hulls", "3", "--vertices", "20"});
+    EXPECT_EQ(ran.code, 0) << mode << ": " << ran.err;
+    EXPECT_THAT(ran.out, AllOf(HasSubstr("30, of which 0 failed"), HasSubstr("latency p99.9"),
+                               HasSubstr("requests/s"), HasSubstr("#")))
+        << mode;
+    EXPECT_EQ(ran.err, "") << mode;
+  }
+  EXPECT_EQ(Ask({"list"}).out, Ask({"list", "cube"}).out);
+}
+
+TEST_F(HullctlOnServer, LoadCountsItemsInJson) {
+  const Ran ran = Ask({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
+                       "--rate", "1000", "--json"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  Struct json;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok()) << ran.out;
+  const auto& fields = json.fields();
+  EXPECT_EQ(fields.at("mode").string_value(), "batch");
+  EXPECT_EQ(fields.at("succeeded").string_value(), "5");
+  EXPECT_EQ(fields.at("failed").string_value(), "0");
+  EXPECT_EQ(fields.at("ratePerSecond").number_value(), 1000);
+  EXPECT_FALSE(fields.at("interrupted").bool_value());
+  EXPECT_NEAR(fields.at("itemsPerSecond").number_value(),
+              70 * fields.at("requestsPerSecond").number_value(), 1e-6);
+  const auto& latency = fields.at("latencySeconds").struct_value().fields();
+  EXPECT_LE(latency.at("p50").number_value(), latency.at("p99.9").number_value());
+  EXPECT_LE(latency.at("p99.9").number_value(), latency.at("max").number_value());
+  double counted = 0;
+  for (const auto& row : fields.at("histogram").list_value().values()) {
+    counted += std::stod(row.struct_value().fields().at("count").string_value());
+  }
+  EXPECT_EQ(counted, 5);
+}
+
+TEST_F(HullctlOnServer, LoadRefusesAPrefixThatIsInUse) {
+  Put("mine/cube", server::Cube());
+  const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("\"mine/cube\" is there already"), HasSubstr("--prefix")));
+  EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
+}
+
+TEST_F(HullctlOnServer, LoadShowsErrorsByCode) {
+  const Ran ran = Ask({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
+                       "--prefix", "a b"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("2, of which 2 failed"), HasSubstr("INVALID_ARGUMENT"),
+                             HasSubstr("malformed")));
+}
+
+// The signal comes once hulls of the load are there; the load itself would last for minutes.
+TEST_F(HullctlOnServer, AnInterruptedLoadReportsAndDeletesItsHulls) {
+  std::thread interrupter([this] {
+    v1::ListHullsRequest request;
+    request.set_prefix("short/append-");
+    v1::ListHullsResponse response;
+    while (response.hulls_size() == 0) {
+      grpc::ClientContext context;
+      if (!hulls_->ListHulls(&context, request, &response).ok()) break;
+    }
+    kill(getpid(), SIGINT);
+  });
+  const Ran ran = Ask({"bench", "load", "--mode", "append", "--duration", "5m", "--points", "10",
+                       "--prefix", "short/"});
+  interrupter.join();
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("interrupted; the hulls of the load are deleted"));
+  EXPECT_THAT(ran.out, HasSubstr("requests/s"));
+  v1::ListHullsResponse left;
+  grpc::ClientContext context;
+  ASSERT_TRUE(hulls_->ListHulls(&context, v1::ListHullsRequest(), &left).ok());
+  EXPECT_EQ(left.hulls_size(), 0);
+}
+
+TEST_F(HullctlOnServer, LoadOptionsThatMakeNoSenseAreExplained) {
+  Ran ran = Ask({"bench", "load", "--rate", "0"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests a second"));
+  ran = Ask({"bench", "load", "--clients", "0"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("whole number from 1 to 1000"));
+  EXPECT_EQ(Ask({"bench", "load", "--mode", "storm"}).code, 2);
+  EXPECT_EQ(Ask({"bench", "load", "--duration", "soon"}).code, 2);
+  EXPECT_EQ(Ask({"bench"}).code, 2);
+}
+
+}  // namespace
+}  // namespace hulld

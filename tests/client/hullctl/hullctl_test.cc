@@ -1,0 +1,465 @@
+// hullctl's commands, run within the test against a fake server.
+#include "client/hullctl/hullctl.h"
+
+#include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "tests/client/fake_hulld.h"
+#include "tests/client/formats/point_reading.h"
+#include "tests/client/hullctl/xml_check.h"
+
+namespace hulld {
+namespace {
+
+using google::protobuf::Struct;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+struct Ran {
+  int code = -1;
+  std::string out;
+  std::string err;
+};
+
+Ran RunTool(const std::vector<std::string>& arguments) {
+  std::ostringstream out;
+  std::ostringstream err;
+  Ran ran;
+  ran.code = RunHullctl(arguments, out, err);
+  ran.out = out.str();
+  ran.err = err.str();
+  return ran;
+}
+
+// The output as JSON; an empty object, and a failure, when it is none.
+Struct Json(const Ran& ran) {
+  Struct json;
+  const auto status = google::protobuf::util::JsonStringToMessage(ran.out, &json);
+  EXPECT_TRUE(status.ok()) << status.ToString() << "\n" << ran.out;
+  return json;
+}
+
+class HullctlTest : public testing::Test {
+ protected:
+  Ran Ask(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--server", fake_.address()});
+    return RunTool(arguments);
+  }
+  Ran AskJson(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--output", "json"});
+    return Ask(arguments);
+  }
+
+  FakeHulld fake_;
+};
+
+TEST_F(HullctlTest, CreateGetListAndDelete) {
+  EXPECT_EQ(Ask({"create", "a/1"}).out, "a/1 created at revision 1\n");
+  EXPECT_EQ(Ask({"create", "a/1", "--if-absent"}).out, "a/1 exists already at revision 1\n");
+  EXPECT_THAT(Ask({"get", "a/1"}).out, HasSubstr("vertices    0\n"));
+  EXPECT_THAT(Ask({"list", "a"}).out, AllOf(StartsWith("HULL"), HasSubstr("\na/1 ")));
+  const Ran wrong = Ask({"delete", "a/1", "--if-revision", "9"});
+  EXPECT_EQ(wrong.code, 1);
+  EXPECT_THAT(wrong.err, HasSubstr("see its revision with 'hullctl get'"));
+  EXPECT_EQ(Ask({"delete", "a/1", "--if-revision", "1"}).code, 0);
+  EXPECT_EQ(fake_.hull("a/1").create_revision, 0u);
+}
+
+TEST_F(HullctlTest, ErrorsSayWhatToDo) {
+  const Ran missing = Ask({"get", "x"});
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_EQ(missing.err, "hullctl: hull \"x\" not found (see 'hullctl list')\n");
+  const Ran unreachable = RunTool({"list", "--server", "127.0.0.1:1", "--timeout", "10s"});
+  EXPECT_EQ(unreachable.code, 3);
+  EXPECT_THAT(unreachable.err, StartsWith("hullctl: cannot reach hulld at 127.0.0.1:1: start it "
+                                          "with 'hulld', or name another with --server"));
+  fake_.Hang("GetHull");
+  const Ran late = Ask({"get", "x", "--timeout", "50ms"});
+  EXPECT_EQ(late.code, 3);
+  EXPECT_THAT(late.err, HasSubstr("within 50 ms: raise --timeout"));
+  fake_.FailNext("CreateHull", {{grpc::StatusCode::UNAVAILABLE, "draining"}});
+  const Ran draining = Ask({"create", "x"});
+  EXPECT_EQ(draining.code, 3);
+  EXPECT_THAT(draining.err, HasSubstr("is not available: draining; try again later"));
+}
+
+TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
+  const std::vector<std::vector<std::string>> mistakes = {
+      {},
+      {"fly"},
+      {"create"},
+      {"create", "a", "b"},
+      {"get", "a", "--output", "xml"},
+      {"get", "a", "--timeout", "soon"},
+      {"get", "a", "--server", "here"},
+      {"check", "a", "b", "--pose-a", "1,2"},
+      {"generate", "ball", "many"},
+      {"generate", "blob", "3"},
+      {"generate", "ball", "3", "--radius", "-1"},
+      {"generate", "cube", "3", "--size", "1e308", "--center", "1.7e308,0,0"},
+      {"append", "a", "no-such-file.xyz"},
+      {"append", "a", "CMakeLists.unknown"},
+      {"append", "a", "-", "--chunk-points", "0"},
+      {"append", "a", "-", "--resume"},
+      {"batch", "no-such-file"},
+      {"picture"},
+      {"delete", "a", "--if-revision", "-1"},
+  };
+  for (const auto& arguments : mistakes) {
+    const Ran ran = RunTool(arguments);
+    EXPECT_EQ(ran.code, 2) << testing::PrintToString(arguments);
+    EXPECT_NE(ran.err, "") << testing::PrintToString(arguments);
+    EXPECT_EQ(ran.out, "");
+  }
+}
+
+TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
+  const Ran help = RunTool({"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* word :
+       {"create", "append", "get", "list", "delete", "mesh", "check", "batch", "scene", "stream",
+        "verify", "generate", "status", "picture", "HULLCTL_SERVER", "Exit codes"}) {
+    EXPECT_THAT(help.out, HasSubstr(word));
+  }
+  EXPECT_THAT(RunTool({"--version"}).out, StartsWith("hullctl "));
+  EXPECT_THAT(RunTool({"batch", "--help"}).out, HasSubstr("place NAME HULL"));
+}
+
+TEST_F(HullctlTest, AppendSendsFilesInChunks) {
+  const TempFile first("one.xyz", "1 2 3\n4 5 6\n7 8 9\n");
+  const TempFile second("two.obj", "v 0.1 1e-310 -0\n");
+  const Ran missing = Ask({"append", "a", first.path()});
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.err, HasSubstr("--create"));
+  const Ran ran =
+      Ask({"append", "a", first.path(), second.path(), "--create", "--chunk-points", "2"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("points     4 appended in 3 chunks\n"));
+  EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 0.1, 1e-310, -0.0));
+}
+
+TEST_F(HullctlTest, AppendCountsSkippedPoints) {
+  const TempFile file("a.csv", "x,y,z\n1,2,3\nnan,0,0\n0,inf,0\n4,5,6\n");
+  const Ran strict = Ask({"append", "a", "--create", file.path()});
+  EXPECT_EQ(strict.code, 2);
+  EXPECT_THAT(strict.err, HasSubstr(".csv:3: point 2 has x = NaN; leave such points out with "
+                                    "--skip-nonfinite"));
+  const Ran ran = Ask({"append", "b", "--create", "--skip-nonfinite", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("skipped    2 points that are not finite\n"));
+  EXPECT_THAT(fake_.hull("b").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST_F(HullctlTest, AnErrorInAFileLeavesTheChunksBeforeIt) {
+  const TempFile file("a.csv", "1,2,3\n4,5,6\n7,abc,9\n");
+  const Ran ran = Ask({"append", "a", "--create", "--chunk-points", "1", file.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("a.csv:3: \"abc\" is not a number"));
+  EXPECT_THAT(ran.out, HasSubstr("2 appended in 2 chunks"));
+  EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 2, 3, 4, 5, 6));
+}
+
+TEST_F(HullctlTest, AppendResumesWhereTheWriterStopped) {
+  const TempFile file("a.xyz", "1 1 1\n2 2 2\n3 3 3\n");
+  StreamScript script;
+  script.refuse_sequence = 3;
+  fake_.ScriptStreams({script});
+  const std::vector<std::string> command = {"append",         "a", "--create", "--writer", "w",
+                                            "--chunk-points", "1", file.path()};
+  EXPECT_EQ(Ask(command).code, 1);
+  std::vector<std::string> again = command;
+  again.push_back("--resume");
+  const Ran resumed = Ask(again);
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_THAT(resumed.out, HasSubstr("2 points were committed before"));
+  EXPECT_THAT(fake_.hull("a").xyz, ElementsAre(1, 1, 1, 2, 2, 2, 3, 3, 3));
+}
+
+TEST_F(HullctlTest, CheckPassesPosesAndWishesOn) {
+  fake_.collision_answer.set_relation(v1::RELATION_SEPARATED);
+  fake_.collision_answer.mutable_hull_a()->set_hull_id("a");
+  fake_.collision_answer.mutable_axis()->set_kind(v1::AXIS_KIND_FACET_B);
+  fake_.collision_answer.mutable_axis()->mutable_direction()->set_x(1);
+  fake_.collision_answer.mutable_analysis()->set_axes_tested(17);
+  fake_.collision_answer.mutable_analysis()->set_axes_total(99);
+  fake_.collision_answer.mutable_analysis()->set_axis_index(16);
+  fake_.collision_answer.mutable_analysis()->set_stage(v1::AXIS_KIND_EDGE_EDGE);
+  fake_.collision_answer.mutable_analysis()->mutable_time()->set_nanos(1500000);
+  fake_.collision_answer.mutable_analysis()->mutable_size_b()->set_edges(12);
+  const Ran ran = Ask({"check", "a", "b", "--pose-a", "-1,0,0", "--pose-b", "2,1,0,0,5,6,7",
+                       "--textbook", "--axis", "--report"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  const v1::CheckCollisionRequest request = fake_.last_collision_request();
+  EXPECT_EQ(request.a().hull_id(), "a");
+  EXPECT_EQ(request.a().pose().translation().x(), -1);
+  EXPECT_EQ(request.b().pose().rotation().w(), 2);
+  EXPECT_EQ(request.method(), v1::METHOD_TEXTBOOK_SAT);
+  EXPECT_TRUE(request.wanted().axis());
+  EXPECT_TRUE(request.wanted().analysis());
+  EXPECT_THAT(ran.out, AllOf(HasSubstr("relation     SEPARATED\n"), HasSubstr("1 0 0  (FACET_B)"),
+                             HasSubstr("1.5 ms"), HasSubstr("17 of 99"),
+                             HasSubstr("EDGE_EDGE, axis 16"), HasSubstr("12 edges")));
+}
+
+TEST_F(HullctlTest, CheckShowsWhatWasMeasured) {
+  v1::CheckCollisionResponse& answer = fake_.collision_answer;
+  answer.set_relation(v1::RELATION_SEPARATED);
+  answer.mutable_separation()->set_value(0.5);
+  answer.mutable_separation()->set_bound(1e-16);
+  answer.mutable_witness()->mutable_point_a()->set_x(1);
+  answer.mutable_witness()->mutable_point_b()->set_x(1.5);
+  answer.mutable_witness()->set_error(2e-16);
+  answer.set_within_clearance(true);
+  answer.mutable_certificate()->mutable_integer_direction()->set_x(
+      "123456789012345678901234567890");
+  answer.mutable_certificate()->mutable_integer_direction()->set_y("-7");
+  answer.mutable_certificate()->mutable_integer_direction()->set_z("0");
+  answer.mutable_certificate()->add_pairs()->set_index_a(3);
+  const Ran ran = Ask({"check", "a", "b", "--max-error", "1e-3", "--witness", "--clearance", "0.75",
+                       "--certificate"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  const v1::Wanted wanted = fake_.last_collision_request().wanted();
+  EXPECT_TRUE(wanted.separation() && wanted.witness() && wanted.certificate());
+  EXPECT_EQ(wanted.max_error(), 1e-3);
+  EXPECT_EQ(wanted.clearance(), 0.75);
+  EXPECT_FALSE(wanted.axis() || wanted.analysis());
+  EXPECT_THAT(
+      ran.out,
+      AllOf(HasSubstr("separation     0.5 within 1e-16\n"), HasSubstr("point of B     1.5 0 0\n"),
+            HasSubstr("points within  2e-16\n"), HasSubstr("clearance      within 0.75\n"),
+            HasSubstr("n = 12345678...(30 digits) -7 0; A 3 with B 0\n")));
+  EXPECT_EQ(Ask({"check", "a", "b", "--tolerance", "0.25"}).code, 0);
+  EXPECT_EQ(fake_.last_collision_request().tolerance(), 0.25);
+  EXPECT_FALSE(fake_.last_collision_request().wanted().has_clearance());
+}
+
+TEST_F(HullctlTest, ACollisionIsNoError) {
+  fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
+  EXPECT_EQ(Ask({"check", "a", "b"}).code, 0);
+}
+
+TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
+  fake_.PutHull("box", {});
+  const TempFile good("good", "place a box\nplace b box 1 2 3\npair a b\npair b a\n");
+  const Ran fine = Ask({"batch", good.path()});
+  EXPECT_EQ(fine.code, 0) << fine.err;
+  EXPECT_EQ(fine.out,
+            "a\tb\tTOUCHING\nb\ta\tTOUCHING\n# separated 0 touching 2 overlapping 0 failed 0\n");
+  const TempFile mixed("mixed", "place a box\nplace b box\nplace c nope\nall\n");
+  const Ran some = Ask({"batch", mixed.path()});
+  EXPECT_EQ(some.code, 4);
+  EXPECT_THAT(some.out, HasSubstr("a\tc\tFAILED\thull \"nope\" not found\n"));
+  EXPECT_THAT(some.err, HasSubstr("2 of 3 pairs have no answer"));
+  const Ran json = AskJson({"batch", mixed.path(), "--axis", "--report"});
+  EXPECT_EQ(json.code, 4);
+  const auto answers = Json(json).fields().at("answers").list_value();
+  ASSERT_EQ(answers.values_size(), 3);
+  const auto& failed = answers.values(1).struct_value().fields();
+  EXPECT_EQ(failed.at("relation").string_value(), "RELATION_UNSPECIFIED");
+  EXPECT_EQ(failed.at("problem").struct_value().fields().at("code").number_value(), 5);
+  EXPECT_EQ(answers.values(0)
+                .struct_value()
+                .fields()
+                .at("axis")
+                .struct_value()
+                .fields()
+                .at("kind")
+                .string_value(),
+            "AXIS_KIND_EDGE_EDGE");
+}
+
+TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
+  fake_.PutHull("box", {});
+  std::string text = "place extra box\n";
+  for (int i = 0; i < 500; ++i) text += "place p" + std::to_string(i) + " box\n";
+  text += "all\n";
+  const TempFile file("big", text);
+  const Ran ran = Ask({"batch", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("# separated 0 touching 125250 overlapping 0 failed 0\n"));
+  const auto requests = fake_.batch_requests();
+  ASSERT_EQ(requests.size(), 2u);
+  EXPECT_EQ(requests[0].pairs_size() + requests[1].pairs_size(), 2 * 125250);
+  EXPECT_LT(requests[1].placements_size(), 501);
+}
+
+TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
+  const TempFile file("pairs", "place a box\nplace b box\npair a b\npair b a\n");
+  v1::BatchCheckCollisionsResponse late;
+  late.set_first_pair(1);
+  late.add_relations(v1::RELATION_TOUCHING);
+  v1::BatchCheckCollisionsResponse few;
+  few.add_relations(v1::RELATION_TOUCHING);
+  v1::BatchCheckCollisionsResponse many;
+  for (int i = 0; i < 3; ++i) many.add_relations(v1::RELATION_TOUCHING);
+  v1::BatchCheckCollisionsResponse ragged;
+  for (int i = 0; i < 2; ++i) ragged.add_relations(v1::RELATION_TOUCHING);
+  ragged.add_axes();
+  v1::BatchCheckCollisionsResponse half;
+  for (int i = 0; i < 2; ++i) half.add_relations(v1::RELATION_TOUCHING);
+  for (int i = 0; i < 2; ++i) half.add_separations(1);
+  for (const auto& answer : {late, few, many, ragged, half}) {
+    fake_.batch_answers = {answer};
+    EXPECT_EQ(Ask({"batch", file.path()}).code, 1);
+  }
+}
+
+TEST_F(HullctlTest, EveryJsonOutputIsValid) {
+  const TempFile points("a.xyz", "1 2 3\n");
+  EXPECT_EQ(Json(AskJson({"append", "a", "--create", points.path()}))
+                .fields()
+                .at("pointsSent")
+                .string_value(),
+            "1");
+  Json(AskJson({"create", "b"}));
+  Json(AskJson({"get", "a", "--audit"}));
+  EXPECT_EQ(Json(AskJson({"list"})).fields().at("hulls").list_value().values_size(), 2);
+  Json(AskJson({"check", "a", "b", "--axis", "--report"}));
+  EXPECT_EQ(Json(AskJson({"status"})).fields().at("health").string_value(), "SERVING");
+  Json(AskJson({"delete", "b"}));
+  EXPECT_EQ(QuoteJson("a\"b\\c\n\x01"), "\"a\\\"b\\\\c\\u000a\\u0001\"");
+}
+
+TEST_F(HullctlTest, AnAuditThatFindsSomethingFails) {
+  fake_.PutHull("a", {});
+  EXPECT_EQ(Ask({"get", "a", "--audit"}).code, 0);
+  fake_.audit_finding = "edge 3 is not convex";
+  const Ran ran = Ask({"get", "a", "--audit"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("edge 3 is not convex"));
+}
+
+TEST_F(HullctlTest, StatusFailsWhenTheServerDoesNotServe) {
+  EXPECT_THAT(Ask({"status"}).out, HasSubstr("SERVING"));
+  fake_.SetServing(false);
+  const Ran ran = Ask({"status"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.out, HasSubstr("NOT_SERVING"));
+  EXPECT_EQ(RunTool({"status", "--server", "127.0.0.1:1"}).code, 3);
+}
+
+// A tetrahedron with coordinates that need 17 digits.
+std::vector<v1::GetHullMeshResponse> Tetrahedron() {
+  std::vector<v1::GetHullMeshResponse> parts(3);
+  v1::MeshHeader& header = *parts[0].mutable_header();
+  header.mutable_hull()->set_hull_id("a");
+  header.mutable_hull()->set_vertex_count(4);
+  header.set_vertex_count(4);
+  header.mutable_hull()->set_dimension(3);
+  header.set_facet_count(4);
+  for (const double x : {0.1, 1e-310, 0.0, 1.0 / 3, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1e308}) {
+    parts[1].mutable_vertices()->add_xyz(x);
+  }
+  for (int i = 0; i < 4; ++i) parts[2].mutable_facets()->add_sizes(3);
+  for (const uint32_t i : {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3}) {
+    parts[2].mutable_facets()->add_indices(i);
+  }
+  return parts;
+}
+
+TEST_F(HullctlTest, MeshWritesObjThatReadsBackExactly) {
+  fake_.mesh_parts = Tetrahedron();
+  const TempFile file("a.obj", "");
+  ASSERT_EQ(Ask({"mesh", "a", "-o", file.path()}).code, 0);
+  EXPECT_THAT(ReadFile(file.path(), PointFormat::kObj).xyz(),
+              ElementsAre(0.1, 1e-310, 0.0, 1.0 / 3, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1e308));
+  const Ran printed = Ask({"mesh", "a"});
+  EXPECT_THAT(printed.out, HasSubstr("f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"));
+  EXPECT_EQ(Ask({"mesh", "a", "-o", "/no/such/folder/a.obj"}).code, 2);
+}
+
+TEST_F(HullctlTest, CheckAsksAgainWhenAHullMovesOnBeforeItIsVerified) {
+  fake_.mesh_parts = Tetrahedron();
+  fake_.mesh_parts[0].mutable_header()->mutable_hull()->set_revision(7);
+  v1::CheckCollisionResponse& answer = fake_.collision_answer;
+  answer.set_relation(v1::RELATION_TOUCHING);
+  answer.mutable_hull_a()->set_hull_id("a");
+  answer.mutable_hull_b()->set_hull_id("a");
+  answer.mutable_certificate()->add_pairs();
+  answer.mutable_certificate()->mutable_direction()->set_x(1);
+  answer.mutable_hull_a()->set_revision(6);
+  const Ran moved = Ask({"check", "a", "a", "--verify"});
+  EXPECT_EQ(moved.code, 6);
+  EXPECT_THAT(moved.err, HasSubstr("hull a is at revision 7; the answer is from revision 6"));
+  EXPECT_EQ(fake_.calls("CheckCollision"), 5);
+  answer.mutable_hull_a()->set_revision(7);
+  answer.mutable_hull_b()->set_revision(7);
+  const Ran wrong = Ask({"check", "a", "a", "--verify"});
+  EXPECT_EQ(wrong.code, 5);
+  EXPECT_EQ(fake_.calls("CheckCollision"), 6);
+  EXPECT_THAT(wrong.err, HasSubstr("does not prove the answer"));
+}
+
+TEST_F(HullctlTest, SimplifiedMeshTellsItsError) {
+  fake_.mesh_parts = Tetrahedron();
+  v1::MeshHeader& header = *fake_.mesh_parts[0].mutable_header();
+  header.mutable_hull()->set_vertex_count(72);
+  header.set_error(0.25);
+  EXPECT_THAT(Ask({"mesh", "a", "--max-vertices", "8", "--outside"}).out,
+              HasSubstr("4 vertices, 4 facets, simplified from 72 vertices within 0.25\n"));
+  EXPECT_EQ(fake_.last_mesh_request.simplification().side(), v1::SIMPLIFICATION_SIDE_OUTSIDE);
+  EXPECT_EQ(fake_.last_mesh_request.simplification().max_vertices(), 8u);
+  const Ran unclear = Ask({"mesh", "a", "--outside"});
+  EXPECT_EQ(unclear.code, 2);
+  EXPECT_THAT(unclear.err, HasSubstr("--max-vertices"));
+  EXPECT_EQ(Ask({"mesh", "a", "--max-error", "-1"}).code, 2);
+}
+
+TEST_F(HullctlTest, MeshWritesSegmentsAndPoints) {
+  v1::GetHullMeshResponse header;
+  header.mutable_header()->mutable_hull()->set_vertex_count(2);
+  header.mutable_header()->set_vertex_count(2);
+  v1::GetHullMeshResponse vertices;
+  for (int i = 0; i < 6; ++i) vertices.mutable_vertices()->add_xyz(i);
+  fake_.mesh_parts = {header, vertices};
+  EXPECT_THAT(Ask({"mesh", "a"}).out, HasSubstr("v 0 1 2\nv 3 4 5\nl 1 2\n"));
+}
+
+TEST_F(HullctlTest, PictureShowsPointsMeshAndHull) {
+  fake_.mesh_parts = Tetrahedron();
+  const TempFile points("p.xyz", "0 0 0\n1 1 1\nnan 0 0\n");
+  const TempFile mesh("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const TempFile picture("scene.svg", "");
+  ASSERT_EQ(Ask({"picture", "--points", points.path(), "--mesh", mesh.path(), "--hull", "a", "-o",
+                 picture.path()})
+                .code,
+            0);
+  std::ifstream file(picture.path());
+  const std::string svg((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_EQ(XmlProblem(svg), "");
+  for (const char* text : {">Points<", ">Mesh<", ">Hull<", ">2 points<",
+                           ">3 vertices, 1 triangles<", ">4 vertices, 4 facets<"}) {
+    EXPECT_THAT(svg, HasSubstr(text));
+  }
+}
+
+TEST_F(HullctlTest, GenerateWritesTheSamePointsEachTime) {
+  const Ran first = RunTool({"generate", "sphere", "100", "--seed", "5"});
+  EXPECT_EQ(first.code, 0);
+  EXPECT_EQ(RunTool({"generate", "sphere", "100", "--seed", "5"}).out, first.out);
+  EXPECT_NE(RunTool({"generate", "sphere", "100", "--seed", "6"}).out, first.out);
+  EXPECT_EQ(RunTool({"generate", "lattice", "3", "--size", "0.1", "--center", "-1,0,0"}).out,
+            "-1 0 0\n-0.9 0 0\n-1 0.1 0\n");
+}
+
+TEST(ProgressBar, ShowsShareAndPoints) {
+  EXPECT_EQ(ProgressText(50, 100, 1200), "[###############---------------]  50 %  1200 points");
+  EXPECT_EQ(ProgressText(5, 0, 7), "7 points");
+  EXPECT_THAT(ProgressText(200, 100, 1), HasSubstr("100 %"));
+  std::ostringstream out;
+  ProgressBar hidden(out, false, 10);
+  hidden.Update(5, 1);
+  hidden.Clear();
+  EXPECT_EQ(out.str(), "");
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "core/hull/growth/hull_builder.h"
+#include "core/query/placed/query_hull.h"
+#include "tests/core/checks/oracle_bridge.h"
+#include "tests/core/checks/point_sets.h"
+
+namespace hulld {
+namespace {
+
+// What a hull costs, counted: work and memory, never time.
+
+struct NamedPoints {
+  const char* name;
+  std::vector<Vector> points;
+};
+
+// Shells that each hide the one before.
+std::vector<Vector> GrowingShells(Random& random, size_t n) {
+  std::vector<Vector> points = RandomOnSphere(random, n, 1);
+  for (size_t i = 0; i < n; ++i) points[i] *= 1 + std::floor(static_cast<double>(i) / 500) / 4;
+  return points;
+}
+
+// Of one point after another, none does much more than its share of the housekeeping: beyond the
+// triangles that it removes and creates, its work grows like the square of a logarithm.
+TEST(HullCost, NoSinglePointStalls) {
+  const uint64_t seed = TestSeed(501);
+  Random random(seed);
+  const std::vector<NamedPoints> streams = {{"ball", RandomInBall(random, 50000, 1)},
+                                            {"sphere", RandomOnSphere(random, 20000, 1)},
+                                            {"cube", RandomInCube(random, 50000, 1)},
+                                            {"shells", GrowingShells(random, 5000)}};
+  for (const NamedPoints& stream : streams) {
+    HullBuilder builder;
+    uint64_t before = 0;
+    for (size_t i = 0; i < stream.points.size(); ++i) {
+      ASSERT_TRUE(builder.Add(std::span(stream.points).subspan(i, 1)).ok());
+      const uint64_t steps = builder.housekeeping_steps() - before;
+      before = builder.housekeeping_steps();
+      const double log = std::log2(static_cast<double>(i + 64));
+      ASSERT_LE(static_cast<double>(steps), 4 * log * log)
+          << stream.name << " point " << i << " seed " << seed;
+    }
+    // The counter counts.
+    EXPECT_GT(before, builder.vertex_count()) << stream.name;
+  }
+}
+
+// The same bits and the same counts, on any number of threads.
+TEST(HullCost, ThreadsLeaveNoTrace) {
+  const uint64_t seed = TestSeed(502);
+  Random random(seed);
+  std::vector<Vector> lattice = LatticeCube(48, 1);
+  Shuffle(random, lattice);
+  const std::vector<Vector> ball = RandomInBall(random, 150000, 1);
+  const std::vector<NamedPoints> clouds = {{"ball", ball},
+                                           {"ball twice", Concatenated(ball, Scaled(ball, 1.0))},
+                                           {"sphere", RandomOnSphere(random, 70000, 1)},
+                                           {"lattice", Concatenated(lattice, lattice)}};
+  const Hull small = BuildHull(RandomOnSphere(random, 300, 0.9));
+  for (const NamedPoints& cloud : clouds) {
+    std::vector<Hull> hulls;
+    std::vector<PointCounts> counts;
+    for (const int threads : {1, 2, 8}) {
+      HullBuilder builder;
+      AddLimits limits;
+      limits.threads = threads;
+      counts.push_back(builder.Add(cloud.points, limits).value());
+      hulls.push_back(builder.Snapshot());
+      // Into a live hull as well.
+      HullBuilder live;
+      ASSERT_TRUE(live.Add(small.vertices()).ok());
+      ASSERT_TRUE(live.Add(cloud.points, limits).ok());
+      ASSERT_TRUE(live.Add(small.vertices(), limits).ok());
+      hulls.push_back(live.Snapshot());
+    }
+    for (size_t k = 2; k < hulls.size(); ++k) {
+      EXPECT_TRUE(SameBits(hulls[k], hulls[k % 2])) << cloud.name << " seed " << seed;
+    }
+    EXPECT_EQ(counts[1], counts[0]) << cloud.name;
+    EXPECT_EQ(counts[2], counts[0]) << cloud.name;
+  }
+}
+
+TEST(HullCost, CancellationOnThreadsChangesNothing) {
+  const uint64_t seed = TestSeed(504);
+  Random random(seed);
+  const std::vector<Vector> first = RandomInBall(random, 500, 1);
+  const std::vector<Vector> block = RandomOnSphere(random, 30000, 2);
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(first).ok());
+  const Hull before = builder.Snapshot();
+  int cancelled = 0;
+  // The last of the polls are those of the threads.
+  for (const int allowed : {0, 10, 40, 60, 80}) {
+    int polls = 0;
+    AddLimits limits;
+    limits.threads = 2;
+    limits.should_stop = [&] { return ++polls > allowed; };
+    if (builder.Add(block, limits).ok()) break;
+    ++cancelled;
+    ASSERT_TRUE(SameBits(builder.Snapshot(), before)) << "after " << allowed << " polls";
+  }
+  EXPECT_GE(cancelled, 4);
+}
+
+// Inside points are not kept, and what is kept is small.
+TEST(HullCost, MemoryIsBoundedByTheVertices) {
+  const uint64_t seed = TestSeed(503);
+  Random random(seed);
+  const std::vector<NamedPoints> clouds = {{"sphere of 1000", RandomOnSphere(random, 1000, 1)},
+                                           {"sphere of 1100", RandomOnSphere(random, 1100, 1)},
+                                           {"sphere", RandomOnSphere(random, 30000, 1)},
+                                           {"ball of 1e5", RandomInBall(random, 100000, 1)},
+                                           {"ball of 1e6", RandomInBall(random, 1000000, 1)}};
+  for (const NamedPoints& cloud : clouds) {
+    HullBuilder builder;
+    ASSERT_TRUE(builder.Add(cloud.points).ok());
+    HullBuilder streamed;
+    for (size_t i = 0; i < cloud.points.size() && i < 100000; ++i) {
+      ASSERT_TRUE(streamed.Add(std::span(cloud.points).subspan(i, 1)).ok());
+    }
+    for (const HullBuilder* b : {&builder, &streamed}) {
+      const auto vertices = static_cast<double>(b->vertex_count());
+      ASSERT_GE(vertices, 1000) << cloud.name;
+      const Hull hull = b->Snapshot();
+      EXPECT_LE(static_cast<double>(hull.MemoryBytes()) / vertices, 100) << cloud.name;
+      EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 300) << cloud.name;
+      const auto queried = static_cast<double>(hull.MemoryBytes() + QueryHull(hull).MemoryBytes());
+      EXPECT_LE(queried / vertices, 350) << cloud.name;
+      std::printf("%s, %s: %.0f vertices, bytes for each: %.0f, for queries %.0f, builder %.0f\n",
+                  cloud.name, b == &builder ? "at once" : "one by one", vertices,
+                  static_cast<double>(hull.MemoryBytes()) / vertices, queried / vertices,
+                  static_cast<double>(b->MemoryBytes()) / vertices);
+      // At least the vertices and the triangles are counted.
+      EXPECT_GE(static_cast<double>(hull.MemoryBytes()) / vertices, 24 + 24 + 24) << cloud.name;
+      EXPECT_GE(static_cast<double>(b->MemoryBytes()) / vertices, 24 + 2 * 64 - 1) << cloud.name;
+    }
+  }
+}
+
+TEST(HullCost, MemoryOfFlatHullsIsCounted) {
+  HullBuilder builder;
+  const size_t empty = builder.MemoryBytes();
+  EXPECT_GT(empty, 0u);
+  std::vector<Vector> circle;
+  for (int i = -500; i <= 500; ++i) circle.emplace_back(i, i * i, 0);
+  ASSERT_TRUE(builder.Add(circle).ok());
+  EXPECT_GE(builder.MemoryBytes(), empty + circle.size() * (24 + 48));
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,49 @@
+// The questions on which tests/bench counts the wrong answers of every library: none here.
+
+#include "tests/bench/queries/accuracy_suite.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "core/query/collision.h"
+#include "tests/core/checks/oracle_bridge.h"
+
+namespace hulld {
+namespace {
+
+TEST(AccuracySuite, EveryQuestionIsAnsweredExactly) {
+#ifdef HULLD_SANITIZED
+  constexpr size_t kStride = 11;
+  constexpr size_t kQuestions = 422;
+#else
+  constexpr size_t kStride = 1;
+  constexpr size_t kQuestions = 4640;
+#endif
+  const bench::AccuracySuite suite = bench::MakeAccuracySuite(kStride);
+  ASSERT_EQ(suite.queries.size(), kQuestions);
+  std::map<Relation, size_t> relations;
+  std::map<Rung, size_t> rungs;
+  for (size_t i = 0; i < suite.queries.size(); ++i) {
+    const bench::QuerySet::Query& query = suite.queries[i];
+    const Hull& a = suite.hulls[query.hull_a];
+    const Hull& b = suite.hulls[query.hull_b];
+    const absl::StatusOr<Answer> answer = CheckCollision(a, query.X_WA, b, query.X_WB);
+    ASSERT_TRUE(answer.ok()) << answer.status();
+    const Relation expected = OracleRelation(a, query.X_WA, b, query.X_WB);
+    EXPECT_EQ(Name(answer->relation), std::string(Name(expected)))
+        << suite.kinds[i] << ", question " << i << "\n"
+        << Describe(a, query.X_WA, b, query.X_WB);
+    ++relations[expected];
+    ++rungs[answer->rung];
+  }
+  // The suite asks what it says: every relation, many of them beyond floating point.
+  EXPECT_GT(relations[Relation::kSeparated], kQuestions / 3);
+  EXPECT_GT(relations[Relation::kTouching], kQuestions / 20);
+  EXPECT_GT(relations[Relation::kOverlapping], kQuestions / 3);
+  EXPECT_GT(rungs[Rung::kFloatingPoint], kQuestions / 4);
+  EXPECT_GT(rungs[Rung::kExact], kQuestions / 10);
+}
+
+}  // namespace
+}  // namespace hulld

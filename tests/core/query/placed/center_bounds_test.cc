@@ -1,0 +1,197 @@
+#include "core/query/placed/center_bounds.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/numeric/orientation.h"
+#include "core/query/collision.h"
+#include "tests/core/checks/oracle_bridge.h"
+#include "tests/core/checks/point_sets.h"
+
+namespace hulld {
+namespace {
+
+struct NamedHull {
+  std::string name;
+  Hull hull;
+};
+
+// Round ones and boxes, needles and plates, far from the origin and at the ends of the range, with
+// few vertices and many.
+std::vector<NamedHull> Solids(Random& random) {
+  std::vector<NamedHull> solids;
+  const auto add = [&](const std::string& name, std::vector<Vector> points) {
+    for (const double scale : {1.0, 0x1p-200, 0x1p200}) {
+      solids.push_back(
+          {name + " times " + std::to_string(scale), BuildHull(Scaled(points, scale))});
+    }
+    solids.push_back({name + " far off", BuildHull(Shifted(points, Vector(3e3, -1e4, 5e3)))});
+    for (Vector& p : points) p = p.cwiseProduct(Vector(1, 0.02, 7));
+    solids.push_back({name + " oblong", BuildHull(points)});
+    for (Vector& p : points) p.x() *= 1e-5;
+    solids.push_back({name + " thin", BuildHull(points)});
+  };
+  add("cube", LatticeCube(2, 1));
+  add("tetrahedron", {Vector(0, 0, 0), Vector(1, 0, 0), Vector(0, 1, 0), Vector(0, 0, 1)});
+  add("8 points", RandomInBall(random, 8, 1));
+  add("sphere of 50", RandomOnSphere(random, 50, 1));
+  add("sphere of 700", RandomOnSphere(random, 700, 1));
+  add("paraboloid", IntegerParaboloid(3));
+  return solids;
+}
+
+// Corners of the cube map's cells among them, where bounds are met closely.
+std::vector<Vector> Directions(Random& random) {
+  std::vector<Vector> directions = LatticeCubeSurface(5);
+  for (Vector& n : directions) n -= Vector(2, 2, 2);
+  for (const Vector& n : RandomOnSphere(random, 200, 1)) directions.push_back(n);
+  return directions;
+}
+
+double SupportOf(const Hull& hull, const Vector& n) {
+  double farthest = -INFINITY;
+  for (const Vector& v : hull.vertices()) farthest = std::max(farthest, n.dot(v - hull.center()));
+  return farthest;
+}
+
+bool Holds(const Hull& hull, const Vector& p) {
+  const auto v = hull.vertices();
+  for (size_t f = 0; f < hull.facet_count(); ++f) {
+    const auto facet = hull.facet(f);
+    if (Orient3d(v[facet[0]], v[facet[1]], v[facet[2]], p) > 0) return false;
+  }
+  return true;
+}
+
+TEST(CenterBounds, SupportIsNeverFarther) {
+  const uint64_t seed = TestSeed(901);
+  Random random(seed);
+  for (const auto& [name, hull] : Solids(random)) {
+    const SupportMap support(hull);
+    const CenterBounds bounds(hull, support);
+    for (const Vector& n : Directions(random)) {
+      ASSERT_GE(bounds.Along(n).support, SupportOf(hull, n)) << name << " seed " << seed;
+    }
+  }
+}
+
+TEST(CenterBounds, PointsWithinTheGaugeAreInside) {
+  const uint64_t seed = TestSeed(902);
+  Random random(seed);
+  int without = 0;
+  for (const auto& [name, hull] : Solids(random)) {
+    const SupportMap support(hull);
+    const CenterBounds bounds(hull, support);
+    for (const Vector& d : Directions(random)) {
+      const double gauge = bounds.Along(d).gauge;
+      if (std::isnan(gauge)) {
+        ++without;
+        continue;
+      }
+      ASSERT_GT(gauge, 0) << name;
+      ASSERT_LE(gauge, (1 + 1e-6) * bounds.largest_gauge() * d.cwiseAbs().maxCoeff()) << name;
+      ASSERT_TRUE(Holds(hull, hull.center() + d / gauge)) << name << " seed " << seed;
+    }
+  }
+  EXPECT_GT(without, 0);
+}
+
+TEST(CenterBounds, RoundHullsAreBoundedClosely) {
+  Random random(TestSeed(903));
+  const Hull hull = BuildHull(RandomOnSphere(random, 2000, 1));
+  const SupportMap support(hull);
+  const CenterBounds bounds(hull, support);
+  for (Vector n : Directions(random)) {
+    n.normalize();
+    EXPECT_LT(bounds.Along(n).support, 1.05);
+    EXPECT_LT(bounds.Along(n).gauge, 1.2);
+  }
+}
+
+TEST(CenterBounds, FlatHullsHaveNone) {
+  for (const std::vector<Vector>& points : {std::vector<Vector>{Vector(1, 2, 3)},
+                                            {Vector(0, 0, 0), Vector(1, 1, 0)},
+                                            {Vector(0, 0, 0), Vector(1, 0, 0), Vector(0, 1, 0)}}) {
+    const Hull hull = BuildHull(points);
+    const SupportMap support(hull);
+    const CenterBounds bounds(hull, support);
+    EXPECT_TRUE(std::isnan(bounds.Along(Vector(1, 0, 0)).support));
+    EXPECT_TRUE(std::isnan(bounds.Along(Vector(1, 0, 0)).gauge));
+  }
+}
+
+// Its six extreme vertices are corners of one facet.
+TEST(CenterBounds, CentersOnTheBoundaryHaveNoGauge) {
+  const Hull hull = BuildHull(std::vector<Vector>{Vector(12, -6, -6), Vector(-6, 12, -6),
+                                                  Vector(-6, -6, 12), Vector(1, 1, 1)});
+  ASSERT_EQ(hull.center(), Vector(-3, 0, 3));
+  const SupportMap support(hull);
+  const CenterBounds bounds(hull, support);
+  EXPECT_LT(bounds.Along(Vector(1, 1, 1)).support, INFINITY);
+  for (const Vector& d : {Vector(1, 1, 1), Vector(-1, -1, -1), Vector(1, -1, 0)}) {
+    EXPECT_TRUE(std::isnan(bounds.Along(d).gauge));
+  }
+}
+
+// The relation alone, which the bounds may settle, against what the search finds with evidence.
+TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
+  const uint64_t seed = TestSeed(904);
+  Random random(seed);
+  const std::vector<NamedHull> solids = Solids(random);
+  int settled[2] = {0, 0};
+  for (int round = 0; round < 5000; ++round) {
+    const NamedHull& one = solids[random.Below(static_cast<int>(solids.size()))];
+    const NamedHull& other = solids[random.Below(static_cast<int>(solids.size()))];
+    if (one.hull.max_abs_coordinate() > 0x1p60 * other.hull.max_abs_coordinate()) continue;
+    if (other.hull.max_abs_coordinate() > 0x1p60 * one.hull.max_abs_coordinate()) continue;
+    const QueryHull a(one.hull);
+    const QueryHull b(other.hull);
+    Pose X_WA;
+    Pose X_WB;
+    for (double& q : X_WA.q) q = random.Real(-1, 1);
+    for (double& q : X_WB.q) q = random.Real(-1, 1);
+    const PlacedHull placed_a = PlacedHull::Make(a, X_WA).value();
+    const Vector start =
+        placed_a.rotated_center() - PlacedHull::Make(b, X_WB).value().rotated_center();
+    const double reach = a.radius() + b.radius();
+    X_WB.t = start + RandomOnSphere(random, 1, reach * random.Real(0, 1))[0];
+    const PlacedHull placed_b = PlacedHull::Make(b, X_WB).value();
+    QueryOptions options;
+    options.want_axis = true;
+    const RelationAnswer plain = FindRelation(placed_a, placed_b);
+    ASSERT_EQ(plain.relation, CheckCollision(placed_a, placed_b, options)->relation)
+        << one.name << ", " << other.name << " seed " << seed << " round " << round;
+    if (plain.rung == Rung::kBounds) ++settled[plain.relation == Relation::kOverlapping];
+  }
+  EXPECT_GT(settled[0], 300);
+  EXPECT_GT(settled[1], 300);
+}
+
+// Centres in one place, and hulls that touch along the line of their centres.
+TEST(CenterBounds, LimitsOfTheLineOfCentres) {
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  const QueryHull query_hull(cube);
+  const auto ask = [&](const Vector& t) {
+    Pose X_WB;
+    X_WB.t = t;
+    return FindRelation(PlacedHull::Make(query_hull, Pose()).value(),
+                        PlacedHull::Make(query_hull, X_WB).value())
+        .relation;
+  };
+  EXPECT_EQ(ask(Vector(0, 0, 0)), Relation::kOverlapping);
+  EXPECT_EQ(ask(Vector(0x1p-1000, 0, 0)), Relation::kOverlapping);
+  for (const Vector& d : {Vector(1, 0, 0), Vector(0, -1, 0), Vector(1, 1, 0), Vector(-1, 1, 1)}) {
+    EXPECT_EQ(ask((1 - 0x1p-50) * d), Relation::kOverlapping);
+    EXPECT_EQ(ask(0.5 * d), Relation::kOverlapping);
+    EXPECT_EQ(ask(d), Relation::kTouching);
+    EXPECT_EQ(ask((1 + 0x1p-50) * d), Relation::kSeparated);
+    EXPECT_EQ(ask(1.5 * d), Relation::kSeparated);
+  }
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,188 @@
+#include "core/query/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "core/query/box_tree.h"
+#include "tests/core/checks/oracle_bridge.h"
+#include "tests/core/checks/point_sets.h"
+
+namespace hulld {
+namespace {
+
+struct Scene {
+  std::deque<Hull> hulls;
+  std::deque<QueryHull> query_hulls;
+  std::vector<PlacedHull> placements;
+};
+
+// Hulls of all dimensions, an empty one among them, on a lattice where many touch.
+Scene MakeScene(uint64_t seed, int placements, int side) {
+  Random random(TestSeed(seed));
+  Scene scene;
+  scene.hulls.emplace_back();
+  for (int i = 0; i < 10; ++i) {
+    scene.hulls.push_back(BuildHull(RandomLatticePoints(random, random.Between(1, 12), 3)));
+    scene.hulls.push_back(BuildHull(RandomOnSphere(random, 60, 1.5)));
+  }
+  for (const Hull& hull : scene.hulls) scene.query_hulls.emplace_back(hull);
+  for (int i = 0; i < placements; ++i) {
+    Pose pose;
+    if (i % 3 == 0) pose.q = {2, 1, 0, 0};
+    pose.t = Vector(random.Below(side), random.Below(side), random.Below(side));
+    const auto hull = static_cast<size_t>(random.Below(static_cast<int>(scene.hulls.size())));
+    scene.placements.push_back(*PlacedHull::Make(scene.query_hulls[hull], pose));
+  }
+  return scene;
+}
+
+using Found = std::vector<std::pair<PlacedPair, Relation>>;
+
+Found Search(const Scene& scene, const SceneOptions& options, SceneTotals* totals) {
+  Found found;
+  const absl::StatusOr<SceneTotals> result =
+      FindCollisions(scene.placements, options, [&](std::span<const SceneAnswer> answers) {
+        for (const SceneAnswer& answer : answers) {
+          found.emplace_back(answer.pair, answer.answer->relation);
+        }
+      });
+  EXPECT_TRUE(result.ok()) << result.status();
+  *totals = *result;
+  return found;
+}
+
+template <typename IsAsked>
+Found BruteForce(const Scene& scene, IsAsked is_asked, uint64_t* asked) {
+  Found found;
+  *asked = 0;
+  for (uint32_t a = 0; a < scene.placements.size(); ++a) {
+    for (uint32_t b = a + 1; b < scene.placements.size(); ++b) {
+      if (!is_asked(a, b)) continue;
+      ++*asked;
+      const Relation relation = FindRelation(scene.placements[a], scene.placements[b]).relation;
+      if (relation != Relation::kSeparated) found.emplace_back(PlacedPair{a, b}, relation);
+    }
+  }
+  return found;
+}
+
+TEST(Scene, FindsWhatAllPairsFindInTheSameOrderOnAnyNumberOfThreads) {
+  const Scene scene = MakeScene(821, 700, 20);
+  uint64_t asked = 0;
+  const Found expected = BruteForce(
+      scene, [](uint32_t, uint32_t) { return true; }, &asked);
+  size_t touching = 0;
+  for (const auto& [pair, relation] : expected) touching += relation == Relation::kTouching;
+  EXPECT_GT(touching, 50u);
+  EXPECT_GT(expected.size() - touching, 50u);
+  for (const int threads : {1, 2, 8}) {
+    SceneOptions options;
+    options.threads = threads;
+    SceneTotals totals;
+    EXPECT_TRUE(Search(scene, options, &totals) == expected) << threads << " threads";
+    EXPECT_EQ(totals.pairs, asked);
+    EXPECT_EQ(totals.found, expected.size());
+    // The boxes leave few pairs.
+    EXPECT_LT(totals.candidates, asked / 20);
+    EXPECT_GE(totals.candidates, totals.found);
+  }
+}
+
+TEST(Scene, GroupsAndMoversLeaveOutTheirPairs) {
+  const Scene scene = MakeScene(822, 300, 9);
+  std::vector<uint32_t> groups;
+  for (uint32_t i = 0; i < 300; ++i) groups.push_back(i * i % 7);
+  // A pair named twice, or both ways, counts once.
+  const std::vector<GroupPair> ignored = {{0, 0}, {1, 2}, {2, 1}, {4, 4}, {9, 1}};
+  const auto is_ignored = [&](uint32_t a, uint32_t b) {
+    for (const auto& [first, second] : ignored) {
+      if (groups[a] == first && groups[b] == second) return true;
+      if (groups[a] == second && groups[b] == first) return true;
+    }
+    return false;
+  };
+  for (const uint32_t movers : {0u, 1u, 37u, 300u, 1000u}) {
+    SceneOptions options;
+    options.groups = groups;
+    options.ignored_groups = ignored;
+    options.movers = movers;
+    uint64_t asked = 0;
+    const Found expected = BruteForce(
+        scene, [&](uint32_t a, uint32_t b) { return a < movers && !is_ignored(a, b); }, &asked);
+    SceneTotals totals;
+    EXPECT_TRUE(Search(scene, options, &totals) == expected) << movers << " movers";
+    EXPECT_EQ(totals.pairs, asked);
+    EXPECT_EQ(expected.empty(), movers == 0);
+  }
+}
+
+TEST(Scene, RefusesGroupsThatAreNotOneForEachPlacement) {
+  const Scene scene = MakeScene(823, 3, 3);
+  const std::vector<uint32_t> groups = {0, 1};
+  SceneOptions options;
+  options.groups = groups;
+  const auto result = FindCollisions(scene.placements, options, [](auto) { FAIL(); });
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(Scene, CancellationEndsTheSearch) {
+  const Scene scene = MakeScene(824, 700, 6);
+  std::atomic<int> polls = 0;
+  int limit = std::numeric_limits<int>::max();
+  SceneOptions options;
+  options.query.should_stop = [&] { return ++polls > limit; };
+  size_t emitted = 0;
+  const auto emit = [&](std::span<const SceneAnswer> answers) { emitted += answers.size(); };
+  ASSERT_TRUE(FindCollisions(scene.placements, options, emit).ok());
+  const size_t all = emitted;
+  limit = polls * 3 / 4;
+  polls = 0;
+  emitted = 0;
+  const auto result = FindCollisions(scene.placements, options, emit);
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_GT(emitted, 0u);
+  EXPECT_LT(emitted, all);
+}
+
+TEST(Scene, BoxesHoldTheirHullsAtEveryScale) {
+  Random random(TestSeed(825));
+  for (const double scale : {1e-305, 1e-100, 1e-3, 1.0, 1e80, 1e300}) {
+    for (const double offset : {0.0, 1.0, 1e15}) {
+      if (!std::isfinite(offset * scale)) continue;
+      const Hull ball = BuildHull(Scaled(RandomOnSphere(random, 100, 1), scale));
+      const QueryHull query(ball);
+      Pose pose;
+      pose.q = {random.Real(-1, 1), random.Real(-1, 1), random.Real(-1, 1), 0.5};
+      pose.t = Vector(offset * scale, -offset * scale, 0);
+      const PlacedHull placed = *PlacedHull::Make(query, pose);
+      const Box box = BoundingBox(placed);
+      // A plate beyond each side of the box is not entered.
+      for (int axis = 0; axis < 3; ++axis) {
+        for (const double side : {-1.0, 1.0}) {
+          const double bound = side < 0 ? box.low[axis] : box.high[axis];
+          if (!std::isfinite(bound)) continue;
+          std::vector<Vector> plate;
+          const double reach = 4 * scale * (1 + offset);
+          for (int corner = 0; corner < 8; ++corner) {
+            Vector v;
+            v[axis] = corner & 1 ? bound : bound + side * reach;
+            v[(axis + 1) % 3] = corner & 2 ? reach : -reach;
+            v[(axis + 2) % 3] = corner & 4 ? reach : -reach;
+            plate.push_back(v);
+          }
+          const Hull beyond = BuildHull(plate);
+          EXPECT_NE(CheckCollision(ball, pose, beyond, Pose())->relation, Relation::kOverlapping);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hulld

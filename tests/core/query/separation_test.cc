@@ -1,0 +1,277 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/query/collision.h"
+#include "tests/core/checks/oracle_bridge.h"
+#include "tests/core/checks/point_sets.h"
+#include "tests/core/checks/separation_check.h"
+
+namespace hulld {
+namespace {
+
+#ifdef HULLD_SANITIZED
+constexpr int kRounds = 240;
+constexpr int kLargeRounds = 4;
+#else
+constexpr int kRounds = 1200;
+constexpr int kLargeRounds = 40;
+#endif
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kLargest = std::numeric_limits<double>::max();
+constexpr double kLeast = std::numeric_limits<double>::denorm_min();
+
+Pose At(double x, double y, double z) {
+  Pose pose;
+  pose.t = Vector(x, y, z);
+  return pose;
+}
+
+Pose RandomPose(Random& random, double reach) {
+  Pose pose;
+  for (double& q : pose.q) q = random.Real(-1, 1);
+  for (int k = 0; k < 3; ++k) pose.t[k] = random.Real(-reach, reach);
+  return pose;
+}
+
+Answer Ask(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB,
+           std::optional<double> max_error = std::nullopt) {
+  return CheckCollision(a, X_WA, b, X_WB, WantSeparation(max_error)).value();
+}
+
+TEST(Separation, CubesHaveTheLengthsOneExpects) {
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  SeparationCheck check;
+  const struct {
+    Pose X_WB;
+    double separation;
+  } kCases[] = {{At(1.5, 0, 0), 0.5},       {At(4, 5, 0), 5},
+                {At(3, 3, 2), 3},           {At(1, 0.5, 0.5), 0},
+                {At(1, 1, 1), 0},           {At(0, 0, 0), -1},
+                {At(0.75, 0.25, 0), -0.25}, {At(0.5, 0.5, 0.875), -0.125}};
+  for (const auto& [X_WB, separation] : kCases) {
+    const Answer exact = Ask(cube, Pose(), cube, X_WB, 0);
+    EXPECT_EQ(exact.separation->value, separation);
+    EXPECT_LE(exact.separation->bound, 0x1p-51 * std::abs(separation));
+    const Answer answer = Ask(cube, Pose(), cube, X_WB);
+    EXPECT_NEAR(answer.separation->value, separation, 1e-11);
+    EXPECT_TRUE(check.Ask(cube, Pose(), cube, X_WB));
+    EXPECT_TRUE(check.Ask(cube, Pose(), cube, X_WB, 0));
+  }
+}
+
+TEST(Separation, EmptyHullsAreInfinitelyFar) {
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  QueryOptions options = WantSeparation();
+  options.clearance = kInfinity;
+  const Answer answer = CheckCollision(cube, Pose(), Hull(), Pose(), options).value();
+  EXPECT_EQ(answer.separation->value, kInfinity);
+  EXPECT_FALSE(answer.witness.has_value());
+  EXPECT_EQ(answer.within_clearance, false);
+}
+
+TEST(Separation, WhatNoDoubleHoldsSaturates) {
+  const Hull far_left = BuildHull(std::vector<Vector>{{-kLargest, 0, 0}, {-kLargest, 1, 0}});
+  const Hull far_right = BuildHull(std::vector<Vector>{{kLargest, 0, 0}});
+  const Answer far = Ask(far_left, Pose(), far_right, Pose());
+  EXPECT_EQ(far.separation->value, kLargest);
+  EXPECT_EQ(far.separation->bound, kInfinity);
+  const Hull slab = BuildHull(std::vector<Vector>{{-kLargest, -kLargest, -kLargest},
+                                                  {kLargest, -kLargest, -kLargest},
+                                                  {0, kLargest, -kLargest},
+                                                  {0, 0, kLargest}});
+  const Answer deep = Ask(slab, Pose(), slab, Pose());
+  EXPECT_EQ(deep.relation, Relation::kOverlapping);
+  EXPECT_LT(deep.separation->value, -1e308);
+  EXPECT_GT(deep.separation->bound, 0);
+}
+
+TEST(Separation, TheLeastDoubleKeepsItsSign) {
+  const Hull point = BuildHull(std::vector<Vector>{{0, 0, 0}});
+  const Answer near = Ask(point, Pose(), point, At(kLeast, 0, 0));
+  EXPECT_EQ(near.separation->value, kLeast);
+  // Turned, it is a third of that along each axis; a length that no double holds.
+  const Hull needle = BuildHull(std::vector<Vector>{{0, 0, 0}, {1, 1, 1}});
+  Pose turned;
+  turned.q = {1, 0.3, 0.2, 0.1};
+  const Answer tiny = Ask(needle, turned, point, At(kLeast, 0, 0), 0);
+  EXPECT_EQ(tiny.relation, Relation::kSeparated);
+  EXPECT_EQ(tiny.separation->value, kLeast);
+  EXPECT_GT(tiny.separation->bound, 0);
+}
+
+std::vector<Vector> SmallSet(Random& random, int most) {
+  return random.Below(2) ? RandomLatticePoints(random, random.Between(1, most), 4)
+                         : RandomFlatPoints(random, random.Between(1, most), random.Below(4));
+}
+
+// Half of the pairs share a pose and a vertex: touching, or overlapping where B reaches into A.
+TEST(Separation, SmallHullsOfEveryDimensionMatchBruteForce) {
+  const uint64_t seed = TestSeed(711);
+  Random random(seed);
+  SeparationCheck check;
+  for (int round = 0; round < kRounds; ++round) {
+    const double scale = std::array{1e-300, 1e-30, 1.0, 1.0, 1.0, 1e30, 1e290}[random.Below(7)];
+    const Vector middle = Vector::Constant(-1.5);
+    const std::vector<Vector> first = Shifted(SmallSet(random, 6), middle);
+    std::vector<Vector> second = Shifted(SmallSet(random, 6), middle);
+    const Pose X_WA = RandomPose(random, scale);
+    Pose X_WB = X_WA;
+    if (random.Below(2)) {
+      second = Shifted(second, first[random.Below(first.size())] - second[0]);
+    } else {
+      X_WB = RandomPose(random, scale);
+    }
+    const Hull a = BuildHull(Scaled(first, scale));
+    const Hull b = BuildHull(Scaled(second, scale));
+    std::optional<double> max_error;
+    if (random.Below(3) == 0) max_error = random.Below(2) ? 0 : 1e-3 * scale;
+    ASSERT_TRUE(check.Ask(a, X_WA, b, X_WB, max_error)) << "seed " << seed << " round " << round;
+  }
+  for (const Relation r : {Relation::kSeparated, Relation::kTouching, Relation::kOverlapping}) {
+    EXPECT_GT(check.count(r), kRounds / 40) << Name(r);
+  }
+  EXPECT_GT(check.exact_count(), kRounds / 5);
+  EXPECT_GT(check.float_count(), kRounds / 20);
+}
+
+// Needles, plates and offsets in the poses and in the hulls' own frames, which only exact
+// arithmetic survives.
+TEST(Separation, NeedlesPlatesAndOffsetsMatchBruteForce) {
+  const uint64_t seed = TestSeed(712);
+  Random random(seed);
+  SeparationCheck check;
+  for (int round = 0; round < kRounds / 2; ++round) {
+    const double local = std::array{0.0, 0.0, 1e6, 1e15}[random.Below(4)];
+    const auto points = [&] {
+      std::vector<Vector> set = RandomInCube(random, random.Between(2, 6), 1);
+      const Vector stretch(1, std::pow(10.0, random.Between(-9, 0)),
+                           std::pow(10.0, random.Between(-9, 0)));
+      for (Vector& p : set) p = p.cwiseProduct(stretch);
+      return Shifted(set, Vector(local, -local, 0));
+    };
+    Pose X_WA = RandomPose(random, 1);
+    Pose X_WB = random.Below(2) ? X_WA : RandomPose(random, 1);
+    const Vector offset = Vector::Constant(std::array{0.0, 1e6, 1e15}[random.Below(3)]);
+    X_WA.t += offset;
+    X_WB.t += offset;
+    ASSERT_TRUE(check.Ask(BuildHull(points()), X_WA, BuildHull(points()), X_WB))
+        << "seed " << seed << " round " << round;
+  }
+  EXPECT_GT(check.count(Relation::kSeparated), kRounds / 40);
+  EXPECT_GT(check.count(Relation::kOverlapping), kRounds / 240);
+  EXPECT_GT(check.exact_count(), kRounds / 120);
+  EXPECT_GT(check.float_count(), kRounds / 120);
+}
+
+// Whether two answers to one question can both be right.
+testing::AssertionResult Agree(const Separation& a, const Separation& b) {
+  if (std::abs(a.value - b.value) <= a.bound + b.bound) return testing::AssertionSuccess();
+  return testing::AssertionFailure()
+         << a.value << " +- " << a.bound << ", " << b.value << " +- " << b.bound;
+}
+
+// Larger hulls than brute force can do: floating point against the exact walk, which the tests
+// above check.
+TEST(Separation, FloatingPointAgreesWithExactArithmeticOnLargerHulls) {
+  const uint64_t seed = TestSeed(713);
+  Random random(seed);
+  int overlapping = 0;
+  int in_floating_point = 0;
+  for (int round = 0; round < kLargeRounds; ++round) {
+    const int n = std::array{16, 64, 300}[round % 3];
+    const Hull a = BuildHull(round % 2 ? RandomOnSphere(random, n, 1) : RandomInCube(random, n, 1));
+    const Hull b = BuildHull(RandomInBall(random, n, 1));
+    const Pose X_WA = RandomPose(random, 0.1);
+    const Pose X_WB = RandomPose(random, random.Below(2) ? 0.9 : 4);
+    const Answer rough = Ask(a, X_WA, b, X_WB);
+    const Answer exact = Ask(a, X_WA, b, X_WB, 0);
+    EXPECT_TRUE(Agree(*rough.separation, *exact.separation))
+        << "seed " << seed << " round " << round;
+    EXPECT_LE(rough.separation->bound, 1e-12 * (4 + std::abs(rough.separation->value)));
+    EXPECT_LE(exact.separation->bound, 0x1p-51 * std::abs(exact.separation->value));
+    const double apart = (rough.witness->p_WA - rough.witness->p_WB).norm();
+    EXPECT_NEAR(apart, std::abs(exact.separation->value), 1e-11);
+    overlapping += rough.relation == Relation::kOverlapping;
+    in_floating_point += rough.separation->bound > exact.separation->bound;
+  }
+  EXPECT_GT(overlapping, kLargeRounds / 5);
+  EXPECT_GE(in_floating_point, kLargeRounds - 1);
+}
+
+TEST(Separation, ACacheChangesNeitherValueNorBound) {
+  const uint64_t seed = TestSeed(714);
+  Random random(seed);
+  int cached = 0;
+  for (int round = 0; round < kLargeRounds; ++round) {
+    const Hull hulls[2] = {BuildHull(RandomInBall(random, 60, 1)),
+                           BuildHull(RandomInBall(random, 60, 1))};
+    const QueryHull a(hulls[0]);
+    const QueryHull b(hulls[1]);
+    const PlacedHull placed_a = PlacedHull::Make(a, RandomPose(random, 0.1)).value();
+    Pose X_WB = RandomPose(random, 1.2);
+    PairCache cache;
+    for (int step = 0; step < 5; ++step) {
+      X_WB.t.x() += 0.01;
+      const PlacedHull placed_b = PlacedHull::Make(b, X_WB).value();
+      const Answer warm = CheckCollision(placed_a, placed_b, WantSeparation(), &cache).value();
+      const Answer cold = CheckCollision(placed_a, placed_b, WantSeparation()).value();
+      EXPECT_EQ(warm.separation->value, cold.separation->value);
+      EXPECT_EQ(warm.separation->bound, cold.separation->bound);
+      cached += warm.rung == Rung::kCached;
+    }
+  }
+  EXPECT_GT(cached, kLargeRounds);
+}
+
+TEST(Separation, TheTextbookMethodGivesTheSame) {
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  QueryOptions textbook = WantSeparation();
+  textbook.method = Method::kTextbookSat;
+  for (const double x : {0.3, 1.0, 1.7}) {
+    const Answer expected = Ask(cube, Pose(), cube, At(x, 0.1, 0));
+    const Answer answer = CheckCollision(cube, Pose(), cube, At(x, 0.1, 0), textbook).value();
+    EXPECT_EQ(answer.separation->value, expected.separation->value);
+    EXPECT_EQ(answer.witness->p_WB, expected.witness->p_WB);
+  }
+}
+
+TEST(Separation, OptionsThatMeanNothingAreRefused) {
+  const Hull cube = BuildHull(LatticeCube(2, 1));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto message = [&](auto change) {
+    QueryOptions options;
+    change(options);
+    const absl::Status status = CheckCollision(cube, Pose(), cube, Pose(), options).status();
+    return status.code() == absl::StatusCode::kInvalidArgument ? std::string(status.message())
+                                                               : status.ToString();
+  };
+  EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = nan; }), "tolerance is NaN");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = -1; }), "tolerance is negative");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = nan; }), "max_error is NaN");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = -kLeast; }), "max_error is negative");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.clearance = nan; }), "clearance is NaN");
+  const auto with_tolerance = [&](auto change) {
+    return message([&](QueryOptions& o) {
+      o.tolerance = 1;
+      change(o);
+    });
+  };
+  const std::string rest = " needs the relation, which a tolerance > 0 may leave open; ask with 0";
+  EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_separation = true; }),
+            "the separation" + rest);
+  EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_certificate = true; }),
+            "the certificate" + rest);
+  EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.clearance = 0; }), "the clearance" + rest);
+  EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.method = Method::kTextbookSat; }),
+            "the textbook method" + rest);
+  EXPECT_EQ(message([](QueryOptions& o) { o.max_error = kInfinity; }), "OK");
+}
+
+}  // namespace
+}  // namespace hulld

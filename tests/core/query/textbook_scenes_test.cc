@@ -1,0 +1,111 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "core/hull/audit.h"
+#include "core/query/collision.h"
+#include "tests/core/checks/oracle_bridge.h"
+#include "tests/core/checks/point_sets.h"
+#include "tests/core/checks/relation_check.h"
+
+namespace hulld {
+namespace {
+
+// The scenes of the coursework that this project grew from, with poses that make the answer known:
+// each hull is shifted so that one of its vertices is exactly the origin. The textbook runs on the
+// hulls of at most this many vertices.
+constexpr size_t kTextbookVertices = 70;
+
+Pose At(const Vector& t) {
+  Pose pose;
+  pose.t = t;
+  return pose;
+}
+
+// The vertex of largest, or of least, x. Vertices are sorted by x first.
+const Vector& Rightmost(const Hull& hull) { return hull.vertices().back(); }
+const Vector& Leftmost(const Hull& hull) { return hull.vertices().front(); }
+
+void Expect(const Hull& a, const Pose& X_WA, const Hull& b, const Pose& X_WB, Relation expected,
+            const char* scene) {
+  const bool small = std::max(a.vertices().size(), b.vertices().size()) <= kTextbookVertices;
+  RelationCheck check;
+  EXPECT_TRUE(check.Ask(a, X_WA, b, X_WB, expected,
+                        small ? RelationCheck::kAllWays : RelationCheck::kSearchOnly))
+      << scene;
+#ifndef HULLD_SANITIZED
+  EXPECT_STREQ(Name(OracleRelation(a, X_WA, b, X_WB)), Name(expected)) << scene;
+#endif
+}
+
+// Two hulls far apart, overlapping plainly and barely, and exactly at the boundary: A's rightmost
+// vertex and B's leftmost both at the origin, with A in x <= 0 and B in x >= 0.
+void ExpectScenes(const Hull& a, const Hull& b) {
+  const Vector at_a = -Rightmost(a);
+  const Vector at_b = -Leftmost(b);
+  const double width = Rightmost(a).x() - Leftmost(a).x() + Rightmost(b).x() - Leftmost(b).x();
+  Expect(a, At(at_a), b, At(at_b), Relation::kTouching, "exactly at the boundary");
+  Expect(a, At(at_a), b, At(at_b + Vector(width, 0, 0)), Relation::kSeparated, "far apart");
+  Pose apart = At(at_b);
+  apart.t.x() = std::nextafter(apart.t.x(), 2 * std::abs(apart.t.x()) + 1);
+  Expect(a, At(at_a), b, apart, Relation::kSeparated, "one unit in the last place apart");
+
+  // Towards the other's centre, by about a tenth and by about 2^-40 of the size.
+  const auto centre = [](const Hull& hull) {
+    Vector sum = Vector::Zero();
+    for (const Vector& p : hull.vertices()) sum += p;
+    return Vector(sum / static_cast<double>(hull.vertices().size()));
+  };
+  // From B's centre to A's, each relative to the common origin: an inner direction of A - B.
+  const Vector inward = (centre(a) + at_a) - (centre(b) + at_b);
+  Expect(a, At(at_a), b, At(at_b + 0.9 * inward), Relation::kOverlapping, "overlapping plainly");
+  Expect(a, At(at_a), b, At(at_b + 0x1p-40 * inward), Relation::kOverlapping, "overlapping barely");
+  // The common pose changes nothing when it turns both by a quarter.
+  Pose turned_a = At(Vector(at_a.x(), -at_a.z(), at_a.y()));
+  Pose turned_b = At(Vector(at_b.x(), -at_b.z(), at_b.y()));
+  turned_a.q = turned_b.q = {1, 1, 0, 0};
+  Expect(a, turned_a, b, turned_b, Relation::kTouching, "at the boundary, turned");
+}
+
+TEST(TextbookScenes, OneMesh) {
+  const std::optional<std::vector<Vector>> mesh = MeshVertices("spot.obj");
+  if (!mesh) GTEST_SKIP() << "skipped: no data";
+  const Hull hull = BuildHull(*mesh);
+  EXPECT_EQ(hull.dimension(), 3);
+  EXPECT_TRUE(AuditHull(hull).ok());
+  Expect(hull, Pose(), hull, Pose(), Relation::kOverlapping, "a mesh and itself");
+}
+
+TEST(TextbookScenes, TwoCopiesOfAMesh) {
+  const std::optional<std::vector<Vector>> mesh = MeshVertices("spot.obj");
+  if (!mesh) GTEST_SKIP() << "skipped: no data";
+  const Hull hull = BuildHull(*mesh);
+  ExpectScenes(hull, hull);
+}
+
+TEST(TextbookScenes, ThreeThousandRandomPointsInABall) {
+  Random random(801);
+  const Hull hull = BuildHull(RandomInBall(random, 3000, 1));
+  ExpectScenes(hull, hull);
+}
+
+TEST(TextbookScenes, AHundredRandomPointsInABall) {
+  Random random(802);
+  const Hull hull = BuildHull(RandomInBall(random, 100, 1));
+  ASSERT_LE(hull.vertices().size(), kTextbookVertices);
+  ExpectScenes(hull, hull);
+}
+
+TEST(TextbookScenes, TwoRandomBalls) {
+  Random random(803);
+  const Hull large = BuildHull(RandomInBall(random, 3000, 2));
+  const Hull small = BuildHull(RandomInBall(random, 100, 1));
+  ExpectScenes(large, small);
+  const Hull other = BuildHull(RandomInBall(random, 60, 1.5));
+  ExpectScenes(small, other);
+}
+
+}  // namespace
+}  // namespace hulld

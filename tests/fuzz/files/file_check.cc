@@ -1,0 +1,322 @@
+#include "tests/fuzz/files/file_check.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <google/protobuf/message.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "client/formats/byte_source.h"
+#include "client/formats/mesh_file.h"
+#include "client/formats/point_file.h"
+#include "client/hullctl/command_line/batch_file.h"
+#include "client/hullctl/printing/json.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld::fuzz {
+namespace {
+
+constexpr char kName[] = "the file";
+constexpr size_t kSmallBlock = 2;
+
+// The content as a file that is open at its start.
+int OpenInMemory(std::string_view content) {
+  const int file = memfd_create("fuzz", 0);
+  if (file < 0) std::abort();
+  while (!content.empty()) {
+    const ssize_t written = write(file, content.data(), content.size());
+    if (written <= 0) std::abort();
+    content.remove_prefix(static_cast<size_t>(written));
+  }
+  lseek(file, 0, SEEK_SET);
+  return file;
+}
+
+std::string CheckRefusal(const absl::Status& status) {
+  const std::string message(status.message().data(), status.message().size());
+  if (absl::IsInvalidArgument(status) && message.rfind(kName, 0) == 0 &&
+      message.size() > sizeof(kName) + 3) {
+    return {};
+  }
+  return "a refusal that does not say what is wrong with which file: " + status.ToString();
+}
+
+using PointReader = absl::Status (*)(ByteSource*, PointCollector*);
+
+PointReader ReaderOf(FileKind kind) {
+  switch (kind) {
+    case FileKind::kObj:
+      return ReadObj;
+    case FileKind::kOff:
+      return ReadOff;
+    case FileKind::kPly:
+      return ReadPly;
+    case FileKind::kXyz:
+      return ReadXyz;
+    case FileKind::kCsv:
+      return ReadCsv;
+    case FileKind::kPcd:
+      return ReadPcd;
+    default:
+      return nullptr;
+  }
+}
+
+// All points of a file, as they were passed on.
+struct PointsRead {
+  absl::Status status;
+  ReadCounts counts;
+  std::vector<double> xyz;
+  std::string finding;
+};
+
+void Take(const PointBlock& block, size_t most, PointsRead* to) {
+  if (!block.xyz.empty() && !block.xyz_float.empty()) to->finding = "a block of two kinds";
+  if (block.size() == 0 || (most > 0 && block.size() > most)) to->finding = "a block of no size";
+  if ((block.xyz.size() + block.xyz_float.size()) % 3 != 0) to->finding = "a block tears a point";
+  to->xyz.insert(to->xyz.end(), block.xyz.begin(), block.xyz.end());
+  to->xyz.insert(to->xyz.end(), block.xyz_float.begin(), block.xyz_float.end());
+}
+
+PointsRead ReadPointsOf(PointReader reader, std::string_view content, const ReadOptions& options) {
+  PointsRead read;
+  PointCollector points(options, [&](const PointBlock& block) {
+    Take(block, options.points_per_block, &read);
+    return absl::OkStatus();
+  });
+  ByteSource source(OpenInMemory(content), kName);
+  read.status = reader(&source, &points);
+  if (read.status.ok()) read.status = points.Flush();
+  read.counts = points.counts();
+  const auto is_finite = [](double x) { return std::isfinite(x); };
+  if (!read.finding.empty()) return read;
+  if (!std::all_of(read.xyz.begin(), read.xyz.end(), is_finite)) {
+    read.finding = "a point that is not finite was passed on";
+  } else if (!read.status.ok()) {
+    read.finding = CheckRefusal(read.status);
+  } else if (3 * read.counts.points != read.xyz.size()) {
+    read.finding = absl::StrCat(read.counts.points, " points counted, but ", read.xyz.size(),
+                                " coordinates passed on");
+  }
+  return read;
+}
+
+FileVerdict CheckPoints(PointReader reader, std::string_view content) {
+  const PointsRead whole = ReadPointsOf(reader, content, {});
+  if (!whole.finding.empty()) return {whole.finding, false};
+  ReadOptions options;
+  options.points_per_block = kSmallBlock;
+  const PointsRead pieces = ReadPointsOf(reader, content, options);
+  if (!pieces.finding.empty()) return {pieces.finding, false};
+  if (pieces.status != whole.status) return {"the size of blocks decides what is refused", false};
+  if (whole.status.ok() && pieces.xyz != whole.xyz) {
+    return {"the size of blocks changes the points", false};
+  }
+  options.skip_nonfinite = true;
+  const PointsRead lenient = ReadPointsOf(reader, content, options);
+  if (!lenient.finding.empty()) return {lenient.finding, false};
+  if (whole.status.ok() && (lenient.counts.skipped > 0 || lenient.xyz != whole.xyz)) {
+    return {"points are skipped although all are finite", false};
+  }
+  return {"", whole.status.ok()};
+}
+
+FileVerdict CheckMesh(absl::Status (*reader)(ByteSource*, TriangleMesh*),
+                      std::string_view content) {
+  ByteSource source(OpenInMemory(content), kName);
+  TriangleMesh mesh;
+  const absl::Status status = reader(&source, &mesh);
+  if (!status.ok()) return {CheckRefusal(status), false};
+  for (const auto& vertex : mesh.vertices) {
+    for (const double x : vertex) {
+      if (!std::isfinite(x)) return {"a vertex is not finite", false};
+    }
+  }
+  for (const auto& triangle : mesh.triangles) {
+    for (const uint32_t index : triangle) {
+      if (index >= mesh.vertices.size()) return {"a triangle without a vertex", false};
+    }
+  }
+  return {"", true};
+}
+
+FileVerdict CheckBatchFile(std::string_view content) {
+  ByteSource source(OpenInMemory(content), kName);
+  const absl::StatusOr<BatchScene> scene = ReadBatchFile(&source);
+  if (!scene.ok()) return {CheckRefusal(scene.status()), false};
+  if (scene->names.size() != scene->placements.size()) return {"names without placement", false};
+  for (const auto& [a, b] : scene->pairs) {
+    if (a >= scene->placements.size() || b >= scene->placements.size()) {
+      return {"a pair without a placement", false};
+    }
+  }
+  return {"", true};
+}
+
+// What reads back must be the same bits, NaN included.
+std::string CheckRoundTrip(const google::protobuf::Message& message) {
+  const std::string json = MessageJson(message);
+  const std::unique_ptr<google::protobuf::Message> again(message.New());
+  const absl::Status parsed = ParseJson(json, UnknownFields::kRefuse, again.get());
+  if (!parsed.ok()) return "what was written cannot be read: " + parsed.ToString() + json;
+  if (again->SerializeAsString() != message.SerializeAsString()) {
+    return "what was written reads back as something else: " + json;
+  }
+  return {};
+}
+
+FileVerdict CheckJson(std::string_view content, google::protobuf::Message* message) {
+  const absl::Status parsed = ParseJson(std::string(content), UnknownFields::kRefuse, message);
+  if (parsed.ok()) return {CheckRoundTrip(*message), true};
+  const bool explained = absl::IsInvalidArgument(parsed) && !parsed.message().empty();
+  return {explained ? "" : "JSON refused without a word: " + parsed.ToString(), false};
+}
+
+// As `hullctl verify` reads it.
+FileVerdict CheckAnswer(std::string_view content) {
+  const std::string json(content);
+  v1::CheckCollisionRequest request;
+  v1::CheckCollisionResponse response;
+  absl::Status status = ParseMember(json, "request", &request);
+  if (status.ok()) status = ParseJson(json, UnknownFields::kIgnore, &response);
+  if (!status.ok()) {
+    const bool explained = absl::IsInvalidArgument(status) && !status.message().empty();
+    return {explained ? "" : "an answer refused without a word: " + status.ToString(), false};
+  }
+  std::string finding = CheckRoundTrip(request);
+  if (finding.empty()) finding = CheckRoundTrip(response);
+  return {finding, true};
+}
+
+}  // namespace
+
+FileVerdict CheckFile(FileKind kind, std::string_view content) {
+  if (const PointReader reader = ReaderOf(kind); reader != nullptr) {
+    return CheckPoints(reader, content);
+  }
+  switch (kind) {
+    case FileKind::kObjMesh:
+      return CheckMesh(ReadObjMesh, content);
+    case FileKind::kOffMesh:
+      return CheckMesh(ReadOffMesh, content);
+    case FileKind::kBatch:
+      return CheckBatchFile(content);
+    case FileKind::kAnswerJson:
+      return CheckAnswer(content);
+    case FileKind::kStreamJson: {
+      v1::CollisionStreamOpen message;
+      return CheckJson(content, &message);
+    }
+    default: {
+      v1::FindCollisionsRequest message;
+      return CheckJson(content, &message);
+    }
+  }
+}
+
+std::vector<SeedFile> SeedFiles() {
+  const std::string packed(48, '\x3f');
+  return {
+      {FileKind::kObj, "# c\no a\nv 1 2 3 1\nv -4e-3 5 .6\nvn 0 0 1\nf 1 2 \\\n 1\n"},
+      {FileKind::kOff, "OFF\n2 1 0\n1 2 3\n4 5 6\n3 0 1 1\n"},
+      {FileKind::kOff, "COFF\n# c\n1 0 0\n1 2 3 0 0 0 1\n"},
+      {FileKind::kPly,
+       "ply\nformat ascii 1.0\ncomment c\nelement vertex 2\nproperty float x\nproperty float y\n"
+       "property list uchar int l\nproperty double z\nend_header\n1 2 1 9 3\n4 5 0 6\n"},
+      {FileKind::kPly,
+       "ply\nformat binary_little_endian 1.0\nelement a 2\nproperty list uchar uchar l\n"
+       "element vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n" +
+           std::string("\x02zz\x00", 4) + packed},
+      {FileKind::kPly,
+       "ply\nformat binary_big_endian 1.0\nelement vertex 2\nproperty double x\nproperty short y\n"
+       "property uint z\nend_header\n" +
+           packed},
+      {FileKind::kXyz, "1 2 3\n4\t5 6 255 0 0\n\n# c\n-0 1e308 5e-324\n"},
+      {FileKind::kCsv, "t,x,y,\"z\"\n0,1,2,3\n1,\"4\",5,6\n"},
+      {FileKind::kCsv, "1;2;3\n4;5;6\n"},
+      {FileKind::kPcd,
+       "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
+       "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n1 2 3\nnan nan nan\n"},
+      {FileKind::kPcd,
+       "FIELDS x y z w\nSIZE 4 4 4 8\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\n"
+       "POINTS 2\nDATA binary\n" +
+           packed},
+      {FileKind::kObjMesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1/1 2//2 -1/3/3 4\n"},
+      {FileKind::kOffMesh, "OFF 3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n"},
+      {FileKind::kBatch,
+       "# c\nplace a arm\nplace b box 1 2 3\nplace c box 1 0 0 0 1 2 3\n"
+       "pair a b\npair b c # d\n"},
+      {FileKind::kBatch, "place a arm\nplace b arm 1 0 0\nall\n"},
+      {FileKind::kSceneJson,
+       R"({"placements":[{"hullId":"a"},{"hullId":"b","pose":{"translation":{"x":2}}},)"
+       R"({"hullId":"b","pose":{"rotation":{"w":1,"z":"NaN"}}}],"groups":[0,1,1],)"
+       R"("ignoreSameGroup":true,"movers":1,"wanted":{"clearance":0.1}})"},
+      {FileKind::kAnswerJson,
+       R"({"request":{"a":{"hullId":"a"},"b":{"hullId":"b"}},"header":{"storeId":"s",)"
+       R"("revision":"4"},"relation":"RELATION_TOUCHING","rung":4,"certificate":{"direction":)"
+       R"({"x":1},"pairs":[{"indexA":4,"vertexA":{"x":1e308}}]},"withinClearance":false})"},
+      {FileKind::kStreamJson,
+       R"({"placements":[{"hullId":"a"},{"hullId":"b"}],"pairs":[0,1],"onlyChanges":true})"},
+  };
+}
+
+const std::vector<std::string>& FileTokens() {
+  static const auto* const tokens = new std::vector<std::string>{"nan",
+                                                                 "-inf",
+                                                                 "1e308",
+                                                                 "1e309",
+                                                                 "-0",
+                                                                 "5e-324",
+                                                                 "0x1p3",
+                                                                 "1,5",
+                                                                 "\xef\xbb\xbf",
+                                                                 "\r",
+                                                                 "\r\n",
+                                                                 "\\\n",
+                                                                 "18446744073709551615",
+                                                                 "4294967296",
+                                                                 "-1",
+                                                                 "#",
+                                                                 "\"",
+                                                                 ";",
+                                                                 "\t",
+                                                                 "element vertex 9\n",
+                                                                 "property list uint double l\n",
+                                                                 "property float x\n",
+                                                                 "end_header\n",
+                                                                 "format binary_big_endian 1.0\n",
+                                                                 "DATA binary\n",
+                                                                 "DATA binary_compressed\n",
+                                                                 "POINTS 3\n",
+                                                                 "COUNT 4000000000 1 1\n",
+                                                                 "SIZE 8 8 8\n",
+                                                                 "TYPE U F I\n",
+                                                                 "f 1 2 3\n",
+                                                                 "v 1 2\n",
+                                                                 "f -9\n",
+                                                                 "OFF\n",
+                                                                 "STCOFF\n",
+                                                                 "all\n",
+                                                                 "place a b 1 2\n",
+                                                                 "pair a a\n",
+                                                                 "{",
+                                                                 "[",
+                                                                 "}",
+                                                                 "]",
+                                                                 "\"NaN\"",
+                                                                 "null",
+                                                                 "\\u0000",
+                                                                 "\\ud800",
+                                                                 "\"hullId\":",
+                                                                 "x,y,z\n",
+                                                                 std::string(1, '\0'),
+                                                                 std::string(300, '1'),
+                                                                 std::string(120, '[')};
+  return *tokens;
+}
+
+}  // namespace hulld::fuzz

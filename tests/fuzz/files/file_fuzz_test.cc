@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/core/checks/point_sets.h"
+#include "tests/fuzz/files/file_check.h"
+
+namespace hulld::fuzz {
+namespace {
+
+// The fuzzer's target without the fuzzer: as many inputs on every run, from a fixed seed.
+#ifdef HULLD_SANITIZED
+constexpr int kChangesPerSeed = 300;
+#else
+constexpr int kChangesPerSeed = 1500;
+#endif
+
+size_t Place(Random& random, const std::string& content) {
+  return static_cast<size_t>(random.Below(static_cast<int>(content.size()) + 1));
+}
+
+void Change(Random& random, std::string* content) {
+  const size_t at = Place(random, *content);
+  switch (random.Below(5)) {
+    case 0:
+      if (at < content->size()) (*content)[at] = static_cast<char>(random.Below(256));
+      return;
+    case 1:
+      content->erase(at, static_cast<size_t>(random.Below(9)));
+      return;
+    case 2:
+      content->resize(at);
+      return;
+    case 3:
+      content->insert(at, content->substr(Place(random, *content), 12));
+      return;
+    default: {
+      const std::vector<std::string>& tokens = FileTokens();
+      content->insert(at,
+                      tokens[static_cast<size_t>(random.Below(static_cast<int>(tokens.size())))]);
+    }
+  }
+}
+
+TEST(FileFuzz, SeedsAreRead) {
+  for (const SeedFile& seed : SeedFiles()) {
+    // One seed holds a point that only --skip-nonfinite lets pass.
+    if (seed.content.find("nan nan") != std::string::npos) continue;
+    const FileVerdict verdict = CheckFile(seed.kind, seed.content);
+    EXPECT_EQ(verdict.finding, "") << seed.content;
+    EXPECT_TRUE(verdict.read) << seed.content;
+  }
+}
+
+TEST(FileFuzz, ChangedFilesAreReadOrRefused) {
+  const uint64_t seed = TestSeed(701);
+  Random random(seed);
+  std::array<int, kFileKinds> read = {};
+  std::array<int, kFileKinds> refused = {};
+  for (const SeedFile& file : SeedFiles()) {
+    for (int i = 0; i < kChangesPerSeed; ++i) {
+      std::string content = file.content;
+      for (int changes = random.Between(1, 4); changes > 0; --changes) Change(random, &content);
+      const FileVerdict verdict = CheckFile(file.kind, content);
+      ASSERT_EQ(verdict.finding, "")
+          << "seed " << seed << " kind " << static_cast<int>(file.kind) << ":\n"
+          << testing::PrintToString(content);
+      ++(verdict.read ? read : refused)[static_cast<size_t>(file.kind)];
+    }
+  }
+  for (size_t kind = 0; kind < kFileKinds; ++kind) {
+    // Few changes leave JSON what it was.
+    EXPECT_GT(read[kind], kChangesPerSeed / 300) << kind;
+    EXPECT_GT(refused[kind], kChangesPerSeed / 5) << kind;
+  }
+}
+
+}  // namespace
+}  // namespace hulld::fuzz

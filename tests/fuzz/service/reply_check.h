@@ -1,0 +1,113 @@
+#ifndef HULLD_TESTS_FUZZ_SERVICE_REPLY_CHECK_H_
+#define HULLD_TESTS_FUZZ_SERVICE_REPLY_CHECK_H_
+
+#include <cstdint>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hulld/v1/collision.pb.h"
+#include "hulld/v1/hull.pb.h"
+
+namespace hulld::fuzz {
+
+// What the contract says of replies that end OK, whatever was asked. Each function returns what is
+// wrong with a reply, or nothing.
+
+std::string CheckHullInfo(const v1::HullInfo& hull);
+std::string CheckHull(const v1::GetHullRequest& request, const v1::GetHullResponse& response);
+std::string CheckPage(const v1::ListHullsRequest& request, const v1::ListHullsResponse& response);
+std::string CheckMesh(const v1::GetHullMeshRequest& request,
+                      std::span<const v1::GetHullMeshResponse> parts);
+std::string CheckPair(const v1::CheckCollisionRequest& request,
+                      const v1::CheckCollisionResponse& response);
+// Every pair is answered exactly once, in order.
+std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
+                       std::span<const v1::BatchCheckCollisionsResponse> parts);
+// Pairs ascend, each at most once, and the totals count them.
+std::string CheckScene(const v1::FindCollisionsRequest& request,
+                       std::span<const v1::FindCollisionsResponse> parts);
+
+// The relations of a batch, in the order of its pairs.
+std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts);
+
+// Follows one ReplaceHull call.
+class ReplaceCheck {
+ public:
+  // Every message, whether or not it could be sent.
+  void Sent(const v1::ReplaceHullRequest& request);
+  // What is wrong with a call that ended OK.
+  std::string EndedOk(const v1::ReplaceHullResponse& response) const;
+
+  const std::string& hull_id() const { return hull_id_; }
+  // Whether the call may end OK: an opening, points, and an empty block at the end.
+  bool is_whole() const { return well_formed_ && ends_; }
+  // Whether it may not, for want of that block alone.
+  bool is_cut_short() const { return well_formed_ && !ends_; }
+
+ private:
+  std::string hull_id_;
+  bool opened_ = false;
+  bool well_formed_ = true;
+  bool ends_ = false;
+  uint64_t points_ = 0;
+};
+
+// Follows one AppendPoints call.
+class AppendCheck {
+ public:
+  // Points of chunks in the order in which they were sent.
+  void Sent(const v1::AppendPointsRequest& request);
+  std::string Received(const v1::AppendPointsResponse& response);
+  // ok: how the call ended, after everything was read.
+  std::string Ended(bool ok) const;
+
+  const v1::AppendOpened& opened() const { return opened_; }
+  bool is_open() const { return open_; }
+  // The hull as the last reply told of it, but for its dimension; requires is_open().
+  const v1::HullInfo& hull() const { return hull_; }
+
+ private:
+  struct SentChunk {
+    uint64_t sequence = 0;
+    uint64_t points = 0;
+  };
+
+  std::vector<SentChunk> chunks_;
+  v1::AppendOpened opened_;
+  v1::HullInfo hull_;
+  bool open_ = false;
+  uint64_t received_ = 0;
+  uint64_t revision_ = 0;
+};
+
+// Follows one StreamCollisions call: what its client knows of the pairs.
+class CollisionStreamCheck {
+ public:
+  explicit CollisionStreamCheck(const v1::CollisionStreamOpen& open);
+
+  // Messages are numbered from 0, the opening one.
+  void Sent(const v1::CollisionStreamUpdate& update);
+  std::string Received(const v1::StreamCollisionsResponse& response);
+
+  // The question of a batch whose relations are those that the stream has told so far. Requires
+  // that every message was answered.
+  v1::BatchCheckCollisionsRequest AsBatch() const;
+  const std::vector<v1::Relation>& relations() const { return relations_; }
+  bool has_tolerance() const { return open_.tolerance() != 0; }
+
+ private:
+  v1::CollisionStreamOpen open_;
+  std::vector<v1::Relation> relations_;
+  uint64_t sent_ = 0;
+  // Where the answer that is being received stands.
+  uint64_t answering_ = 0;
+  bool starts_ = true;
+  uint32_t last_pair_ = 0;
+  bool any_pair_ = false;
+};
+
+}  // namespace hulld::fuzz
+
+#endif  // HULLD_TESTS_FUZZ_SERVICE_REPLY_CHECK_H_

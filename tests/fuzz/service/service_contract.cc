@@ -1,0 +1,79 @@
+#include "tests/fuzz/service/service_contract.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <set>
+
+namespace hulld::fuzz {
+namespace {
+
+using server::Rpc;
+using Codes = std::set<grpc::StatusCode>;
+
+// Beside OK, and what any call can end with.
+Codes CodesOf(Rpc rpc) {
+  switch (rpc) {
+    case Rpc::kCreateHull:
+      return {grpc::INVALID_ARGUMENT, grpc::ALREADY_EXISTS};
+    case Rpc::kAppendPoints:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::FAILED_PRECONDITION, grpc::ABORTED};
+    case Rpc::kReplaceHull:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
+    case Rpc::kGetHull:
+    case Rpc::kGetHullMesh:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
+    case Rpc::kListHulls:
+    case Rpc::kBatchCheckCollisions:
+    case Rpc::kStreamCollisions:
+    case Rpc::kFindCollisions:
+      return {grpc::INVALID_ARGUMENT};
+    case Rpc::kDeleteHull:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
+    case Rpc::kCheckCollision:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
+    case Rpc::kSaveSnapshot:
+      return {grpc::FAILED_PRECONDITION};
+    case Rpc::kGetStatus:
+      return {};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string CheckStatus(Rpc rpc, const CallManner& manner, const grpc::Status& status) {
+  const grpc::StatusCode code = status.error_code();
+  if (code == grpc::OK) return {};
+  // gRPC says these itself.
+  if (manner.hurried && code == grpc::DEADLINE_EXCEEDED) return {};
+  if (manner.cancelled && code == grpc::CANCELLED) return {};
+  if (manner.raw && code == grpc::UNIMPLEMENTED) return {};
+  Codes codes = CodesOf(rpc);
+  codes.insert(grpc::RESOURCE_EXHAUSTED);
+  if (codes.count(code) > 0 && !status.error_message().empty()) return {};
+  return absl::StrCat(server::RpcName(rpc), " ended ", CodeName(code), ": \"",
+                      status.error_message(), "\"");
+}
+
+std::string CodeName(grpc::StatusCode code) {
+  static constexpr const char* kNames[] = {"OK",
+                                           "CANCELLED",
+                                           "UNKNOWN",
+                                           "INVALID_ARGUMENT",
+                                           "DEADLINE_EXCEEDED",
+                                           "NOT_FOUND",
+                                           "ALREADY_EXISTS",
+                                           "PERMISSION_DENIED",
+                                           "RESOURCE_EXHAUSTED",
+                                           "FAILED_PRECONDITION",
+                                           "ABORTED",
+                                           "OUT_OF_RANGE",
+                                           "UNIMPLEMENTED",
+                                           "INTERNAL",
+                                           "UNAVAILABLE",
+                                           "DATA_LOSS",
+                                           "UNAUTHENTICATED"};
+  return code >= 0 && code < 17 ? kNames[code] : absl::StrCat("code ", static_cast<int>(code));
+}
+
+}  // namespace hulld::fuzz

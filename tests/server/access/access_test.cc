@@ -1,0 +1,412 @@
+// Tokens over the contract: who may call what, and who sees which hulls.
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <gtest/gtest.h>
+#include <openssl/sha.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "server/access/caller.h"
+#include "tests/server/harness/test_certificates.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string TokenLine(const std::string& name, const std::string& role, const std::string& prefix,
+                      const std::string& token) {
+  unsigned char hash[SHA256_DIGEST_LENGTH];
+  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash);
+  std::string text = absl::StrCat(name, " ", role, " ", prefix, " sha256:");
+  for (const unsigned char byte : hash) {
+    char digits[3];
+    std::snprintf(digits, sizeof digits, "%02x", byte);
+    text += digits;
+  }
+  return text + "\n";
+}
+
+// How a call ended and the bytes of its replies.
+struct Outcome {
+  grpc::Status status;
+  std::string replies;
+};
+
+// What the tests below know of a call.
+struct CallRule {
+  Permission needed;
+  // The messages of a request about a hull.
+  std::function<std::vector<std::string>(const std::string& hull_id)> request;
+  // How a hull outside of the caller's prefix is refused: by the call's status, inside its reply,
+  // or the call is about no hull.
+  enum { kByStatus, kInReply, kNoHull } refusal;
+};
+
+template <typename Request>
+std::vector<std::string> WithHullId(const std::string& hull_id) {
+  Request request;
+  request.set_hull_id(hull_id);
+  return {request.SerializeAsString()};
+}
+
+// Every call of the contract. A new one must be given its rule here.
+const std::map<std::string, CallRule>& Rules() {
+  static const auto* const rules = new std::map<std::string, CallRule>{
+      {"hulld.v1.HullService.CreateHull",
+       {Permission::kWrite, WithHullId<v1::CreateHullRequest>, CallRule::kByStatus}},
+      {"hulld.v1.HullService.AppendPoints",
+       {Permission::kWrite,
+        [](const std::string& hull_id) {
+          return std::vector{OpenMessage(hull_id, "w", true).SerializeAsString(),
+                             ChunkMessage(1, Cube()).SerializeAsString()};
+        },
+        CallRule::kByStatus}},
+      {"hulld.v1.HullService.ReplaceHull",
+       {Permission::kWrite,
+        [](const std::string& hull_id) {
+          v1::ReplaceHullRequest open;
+          open.mutable_open()->set_hull_id(hull_id);
+          open.mutable_open()->set_create_if_absent(true);
+          v1::ReplaceHullRequest points;
+          for (const double number : Cube()) points.mutable_points()->add_xyz(number);
+          v1::ReplaceHullRequest end;
+          end.mutable_points();
+          return std::vector{open.SerializeAsString(), points.SerializeAsString(),
+                             end.SerializeAsString()};
+        },
+        CallRule::kByStatus}},
+      {"hulld.v1.HullService.GetHull",
+       {Permission::kRead, WithHullId<v1::GetHullRequest>, CallRule::kByStatus}},
+      {"hulld.v1.HullService.GetHullMesh",
+       {Permission::kRead, WithHullId<v1::GetHullMeshRequest>, CallRule::kByStatus}},
+      {"hulld.v1.HullService.ListHulls",
+       {Permission::kRead,
+        [](const std::string& hull_id) {
+          v1::ListHullsRequest request;
+          request.set_prefix(hull_id);
+          return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kByStatus}},
+      {"hulld.v1.HullService.DeleteHull",
+       {Permission::kWrite, WithHullId<v1::DeleteHullRequest>, CallRule::kByStatus}},
+      {"hulld.v1.CollisionService.CheckCollision",
+       {Permission::kRead,
+        [](const std::string& hull_id) {
+          v1::CheckCollisionRequest request;
+          *request.mutable_a() = PlacementOf("cell-1/own");
+          *request.mutable_b() = PlacementOf(hull_id);
+          return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kByStatus}},
+      {"hulld.v1.CollisionService.BatchCheckCollisions",
+       {Permission::kRead,
+        [](const std::string& hull_id) {
+          v1::BatchCheckCollisionsRequest request;
+          *request.add_placements() = PlacementOf("cell-1/own");
+          *request.add_placements() = PlacementOf(hull_id);
+          request.add_pairs(0);
+          request.add_pairs(1);
+          return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kInReply}},
+      {"hulld.v1.CollisionService.StreamCollisions",
+       {Permission::kRead,
+        [](const std::string& hull_id) {
+          v1::StreamCollisionsRequest open;
+          *open.mutable_open()->add_placements() = PlacementOf("cell-1/own");
+          *open.mutable_open()->add_placements() = PlacementOf(hull_id);
+          open.mutable_open()->add_pairs(0);
+          open.mutable_open()->add_pairs(1);
+          v1::StreamCollisionsRequest update;
+          update.mutable_update()->set_refresh_hulls(true);
+          update.mutable_update()->add_placements(1);
+          for (const double number : {1, 0, 0, 0, 3, 0, 0}) {
+            update.mutable_update()->add_poses(number);
+          }
+          return std::vector{open.SerializeAsString(), update.SerializeAsString()};
+        },
+        CallRule::kInReply}},
+      {"hulld.v1.CollisionService.FindCollisions",
+       {Permission::kRead,
+        [](const std::string& hull_id) {
+          v1::FindCollisionsRequest request;
+          *request.add_placements() = PlacementOf("cell-1/own");
+          *request.add_placements() = PlacementOf(hull_id);
+          return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kInReply}},
+      {"hulld.v1.StatusService.GetStatus",
+       {Permission::kRead, [](const std::string&) { return std::vector{std::string()}; },
+        CallRule::kNoHull}},
+      {"hulld.v1.MaintenanceService.SaveSnapshot",
+       {Permission::kAdmin, [](const std::string&) { return std::vector{std::string()}; },
+        CallRule::kNoHull}},
+  };
+  return *rules;
+}
+
+class Access : public ServerTest {
+ protected:
+  void SetUp() override {
+    path_ = absl::StrCat(::testing::TempDir(), "/hulld_access_test_", getpid());
+    WriteSecret(path_, TokenLine("viewer", "read-only", "*", "viewer's secret") +
+                           TokenLine("robot", "read-write", "*", "robot's secret") +
+                           TokenLine("boss", "admin", "*", "boss's secret") +
+                           TokenLine("cell", "admin", "cell-1/", "cell's secret"));
+    Config config = TestConfig();
+    config.tokens_file = path_;
+    Restart(config);
+    for (const char* hull : {"cell-1/own", "cell-10/theirs", "cell", "cell-1"}) {
+      ASSERT_TRUE(Do("hulld.v1.HullService.AppendPoints", "robot's secret", hull).status.ok());
+    }
+  }
+
+  ~Access() override { std::filesystem::remove(path_); }
+
+  // Every call that the server knows, by its own account: "hulld.v1.Service.Method".
+  std::set<std::string> KnownCalls() {
+    const Outcome services = Run("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                                 {}, {std::string(":\0", 2)});
+    std::set<std::string> calls;
+    const std::string_view replies = services.replies;
+    constexpr std::string_view kPackage = "hulld.v1.";
+    for (std::size_t at = replies.find(kPackage); at != replies.npos;
+         at = replies.find(kPackage, at + 1)) {
+      std::size_t end = at + kPackage.size();
+      while (end < replies.size() && absl::ascii_isalpha(replies[end])) ++end;
+      const std::string name(replies.substr(at, end - at));
+      const auto* const service =
+          google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(name);
+      if (service == nullptr) {
+        ADD_FAILURE() << name;
+        continue;
+      }
+      for (int i = 0; i < service->method_count(); ++i) {
+        calls.insert(service->method(i)->full_name());
+      }
+    }
+    return calls;
+  }
+
+  Outcome Run(const std::string& method, const std::vector<std::string>& authorizations,
+              const std::vector<std::string>& messages) {
+    grpc::GenericStub stub(channel_);
+    grpc::ClientContext context;
+    for (const std::string& text : authorizations) context.AddMetadata("authorization", text);
+    grpc::CompletionQueue queue;
+    const auto stream = stub.PrepareCall(&context, method, &queue);
+    const auto done = [&queue] {
+      void* tag = nullptr;
+      bool ok = false;
+      return queue.Next(&tag, &ok) && ok;
+    };
+    Outcome outcome;
+    stream->StartCall(nullptr);
+    bool open = done();
+    for (const std::string& message : messages) {
+      if (!open) break;
+      const grpc::Slice slice(message);
+      stream->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+      open = done();
+    }
+    if (open) {
+      stream->WritesDone(nullptr);
+      done();
+    }
+    for (bool more = true; more;) {
+      grpc::ByteBuffer reply;
+      stream->Read(&reply, nullptr);
+      more = done();
+      std::vector<grpc::Slice> slices;
+      if (!more || !reply.Dump(&slices).ok()) continue;
+      for (const grpc::Slice& slice : slices) {
+        outcome.replies.append(reinterpret_cast<const char*>(slice.begin()), slice.size());
+      }
+    }
+    stream->Finish(&outcome.status, nullptr);
+    done();
+    return outcome;
+  }
+
+  Outcome Do(const std::string& call, const std::string& token, const std::string& hull_id) {
+    const size_t dot = call.rfind('.');
+    return Run(absl::StrCat("/", call.substr(0, dot), "/", call.substr(dot + 1)),
+               {absl::StrCat("Bearer ", token)}, Rules().at(call).request(hull_id));
+  }
+
+  std::vector<std::string> ListedBy(const std::string& token, const std::string& prefix) {
+    std::vector<std::string> ids;
+    v1::ListHullsRequest request;
+    request.set_prefix(prefix);
+    request.set_page_size(1);
+    do {
+      grpc::ClientContext context;
+      context.AddMetadata("authorization", absl::StrCat("Bearer ", token));
+      v1::ListHullsResponse response;
+      const grpc::Status status = hulls_->ListHulls(&context, request, &response);
+      EXPECT_TRUE(status.ok()) << status.error_message();
+      for (const v1::HullInfo& hull : response.hulls()) ids.push_back(hull.hull_id());
+      request.set_page_token(response.next_page_token());
+    } while (!request.page_token().empty());
+    return ids;
+  }
+
+  std::string path_;
+};
+
+TEST_F(Access, EveryCallOfTheServerHasARule) {
+  const std::set<std::string> calls = KnownCalls();
+  EXPECT_EQ(calls.size(), Rules().size());
+  for (const std::string& call : calls) EXPECT_EQ(Rules().count(call), 1) << call;
+}
+
+TEST_F(Access, EveryCallNeedsAKnownToken) {
+  for (const auto& [call, rule] : Rules()) {
+    const size_t dot = call.rfind('.');
+    const std::string method = absl::StrCat("/", call.substr(0, dot), "/", call.substr(dot + 1));
+    const std::vector<std::string> request = rule.request("cell-1/new");
+    const std::vector<std::vector<std::string>> wrong = {
+        {},
+        {"Bearer hunter2"},
+        {"Bearer "},
+        {"hunter2"},
+        {"Basic hunter2"},
+        {"Bearer viewer's secret "},
+        {"Bearer robot's secret", "Bearer robot's secret"}};
+    for (const std::vector<std::string>& authorizations : wrong) {
+      const Outcome outcome = Run(method, authorizations, request);
+      EXPECT_EQ(outcome.status.error_code(), grpc::StatusCode::UNAUTHENTICATED) << call;
+      EXPECT_THAT(outcome.status.error_message(),
+                  AllOf(Not(HasSubstr("hunter2")), Not(HasSubstr("secret"))));
+      EXPECT_EQ(outcome.replies, "") << call;
+    }
+    EXPECT_NE(Run(method, {"bearer boss's secret"}, request).status.error_code(),
+              grpc::StatusCode::UNAUTHENTICATED)
+        << call;
+  }
+}
+
+TEST_F(Access, EveryCallNeedsItsRole) {
+  const std::map<Permission, std::string> tokens = {{Permission::kRead, "viewer's secret"},
+                                                    {Permission::kWrite, "robot's secret"},
+                                                    {Permission::kAdmin, "boss's secret"}};
+  for (const auto& [call, rule] : Rules()) {
+    for (const auto& [permission, token] : tokens) {
+      const grpc::Status status = Do(call, token, "cell-1/own").status;
+      if (permission >= rule.needed) {
+        EXPECT_NE(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << call;
+        continue;
+      }
+      EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << call;
+      EXPECT_THAT(status.error_message(), HasSubstr(std::string("needs ") + RoleName(rule.needed)));
+    }
+  }
+}
+
+// Not by the code, not by the message, not by the reply.
+TEST_F(Access, NoCallTellsWhetherAHullOfOthersExists) {
+  for (const auto& [call, rule] : Rules()) {
+    if (rule.refusal == CallRule::kNoHull) continue;
+    for (const char* theirs : {"cell-10/theirs", "cell", "cell-1"}) {
+      if (call.ends_with("ListHulls") && std::string("cell-1/").starts_with(theirs)) continue;
+      const std::string none = absl::StrCat(std::string(theirs, std::strlen(theirs) - 1), "X");
+      const Outcome there = Do(call, "cell's secret", theirs);
+      Outcome absent = Do(call, "cell's secret", none);
+      const std::string& said =
+          rule.refusal == CallRule::kByStatus ? there.status.error_message() : there.replies;
+      EXPECT_THAT(said, HasSubstr("is outside of \"cell-1/\"")) << call << " " << theirs;
+      EXPECT_EQ(there.status.error_code(), rule.refusal == CallRule::kByStatus
+                                               ? grpc::StatusCode::PERMISSION_DENIED
+                                               : grpc::StatusCode::OK)
+          << call;
+      const auto renamed = [&](std::string text) {
+        for (size_t at = 0; (at = text.find(none, at)) != std::string::npos;) {
+          text.replace(at, none.size(), theirs);
+        }
+        return text;
+      };
+      EXPECT_EQ(renamed(absent.status.error_message()), there.status.error_message()) << call;
+      EXPECT_EQ(renamed(absent.replies), there.replies) << call;
+    }
+    EXPECT_NE(Do(call, "cell's secret", "cell-1/own").status.error_code(),
+              grpc::StatusCode::PERMISSION_DENIED)
+        << call;
+  }
+}
+
+TEST_F(Access, ListsShowWhatIsTheCallersAlone) {
+  EXPECT_THAT(ListedBy("boss's secret", ""),
+              ElementsAre("cell", "cell-1", "cell-1/own", "cell-10/theirs"));
+  for (const char* prefix : {"", "c", "cell-1", "cell-1/", "cell-1/o"}) {
+    EXPECT_THAT(ListedBy("cell's secret", prefix), ElementsAre("cell-1/own")) << prefix;
+  }
+  EXPECT_THAT(ListedBy("cell's secret", "cell-1/x"), ElementsAre());
+}
+
+TEST_F(Access, TheStoreAsAWholeIsNotForThoseWithAPrefix) {
+  const grpc::Status status =
+      Do("hulld.v1.MaintenanceService.SaveSnapshot", "cell's secret", "").status;
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_THAT(status.error_message(), HasSubstr("\"cell-1/\""));
+}
+
+TEST_F(Access, SizesOfTheStoreAreNotForThoseWithAPrefix) {
+  const auto ask = [this](const std::string& token) {
+    v1::GetStatusResponse response;
+    const Outcome outcome = Do("hulld.v1.StatusService.GetStatus", token, "");
+    EXPECT_TRUE(outcome.status.ok() && response.ParseFromString(outcome.replies));
+    return response;
+  };
+  EXPECT_EQ(ask("viewer's secret").hull_count(), 4);
+  EXPECT_FALSE(ask("cell's secret").has_hull_count());
+  EXPECT_FALSE(ask("cell's secret").has_vertex_count());
+}
+
+TEST_F(Access, HealthNeedsNoToken) {
+  EXPECT_TRUE(Run("/grpc.health.v1.Health/Check", {}, {""}).status.ok());
+}
+
+TEST_F(Access, ChangedTokensCountFromTheNextCallAndABrokenFileChangesNothing) {
+  const auto code = [this](const std::string& token) {
+    return Do("hulld.v1.HullService.GetHull", token, "cell-1/own").status.error_code();
+  };
+  const std::string line = TokenLine("new", "read-only", "*", "new secret");
+  for (const std::string& broken : {std::string(), line + "new secret\n", line + line}) {
+    WriteSecret(path_, broken);
+    server_->ReloadFiles();
+    EXPECT_EQ(code("viewer's secret"), grpc::StatusCode::OK);
+    EXPECT_EQ(code("new secret"), grpc::StatusCode::UNAUTHENTICATED);
+  }
+  WriteSecret(path_, line);
+  server_->ReloadFiles();
+  EXPECT_EQ(code("viewer's secret"), grpc::StatusCode::UNAUTHENTICATED);
+  EXPECT_EQ(code("new secret"), grpc::StatusCode::OK);
+  std::filesystem::remove(path_);
+  server_->ReloadFiles();
+  EXPECT_EQ(code("new secret"), grpc::StatusCode::OK);
+}
+
+TEST_F(Access, WithoutTokensATokenIsNotLookedAt) {
+  Restart(TestConfig());
+  Put("h", Cube());
+  EXPECT_TRUE(Do("hulld.v1.HullService.GetHull", "anything", "h").status.ok());
+}
+
+}  // namespace
+}  // namespace hulld::server

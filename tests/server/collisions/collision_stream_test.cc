@@ -1,0 +1,367 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <thread>
+
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+v1::StreamCollisionsRequest Open(const std::vector<v1::Placement>& placements,
+                                 const std::vector<uint32_t>& pairs) {
+  v1::StreamCollisionsRequest request;
+  for (const v1::Placement& placement : placements) {
+    *request.mutable_open()->add_placements() = placement;
+  }
+  request.mutable_open()->mutable_pairs()->Assign(pairs.begin(), pairs.end());
+  return request;
+}
+
+using PoseNumbers = std::array<double, 7>;
+
+v1::StreamCollisionsRequest Move(const std::vector<std::pair<uint32_t, PoseNumbers>>& moves) {
+  v1::StreamCollisionsRequest request;
+  request.mutable_update();
+  for (const auto& [placement, pose] : moves) {
+    request.mutable_update()->add_placements(placement);
+    for (const double number : pose) request.mutable_update()->add_poses(number);
+  }
+  return request;
+}
+
+v1::StreamCollisionsRequest MoveX(uint32_t placement, double x) {
+  return Move({{placement, {1, 0, 0, 0, x, 0, 0}}});
+}
+
+v1::StreamCollisionsRequest Refresh() {
+  v1::StreamCollisionsRequest request;
+  request.mutable_update()->set_refresh_hulls(true);
+  return request;
+}
+
+// One stream; whatever fails shows in how it ends.
+class Stream {
+ public:
+  explicit Stream(v1::CollisionService::Stub& stub) : call_(stub.StreamCollisions(&context_)) {}
+
+  bool Send(const v1::StreamCollisionsRequest& request) { return call_->Write(request); }
+
+  // The pieces of the next answer, put together.
+  v1::StreamCollisionsResponse Read() {
+    v1::StreamCollisionsResponse answer;
+    v1::StreamCollisionsResponse piece;
+    pieces = 0;
+    largest_piece = 0;
+    while (call_->Read(&piece)) {
+      EXPECT_EQ(piece.pairs_size(), piece.columns().relations_size());
+      EXPECT_EQ(piece.has_header(), pieces == 0);
+      ++pieces;
+      largest_piece = std::max(largest_piece, piece.ByteSizeLong());
+      answer.MergeFrom(piece);
+      if (piece.last()) break;
+    }
+    return answer;
+  }
+
+  v1::StreamCollisionsResponse Ask(const v1::StreamCollisionsRequest& request) {
+    Send(request);
+    return Read();
+  }
+
+  // How the call ends when nothing more is said; what is left is read.
+  grpc::Status Finish() {
+    call_->WritesDone();
+    v1::StreamCollisionsResponse rest;
+    while (call_->Read(&rest)) {
+    }
+    return call_->Finish();
+  }
+
+  grpc::ClientContext& context() { return context_; }
+
+  int pieces = 0;
+  size_t largest_piece = 0;
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<
+      grpc::ClientReaderWriter<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>>
+      call_;
+};
+
+class StreamCollisionsCall : public ServerTest {
+ protected:
+  void ExpectRefused(const std::vector<v1::StreamCollisionsRequest>& messages,
+                     grpc::StatusCode code, const std::string& what) {
+    Stream stream(*collisions_);
+    for (const auto& message : messages) stream.Send(message);
+    const grpc::Status status = stream.Finish();
+    EXPECT_EQ(status.error_code(), code) << status.error_message();
+    EXPECT_THAT(status.error_message(), HasSubstr(what));
+  }
+};
+
+TEST_F(StreamCollisionsCall, OpenIsAnsweredByEveryPair) {
+  Put("cube", Cube());
+  Stream stream(*collisions_);
+  const auto answer = stream.Ask(Open(
+      {PlacementOf("cube"), PlacementOf("cube", 1), PlacementOf("cube", 3), PlacementOf("none")},
+      {0, 1, 0, 2, 0, 0, 3, 1}));
+  EXPECT_EQ(answer.update(), 0);
+  EXPECT_TRUE(answer.last());
+  EXPECT_THAT(answer.pairs(), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(answer.columns().relations(),
+              ElementsAre(v1::RELATION_TOUCHING, v1::RELATION_SEPARATED, v1::RELATION_OVERLAPPING,
+                          v1::RELATION_UNSPECIFIED));
+  EXPECT_EQ(answer.header().revision(), Get("cube").header().revision());
+  ASSERT_EQ(answer.hulls_size(), 4);
+  EXPECT_EQ(answer.hulls(1).revision(), Get("cube").hull().revision());
+  ASSERT_EQ(answer.placement_problems_size(), 1);
+  EXPECT_EQ(answer.placement_problems(0).placement(), 3);
+  EXPECT_EQ(answer.placement_problems(0).code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, UpdatesAreAnsweredByThePairsThatMoved) {
+  Put("cube", Cube());
+  Stream stream(*collisions_);
+  stream.Ask(Open({PlacementOf("cube"), PlacementOf("cube", 1), PlacementOf("cube", 3)},
+                  {0, 1, 1, 2, 0, 2, 2, 2}));
+  auto answer = stream.Ask(MoveX(1, 2));
+  EXPECT_EQ(answer.update(), 1);
+  EXPECT_THAT(answer.pairs(), ElementsAre(0, 1));
+  EXPECT_THAT(answer.columns().relations(),
+              ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_TOUCHING));
+  EXPECT_EQ(answer.hulls_size(), 0);
+  EXPECT_GT(answer.header().revision(), 0);
+  answer = stream.Ask(Move({}));
+  EXPECT_EQ(answer.update(), 2);
+  EXPECT_THAT(answer.pairs(), IsEmpty());
+  answer = stream.Ask(Move({{2, {1, 0, 0, 0, 0.5, 0, 0}}, {0, {1, 0, 0, 0, 9, 0, 0}}}));
+  EXPECT_THAT(answer.pairs(), ElementsAre(0, 1, 2, 3));
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, OnlyChangesLeavesOutWhatIsAsBefore) {
+  Put("cube", Cube());
+  Stream stream(*collisions_);
+  auto open =
+      Open({PlacementOf("cube"), PlacementOf("cube", 5), PlacementOf("cube", 1)}, {0, 1, 1, 2});
+  open.mutable_open()->set_only_changes(true);
+  EXPECT_THAT(stream.Ask(open).pairs(), ElementsAre(0, 1));
+  EXPECT_THAT(stream.Ask(MoveX(1, 4)).pairs(), IsEmpty());
+  const auto answer = stream.Ask(MoveX(1, 2));
+  EXPECT_THAT(answer.pairs(), ElementsAre(1));
+  EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
+  EXPECT_THAT(stream.Ask(MoveX(1, 2)).pairs(), IsEmpty());
+  EXPECT_THAT(stream.Ask(MoveX(1, 0.5)).pairs(), ElementsAre(0, 1));
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, EveryStepEqualsASingleCheck) {
+  Put("cube", Cube(-1, 2));
+  Put("ball", Sphere(60));
+  Put("square", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
+  const std::vector<std::string> ids = {"cube", "ball", "square", "ball"};
+  std::vector<v1::Placement> placements;
+  for (const std::string& id : ids) placements.push_back(PlacementOf(id, 1.5 * placements.size()));
+  Stream stream(*collisions_);
+  auto answer = stream.Ask(Open(placements, {0, 1, 1, 2, 2, 3, 3, 0, 0, 2}));
+  const uint32_t pairs[][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {0, 2}};
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> step(-0.1, 0.1);
+  int cached = 0;
+  int relations[4] = {};
+  for (int i = 0; i < 300; ++i) {
+    const uint32_t moved = i % 4;
+    v1::Pose* const pose = placements[moved].mutable_pose();
+    pose->mutable_rotation()->set_w(1);
+    pose->mutable_rotation()->set_x(pose->rotation().x() + step(random));
+    pose->mutable_translation()->set_x(pose->translation().x() * 0.95 + step(random));
+    answer = stream.Ask(Move({{moved,
+                               {1, pose->rotation().x(), 0, 0, pose->translation().x(),
+                                pose->translation().y(), pose->translation().z()}}}));
+    ASSERT_GE(answer.pairs_size(), 2) << i;
+    for (int k = 0; k < answer.pairs_size(); ++k) {
+      v1::CheckCollisionRequest single;
+      *single.mutable_a() = placements[pairs[answer.pairs(k)][0]];
+      *single.mutable_b() = placements[pairs[answer.pairs(k)][1]];
+      ASSERT_EQ(answer.columns().relations(k), Check(single).relation()) << "step " << i;
+      cached += answer.columns().rungs(k) == v1::RUNG_CACHED ? 1 : 0;
+      ++relations[answer.columns().relations(k)];
+    }
+  }
+  EXPECT_GT(cached, 50);
+  EXPECT_GT(relations[v1::RELATION_SEPARATED], 50);
+  EXPECT_GT(relations[v1::RELATION_OVERLAPPING], 50);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
+  Put("grows", {0, 0, 0});
+  Put("target", Cube(5, 1));
+  Stream stream(*collisions_);
+  const auto target = PlacementOf("target");
+  auto answer = stream.Ask(
+      Open({PlacementOf("grows"), target, target, PlacementOf("later")}, {0, 1, 1, 2, 3, 1}));
+  EXPECT_THAT(
+      answer.columns().relations(),
+      ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED));
+  ASSERT_TRUE(Appender(*hulls_, "grows", "w").Append(1, Cube(0, 10)).has_value());
+  Put("later", Cube(5.5, 9));
+  answer = stream.Ask(Move({{0, {1, 0, 0, 0, 0, 0, 0}}}));
+  EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_SEPARATED));
+  answer = stream.Ask(Refresh());
+  EXPECT_THAT(answer.pairs(), ElementsAre(0, 2));
+  EXPECT_THAT(answer.columns().relations(),
+              ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_OVERLAPPING));
+  ASSERT_EQ(answer.hulls_size(), 4);
+  EXPECT_EQ(answer.hulls(0).revision(), Get("grows").hull().revision());
+  EXPECT_EQ(answer.placement_problems_size(), 0);
+  EXPECT_THAT(stream.Ask(Refresh()).pairs(), IsEmpty());
+  // Smaller hulls under the same names: what was kept of the pairs names vertices that are gone.
+  ASSERT_TRUE(Delete("grows").ok() && Delete("later").ok());
+  Put("grows", {5, 5, 5});
+  answer = stream.Ask(Refresh());
+  EXPECT_THAT(answer.pairs(), ElementsAre(0, 2));
+  EXPECT_THAT(answer.columns().relations(),
+              ElementsAre(v1::RELATION_TOUCHING, v1::RELATION_UNSPECIFIED));
+  ASSERT_EQ(answer.placement_problems_size(), 1);
+  EXPECT_EQ(answer.placement_problems(0).placement(), 3);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, AMoveCuresAMalformedPose) {
+  Put("cube", Cube());
+  Stream stream(*collisions_);
+  const auto bad = PlacementOf("cube", std::numeric_limits<double>::quiet_NaN());
+  auto answer = stream.Ask(Open({PlacementOf("cube"), bad}, {0, 1}));
+  EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_UNSPECIFIED));
+  EXPECT_THAT(answer.placement_problems(0).message(),
+              HasSubstr("placements[1].pose.translation.x is NaN"));
+  answer = stream.Ask(MoveX(1, 1));
+  EXPECT_THAT(answer.columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, ErrorsNameTheMessageAndTheField) {
+  Put("cube", Cube());
+  const auto open = Open({PlacementOf("cube"), PlacementOf("cube")}, {0, 1});
+  constexpr grpc::StatusCode kInvalid = grpc::StatusCode::INVALID_ARGUMENT;
+  ExpectRefused({v1::StreamCollisionsRequest()}, kInvalid, "set open or update");
+  ExpectRefused({MoveX(0, 1)}, kInvalid, "the first message must be open");
+  ExpectRefused({open, open}, kInvalid, "open came twice");
+  ExpectRefused({Open({PlacementOf("cube")}, {0})}, kInvalid, "open: pairs holds 1 indices");
+  ExpectRefused({Open({PlacementOf("cube")}, {0, 1})}, kInvalid,
+                "open: pairs[1] is 1, but placements holds 1");
+  auto negative = open;
+  negative.mutable_open()->set_tolerance(-1);
+  ExpectRefused({negative}, kInvalid, "open: tolerance is -1");
+  ExpectRefused({open, MoveX(1, 1), MoveX(2, 1)}, kInvalid, "update 2: placements[0] is 2");
+  ExpectRefused({open, Move({{1, {1, 0, 0, 0, 0, 0, 0}}, {1, {1, 0, 0, 0, 0, 0, 0}}})}, kInvalid,
+                "update 1: placements[1] is 1, which is named twice");
+  ExpectRefused({open, Move({{0, {1, 0, 0, 0, 0, 0, 0}}, {1, {0, 0, 0, 0, 0, 0, 0}}})}, kInvalid,
+                "update 1: poses[1].rotation is zero");
+  auto few = MoveX(0, 1);
+  few.mutable_update()->mutable_poses()->RemoveLast();
+  ExpectRefused({open, few}, kInvalid, "update 1: poses holds 6 numbers for 1 placements");
+  Config config = TestConfig();
+  config.limits.max_pairs_per_batch = 1;
+  Restart(config);
+  ExpectRefused({Open({PlacementOf("cube")}, {0, 0, 0, 0})}, grpc::StatusCode::RESOURCE_EXHAUSTED,
+                "the stream holds 2 pairs; the limit is 1 (--max-pairs-per-batch)");
+}
+
+TEST_F(StreamCollisionsCall, LongAnswersComeInPiecesOfAMebibyte) {
+  Put("cube", Cube());
+  std::vector<uint32_t> pairs;
+  for (uint32_t i = 0; i < 20'000; ++i) pairs.insert(pairs.end(), {i % 2, 1});
+  auto open = Open({PlacementOf("cube"), PlacementOf("cube", 3)}, pairs);
+  open.mutable_open()->mutable_wanted()->set_axis(true);
+  Stream stream(*collisions_);
+  for (const auto& message : {open, MoveX(1, 2)}) {
+    const auto answer = stream.Ask(message);
+    ASSERT_EQ(answer.pairs_size(), 20'000);
+    EXPECT_GT(stream.pieces, 2);
+    EXPECT_LT(stream.largest_piece, (1 << 20) + 4096);
+    for (int i = 0; i < answer.pairs_size(); ++i) {
+      ASSERT_EQ(answer.pairs(i), i);
+      const bool found = answer.columns().axes(i).kind() != v1::AXIS_KIND_UNSPECIFIED;
+      ASSERT_EQ(found, i % 2 == 0);
+    }
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, ClientsThatWriteAheadAreAnsweredInOrder) {
+  Put("cube", Cube());
+  Stream stream(*collisions_);
+  stream.Send(Open({PlacementOf("cube"), PlacementOf("cube", 2)}, {0, 1}));
+  for (int i = 0; i < 200; ++i) ASSERT_TRUE(stream.Send(MoveX(1, i % 3)));
+  EXPECT_EQ(stream.Read().update(), 0);
+  const v1::Relation expected[] = {v1::RELATION_OVERLAPPING, v1::RELATION_TOUCHING,
+                                   v1::RELATION_SEPARATED};
+  for (int i = 0; i < 200; ++i) {
+    const auto answer = stream.Read();
+    ASSERT_EQ(answer.update(), i + 1);
+    ASSERT_EQ(answer.columns().relations(0), expected[i % 3]);
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, DrainingRefusesNewStreamsAndLetsOthersEnd) {
+  Put("cube", Cube());
+  Stream stream(*collisions_);
+  stream.Ask(Open({PlacementOf("cube"), PlacementOf("cube", 2)}, {0, 1}));
+  server_->BeginDrain();
+  ExpectRefused({}, grpc::StatusCode::UNAVAILABLE, "draining");
+  EXPECT_THAT(stream.Ask(MoveX(1, 1)).columns().relations(), ElementsAre(v1::RELATION_TOUCHING));
+  EXPECT_FALSE(server_->WaitIdle(std::chrono::milliseconds(0)));
+  EXPECT_TRUE(stream.Finish().ok());
+  EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+}
+
+// Its answers take minutes: every pair is decided by exact arithmetic on large features.
+v1::StreamCollisionsRequest EndlessOpen() {
+  std::vector<uint32_t> pairs;
+  for (uint32_t i = 0; i < 900'000; ++i) pairs.insert(pairs.end(), {0, 1});
+  auto open = Open({PlacementOf("ball"), PlacementOf("ball", 2)}, pairs);
+  open.mutable_open()->mutable_wanted()->set_axis(true);
+  return open;
+}
+
+TEST_F(StreamCollisionsCall, CancellingEndsALongAnswer) {
+  Put("ball", Sphere(3000));
+  Stream stream(*collisions_);
+  stream.Send(EndlessOpen());
+  stream.context().TryCancel();
+  EXPECT_EQ(stream.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  server_->BeginDrain();
+  EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+}
+
+TEST_F(StreamCollisionsCall, ADeadlineEndsALongAnswer) {
+  Put("ball", Sphere(3000));
+  v1::StreamCollisionsRequest open = EndlessOpen();
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::milliseconds(500));
+  const auto stream = collisions_->StreamCollisions(&context);
+  stream->Write(open);
+  v1::StreamCollisionsResponse piece;
+  while (stream->Read(&piece)) EXPECT_FALSE(piece.last());
+  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  server_->BeginDrain();
+  EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+}
+
+}  // namespace
+}  // namespace hulld::server

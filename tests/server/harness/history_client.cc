@@ -1,0 +1,310 @@
+#include "tests/server/harness/history_client.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace hulld::server {
+namespace {
+
+using Kind = Operation::Kind;
+using Outcome = Operation::Outcome;
+
+constexpr int kCloudSize = 48;
+// Far more than any of these calls takes: so that a defect ends as a failure and not as a hang.
+constexpr std::chrono::seconds kDeadline(60);
+
+std::unique_ptr<grpc::ClientContext> NewContext() {
+  auto context = std::make_unique<grpc::ClientContext>();
+  context->set_deadline(std::chrono::system_clock::now() + kDeadline);
+  return context;
+}
+
+Outcome OutcomeOf(const grpc::Status& status) {
+  switch (status.error_code()) {
+    case grpc::StatusCode::OK:
+      return Outcome::kOk;
+    case grpc::StatusCode::NOT_FOUND:
+      return Outcome::kNotFound;
+    case grpc::StatusCode::ALREADY_EXISTS:
+      return Outcome::kAlreadyExists;
+    case grpc::StatusCode::ABORTED:
+      return Outcome::kAborted;
+    default:
+      return Outcome::kUnknown;
+  }
+}
+
+void TakeRecord(const v1::HullInfo& hull, Operation& operation) {
+  operation.create_revision = hull.create_revision();
+  operation.revision = hull.revision();
+  operation.vertex_count = hull.vertex_count();
+  operation.received = hull.counts().received();
+  operation.outside = hull.counts().outside();
+  operation.duplicate = hull.counts().duplicate();
+}
+
+// Which point of the cloud this is; -1 when none.
+int NumberOf(const double* xyz) {
+  const Coordinates& cloud = HistoryCloud();
+  for (int i = 0; i < kCloudSize; ++i) {
+    if (std::equal(xyz, xyz + 3, cloud.data() + 3 * i)) return i;
+  }
+  return -1;
+}
+
+}  // namespace
+
+const Coordinates& HistoryCloud() {
+  static const Coordinates cloud = Sphere(kCloudSize);
+  return cloud;
+}
+
+HistoryClient::HistoryClient(const std::shared_ptr<grpc::Channel>& channel, HullHistory& history,
+                             std::string name, uint64_t seed)
+    : history_(history), name_(std::move(name)), random_(seed) {
+  Connect(channel);
+}
+
+void HistoryClient::Connect(const std::shared_ptr<grpc::Channel>& channel) {
+  streams_.clear();
+  hulls_ = v1::HullService::NewStub(channel);
+  collisions_ = v1::CollisionService::NewStub(channel);
+}
+
+void HistoryClient::MakeProbe() {
+  Appender appender(*hulls_, kProbeHull, "probe", true);
+  if (appender.opened().last_sequence() == 0) {
+    ASSERT_TRUE(appender.Append(1, {0, 0, 0}).has_value());
+  }
+  const grpc::Status status = appender.Finish();
+  ASSERT_TRUE(status.ok()) << status.error_message();
+}
+
+bool HistoryClient::CallAtRandom(const std::string& hull_id) {
+  return Below(100) < 45 ? ChangeAtRandom(hull_id) : ReadAtRandom(hull_id);
+}
+
+bool HistoryClient::ChangeAtRandom(const std::string& hull_id) {
+  const int choice = Below(45);
+  if (choice < 5) return Create(hull_id, Below(2) == 0);
+  if (choice < 8) return Delete(hull_id, Below(2) == 0);
+  if (choice < 14) return Replace(hull_id);
+  return Append(hull_id);
+}
+
+bool HistoryClient::ReadAtRandom(const std::string& hull_id) {
+  const int choice = Below(55);
+  if (choice < 20) return Get(hull_id);
+  if (choice < 35) return Mesh(hull_id);
+  return Probe(hull_id);
+}
+
+Operation HistoryClient::Begin(Kind kind) {
+  Operation operation;
+  operation.kind = kind;
+  operation.writer = name_;
+  operation.invoked = history_.Tick();
+  return operation;
+}
+
+bool HistoryClient::End(const std::string& hull_id, Operation& operation,
+                        const grpc::Status& status) {
+  operation.outcome = OutcomeOf(status);
+  const bool read = operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
+                    operation.kind == Kind::kProbe;
+  if (operation.outcome == Outcome::kUnknown) {
+    // The incarnation is gone: what it did, it did before this answer.
+    const bool gone = status.error_code() == grpc::StatusCode::FAILED_PRECONDITION;
+    if (gone) operation.returned = history_.Tick();
+    // A read that was not answered says nothing.
+    if (!read) history_.Record(hull_id, operation);
+    return status.error_code() != grpc::StatusCode::UNAVAILABLE;
+  }
+  operation.returned = history_.Tick();
+  history_.Record(hull_id, operation);
+  if (operation.outcome == Outcome::kOk) revisions_[hull_id] = operation.revision;
+  return true;
+}
+
+std::optional<uint64_t> HistoryClient::SomeRevision(const std::string& hull_id) {
+  const auto known = revisions_.find(hull_id);
+  if (known == revisions_.end() || Below(4) != 0) return std::nullopt;
+  return known->second;
+}
+
+bool HistoryClient::Create(const std::string& hull_id, bool if_absent) {
+  Operation operation = Begin(Kind::kCreate);
+  operation.if_absent = if_absent;
+  v1::CreateHullRequest request;
+  v1::CreateHullResponse response;
+  request.set_hull_id(hull_id);
+  request.set_if_absent(if_absent);
+  const grpc::Status status = hulls_->CreateHull(NewContext().get(), request, &response);
+  TakeRecord(response.hull(), operation);
+  operation.created = response.created();
+  operation.store_revision = response.header().revision();
+  return End(hull_id, operation, status);
+}
+
+Coordinates HistoryClient::SomePoints(int count, Operation& operation) {
+  Coordinates xyz;
+  for (int i = 0; i < count; ++i) {
+    const int point = Below(kCloudSize);
+    operation.points |= PointSet{1} << point;
+    const double* from = HistoryCloud().data() + 3 * point;
+    xyz.insert(xyz.end(), from, from + 3);
+  }
+  operation.sent += static_cast<uint64_t>(count);
+  return xyz;
+}
+
+HistoryClient::Stream* HistoryClient::OpenStream(const std::string& hull_id, bool* answered) {
+  Operation operation = Begin(Kind::kOpen);
+  operation.if_absent = Below(2) == 0;
+  Stream stream;
+  stream.appender = std::make_unique<Appender>(*hulls_, hull_id, name_, operation.if_absent);
+  if (!stream.appender->is_open()) {
+    *answered = End(hull_id, operation, stream.appender->Finish());
+    return nullptr;
+  }
+  const v1::AppendOpened& opened = stream.appender->opened();
+  TakeRecord(opened.hull(), operation);
+  operation.last_sequence = opened.last_sequence();
+  operation.store_revision = opened.header().revision();
+  stream.incarnation = operation.create_revision;
+  stream.next_sequence = operation.last_sequence + 1;
+  *answered = End(hull_id, operation, grpc::Status::OK);
+  return &(streams_[hull_id] = std::move(stream));
+}
+
+bool HistoryClient::Append(const std::string& hull_id) {
+  const auto open = streams_.find(hull_id);
+  bool answered = true;
+  Stream* stream = open != streams_.end() ? &open->second : OpenStream(hull_id, &answered);
+  if (stream == nullptr) return answered;
+
+  Operation operation = Begin(Kind::kAppend);
+  operation.incarnation = stream->incarnation;
+  operation.sequence = stream->next_sequence;
+  operation.if_revision = SomeRevision(hull_id);
+  const Coordinates xyz = SomePoints(1 + Below(3), operation);
+  // Now and then a chunk is sent again, as a client does that lost an ack.
+  if (operation.sequence > 1 && Below(8) == 0) --operation.sequence;
+  const std::optional<v1::AppendAck> ack =
+      stream->appender->Append(operation.sequence, xyz, operation.if_revision);
+  if (!ack.has_value()) {
+    answered = End(hull_id, operation, stream->appender->Finish());
+    streams_.erase(hull_id);
+    return answered;
+  }
+  stream->next_sequence = operation.sequence + 1;
+  operation.already_applied = ack->outcome() == v1::APPEND_OUTCOME_ALREADY_APPLIED;
+  operation.store_revision = ack->header().revision();
+  operation.revision = ack->hull_revision();
+  operation.vertex_count = ack->vertex_count();
+  operation.received = ack->counts().received();
+  operation.outside = ack->counts().outside();
+  operation.duplicate = ack->counts().duplicate();
+  return End(hull_id, operation, grpc::Status::OK);
+}
+
+bool HistoryClient::Replace(const std::string& hull_id) {
+  Operation operation = Begin(Kind::kReplace);
+  operation.if_absent = Below(2) == 0;
+  operation.if_revision = SomeRevision(hull_id);
+  if (!operation.if_revision && Below(8) == 0) operation.if_revision = 0;
+  const bool cut_short = Below(6) == 0;
+  const bool cancelled = !cut_short && Below(12) == 0;
+
+  const std::unique_ptr<grpc::ClientContext> context = NewContext();
+  v1::ReplaceHullResponse response;
+  const auto writer = hulls_->ReplaceHull(context.get(), &response);
+  v1::ReplaceHullRequest request;
+  request.mutable_open()->set_hull_id(hull_id);
+  request.mutable_open()->set_create_if_absent(operation.if_absent);
+  if (operation.if_revision) request.mutable_open()->set_if_revision(*operation.if_revision);
+  bool going = writer->Write(request);
+  for (int blocks = 1 + Below(3); blocks > 0; --blocks) {
+    const Coordinates xyz = SomePoints(1 + Below(4), operation);
+    request.mutable_points()->mutable_xyz()->Assign(xyz.begin(), xyz.end());
+    going = going && writer->Write(request);
+  }
+  request.mutable_points()->clear_xyz();
+  if (!cut_short) going = going && writer->Write(request);
+  if (going) writer->WritesDone();
+  if (cancelled) context->TryCancel();
+  const grpc::Status status = writer->Finish();
+  if (cut_short) {
+    // No operation: whatever it did would be seen, and not be explained.
+    EXPECT_FALSE(status.ok()) << "a stream that was cut short replaced hull " << hull_id;
+    return status.error_code() != grpc::StatusCode::UNAVAILABLE;
+  }
+  TakeRecord(response.hull(), operation);
+  operation.created = response.created();
+  operation.store_revision = response.header().revision();
+  return End(hull_id, operation, status);
+}
+
+bool HistoryClient::Delete(const std::string& hull_id, bool if_known_revision) {
+  Operation operation = Begin(Kind::kDelete);
+  const auto known = revisions_.find(hull_id);
+  if (if_known_revision && known != revisions_.end()) operation.if_revision = known->second;
+  v1::DeleteHullRequest request;
+  v1::DeleteHullResponse response;
+  request.set_hull_id(hull_id);
+  if (operation.if_revision) request.set_if_revision(*operation.if_revision);
+  const grpc::Status status = hulls_->DeleteHull(NewContext().get(), request, &response);
+  operation.store_revision = operation.revision = response.header().revision();
+  return End(hull_id, operation, status);
+}
+
+bool HistoryClient::Get(const std::string& hull_id) {
+  Operation operation = Begin(Kind::kGet);
+  v1::GetHullRequest request;
+  v1::GetHullResponse response;
+  request.set_hull_id(hull_id);
+  const grpc::Status status = hulls_->GetHull(NewContext().get(), request, &response);
+  TakeRecord(response.hull(), operation);
+  operation.store_revision = response.header().revision();
+  return End(hull_id, operation, status);
+}
+
+bool HistoryClient::Mesh(const std::string& hull_id) {
+  Operation operation = Begin(Kind::kMesh);
+  v1::GetHullMeshRequest request;
+  request.set_hull_id(hull_id);
+  const std::unique_ptr<grpc::ClientContext> context = NewContext();
+  const auto reader = hulls_->GetHullMesh(context.get(), request);
+  v1::GetHullMeshResponse part;
+  while (reader->Read(&part)) {
+    if (part.has_header()) {
+      TakeRecord(part.header().hull(), operation);
+      operation.store_revision = part.header().header().revision();
+    }
+    const auto& xyz = part.vertices().xyz();
+    for (int i = 0; i + 2 < xyz.size(); i += 3) {
+      const int point = NumberOf(xyz.data() + i);
+      EXPECT_GE(point, 0) << "hull " << hull_id << " has a vertex that nobody sent";
+      operation.points |= PointSet{1} << point;
+    }
+  }
+  return End(hull_id, operation, reader->Finish());
+}
+
+bool HistoryClient::Probe(const std::string& hull_id) {
+  Operation operation = Begin(Kind::kProbe);
+  operation.probe = Below(kCloudSize);
+  const double* at = HistoryCloud().data() + 3 * operation.probe;
+  v1::CheckCollisionRequest request;
+  v1::CheckCollisionResponse response;
+  *request.mutable_a() = PlacementOf(hull_id);
+  *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
+  const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
+  operation.revision = response.hull_a().revision();
+  operation.store_revision = response.header().revision();
+  operation.touching = response.relation() == v1::RELATION_TOUCHING;
+  return End(hull_id, operation, status);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,83 @@
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
+
+#include <grpcpp/grpcpp.h>
+
+#include <map>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/hull.grpc.pb.h"
+#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+
+// The hull of one point at the origin, with which points of others are probed. Not part of any
+// history.
+inline constexpr const char* kProbeHull = "probe";
+
+// The cloud that histories are made of: 48 points, all extreme.
+const Coordinates& HistoryCloud();
+
+// A client that calls at random and records what it asked and was answered. One thread's.
+class HistoryClient {
+ public:
+  // name: its writer ID. The history must outlive this.
+  HistoryClient(const std::shared_ptr<grpc::Channel>& channel, HullHistory& history,
+                std::string name, uint64_t seed);
+
+  // Makes kProbeHull; once per store.
+  void MakeProbe();
+
+  // From now on calls go to another server, or the same one started again; open streams are gone.
+  void Connect(const std::shared_ptr<grpc::Channel>& channel);
+
+  // One call at random on this hull: any, or one that changes, or one that reads. False when the
+  // server was not there to answer.
+  bool CallAtRandom(const std::string& hull_id);
+  bool ChangeAtRandom(const std::string& hull_id);
+  bool ReadAtRandom(const std::string& hull_id);
+
+  bool Create(const std::string& hull_id, bool if_absent);
+  // Opens a stream when none is open, and appends one chunk.
+  bool Append(const std::string& hull_id);
+  // One to three blocks. Now and then the stream ends without the last, empty one, which must
+  // change nothing, or is cancelled after it, which leaves open whether anything changed.
+  bool Replace(const std::string& hull_id);
+  bool Delete(const std::string& hull_id, bool if_known_revision);
+  bool Get(const std::string& hull_id);
+  bool Mesh(const std::string& hull_id);
+  bool Probe(const std::string& hull_id);
+
+ private:
+  struct Stream {
+    std::unique_ptr<Appender> appender;
+    uint64_t incarnation = 0;
+    uint64_t next_sequence = 1;
+  };
+
+  Operation Begin(Operation::Kind kind);
+  // Records the operation with the status of its call; false when nobody answered.
+  bool End(const std::string& hull_id, Operation& operation, const grpc::Status& status);
+  Stream* OpenStream(const std::string& hull_id, bool* answered);
+  // `count` points of the cloud, with repetition; tells the operation of them.
+  Coordinates SomePoints(int count, Operation& operation);
+  // Absent most times; else the revision last seen.
+  std::optional<uint64_t> SomeRevision(const std::string& hull_id);
+  int Below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
+
+  std::unique_ptr<v1::HullService::Stub> hulls_;
+  std::unique_ptr<v1::CollisionService::Stub> collisions_;
+  HullHistory& history_;
+  const std::string name_;
+  std::mt19937_64 random_;
+  std::map<std::string, Stream> streams_;
+  std::map<std::string, uint64_t> revisions_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_

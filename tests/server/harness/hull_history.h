@@ -1,0 +1,108 @@
+#ifndef HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
+#define HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace hulld::server {
+
+// A set of points by number, of a cloud of at most 64 points that all are extreme: a hull of any of
+// them has exactly these as vertices.
+using PointSet = uint64_t;
+
+// One call on one hull, as its client saw it.
+struct Operation {
+  enum class Kind {
+    kCreate,
+    kOpen,  // of an AppendPoints stream
+    kAppend,
+    kReplace,
+    kDelete,
+    kGet,
+    kMesh,
+    kProbe,  // CheckCollision with one point of the cloud
+  };
+  enum class Outcome {
+    kOk,
+    kNotFound,
+    kAlreadyExists,
+    kAborted,
+    kUnknown,  // no answer: the call may have taken effect, now, later or never
+  };
+
+  Kind kind = Kind::kGet;
+  Outcome outcome = Outcome::kUnknown;
+  // Ticks of the history's clock: the call took effect between the two, if it did.
+  uint64_t invoked = 0;
+  uint64_t returned = UINT64_MAX;
+
+  // What was asked.
+  // Create, open: keeps a hull that exists. Open, replace: makes one that does not.
+  bool if_absent = false;
+  // Of a replace 0: the hull must not exist.
+  std::optional<uint64_t> if_revision;
+  std::string writer;
+  uint64_t sequence = 0;
+  // Append: of the stream, as its opening said.
+  uint64_t incarnation = 0;
+  // Append, replace: how many points were sent; and which, without repetition.
+  uint64_t sent = 0;
+  PointSet points = 0;
+  int probe = 0;
+
+  // What was answered.
+  uint64_t store_revision = 0;
+  uint64_t create_revision = 0;
+  uint64_t revision = 0;
+  bool created = false;
+  bool already_applied = false;
+  bool touching = false;
+  uint64_t last_sequence = 0;
+  uint64_t vertex_count = 0;
+  uint64_t received = 0;
+  uint64_t outside = 0;
+  uint64_t duplicate = 0;
+};
+
+// What clients did to hulls, by hull ID. Thread-safe while it is recorded.
+class HullHistory {
+ public:
+  // The current tick, later than all before.
+  uint64_t Tick() { return ++clock_; }
+  // Requires that invoked and returned are ticks of this clock.
+  void Record(const std::string& hull_id, const Operation& operation);
+
+  // Says that the server that was called so far is gone: what it has not answered took effect
+  // before now or never. No call may be running.
+  void Settle();
+
+  const std::map<std::string, std::vector<Operation>>& operations() const { return operations_; }
+  size_t size() const;
+
+ private:
+  std::atomic<uint64_t> clock_ = 0;
+  std::mutex mutex_;
+  std::map<std::string, std::vector<Operation>> operations_;
+};
+
+// Whether the operations on one hull are linearizable: whether there is an order that agrees with
+// real time in which a hull that does one thing at a time, as hull.proto says, would have answered
+// the same. Empty when there is one; else what could not be explained.
+//
+// The store's revision is shared by all hulls, so that of a change is taken from the answer and
+// must be greater than all before. Search with memory of the states seen. Source: Wing and Gong
+// 1993, Testing and Verifying Concurrent Objects; Lowe 2017, Testing for Linearizability.
+std::string LinearizabilityFault(std::vector<Operation> operations);
+
+// The same for every hull, and that revisions of the store, which all hulls share, never fall from
+// one call to a later one, and that no two changes have the same.
+std::string HistoryFault(const HullHistory& history);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_

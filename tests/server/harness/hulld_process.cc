@@ -1,0 +1,89 @@
+#include "tests/server/harness/hulld_process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <string_view>
+
+namespace hulld::server {
+namespace {
+
+// The environment, in which hulld keeps nothing on disk unless its arguments say otherwise: tests
+// leave nothing behind.
+std::vector<char*> Environment() {
+  static char memory[] = "HULLD_STORE=memory";
+  std::vector<char*> environment;
+  bool chosen = false;
+  for (char** variable = environ; *variable != nullptr; ++variable) {
+    environment.push_back(*variable);
+    chosen |= std::string_view(*variable).starts_with("HULLD_STORE=");
+  }
+  if (!chosen) environment.push_back(memory);
+  environment.push_back(nullptr);
+  return environment;
+}
+
+}  // namespace
+
+Process::Process(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), HULLD_PROGRAM);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) std::abort();
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  // Not fork: threads of clients run here, and whatever lock one of them holds at that moment, the
+  // child would wait for ever.
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  ended_ =
+      posix_spawn(&pid_, HULLD_PROGRAM, &actions, nullptr, argv.data(), Environment().data()) != 0;
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  errors_ = fdopen(ends[0], "r");
+}
+
+Process::~Process() {
+  if (!ended_) {
+    Signal(SIGKILL);
+    Wait();
+  }
+  fclose(errors_);
+}
+
+std::string Process::ReadLineWith(const std::string& text) {
+  char line[4096];
+  while (fgets(line, sizeof line, errors_) != nullptr) {
+    lines_.emplace_back(line);
+    if (lines_.back().find(text) != std::string::npos) return lines_.back();
+  }
+  return "";
+}
+
+void Process::ReadToEnd() {
+  char line[4096];
+  while (fgets(line, sizeof line, errors_) != nullptr) lines_.emplace_back(line);
+}
+
+void Process::Signal(int number) {
+  if (!ended_) kill(pid_, number);
+}
+
+int Process::Wait() {
+  int status = 0;
+  if (ended_ || waitpid(pid_, &status, 0) != pid_) return -1;
+  ended_ = true;
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+std::string AddressIn(const std::string& line) {
+  const size_t start = line.find("listening on ") + 13;
+  return line.substr(start, line.find_first_of("\"\n", start) - start);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,135 @@
+#ifndef HULLD_TESTS_SERVER_HARNESS_STORE_FIXTURE_H_
+#define HULLD_TESTS_SERVER_HARNESS_STORE_FIXTURE_H_
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+#include "server/store/rocksdb_store.h"
+
+namespace hulld::server {
+
+// A registry upon a durable store.
+class DurableRegistry {
+ public:
+  explicit DurableRegistry(std::unique_ptr<RocksDbStore> store, const Limits& limits = {})
+      : store_(std::move(store)), registry_(*store_, limits, writers_) {
+    loaded_ = registry_.Load();
+  }
+
+  RocksDbStore& store() { return *store_; }
+  Registry& registry() { return registry_; }
+  const absl::Status& loaded() const { return loaded_; }
+
+  // Waits for the reply of one call.
+  template <typename T, typename Call>
+  static absl::StatusOr<T> Wait(const Call& call) {
+    std::promise<absl::StatusOr<T>> promise;
+    call([&](absl::StatusOr<T> result) { promise.set_value(std::move(result)); });
+    return promise.get_future().get();
+  }
+
+  absl::StatusOr<CreateResult> Create(const std::string& id, bool if_absent = false) {
+    return Wait<CreateResult>(
+        [&](Reply<CreateResult> done) { registry_.Create(id, if_absent, std::move(done)); });
+  }
+  absl::StatusOr<uint64_t> Delete(const std::string& id) {
+    return Wait<uint64_t>(
+        [&](Reply<uint64_t> done) { registry_.Delete(id, std::nullopt, std::move(done)); });
+  }
+  absl::StatusOr<OpenResult> Open(const std::string& id, const std::string& writer = "w",
+                                  bool create_if_absent = true) {
+    return Wait<OpenResult>([&](Reply<OpenResult> done) {
+      registry_.OpenAppend(
+          id, writer, create_if_absent, [](const absl::Status&) {}, std::move(done));
+    });
+  }
+  absl::StatusOr<ChunkResult> Append(const AppendSession& session, uint64_t sequence,
+                                     std::vector<Vector> points) {
+    return Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+      registry_.Append(session, {sequence, std::move(points), std::nullopt}, {}, {},
+                       std::move(done));
+    });
+  }
+  // One chunk in a session of its own.
+  absl::StatusOr<ChunkResult> Put(const std::string& id, std::vector<Vector> points,
+                                  const std::string& writer = "w") {
+    const absl::StatusOr<OpenResult> opened = Open(id, writer);
+    if (!opened.ok()) return opened.status();
+    absl::StatusOr<ChunkResult> result =
+        Append(opened->session, opened->last_sequence + 1, std::move(points));
+    registry_.CloseAppend(opened->session);
+    return result;
+  }
+  absl::StatusOr<ReplaceResult> Replace(Replacement replacement) {
+    return Wait<ReplaceResult>([&](Reply<ReplaceResult> done) {
+      registry_.Replace(std::move(replacement), std::move(done));
+    });
+  }
+  absl::StatusOr<HullView> View(const std::string& id) {
+    auto resolved = registry_.Resolve(id, {});
+    if (!resolved.ok()) return resolved.status();
+    return resolved->second;
+  }
+
+ private:
+  std::unique_ptr<RocksDbStore> store_;
+  WorkerPool writers_{2};
+  Registry registry_;
+  absl::Status loaded_;
+};
+
+// Gives each test a directory of its own, and opens stores in it.
+class StoreTest : public ::testing::Test {
+ protected:
+  StoreTest() {
+    std::string name = ::testing::TempDir() + "hulld_store_XXXXXX";
+    directory_ = mkdtemp(name.data());
+  }
+  ~StoreTest() override { std::filesystem::remove_all(directory_); }
+
+  absl::StatusOr<std::unique_ptr<RocksDbStore>> OpenStore(const std::string& name = "data") {
+    RocksDbOptions options;
+    options.data_dir = directory_ + "/" + name;
+    options.durability = durability_;
+    options.sync_interval = sync_interval_;
+    options.env = env_;
+    return RocksDbStore::Open(options);
+  }
+  // The store must open. Closes the one that was open before.
+  DurableRegistry& Start(const Limits& limits = {}) {
+    hulls_ = nullptr;
+    absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore();
+    if (!store.ok()) {
+      ADD_FAILURE() << store.status();
+      std::abort();
+    }
+    hulls_ = std::make_unique<DurableRegistry>(*std::move(store), limits);
+    EXPECT_TRUE(hulls_->loaded().ok()) << hulls_->loaded();
+    return *hulls_;
+  }
+
+  std::string directory_;
+  Durability durability_ = Durability::kSync;
+  std::chrono::milliseconds sync_interval_{1};
+  rocksdb::Env* env_ = nullptr;
+  std::unique_ptr<DurableRegistry> hulls_;
+};
+
+// The corners of the cube [low, low + size]^3.
+std::vector<Vector> CubeCorners(double low = 0, double size = 1);
+// `count` points on the unit sphere, all of them extreme.
+std::vector<Vector> SpherePoints(int count, double radius = 1);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_TESTS_SERVER_HARNESS_STORE_FIXTURE_H_

@@ -1,0 +1,35 @@
+#include "server/process/heap.h"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+namespace hulld::server {
+namespace {
+
+#ifdef HULLD_SANITIZED
+// Whose allocator keeps what was freed, to find out who uses it.
+TEST(Heap, DISABLED_FreeMemoryGoesBackOnlyWhenThereIsMuch) {
+#else
+TEST(Heap, FreeMemoryGoesBackOnlyWhenThereIsMuch) {
+#endif
+  GiveBackFreeMemory();
+  constexpr size_t kBlock = 8 << 10;
+  constexpr size_t kBlocks = 20'000;
+  std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
+  for (auto& block : blocks) {
+    block = std::make_unique<char[]>(kBlock);
+    std::memset(block.get(), 1, kBlock);
+  }
+  EXPECT_FALSE(GiveBackFreeMemory());
+  // The last one keeps all before it from going back by itself.
+  for (size_t i = 0; i + 1 < kBlocks; ++i) blocks[i] = nullptr;
+  EXPECT_TRUE(GiveBackFreeMemory());
+  EXPECT_FALSE(GiveBackFreeMemory());
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,409 @@
+// What an operator sees: metrics, request IDs, log lines, health.
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <grpcpp/generic/generic_stub.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <prometheus/text_serializer.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <string>
+#include <thread>
+
+#include "server/process/log.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+// The reply to GET /metrics at "127.0.0.1:port".
+std::string HttpGetMetrics(const std::string& address) {
+  const int fd = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in name = {};
+  name.sin_family = AF_INET;
+  name.sin_port = htons(static_cast<uint16_t>(std::stoi(address.substr(address.find(':') + 1))));
+  name.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  std::string reply;
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0) {
+    const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
+    EXPECT_EQ(send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+    char buffer[4096];
+    for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) reply.append(buffer, n);
+  }
+  close(fd);
+  return reply;
+}
+
+v1::CheckCollisionRequest PairRequest(const std::string& a, const std::string& b, double x) {
+  v1::CheckCollisionRequest request;
+  *request.mutable_a() = PlacementOf(a);
+  *request.mutable_b() = PlacementOf(b, x);
+  return request;
+}
+
+class Observation : public ServerTest {
+ protected:
+  std::string Metrics() const {
+    return prometheus::TextSerializer().Serialize(server_->metrics().Collect());
+  }
+
+  // The value of one series, written as Prometheus shows it; -1 when there is none.
+  double Metric(const std::string& series) const {
+    std::istringstream lines(Metrics());
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with(series + " ")) return std::stod(line.substr(series.size() + 1));
+    }
+    return -1;
+  }
+};
+
+TEST_F(Observation, MetricsAreServedOverHttpOnLoopbackAlone) {
+  EXPECT_EQ(server_->metrics_address(), "");
+  Config config = TestConfig();
+  config.metrics_address = "127.0.0.1:0";
+  Restart(config);
+  const std::string reply = HttpGetMetrics(server_->metrics_address());
+  EXPECT_THAT(reply, StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(reply, HasSubstr("\nhulld_build_info{version=\"0.1.0\"} 1"));
+  EXPECT_THAT(reply, HasSubstr("\nhulld_requests_running 0"));
+  EXPECT_THAT(reply, HasSubstr("\nprocess_resident_memory_bytes "));
+  EXPECT_THAT(reply, HasSubstr("\nhulld_queue_tasks{pool=\"readers\"} 0"));
+
+  config.metrics_address = "0.0.0.0:0";
+  config.listen = "127.0.0.1:0";
+  const absl::Status exposed = Server::Start(config).status();
+  EXPECT_EQ(exposed.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(exposed.message()), HasSubstr("--metrics-insecure"));
+  config.metrics_insecure = true;
+  EXPECT_TRUE(Server::Start(config).ok());
+  config.metrics_address = server_->metrics_address();
+  const absl::Status taken = Server::Start(config).status();
+  EXPECT_EQ(taken.code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(std::string(taken.message()), HasSubstr("--metrics-address"));
+  config.metrics_address = "9551";
+  EXPECT_THAT(std::string(Server::Start(config).status().message()),
+              HasSubstr("--metrics-address is \"9551\""));
+}
+
+TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
+  Create("a");
+  {
+    Appender appender(*hulls_, "a", "w");
+    Coordinates points = Cube();
+    const Coordinates again = Cube();
+    points.insert(points.end(), again.begin(), again.end());
+    points.insert(points.end(), {0.5, 0.5, 0.5});
+    ASSERT_TRUE(appender.Append(1, points).has_value());
+    ASSERT_TRUE(appender.Finish().ok());
+  }
+  Check(PairRequest("a", "a", 50));
+  Check(PairRequest("a", "a", 1));
+  CheckError(PairRequest("a", "none", 0));
+  EXPECT_EQ(Metric("hulld_points_received_total"), 17);
+  EXPECT_EQ(Metric("hulld_points_kept_total"), 8);
+  EXPECT_EQ(Metric("hulld_points_duplicate_total"), 8);
+  EXPECT_EQ(Metric("hulld_points_inside_total"), 1);
+  EXPECT_EQ(Metric("hulld_hulls"), 1);
+  EXPECT_EQ(Metric("hulld_vertices"), 8);
+  EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"CreateHull\"}"), 1);
+  EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"CheckCollision\"}"), 2);
+  EXPECT_EQ(Metric("hulld_requests_total{code=\"NOT_FOUND\",rpc=\"CheckCollision\"}"), 1);
+  EXPECT_EQ(Metric("hulld_request_duration_seconds_count{rpc=\"CheckCollision\"}"), 3);
+  EXPECT_EQ(Metric("hulld_message_duration_seconds_count{rpc=\"AppendPoints\"}"), 1);
+  // Far apart: their spheres; sharing a facet: nothing but exact arithmetic can tell.
+  EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 1);
+  EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
+  EXPECT_EQ(Metric("hulld_exact_fallbacks_total"), 1);
+  // The first one makes what queries need of the hull, which is no work for the thread of gRPC.
+  EXPECT_GE(Metric("hulld_queue_wait_seconds_count{pool=\"readers\"}"), 1);
+}
+
+TEST_F(Observation, TheStoreAndItsCacheReport) {
+  Put("a", Cube());
+  Check(PairRequest("a", "a", 50));
+  Check(PairRequest("a", "a", 50));
+  EXPECT_EQ(Metric("hulld_store_commit_duration_seconds_count"), 2);
+  EXPECT_EQ(Metric("hulld_store_commit_changes_sum"), 2);
+  EXPECT_EQ(Metric("hulld_store_failures_total{operation=\"write\"}"), 0);
+  EXPECT_EQ(Metric("hulld_store_read_only"), 0);
+  EXPECT_GE(Metric("hulld_cache_lookups_total{result=\"miss\"}"), 1);
+  EXPECT_GE(Metric("hulld_cache_lookups_total{result=\"hit\"}"), 1);
+  EXPECT_GT(Metric("hulld_cache_bytes"), 0);
+  EXPECT_GT(Metric("hulld_cache_limit_bytes"), Metric("hulld_cache_bytes"));
+}
+
+TEST_F(Observation, PairsOfBatchesScenesAndStreamsAreCountedByRung) {
+  Put("a", Cube());
+  grpc::ClientContext batch_context;
+  v1::BatchCheckCollisionsRequest batch;
+  for (const double x : {0.0, 9.0, 99.0}) *batch.add_placements() = PlacementOf("a", x);
+  for (const uint32_t i : {0, 1, 0, 2, 1, 2}) batch.add_pairs(i);
+  auto answers = collisions_->BatchCheckCollisions(&batch_context, batch);
+  v1::BatchCheckCollisionsResponse part;
+  while (answers->Read(&part)) {
+  }
+  ASSERT_TRUE(answers->Finish().ok());
+  EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 3);
+
+  grpc::ClientContext scene_context;
+  v1::FindCollisionsRequest scene;
+  for (const double x : {0.0, 1.0, 99.0}) *scene.add_placements() = PlacementOf("a", x);
+  auto found = collisions_->FindCollisions(&scene_context, scene);
+  v1::FindCollisionsResponse scene_part;
+  while (found->Read(&scene_part)) {
+  }
+  ASSERT_TRUE(found->Finish().ok());
+  EXPECT_EQ(Metric("hulld_pairs_total{rung=\"exact\"}"), 1);
+
+  grpc::ClientContext stream_context;
+  auto stream = collisions_->StreamCollisions(&stream_context);
+  v1::StreamCollisionsRequest open;
+  *open.mutable_open()->add_placements() = PlacementOf("a");
+  *open.mutable_open()->add_placements() = PlacementOf("a", 9);
+  open.mutable_open()->add_pairs(0);
+  open.mutable_open()->add_pairs(1);
+  ASSERT_TRUE(stream->Write(open));
+  v1::StreamCollisionsResponse answer;
+  ASSERT_TRUE(stream->Read(&answer));
+  EXPECT_EQ(Metric("hulld_pairs_total{rung=\"bounds\"}"), 4);
+  stream->WritesDone();
+  ASSERT_TRUE(stream->Finish().ok());
+}
+
+// The value of a key in metadata; empty when it is not there.
+std::string ValueOf(const std::multimap<grpc::string_ref, grpc::string_ref>& metadata,
+                    const char* key) {
+  const auto found = metadata.find(key);
+  return found == metadata.end() ? "" : std::string(found->second.data(), found->second.size());
+}
+
+TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
+  const auto ask = [this](const std::string& given, const std::string& hull_id = "none") {
+    grpc::ClientContext context;
+    if (!given.empty()) context.AddMetadata("x-request-id", given);
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id(hull_id);
+    hulls_->GetHull(&context, request, &response);
+    return ValueOf(context.GetServerTrailingMetadata(), "x-request-id");
+  };
+  EXPECT_EQ(ask("cell-1/job_42"), "cell-1/job_42");
+  std::set<std::string> made = {ask(""), ask(""), ask("no spaces"), ask(std::string(129, 'x'))};
+  EXPECT_EQ(made.size(), 4);
+  EXPECT_FALSE(made.contains(""));
+  EXPECT_FALSE(made.contains("no spaces"));
+  EXPECT_EQ(ask(std::string(128, 'x')), std::string(128, 'x'));
+  // Of a call that succeeds nobody else speaks.
+  Put("cube", Cube());
+  EXPECT_EQ(ask("", "cube"), "");
+  EXPECT_EQ(ask("mine", "cube"), "mine");
+  EXPECT_NE(ask("no spaces", "cube"), "");
+}
+
+TEST_F(Observation, AnAuditThatNobodyWaitsForEndsUnfinished) {
+  Put("ball", Sphere(50'000));
+  // Makes the snapshot, so that an audit is all that is left to do.
+  Get("ball");
+  const std::string begun = "hulld_queue_wait_seconds_count{pool=\"long_readers\"}";
+  const double before = Metric(begun);
+  grpc::ClientContext context;
+  grpc::Status status;
+  std::thread client([&] {
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id("ball");
+    request.set_audit(true);
+    status = hulls_->GetHull(&context, request, &response);
+  });
+  // Bounded by the time limit of the test alone.
+  while (Metric(begun) == before) std::this_thread::yield();
+  context.TryCancel();
+  client.join();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  // The client says so by itself: here it is the server that did.
+  EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"GetHull\"}"), 1);
+  EXPECT_EQ(Metric("hulld_requests_total{code=\"CANCELLED\",rpc=\"GetHull\"}"), 1);
+}
+
+TEST_F(Observation, ErrorsNameTheRequestInTheirDetails) {
+  grpc::ClientContext context;
+  context.AddMetadata("x-request-id", "lost-1");
+  v1::GetHullRequest request;
+  v1::GetHullResponse response;
+  request.set_hull_id("none");
+  const grpc::Status status = hulls_->GetHull(&context, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_THAT(status.error_message(), Not(HasSubstr("lost-1")));
+  EXPECT_EQ(ValueOf(context.GetServerTrailingMetadata(), "x-request-id"), "lost-1");
+  // google.rpc.Status: code 5; message; details: an Any of RequestInfo { request_id }.
+  const std::string request_info = "\x0a\x06lost-1";
+  const std::string type = "type.googleapis.com/google.rpc.RequestInfo";
+  std::string any = "\x0a" + std::string(1, static_cast<char>(type.size())) + type;
+  any += "\x12" + std::string(1, static_cast<char>(request_info.size())) + request_info;
+  const std::string& message = status.error_message();
+  EXPECT_EQ(status.error_details(),
+            "\x08\x05\x12" + std::string(1, static_cast<char>(message.size())) + message + "\x1a" +
+                std::string(1, static_cast<char>(any.size())) + any);
+}
+
+// spdlog's default logger into a string, as the server writes it, until this goes.
+class CapturedLog {
+ public:
+  CapturedLog() {
+    auto logger = std::make_shared<spdlog::logger>(
+        "captured", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_));
+    logger->set_pattern("%l %v");
+    logger->set_level(spdlog::level::debug);
+    spdlog::set_default_logger(std::move(logger));
+  }
+  ~CapturedLog() { spdlog::set_default_logger(before_); }
+  std::string text() const { return text_.str(); }
+
+ private:
+  const std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
+  std::ostringstream text_;
+};
+
+TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
+  const LineBudget::Clock::time_point start{};
+  LineBudget budget(2, std::chrono::seconds(10));
+  EXPECT_EQ(budget.Spend(start), 0);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(9)), 0);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(9)), std::nullopt);
+  EXPECT_EQ(budget.Spend(start + std::chrono::milliseconds(9999)), std::nullopt);
+  // The next stretch begins with its first line, however late that is.
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(15)), 2);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(24)), 0);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(24)), std::nullopt);
+  EXPECT_EQ(budget.Spend(start + std::chrono::seconds(25)), 1);
+}
+
+// A name that is not UTF-8, of which protobuf would tell standard error in full, every time.
+TEST_F(Observation, MalformedMessagesDoNotFloodTheLog) {
+  const CapturedLog log;
+  RouteLibraryLogs();
+  constexpr int kMessages = 10 * kLibraryLines;
+  const std::string bad_name = "\x0a\x02\xc3\x28";
+  const grpc::Slice slice(bad_name);
+  const grpc::ByteBuffer request(&slice, 1);
+  testing::internal::CaptureStderr();
+  for (int i = 0; i < kMessages; ++i) {
+    grpc::GenericStub stub(channel_);
+    grpc::ClientContext context;
+    grpc::ByteBuffer response;
+    std::promise<grpc::Status> finished;
+    stub.UnaryCall(&context, "/hulld.v1.HullService/GetHull", grpc::StubOptions(), &request,
+                   &response, [&](grpc::Status status) { finished.set_value(std::move(status)); });
+    EXPECT_FALSE(finished.get_future().get().ok());
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  const std::string text = log.text();
+  EXPECT_THAT(text, HasSubstr("warning protobuf: String field 'hulld.v1.GetHullRequest.hull_id'"));
+  size_t lines = 0;
+  for (size_t at = 0; (at = text.find("protobuf: ", at)) != std::string::npos; ++at) ++lines;
+  EXPECT_LE(lines, size_t{kLibraryLines});
+}
+
+TEST_F(Observation, LogLinesAboutACallNameItsRequest) {
+  const CapturedLog log;
+  grpc::ClientContext context;
+  context.AddMetadata("x-request-id", "made-1");
+  v1::CreateHullRequest request;
+  v1::CreateHullResponse response;
+  request.set_hull_id("a");
+  ASSERT_TRUE(hulls_->CreateHull(&context, request, &response).ok());
+  grpc::ClientContext again;
+  again.AddMetadata("x-request-id", "made-2");
+  EXPECT_FALSE(hulls_->CreateHull(&again, request, &response).ok());
+  server_.reset();  // so that nothing logs any more
+  EXPECT_THAT(log.text(), HasSubstr("info hull created rpc=CreateHull request_id=made-1 hull=a\n"));
+  EXPECT_THAT(log.text(), HasSubstr("debug request failed rpc=CreateHull request_id=made-2 peer="));
+  EXPECT_THAT(log.text(), HasSubstr(" code=ALREADY_EXISTS milliseconds="));
+}
+
+TEST_F(Observation, SlowRequestsAreLoggedWithTheirSizes) {
+  Config config = TestConfig();
+  config.limits.slow_request = std::chrono::milliseconds(1);
+  Restart(config);
+  Put("ball", Sphere(100));
+  const CapturedLog log;
+  // Some 10^8 operations: more than a millisecond on any machine.
+  v1::BatchCheckCollisionsRequest request;
+  request.set_method(v1::METHOD_TEXTBOOK_SAT);
+  *request.add_placements() = PlacementOf("ball");
+  *request.add_placements() = PlacementOf("ball", 0.5);
+  for (int i = 0; i < 4; ++i) {
+    request.add_pairs(0);
+    request.add_pairs(1);
+  }
+  grpc::ClientContext context;
+  context.AddMetadata("x-request-id", "slow-1");
+  auto stream = collisions_->BatchCheckCollisions(&context, request);
+  v1::BatchCheckCollisionsResponse part;
+  while (stream->Read(&part)) {
+  }
+  ASSERT_TRUE(stream->Finish().ok());
+  server_.reset();
+  EXPECT_THAT(log.text(), ::testing::ContainsRegex(
+                              "warning slow request rpc=BatchCheckCollisions request_id=slow-1 "
+                              "peer=[^ ]+ code=OK milliseconds=[0-9.]+ pairs=4 points=0\n"));
+}
+
+TEST(LogEventTest, TextQuotesWhatIsNoWordAndEscapes) {
+  const CapturedLog log;
+  LogEvent(LogLevel::kInfo, "done",
+           {{"id", "a/b"}, {"name", "two words"}, {"bad", "a\n\"b\""}, {"count", uint64_t{3}}});
+  EXPECT_EQ(log.text(), "info done id=a/b name=\"two words\" bad=\"a\\u000a\\\"b\\\"\" count=3\n");
+}
+
+// A watcher of grpc.health.v1, whose generated code Debian does not ship.
+TEST_F(Observation, WatchersOfHealthSeeTheServerDrain) {
+  grpc::GenericStub stub(channel_);
+  grpc::ClientContext context;
+  grpc::CompletionQueue queue;
+  const auto done = [&queue] {
+    void* tag = nullptr;
+    bool ok = false;
+    return queue.Next(&tag, &ok) && ok;
+  };
+  const auto stream = stub.PrepareCall(&context, "/grpc.health.v1.Health/Watch", &queue);
+  stream->StartCall(nullptr);
+  ASSERT_TRUE(done());
+  const grpc::Slice empty;
+  stream->Write(grpc::ByteBuffer(&empty, 1), nullptr);
+  ASSERT_TRUE(done());
+  // HealthCheckResponse.status: 1 SERVING, 2 NOT_SERVING.
+  const auto next = [&]() -> int {
+    grpc::ByteBuffer reply;
+    stream->Read(&reply, nullptr);
+    std::vector<grpc::Slice> slices;
+    if (!done() || !reply.Dump(&slices).ok() || slices.size() != 1) return 0;
+    return slices[0].size() == 2 ? slices[0].begin()[1] : 0;
+  };
+  EXPECT_EQ(next(), 1);
+  server_->BeginDrain();
+  EXPECT_EQ(next(), 2);
+  context.TryCancel();
+  EXPECT_EQ(next(), 0);
+  grpc::Status status;
+  stream->Finish(&status, nullptr);
+  done();
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,222 @@
+// Memory as a cache of the store.
+
+#include <atomic>
+#include <future>
+#include <thread>
+#include <utility>
+
+#include "server/store/memory_store.h"
+#include "tests/server/harness/store_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class RegistryMemory : public StoreTest {};
+
+TEST_F(RegistryMemory, HullsAreReadAtFirstUse) {
+  Start();
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(hulls_->Put(std::to_string(i), CubeCorners()).ok());
+  Start();
+  EXPECT_EQ(hulls_->registry().Cache().bytes, 0);
+  EXPECT_EQ(hulls_->registry().List("", "", 100).hulls.size(), 10);
+  EXPECT_EQ(hulls_->registry().Cache().loads, 0);
+  ASSERT_TRUE(hulls_->View("3").ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, 1);
+  EXPECT_EQ(hulls_->registry().Cache().misses, 1);
+  EXPECT_GT(hulls_->registry().Cache().bytes, 0);
+  ASSERT_TRUE(hulls_->View("3").ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, 1);
+  EXPECT_EQ(hulls_->registry().Cache().hits, 1);
+}
+
+TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
+  Limits limits;
+  limits.memory_limit = 3 << 20;
+  Start(limits);
+  const std::vector<Vector> sphere = SpherePoints(2000);
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(hulls_->Put(std::to_string(i), sphere).ok());
+    EXPECT_LE(hulls_->registry().Cache().bytes, limits.memory_limit);
+  }
+  EXPECT_GT(hulls_->registry().Cache().evictions, 0);
+  const uint64_t loads = hulls_->registry().Cache().loads;
+  ASSERT_TRUE(hulls_->View("19").ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, loads);
+  ASSERT_TRUE(hulls_->View("0").ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, loads + 1);
+  // A dropped hull goes on as if it had stayed.
+  ASSERT_TRUE(hulls_->Put("1", {{3, 3, 3}}).ok());
+  EXPECT_EQ(hulls_->View("1")->record.counts.received, 2001);
+}
+
+TEST_F(RegistryMemory, WhatAReaderHoldsStays) {
+  Limits limits;
+  limits.memory_limit = 1 << 20;
+  Start(limits);
+  ASSERT_TRUE(hulls_->Put("held", SpherePoints(1000)).ok());
+  const HullView held = *hulls_->View("held");
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(hulls_->Put(std::to_string(i), SpherePoints(1000)).ok());
+  }
+  const uint64_t loads = hulls_->registry().Cache().loads;
+  EXPECT_EQ(hulls_->View("held")->snapshot, held.snapshot);
+  EXPECT_EQ(hulls_->registry().Cache().loads, loads);
+}
+
+TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
+  Limits limits;
+  limits.memory_limit = 2 << 20;
+  Start(limits);
+  constexpr int kHulls = 8;
+  const std::vector<Vector> sphere = SpherePoints(1200);
+  std::atomic<bool> ending = false;
+  std::vector<std::thread> readers;
+  for (int r = 0; r < 2; ++r) {
+    readers.emplace_back([&, r] {
+      for (int i = r; !ending; ++i) {
+        const auto view = hulls_->View(std::to_string(i % kHulls));
+        if (!view.ok()) {
+          EXPECT_EQ(view.status().code(), absl::StatusCode::kNotFound) << view.status();
+          continue;
+        }
+        EXPECT_EQ(view->snapshot->hull().vertices().size(), view->record.vertex_count);
+      }
+    });
+  }
+  for (int round = 0; round < 12; ++round) {
+    for (int h = 0; h < kHulls; ++h) {
+      const auto first = sphere.begin() + round * 100;
+      const auto result = hulls_->Put(std::to_string(h), {first, first + 100});
+      ASSERT_TRUE(result.ok()) << result.status();
+    }
+  }
+  ending = true;
+  for (std::thread& reader : readers) reader.join();
+  for (int h = 0; h < kHulls; ++h) {
+    EXPECT_EQ(hulls_->View(std::to_string(h))->record.vertex_count, 1200);
+  }
+  // Builders and snapshots of all of them together are beyond the limit.
+  EXPECT_GT(hulls_->registry().Cache().evictions, 0);
+}
+
+TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Limits limits;
+  limits.memory_limit = 100'000;
+  Registry registry(store, limits, writers);
+  const auto put = [&](const std::string& id) {
+    const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+      registry.OpenAppend(
+          id, "w", true, [](const absl::Status&) {}, std::move(done));
+    });
+    return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+      registry.Append(opened->session, {1, SpherePoints(1000), std::nullopt}, {}, {},
+                      std::move(done));
+    });
+  };
+  ASSERT_TRUE(put("first").ok());
+  const auto second = put("second");
+  EXPECT_EQ(second.status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(second.status().message()), HasSubstr("--memory-limit"));
+  EXPECT_EQ(registry.Resolve("first", {})->second.snapshot->hull().vertices().size(), 1000);
+}
+
+// Points that wait for their turn, and what they are once they are built.
+TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Registry registry(store, Limits(), writers);
+  const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+    registry.OpenAppend(
+        "h", "w", true, [](const absl::Status&) {}, std::move(done));
+  });
+  std::vector<Vector> line;
+  for (int i = 0; i < 20'000; ++i) line.emplace_back(i, 0, 0);
+  const uint64_t line_bytes = line.size() * sizeof(Vector);
+  const std::vector<Vector> waiting(3000, Vector(1, 2, 3));
+  std::promise<absl::StatusOr<ChunkResult>> next;
+  bool asked = false;
+  // While the first chunk is built.
+  const auto should_stop = [&] {
+    if (std::exchange(asked, true)) return false;
+    const uint64_t before = registry.Cache().bytes;
+    EXPECT_EQ(before, line_bytes);
+    registry.Append(opened->session, {2, waiting, std::nullopt}, {}, {},
+                    [&](absl::StatusOr<ChunkResult> result) { next.set_value(std::move(result)); });
+    EXPECT_EQ(registry.Cache().bytes, before + waiting.size() * sizeof(Vector));
+    return false;
+  };
+  const auto first = DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+    registry.Append(opened->session, {1, line, std::nullopt}, should_stop, {}, std::move(done));
+  });
+  EXPECT_TRUE(first.ok());
+  EXPECT_TRUE(asked);
+  EXPECT_TRUE(next.get_future().get().ok());
+  // The builder is left, and nothing of the points.
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(line).ok());
+  ASSERT_TRUE(builder.Add(waiting).ok());
+  EXPECT_EQ(registry.Cache().bytes, builder.MemoryBytes());
+}
+
+TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Limits limits;
+  limits.memory_limit = 10'000;
+  Registry registry(store, limits, writers);
+  const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+    registry.OpenAppend(
+        "h", "w", true, [](const absl::Status&) {}, std::move(done));
+  });
+  const auto append = [&](size_t points) {
+    return DurableRegistry::Wait<ChunkResult>([&](Reply<ChunkResult> done) {
+      registry.Append(opened->session, {1, std::vector<Vector>(points, Vector(1, 2, 3)), {}}, {},
+                      {}, std::move(done));
+    });
+  };
+  EXPECT_EQ(append(1000).status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(registry.Cache().bytes, 0);
+  EXPECT_TRUE(append(100).ok());
+}
+
+TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
+  MemoryStore store;
+  WorkerPool writers(2);
+  Limits limits;
+  limits.memory_limit = 100'000;
+  Registry registry(store, limits, writers);
+  {
+    MemoryCharge charge(registry);
+    charge.Set(100'000);
+    EXPECT_TRUE(registry.CheckMemory().ok());
+    charge.Set(100'001);
+    EXPECT_EQ(registry.CheckMemory().code(), absl::StatusCode::kResourceExhausted);
+    charge.Set(60'000);
+    EXPECT_TRUE(registry.CheckMemory().ok());
+    EXPECT_EQ(registry.Cache().bytes, 60'000);
+    MemoryCharge other(registry);
+    other.Set(60'000);
+    EXPECT_THAT(std::string(registry.CheckMemory().message()), HasSubstr("--memory-limit"));
+  }
+  EXPECT_EQ(registry.Cache().bytes, 0);
+  EXPECT_TRUE(registry.CheckMemory().ok());
+}
+
+TEST_F(RegistryMemory, AReplacementCountsWhileItIsStoredAndAsAHullAfterwards) {
+  Start();
+  Replacement replacement;
+  replacement.hull_id = "h";
+  replacement.create_if_absent = true;
+  replacement.builder = std::make_shared<HullBuilder>();
+  replacement.counts = *replacement.builder->Add(SpherePoints(1000));
+  const uint64_t bytes = replacement.builder->MemoryBytes();
+  ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
+  EXPECT_EQ(hulls_->registry().Cache().bytes, bytes);
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,314 @@
+// Bytes of a store that turned into others: found out, named, and never served.
+
+#include <absl/strings/str_cat.h>
+
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "core/hull/audit.h"
+#include "server/admin/doctor.h"
+#include "server/store/store_keys.h"
+#include "tests/server/harness/store_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class StoreDamage : public StoreTest {
+ protected:
+  // Flips a bit of the value that is kept under `key`, as a faulty disk controller might.
+  void Flip(const std::string& key) {
+    std::string value;
+    ASSERT_TRUE(hulls_->store().db().Get({}, key, &value).ok());
+    value[value.size() / 2] ^= 4;
+    ASSERT_TRUE(hulls_->store().db().Put({}, key, value).ok());
+  }
+  std::filesystem::path LogFile() const {
+    std::filesystem::path log;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_ + "/data/rocksdb")) {
+      if (entry.path().extension() == ".log") log = entry.path();
+    }
+    return log;
+  }
+  static void FlipBits(const std::filesystem::path& path, uintmax_t offset, int mask) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(static_cast<std::streamoff>(offset));
+    const char byte = static_cast<char>(file.get() ^ mask);
+    file.seekp(static_cast<std::streamoff>(offset));
+    file.put(byte);
+  }
+  size_t CountKeys(char prefix) {
+    const std::unique_ptr<rocksdb::Iterator> it(hulls_->store().db().NewIterator({}));
+    size_t count = 0;
+    for (it->Seek(std::string(1, prefix)); it->Valid() && it->key()[0] == prefix; it->Next()) {
+      ++count;
+    }
+    return count;
+  }
+  void FillThree() {
+    Start();
+    for (const char* id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Put(id, CubeCorners()).ok());
+  }
+  void ExpectOnlyBIsDamaged() {
+    const auto damaged = hulls_->View("b");
+    EXPECT_EQ(damaged.status().code(), absl::StatusCode::kDataLoss);
+    EXPECT_THAT(std::string(damaged.status().message()), HasSubstr("hull \"b\" is damaged"));
+    EXPECT_EQ(hulls_->Put("b", CubeCorners(), "other").status().code(),
+              absl::StatusCode::kDataLoss);
+    for (const char* id : {"a", "c"}) {
+      EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
+      EXPECT_TRUE(hulls_->Put(id, CubeCorners(2)).ok());
+    }
+    ASSERT_TRUE(hulls_->Delete("b").ok());
+    EXPECT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+    EXPECT_EQ(hulls_->View("b")->record.vertex_count, 8);
+  }
+};
+
+TEST_F(StoreDamage, ADamagedDeltaIsReportedByHullAndNeverServed) {
+  FillThree();
+  const HullRecord record = hulls_->View("b")->record;
+  Flip(DeltaKey(record.create_revision, record.revision));
+  Start();
+  ExpectOnlyBIsDamaged();
+}
+
+TEST_F(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
+  FillThree();
+  Flip(HullKey("b"));
+  Start();
+  const HullPage page = hulls_->registry().List("", "", 10);
+  ASSERT_EQ(page.hulls.size(), 3);
+  EXPECT_FALSE(page.hulls[0].damaged);
+  EXPECT_TRUE(page.hulls[1].damaged);
+  EXPECT_EQ(hulls_->Create("b", true).status().code(), absl::StatusCode::kDataLoss);
+  ExpectOnlyBIsDamaged();
+}
+
+TEST_F(StoreDamage, ADeletedHullWhoseRecordIsDamagedLeavesNothing) {
+  FillThree();
+  ASSERT_TRUE(hulls_->Put("b", SpherePoints(40'000, 9)).ok());
+  ASSERT_GT(CountKeys(kBasePrefix), 0);
+  Flip(HullKey("b"));
+  Start();
+  ASSERT_TRUE(hulls_->Delete("b").ok());
+  EXPECT_EQ(CountKeys(kWriterPrefix), 2);
+  EXPECT_EQ(CountKeys(kDeltaPrefix), 2);
+  EXPECT_EQ(CountKeys(kBasePrefix), 0);
+  Start();
+  for (const char* id : {"a", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
+  EXPECT_EQ(hulls_->Open("a", "w")->last_sequence, 1);
+}
+
+TEST_F(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothing) {
+  FillThree();
+  Flip(HullKey("b"));
+  Start();
+  auto builder = std::make_shared<HullBuilder>();
+  ASSERT_TRUE(builder->Add(CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Replace({"b", {}, false, builder, {}}).ok());
+  EXPECT_EQ(CountKeys(kWriterPrefix), 2);
+  EXPECT_EQ(CountKeys(kDeltaPrefix) + CountKeys(kBasePrefix), 3);
+  Start();
+  for (const char* id : {"a", "b", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
+}
+
+// Of two such hulls nobody knows which keys are whose.
+TEST_F(StoreDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedToo) {
+  FillThree();
+  Flip(HullKey("a"));
+  Flip(HullKey("b"));
+  Start();
+  ASSERT_TRUE(hulls_->Delete("b").ok());
+  EXPECT_EQ(CountKeys(kDeltaPrefix), 3);
+  Start();
+  EXPECT_EQ(hulls_->View("a").status().code(), absl::StatusCode::kDataLoss);
+  ASSERT_TRUE(hulls_->Delete("a").ok());
+  EXPECT_EQ(CountKeys(kDeltaPrefix), 1);
+  EXPECT_EQ(CountKeys(kWriterPrefix), 1);
+  EXPECT_EQ(hulls_->View("c")->record.vertex_count, 8);
+}
+
+TEST_F(StoreDamage, TheDoctorsReportIsUtf8WhateverTheKeysAre) {
+  FillThree();
+  ASSERT_TRUE(hulls_->store().db().Put({}, HullKey("x\xff\"\n"), "garbage").ok());
+  hulls_ = nullptr;
+  ::testing::internal::CaptureStdout();
+  EXPECT_EQ(RunDoctor({"--data-dir", directory_ + "/data", "--json"}), 1);
+  const std::string report = ::testing::internal::GetCapturedStdout();
+  EXPECT_THAT(report, HasSubstr(R"({"hullId":"x\ufffd\"\u000a")"));
+}
+
+TEST_F(StoreDamage, AMissingDeltaIsReported) {
+  FillThree();
+  const HullRecord record = hulls_->View("b")->record;
+  ASSERT_TRUE(
+      hulls_->store().db().Delete({}, DeltaKey(record.create_revision, record.revision)).ok());
+  Start();
+  ExpectOnlyBIsDamaged();
+}
+
+TEST_F(StoreDamage, AValueUnderAnotherKeyIsReported) {
+  FillThree();
+  const HullRecord a = hulls_->View("a")->record;
+  const HullRecord b = hulls_->View("b")->record;
+  rocksdb::DB& db = hulls_->store().db();
+  std::string value;
+  ASSERT_TRUE(db.Get({}, DeltaKey(a.create_revision, a.revision), &value).ok());
+  ASSERT_TRUE(db.Put({}, DeltaKey(b.create_revision, b.revision), value).ok());
+  Start();
+  ExpectOnlyBIsDamaged();
+}
+
+TEST_F(StoreDamage, AMissingPartOfABaseIsReported) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", SpherePoints(40'000)).ok());
+  const HullRecord record = hulls_->View("h")->record;
+  ASSERT_TRUE(
+      hulls_->store().db().Delete({}, BaseKey(record.create_revision, record.revision, 1)).ok());
+  Start();
+  EXPECT_THAT(std::string(hulls_->View("h").status().message()),
+              HasSubstr("part 1 of its base: it is missing"));
+}
+
+TEST_F(StoreDamage, ADamagedSequenceIsNotTakenForAnother) {
+  FillThree();
+  Flip(WriterKey(hulls_->View("b")->record.create_revision, "w"));
+  Start();
+  const auto opened = hulls_->Open("b", "w");
+  EXPECT_EQ(opened.status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(opened.status().message()), HasSubstr("hull \"b\""));
+  EXPECT_TRUE(hulls_->View("b").ok());
+}
+
+// One bit after the other, spread over all files of a store: whatever opens serves what was kept,
+// or says that it is damaged.
+TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
+  Start();
+  const std::vector<Vector> sphere = SpherePoints(300);
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(hulls_->Put(absl::StrCat("h", i), {sphere.begin() + i, sphere.end()}).ok());
+  }
+  const Hull expected = hulls_->View("h7")->snapshot->hull();
+  ASSERT_TRUE(hulls_->store().db().Flush({}).ok());
+  ASSERT_TRUE(hulls_->Put("late", CubeCorners()).ok());
+  hulls_ = nullptr;
+
+#ifdef HULLD_SANITIZED
+  constexpr int kTrials = 40;
+#else
+  constexpr int kTrials = 120;
+#endif
+  std::mt19937_64 random(20261121);
+  int refused_to_open = 0;
+  int reported = 0;
+  int harmless = 0;
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(directory_ + "/data/rocksdb")) {
+    const std::string extension = entry.path().extension();
+    if (extension == ".sst" || extension == ".log") files.push_back(entry.path());
+  }
+  ASSERT_GE(files.size(), 2);
+  for (int trial = 0; trial < kTrials; ++trial) {
+    SCOPED_TRACE(trial);
+    const std::string copy = directory_ + "/copy";
+    std::filesystem::remove_all(copy);
+    std::filesystem::copy(directory_ + "/data", copy, std::filesystem::copy_options::recursive);
+    const std::filesystem::path path =
+        std::filesystem::path(copy) / "rocksdb" / files[trial % files.size()].filename();
+    const uintmax_t offset = random() % std::filesystem::file_size(path);
+    FlipBits(path, offset, 1 << random() % 8);
+
+    absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore("copy");
+    if (!store.ok()) {
+      ++refused_to_open;
+      continue;
+    }
+    DurableRegistry hulls(*std::move(store));
+    bool damage = !hulls.loaded().ok();
+    for (int i = 0; i < 20; ++i) {
+      const std::string id = absl::StrCat("h", i);
+      const auto view = hulls.View(id);
+      if (!view.ok()) {
+        damage = true;
+        EXPECT_TRUE(absl::IsDataLoss(view.status()) ||
+                    (absl::IsNotFound(view.status()) && !hulls.loaded().ok()))
+            << view.status();
+        continue;
+      }
+      EXPECT_EQ(view->record.vertex_count, 300 - i);
+      EXPECT_TRUE(
+          AuditContainment(view->snapshot->hull(), {sphere.data() + i, sphere.size() - i}).ok());
+    }
+    ++(damage ? reported : harmless);
+  }
+  RecordProperty("refused_to_open", refused_to_open);
+  RecordProperty("reported", reported);
+  RecordProperty("harmless", harmless);
+  EXPECT_GT(refused_to_open, 0);
+  EXPECT_GT(reported, 0);
+}
+
+TEST_F(StoreDamage, ALogThatEndsInAHalfRecordLosesThatRecordAlone) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+  const HullView before = *hulls_->View("a");
+  const uint64_t revision = before.record.revision;
+  hulls_ = nullptr;
+  std::filesystem::resize_file(LogFile(), std::filesystem::file_size(LogFile()) - 10);
+  Start();
+  EXPECT_EQ(hulls_->View("a")->record.revision, revision);
+  EXPECT_EQ(hulls_->View("b")->record.vertex_count, 0);
+}
+
+// As when the power goes out while the pages of a record are on their way to the disk, the last of
+// them first. What is read does not tell whether the record was acknowledged.
+TEST_F(StoreDamage, ALastRecordThatIsTornInItsMiddleIsDamage) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+  const std::string store_id = hulls_->store().id();
+  hulls_ = nullptr;
+  std::fstream log(LogFile(), std::ios::in | std::ios::out | std::ios::binary);
+  log.seekp(-100, std::ios::end);
+  log << std::string(50, '\0');
+  log.close();
+  EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/data";
+  options.cut_log = true;
+  ASSERT_TRUE(RocksDbStore::Open(options).ok());
+  Start();
+  EXPECT_EQ(hulls_->View("a")->record.vertex_count, 8);
+  EXPECT_EQ(hulls_->View("b")->record.vertex_count, 0);
+  EXPECT_NE(hulls_->store().id(), store_id);
+}
+
+TEST_F(StoreDamage, ALogThatIsDamagedInItsMiddleCanBeCutThere) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
+  const std::string store_id = hulls_->store().id();
+  const uint64_t revision = hulls_->View("a")->record.revision;
+  const uintmax_t kept = std::filesystem::file_size(LogFile());
+  ASSERT_TRUE(hulls_->Put("b", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("c", CubeCorners()).ok());
+  hulls_ = nullptr;
+  FlipBits(LogFile(), kept + 30, 1);
+  EXPECT_EQ(OpenStore("data").status().code(), absl::StatusCode::kDataLoss);
+  RocksDbOptions options;
+  options.data_dir = directory_ + "/data";
+  options.cut_log = true;
+  ASSERT_TRUE(RocksDbStore::Open(options).ok());
+  Start();
+  EXPECT_EQ(hulls_->View("a")->record.revision, revision);
+  EXPECT_EQ(hulls_->View("b").status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(hulls_->View("c").status().code(), absl::StatusCode::kNotFound);
+  // The revisions of b and c will be given to other changes.
+  EXPECT_NE(hulls_->store().id(), store_id);
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,137 @@
+// Encoding of what an answer may hold, from answers made by hand.
+#include "server/wire/answer_columns.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/hull/growth/hull_builder.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Hull Tetrahedron() {
+  const Vector points[] = {{0, 0, 0}, {0, 0, 4}, {0, 4, 0}, {4, 0, 0}};
+  HullBuilder builder;
+  EXPECT_TRUE(builder.Add(points).ok());
+  return builder.Snapshot();
+}
+
+v1::Wanted Everything() {
+  v1::Wanted wanted;
+  wanted.set_axis(true);
+  wanted.set_analysis(true);
+  wanted.set_certificate(true);
+  wanted.set_separation(true);
+  wanted.set_witness(true);
+  wanted.set_clearance(1);
+  return wanted;
+}
+
+Answer FullAnswer() {
+  Answer answer;
+  answer.relation = Relation::kOverlapping;
+  answer.certificate.emplace();
+  answer.certificate->pairs = {{1, 2}, {3, 0}};
+  answer.separation = Separation{-0.5, 0x1p-60};
+  answer.witness = Witness{{1, 2, 3}, {4, 5, 6}, 0.25};
+  answer.within_clearance = true;
+  return answer;
+}
+
+TEST(EncodeCertificate, DirectionsAreDoublesOrIntegers) {
+  const Hull hull = Tetrahedron();
+  Certificate certificate;
+  certificate.direction = Vector(1, -0.5, 1e-300);
+  v1::Certificate message;
+  EncodeCertificate(certificate, hull, hull, &message);
+  EXPECT_EQ(message.direction().y(), -0.5);
+  EXPECT_EQ(message.direction().z(), 1e-300);
+  EXPECT_FALSE(message.has_integer_direction());
+  IntegerVector integers;
+  integers.x = (Integer(1) << 200) + 1;
+  integers.y = -Integer(1'000'000'000'000'000'000);
+  certificate.direction = integers;
+  message.Clear();
+  EncodeCertificate(certificate, hull, hull, &message);
+  EXPECT_FALSE(message.has_direction());
+  EXPECT_EQ(message.integer_direction().x(),
+            "1606938044258990275541962092341162602522202993782792835301377");
+  EXPECT_EQ(message.integer_direction().y(), "-1000000000000000000");
+  EXPECT_EQ(message.integer_direction().z(), "0");
+}
+
+TEST(EncodeCertificate, PairsCarryTheirVertices) {
+  const Hull hull = Tetrahedron();
+  v1::Certificate message;
+  EncodeCertificate(*FullAnswer().certificate, hull, hull, &message);
+  ASSERT_EQ(message.pairs_size(), 2);
+  EXPECT_EQ(message.exact_direction_case(), v1::Certificate::EXACT_DIRECTION_NOT_SET);
+  EXPECT_EQ(message.pairs(0).index_a(), 1);
+  EXPECT_EQ(message.pairs(0).index_b(), 2);
+  EXPECT_EQ(message.pairs(0).vertex_a().z(), hull.vertices()[1][2]);
+  EXPECT_EQ(message.pairs(1).vertex_a().x(), hull.vertices()[3][0]);
+  EXPECT_EQ(message.pairs(1).vertex_b().x(), hull.vertices()[0][0]);
+}
+
+TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
+  const Hull hull = Tetrahedron();
+  const v1::Wanted wanted = Everything();
+  Answer bare;
+  bare.relation = Relation::kSeparated;
+  bare.separation = Separation{kInfinity, kInfinity};
+  bare.within_clearance = false;
+  v1::AnswerColumns columns;
+  size_t bytes = AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, wanted, 0, &columns);
+  bytes += AddUnanswered(wanted, &columns);
+  bytes += AddAnswer(absl::StatusOr<Answer>(bare), hull, hull, wanted, 2, &columns);
+  bytes += AddAnswer(absl::StatusOr<Answer>(absl::ResourceExhaustedError("why")), hull, hull,
+                     wanted, 3, &columns);
+  EXPECT_GE(bytes, columns.ByteSizeLong() - 64);
+  EXPECT_THAT(columns.relations(), ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED,
+                                               v1::RELATION_SEPARATED, v1::RELATION_UNSPECIFIED));
+  EXPECT_EQ(columns.rungs_size(), 4);
+  EXPECT_EQ(columns.axes_size(), 4);
+  EXPECT_EQ(columns.analyses_size(), 4);
+  ASSERT_EQ(columns.certificates_size(), 4);
+  EXPECT_EQ(columns.certificates(0).pairs_size(), 2);
+  EXPECT_EQ(columns.certificates(1).pairs_size(), 0);
+  ASSERT_EQ(columns.separations_size(), 4);
+  EXPECT_EQ(columns.separations(0), -0.5);
+  EXPECT_EQ(columns.separation_bounds(0), 0x1p-60);
+  EXPECT_TRUE(std::isnan(columns.separations(1)));
+  EXPECT_EQ(columns.separations(2), kInfinity);
+  ASSERT_EQ(columns.witness_xyz_size(), 24);
+  EXPECT_EQ(columns.witness_xyz(1), 2);
+  EXPECT_EQ(columns.witness_xyz(5), 6);
+  EXPECT_TRUE(std::isnan(columns.witness_xyz(12)));
+  ASSERT_EQ(columns.witness_errors_size(), 4);
+  EXPECT_EQ(columns.witness_errors(0), 0.25);
+  EXPECT_THAT(columns.within_clearance(), ElementsAre(true, false, false, false));
+  ASSERT_EQ(columns.pair_problems_size(), 1);
+  EXPECT_EQ(columns.pair_problems(0).pair(), 3);
+  EXPECT_EQ(columns.pair_problems(0).message(), "why");
+}
+
+TEST(AnswerColumns, WhatIsNotWantedIsNotSent) {
+  const Hull hull = Tetrahedron();
+  v1::BatchCheckCollisionsResponse columns;
+  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, v1::Wanted(), 0, &columns);
+  AddUnanswered(v1::Wanted(), &columns);
+  v1::BatchCheckCollisionsResponse expected;
+  expected.add_relations(v1::RELATION_OVERLAPPING);
+  expected.add_relations(v1::RELATION_UNSPECIFIED);
+  expected.add_rungs(v1::RUNG_EXACT);
+  expected.add_rungs(v1::RUNG_UNSPECIFIED);
+  EXPECT_EQ(columns.ShortDebugString(), expected.ShortDebugString());
+}
+
+}  // namespace
+}  // namespace hulld::server

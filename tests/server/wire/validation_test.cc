@@ -1,0 +1,111 @@
+// What is refused before it reaches a hull: addresses, IDs, page tokens; and what reaches the log.
+
+#include <absl/status/status.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/contract/hull_id.h"
+#include "server/contract/status_map.h"
+#include "server/process/listen_address.h"
+#include "server/process/log.h"
+#include "server/wire/page_token.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(HullId, SegmentsJoinedBySlashesAreAccepted) {
+  for (const char* id : {"a", "A9", "arm/3", "a.b_c-d/0", "1/2/3"}) {
+    EXPECT_TRUE(CheckHullIdSyntax(id, "hull_id").ok()) << id;
+  }
+  EXPECT_TRUE(CheckHullIdSyntax(std::string(256, 'a'), "hull_id").ok());
+}
+
+TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
+  const auto expect = [](const std::string& id, const std::string& what) {
+    const absl::Status status = CheckHullIdSyntax(id, "field");
+    ASSERT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << id;
+    EXPECT_THAT(std::string(status.message()), HasSubstr(what));
+  };
+  expect("", "field is empty");
+  expect("/a", "empty segment at character 0");
+  expect("a/", "empty segment at character 2");
+  expect("a//b", "empty segment at character 2");
+  expect(".a", "malformed at character 0");
+  expect("a/-b", "malformed at character 2");
+  expect("a\nb", "\"a\\nb\" is malformed at character 1");
+  expect("\xC3\xA4", "malformed at character 0");
+  expect(std::string("a\0b", 3), "malformed at character 1");
+  expect(std::string(257, 'a'), "holds 257 characters; the limit is 256");
+}
+
+TEST(ListenAddress, LoopbackAndUnixSocketsAreLocal) {
+  for (const char* text : {"127.0.0.1:50551", "127.8.9.10:1", "[::1]:0", "localhost:80",
+                           "unix:/run/hulld.sock", "unix:relative", "unix:///run/hulld.sock"}) {
+    const absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
+    ASSERT_TRUE(address.ok()) << text;
+    EXPECT_TRUE(address->is_local()) << text;
+    EXPECT_TRUE(CheckExposure(*address, false, false).ok()) << text;
+  }
+}
+
+TEST(ListenAddress, OthersNeedInsecure) {
+  for (const char* text : {"0.0.0.0:50551", "[::]:50551", "192.168.1.7:1", "example.com:1",
+                           "[::ffff:127.0.0.1]:1", "1270.0.0.1:1", "localhost.example.com:1"}) {
+    const absl::StatusOr<ListenAddress> address = ParseListenAddress(text);
+    ASSERT_TRUE(address.ok()) << text;
+    const absl::Status refused = CheckExposure(*address, false, false);
+    EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("--insecure"));
+    EXPECT_TRUE(CheckExposure(*address, false, true).ok());
+  }
+}
+
+TEST(ListenAddress, MalformedOnesNameTheFlag) {
+  for (const char* text : {"", "127.0.0.1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536", ":1",
+                           "::1:50551", "unix:", "127.0.0.1:+1"}) {
+    const absl::Status status = ParseListenAddress(text).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(std::string(status.message()), HasSubstr("--listen")) << text;
+  }
+}
+
+TEST(PageToken, RoundTripsForItsPrefixOnly) {
+  const std::string token = EncodePageToken("a/", "a/7");
+  EXPECT_EQ(*DecodePageToken(token, "a/"), "a/7");
+  EXPECT_EQ(*DecodePageToken("", "a/"), "");
+  for (const std::string& bad :
+       {token.substr(1), std::string("%%"), std::string("YQ"), EncodePageToken("a/", "b"),
+        EncodePageToken("a/", "a/ "), EncodePageToken("b", "b")}) {
+    EXPECT_EQ(DecodePageToken(bad, "a/").status().code(), absl::StatusCode::kInvalidArgument)
+        << bad;
+  }
+}
+
+TEST(StatusMap, KeepsCodeAndMessage) {
+  for (int code = 1; code <= 16; ++code) {
+    const absl::Status status(static_cast<absl::StatusCode>(code), "why");
+    EXPECT_EQ(static_cast<int>(ToGrpc(status).error_code()), code);
+    EXPECT_EQ(ToGrpc(status).error_message(), "why");
+  }
+  EXPECT_TRUE(ToGrpc(absl::OkStatus()).ok());
+}
+
+TEST(Log, JsonStringsAreEscaped) {
+  EXPECT_EQ(JsonEscape("plain"), "plain");
+  EXPECT_EQ(JsonEscape("a\"b\\c\n\t\x01\x7F"), "a\\\"b\\\\c\\u000a\\u0009\\u0001\\u007f");
+  EXPECT_EQ(JsonEscape("\xC3\xA4\xE2\x82\xAC\xF0\x9F\x98\x80"),
+            "\xC3\xA4\xE2\x82\xAC\xF0\x9F\x98\x80");
+}
+
+TEST(Log, WhatIsNotUtf8IsReplaced) {
+  EXPECT_EQ(JsonEscape("\xFF"), "\\ufffd");
+  EXPECT_EQ(JsonEscape("\xC3"), "\\ufffd");
+  EXPECT_EQ(JsonEscape("\xC0\x80"), "\\ufffd\\ufffd");
+  EXPECT_EQ(JsonEscape("\xED\xA0\x80"), "\\ufffd\\ufffd\\ufffd");
+  EXPECT_EQ(JsonEscape("\xF4\x90\x80\x80x"), "\\ufffd\\ufffd\\ufffd\\ufffdx");
+}
+
+}  // namespace
+}  // namespace hulld::server
