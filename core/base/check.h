@@ -1,0 +1,28 @@
+#ifndef HULLD_CORE_BASE_CHECK_H_
+#define HULLD_CORE_BASE_CHECK_H_
+
+namespace hulld {
+
+// Writes "FILE:LINE: check failed: CONDITION" to the standard error and aborts. Called by the
+// macros below.
+[[noreturn]] void CheckFailed(const char* file, int line, const char* condition) noexcept;
+
+}  // namespace hulld
+
+// Ends the process unless `condition` holds: a broken invariant is a defect of ours, never bad
+// input (that is a Status). Always on, so keep the condition cheap: a comparison or two.
+#define HULLD_CHECK(condition) \
+  ((condition) ? (void)0 : ::hulld::CheckFailed(__FILE__, __LINE__, #condition))
+
+// The same in builds without NDEBUG alone (the presets dev, asan-ubsan, tsan and fuzz), so the
+// condition may be expensive. Elsewhere it is compiled and never evaluated.
+#ifdef NDEBUG
+#define HULLD_DCHECK(condition) (true ? (void)0 : (void)(condition))
+#else
+#define HULLD_DCHECK(condition) HULLD_CHECK(condition)
+#endif
+
+// Marks what no path of a correct program reaches, as after a switch over all values of an enum.
+#define HULLD_UNREACHABLE() ::hulld::CheckFailed(__FILE__, __LINE__, "unreachable")
+
+#endif  // HULLD_CORE_BASE_CHECK_H_
