@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/simd_path.h"
 
 #ifdef HULLD_HAS_AVX2_PATH
@@ -106,8 +107,8 @@ __attribute__((target("avx2"))) size_t DirectionMap::AppendSurvivorsAvx2(
   const __m256d half = _mm256_set1_pd(half_);
   const __m256d n = _mm256_set1_pd(n_);
   const __m256d last = _mm256_set1_pd(n_ - 1);
-  const __m256d least = _mm256_set1_pd(kLeastDistance);
-  const __m256d largest = _mm256_set1_pd(kLargestDistance);
+  const __m256d least = _mm256_set1_pd(kMapMinDistance);
+  const __m256d largest = _mm256_set1_pd(kMapMaxDistance);
   size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
     const double* p = points[i].data();

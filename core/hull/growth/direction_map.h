@@ -8,7 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/hull/hull.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 
@@ -60,7 +61,7 @@ class DirectionMap {
     const int of_two = y > x ? 1 : 0;
     const int axis = z > larger ? 2 : of_two;
     if (m == 0) return {0, 0};
-    if (!(m >= kLeastDistance && m <= kLargestDistance)) return {0, INFINITY};
+    if (!(m >= kMapMinDistance && m <= kMapMaxDistance)) return {0, INFINITY};
     const double half = 0.5 * resolution;
     const double scale = half / m;
     const int i = std::min(resolution - 1, static_cast<int>(v[kNext[axis]] * scale + half));
@@ -94,8 +95,6 @@ class DirectionMap {
                              std::vector<uint32_t>& survivors) const;
 
   static constexpr int kNext[] = {1, 2, 0, 1};
-  static constexpr double kLeastDistance = 0x1p-1000;
-  static constexpr double kLargestDistance = 0x1p1000;
 
   Vector center_;
   int n_;

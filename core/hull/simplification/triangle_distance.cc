@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
