@@ -203,6 +203,7 @@ absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
 
 Answer AnswerOfEmpty(const QueryOptions& options) {
   Answer answer;
+  answer.rung = Rung::kBounds;
   if (options.want_separation) {
     answer.separation = Separation{std::numeric_limits<double>::infinity(), 0};
   }
@@ -271,7 +272,7 @@ absl::StatusOr<RelationAnswer> FindRelation(const PlacedHull& a, const PlacedHul
                                             double tolerance,
                                             const std::function<bool()>& should_stop) {
   if (a.hull().empty() || b.hull().empty()) {
-    return RelationAnswer{Relation::kSeparated, Answer().rung};
+    return RelationAnswer{Relation::kSeparated, Rung::kBounds};
   }
   const absl::StatusOr<Decision> decision = DecideEither(a, b, tolerance, nullptr, should_stop);
   if (!decision.ok()) return decision.status();

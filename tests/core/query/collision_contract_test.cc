@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/query/batch.h"
 #include "core/query/collision.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
@@ -42,6 +43,34 @@ TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
   EXPECT_TRUE(check.Ask(empty, Pose(), empty, Pose(), Relation::kSeparated));
   EXPECT_TRUE(check.Ask(empty, Pose(), UnitCube(), Pose(), Relation::kSeparated));
   EXPECT_TRUE(check.Ask(empty, Pose(), BuildHull(origin), At(1, 2, 3), Relation::kSeparated));
+}
+
+// Found beside each other: a single call said EXACT, a stream said BOUNDS.
+TEST(Collision, AnEmptyHullIsDecidedByTheSameRungHoweverItIsAsked) {
+  const Hull empty;
+  const Hull cube = UnitCube();
+  const QueryHull query_empty(empty);
+  const QueryHull query_cube(cube);
+  const std::vector<PlacedHull> placements = {*PlacedHull::Make(query_empty, Pose()),
+                                              *PlacedHull::Make(query_cube, Pose())};
+  PairCache cache;
+  QueryOptions everything;
+  everything.want_axis = true;
+  everything.want_analysis = true;
+  everything.want_certificate = true;
+  everything.want_separation = true;
+  everything.want_witness = true;
+  everything.clearance = 1;
+  for (const PlacedPair& pair : {PlacedPair{0, 1}, PlacedPair{1, 0}, PlacedPair{0, 0}}) {
+    const PlacedHull& a = placements[pair.a];
+    const PlacedHull& b = placements[pair.b];
+    EXPECT_EQ(CheckCollision(a, b)->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b, {}, &cache)->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b, everything)->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b, Options(Method::kTextbookSat))->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollisions(placements, {&pair, 1}, {}, 1)[0]->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b)->relation, Relation::kSeparated);
+  }
 }
 
 TEST(Collision, RefusesInvalidPosesOfEitherHull) {
