@@ -11,8 +11,9 @@
 #include <span>
 
 #include "core/query/batch.h"
-#include "core/query/collision.h"
 #include "core/query/placed/placed_hull.h"
+#include "core/query/terms/answer.h"
+#include "core/query/terms/query_options.h"
 
 namespace hulld {
 

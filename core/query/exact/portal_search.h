@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "core/query/exact/exact_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

@@ -7,7 +7,7 @@
 #include "core/numeric/error_bounds.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/placed/plain_vector.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
