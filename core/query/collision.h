@@ -3,8 +3,6 @@
 
 #include <absl/status/statusor.h>
 
-#include <functional>
-
 #include "core/hull/hull.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/answer.h"
@@ -17,9 +15,8 @@ namespace hulld {
 // The relation of hull A and hull B at their poses, exact for every finite input, and what else the
 // options ask for. `cache` may be null; with it the relation, the separation and its bound are
 // those without it. Swapping A and B mirrors the answer.
-// INVALID_ARGUMENT: options that exclude each other, a negative or NaN tolerance or max_error, a
-// NaN clearance. RESOURCE_EXHAUSTED: the textbook method would test more axes than allowed.
-// CANCELLED: should_stop said so.
+// INVALID_ARGUMENT: ValidateOptions. RESOURCE_EXHAUSTED: the textbook method would test more axes
+// than allowed. CANCELLED: should_stop said so.
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options = {}, PairCache* cache = nullptr);
 
@@ -27,20 +24,6 @@ absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
 // drops it. INVALID_ARGUMENT also for poses that are not valid (ValidatePose).
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,
                                       const Pose& X_WB, const QueryOptions& options = {});
-
-struct RelationAnswer {
-  Relation relation;
-  Rung rung;
-};
-
-// The relation alone, as CheckCollision finds it with this tolerance: the fastest way to ask.
-// Requires tolerance >= 0.
-RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache = nullptr,
-                            double tolerance = 0);
-// The same, but CANCELLED when should_stop, which may be empty, said so.
-absl::StatusOr<RelationAnswer> FindRelation(const PlacedHull& a, const PlacedHull& b,
-                                            double tolerance,
-                                            const std::function<bool()>& should_stop);
 
 }  // namespace hulld
 

@@ -100,19 +100,20 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 
 absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
                                 Purpose purpose, const std::function<bool()>& should_stop) {
-  Decision decision;
+  absl::StatusOr<Decision> result(absl::in_place);
+  Decision& decision = *result;
   if (pair.usable()) {
     const PlainVector n = -pair.CenterDifference();
     if (SpheresSeparate(pair, n)) {
       decision.axis = Vector(n);
-      return decision;
+      return result;
     }
     if (cache != nullptr) {
       const FloatSearchResult found = TryCached(pair, *cache);
       decision.directions_tried += found.directions_tried;
       if (found.verdict != FloatVerdict::kUndecided) {
         Accept(found, Rung::kCached, decision);
-        return decision;
+        return result;
       }
     }
     PlainVector first = n;
@@ -122,7 +123,7 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
         if (*relation == Relation::kSeparated) decision.axis = Vector(n);
         // What it suggested failed, and would cost the next query more than these bounds.
         if (cache != nullptr) *cache = PairCache();
-        return decision;
+        return result;
       }
     }
     const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
@@ -130,7 +131,7 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
     if (cache != nullptr) Remember(found, *cache);
     if (found.verdict != FloatVerdict::kUndecided) {
       Accept(found, Rung::kFloatingPoint, decision);
-      return decision;
+      return result;
     }
   }
   ExactPair exact(pair);
@@ -142,7 +143,7 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
   if (found->axis) decision.axis = *std::move(found->axis);
   decision.pair_count = static_cast<uint32_t>(found->pairs.size());
   std::copy(found->pairs.begin(), found->pairs.end(), decision.pairs.begin());
-  return decision;
+  return result;
 }
 
 }  // namespace hulld

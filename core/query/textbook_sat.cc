@@ -269,25 +269,30 @@ absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull&
 
   Answer answer;
   answer.rung = Rung::kExact;
-  answer.analysis.axes_total = axes.size();
-  answer.analysis.axes_tested = axes.size();
   uint64_t found = kNone;
   if (scan.separated != kNone) {
     answer.relation = Relation::kSeparated;
     found = scan.separated;
-    answer.analysis.axes_tested = found + 1;
   } else if (scan.zero != kNone) {
     answer.relation = Relation::kTouching;
     found = scan.zero;
   } else {
     answer.relation = Relation::kOverlapping;
   }
-  if (found == kNone) return answer;
-  answer.analysis.stage = axes.KindOf(found);
-  answer.analysis.axis_index = found;
-  if (options.want_axis) {
-    answer.axis = DescribeAxis(exact, axes.Oriented(found));
-    answer.axis->kind = axes.KindOf(found);
+  if (options.want_analysis) {
+    Analysis analysis;
+    analysis.axes_total = axes.size();
+    analysis.axes_tested = answer.relation == Relation::kSeparated ? found + 1 : axes.size();
+    if (found != kNone) {
+      analysis.stage = axes.KindOf(found);
+      analysis.axis_index = found;
+    }
+    answer.analysis = analysis;
+  }
+  if (options.want_axis && found != kNone) {
+    SeparatingAxis axis = DescribeAxis(exact, axes.Oriented(found));
+    axis.kind = axes.KindOf(found);
+    answer.axis = std::move(axis);
   }
   return answer;
 }
