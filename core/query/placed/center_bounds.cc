@@ -117,13 +117,9 @@ CenterBounds::CenterBounds(const Hull& hull, const SupportMap& support) {
 
 Vector CenterBounds::DirectionOf(uint32_t corner) const {
   const uint32_t row = side_ + 1;
-  const uint32_t face = corner / (row * row);
-  const uint32_t axis = face / 2;
-  Vector n;
-  n[axis] = face % 2 == 0 ? 1 : -1;
-  n[(axis + 1) % 3] = (corner / row % row) / half_ - 1;
-  n[(axis + 2) % 3] = (corner % row) / half_ - 1;
-  return n;
+  const double s = (corner / row % row) / half_ - 1;
+  const double t = (corner % row) / half_ - 1;
+  return CubeDirection(corner / (row * row), s, t);
 }
 
 void CenterBounds::AddSupports(const Hull& hull, const SupportMap& support, double radius) {
