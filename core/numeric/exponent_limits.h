@@ -72,6 +72,12 @@ inline constexpr double kFilterMinSize = 0x1p-300;
 inline constexpr double kFilterMaxSize = 0x1p300;
 inline constexpr double kDirectionMin = 0x1p-400;
 inline constexpr double kDirectionMax = 0x1p400;
+inline constexpr bool IsFilterSize(double size) {
+  return size >= kFilterMinSize && size <= kFilterMaxSize;
+}
+inline constexpr bool IsFilterDirection(double largest_component) {
+  return largest_component >= kDirectionMin && largest_component <= kDirectionMax;
+}
 
 // The largest component of a quaternion that is used as it is: no sum of four of its squares
 // overflows, and no square that counts underflows. Proven.

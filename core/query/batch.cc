@@ -3,7 +3,9 @@
 #include <absl/status/status.h>
 
 #include <algorithm>
-#include <atomic>
+
+#include "core/base/stop_poll.h"
+#include "core/query/collision.h"
 
 namespace hulld {
 namespace {
@@ -21,17 +23,16 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
   QueryOptions each = options;
   each.threads = 1;
   const auto count = static_cast<int64_t>(pairs.size());
-  std::atomic<bool> stopped = false;
-#pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
-  for (int64_t i = 0; i < count; ++i) {
-    if (stopped.load(std::memory_order_relaxed)) continue;
+#pragma omp parallel num_threads(std::max(1, threads))
+  {
     // Most pairs take less time than the question whether to stop, hence once a piece.
-    if (i % kPairsPerPiece == 0 && each.should_stop && each.should_stop()) {
-      stopped = true;
-      continue;
+    StopPoll poll(each.should_stop, kPairsPerPiece);
+#pragma omp for schedule(dynamic, kPairsPerPiece)
+    for (int64_t i = 0; i < count; ++i) {
+      if (poll.Step()) continue;
+      const PlacedPair pair = pairs[i];
+      answers[i] = CheckCollision(placements[pair.a], placements[pair.b], each);
     }
-    const PlacedPair pair = pairs[i];
-    answers[i] = CheckCollision(placements[pair.a], placements[pair.b], each);
   }
   return answers;
 }

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "core/numeric/exponent_limits.h"
 #include "core/query/axis_description.h"
 #include "core/query/certification.h"
 #include "core/query/exact/exact_pair.h"

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_pair.h"
 #include "core/query/exact/exact_search.h"
 #include "core/query/floating/float_search.h"
@@ -39,7 +40,7 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
 // Whether bounds about the centres may settle a pair that spheres do not.
 bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
   const double largest = LargestComponent(n);
-  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return false;
+  if (!IsFilterDirection(largest)) return false;
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;

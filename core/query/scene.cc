@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/query/box_tree.h"
 #include "core/query/collision.h"
 
@@ -84,7 +85,7 @@ class SceneSearch {
   }
 
  private:
-  bool Stopped() const { return options_.query.should_stop && options_.query.should_stop(); }
+  bool Stopped() const { return StopPoll(options_.query.should_stop, 1).Poll(); }
 
   bool IsIgnored(uint32_t a, uint32_t b) const {
     if (options_.groups.empty() || ignored_.empty()) return false;

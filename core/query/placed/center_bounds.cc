@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"
 
 namespace hulld {
@@ -104,7 +105,7 @@ CenterBounds::CenterBounds(const Hull& hull, const SupportMap& support) {
     radius = std::max(radius, (v - hull.center()).cwiseAbs().maxCoeff());
   }
   // Beyond what pairs may have, or so small against the coordinates that rounding counts.
-  if (!(radius >= kFilterMinSize && radius <= kFilterMaxSize)) return;
+  if (!IsFilterSize(radius)) return;
   if (radius < kCenterLeastRadius * hull.max_abs_coordinate()) return;
   side_ = SideFor(hull.vertices().size());
   half_ = 0.5 * side_;
