@@ -36,7 +36,7 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kAppendPoints:
     case Rpc::kReplaceHull:
     case Rpc::kStreamCollisions:
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return CallKind::kStream;
   }
   return CallKind::kUnary;

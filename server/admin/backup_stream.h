@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_ADMIN_SNAPSHOT_STREAM_H_
-#define HULLD_SERVER_ADMIN_SNAPSHOT_STREAM_H_
+#ifndef HULLD_SERVER_ADMIN_BACKUP_STREAM_H_
+#define HULLD_SERVER_ADMIN_BACKUP_STREAM_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -18,18 +18,18 @@
 
 namespace hulld::server {
 
-// One SaveSnapshot call: makes a copy of the store, sends its files piece by piece, each read when
+// One SaveBackup call: makes a copy of the store, sends its files piece by piece, each read when
 // the one before is sent, and removes the copy. It owns itself until gRPC is done with it.
-class SnapshotStream : public grpc::ServerWriteReactor<v1::SaveSnapshotResponse> {
+class BackupStream : public grpc::ServerWriteReactor<v1::SaveBackupResponse> {
  public:
-  static grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* Start(
+  static grpc::ServerWriteReactor<v1::SaveBackupResponse>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Store& store,
       const Registry& registry, WorkerPool& readers);
 
  private:
-  SnapshotStream(grpc::CallbackServerContext& context, Admission& admission, WorkerPool& readers)
-      : readers_(readers), call_(context, admission, Rpc::kSaveSnapshot) {}
-  ~SnapshotStream() override;
+  BackupStream(grpc::CallbackServerContext& context, Admission& admission, WorkerPool& readers)
+      : readers_(readers), call_(context, admission, Rpc::kSaveBackup) {}
+  ~BackupStream() override;
 
   void OnWriteDone(bool ok) override;
   void OnCancel() override { call_.Cancel(); }
@@ -48,11 +48,11 @@ class SnapshotStream : public grpc::ServerWriteReactor<v1::SaveSnapshotResponse>
   std::vector<std::string> files_;
   std::ifstream file_;
   uint64_t offset_ = 0;
-  v1::SnapshotEnd totals_;
+  v1::BackupEnd totals_;
   bool ended_ = false;
-  v1::SaveSnapshotResponse message_;
+  v1::SaveBackupResponse message_;
 };
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_ADMIN_SNAPSHOT_STREAM_H_
+#endif  // HULLD_SERVER_ADMIN_BACKUP_STREAM_H_

@@ -1,4 +1,4 @@
-#include "server/admin/snapshot_stream.h"
+#include "server/admin/backup_stream.h"
 
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
@@ -15,20 +15,20 @@
 namespace hulld::server {
 namespace {
 
-// A snapshot holds everybody's hulls.
+// A backup holds everybody's hulls.
 absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
   return absl::PermissionDeniedError(
       absl::StrCat("token \"", caller.name, "\" is limited to \"", caller.prefix,
-                   "\", and a snapshot holds the whole store; use a token without a prefix"));
+                   "\", and a backup holds the whole store; use a token without a prefix"));
 }
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SnapshotStream::Start(
+grpc::ServerWriteReactor<v1::SaveBackupResponse>* BackupStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Store& store,
     const Registry& registry, WorkerPool& readers) {
-  auto* stream = new SnapshotStream(context, admission, readers);
+  auto* stream = new BackupStream(context, admission, readers);
   absl::Status begun = stream->call_.Begin();
   if (begun.ok()) begun = CheckSeesAll(stream->call_.caller());
   if (begun.ok()) {
@@ -39,12 +39,12 @@ grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SnapshotStream::Start(
   return stream;
 }
 
-SnapshotStream::~SnapshotStream() {
+BackupStream::~BackupStream() {
   std::error_code error;
   if (!directory_.empty()) std::filesystem::remove_all(directory_, error);
 }
 
-void SnapshotStream::Open(Store& store, const Registry& registry) {
+void BackupStream::Open(Store& store, const Registry& registry) {
   absl::StatusOr<std::string> directory = store.MakeCopy();
   if (!directory.ok()) return Finish(call_.End(directory.status()));
   directory_ = *std::move(directory);
@@ -60,28 +60,28 @@ void SnapshotStream::Open(Store& store, const Registry& registry) {
         call_.End(absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()))));
   }
   std::sort(files_.rbegin(), files_.rend());
-  spdlog::info("a snapshot of the store is being saved");
-  v1::SnapshotBegin* begin = message_.mutable_begin();
+  spdlog::info("a backup of the store is being saved");
+  v1::BackupBegin* begin = message_.mutable_begin();
   EncodeHeader(store, registry.Sizes().store_revision, begin->mutable_header());
   begin->set_version(HULLD_VERSION);
   begin->set_store_format(kStoreFormat);
   StartWrite(&message_);
 }
 
-void SnapshotStream::OnWriteDone(bool ok) {
+void BackupStream::OnWriteDone(bool ok) {
   if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
   if (!ok) return Finish(call_.End(absl::CancelledError("the client is gone")));
   readers_.Submit([this] { SendNext(); });
 }
 
-void SnapshotStream::SendNext() {
+void BackupStream::SendNext() {
   const absl::StatusOr<bool> more = NextMessage();
   if (!more.ok()) return Finish(call_.End(more.status()));
   if (!*more) return Finish(call_.End(absl::OkStatus()));
   StartWrite(&message_);
 }
 
-absl::StatusOr<bool> SnapshotStream::NextMessage() {
+absl::StatusOr<bool> BackupStream::NextMessage() {
   message_.Clear();
   if (!files_.empty()) return NextPiece();
   if (std::exchange(ended_, true)) return false;
@@ -89,7 +89,7 @@ absl::StatusOr<bool> SnapshotStream::NextMessage() {
   return true;
 }
 
-absl::StatusOr<bool> SnapshotStream::NextPiece() {
+absl::StatusOr<bool> BackupStream::NextPiece() {
   const std::string& path = files_.back();
   const auto failure = [&] {
     return absl::UnavailableError(absl::StrCat("cannot read ", path, " of the copy"));
@@ -98,7 +98,7 @@ absl::StatusOr<bool> SnapshotStream::NextPiece() {
     file_ = std::ifstream(directory_ + "/" + path, std::ios::binary);
     if (!file_) return failure();
   }
-  v1::SnapshotPiece* piece = message_.mutable_piece();
+  v1::BackupPiece* piece = message_.mutable_piece();
   std::string& data = *piece->mutable_data();
   data.resize(Config::kReplyMessageBytes);
   file_.read(data.data(), static_cast<std::streamsize>(data.size()));
