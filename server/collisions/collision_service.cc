@@ -74,8 +74,8 @@ absl::Status TakeHulls(const Registry& registry, absl::StatusOr<Resolved> resolv
   query->a = *std::move(resolved->hulls[0]);
   query->b = *std::move(resolved->hulls[1]);
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
-  EncodeVersion(query->a.record, response->mutable_hull_a());
-  EncodeVersion(query->b.record, response->mutable_hull_b());
+  EncodeVersion(registry.store().id(), query->a.record, response->mutable_hull_a());
+  EncodeVersion(registry.store().id(), query->b.record, response->mutable_hull_b());
   return absl::OkStatus();
 }
 

@@ -260,7 +260,6 @@ void CollisionStream::AddAnswer(uint32_t index) {
   pair.relation = relation;
   if (only_changes_ && messages_ > 0 && !changed) return;
   v1::AnswerColumns* const columns = response_.mutable_columns();
-  const auto position = static_cast<uint64_t>(response_.pairs_size());
   response_.add_pairs(index);
   response_bytes_ += kIndexBytes;
   if (!answerable) {
@@ -268,7 +267,7 @@ void CollisionStream::AddAnswer(uint32_t index) {
     return;
   }
   response_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
-                                       table_.placed()[pair.b].hull(), wanted_, position, columns);
+                                       table_.placed()[pair.b].hull(), wanted_, columns);
 }
 
 void CollisionStream::Send(bool last) {

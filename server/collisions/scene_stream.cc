@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "server/collisions/query_settings.h"
+#include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
@@ -127,10 +128,12 @@ absl::Status SceneStream::Search() {
   const absl::StatusOr<SceneTotals> searched = hulld::FindCollisions(
       table_.placed(), options_, [this](std::span<const SceneAnswer> answers) { Take(answers); });
   if (too_slow_) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "the client reads too slowly: the search waited for it for ", kMostPatience.count(),
-        " s at once or ", kMostPatienceInAll.count(), " s in all while ", kMostWaiting,
-        " MiB were ready; read faster or ask for less"));
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(
+            "the client reads too slowly: the search waited for it for ", kMostPatience.count(),
+            " s at once or ", kMostPatienceInAll.count(), " s in all while ", kMostWaiting,
+            " MiB were ready; read faster or ask for less")),
+        v1::ERROR_REASON_CLIENT_TOO_SLOW);
   }
   if (!searched.ok()) return searched.status();
   call_.AddPairs(searched->pairs);
@@ -152,7 +155,7 @@ void SceneStream::Take(std::span<const SceneAnswer> answers) {
     filling_.add_pairs(b);
     filling_bytes_ +=
         kPairBytes + AddAnswer(found.answer, table_.placed()[a].hull(), table_.placed()[b].hull(),
-                               request_.wanted(), position, filling_.mutable_columns());
+                               request_.wanted(), filling_.mutable_columns());
     Count(filling_.columns().relations(static_cast<int>(position)));
   }
   // What was found goes out as soon as nothing is before it.

@@ -31,8 +31,8 @@ class BatchColumns {
   std::vector<v1::BatchCheckCollisionsResponse> Take();
 
  private:
-  // The message that takes the next row.
-  v1::BatchCheckCollisionsResponse* MessageForNext();
+  // Of the message that takes the next row.
+  v1::AnswerColumns* ColumnsForNext();
 
   const v1::Wanted wanted_;
   uint64_t next_pair_;
