@@ -84,17 +84,17 @@ absl::Status TakeHulls(const Registry& registry, absl::StatusOr<Resolved> resolv
 bool IsQuick(const Resolved& resolved) {
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
     if (!hull.ok()) continue;
-    const Snapshot& snapshot = *hull->snapshot;
-    if (!snapshot.has_query_hull() || !IsQuickToRelate(snapshot.hull())) return false;
+    const ServedHull& served = *hull->served;
+    if (!served.has_query_hull() || !IsQuickToRelate(served.hull())) return false;
   }
   return true;
 }
 
 absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted, Metrics& metrics,
                     v1::CheckCollisionResponse* response) {
-  const auto placed_a = PlacedHull::Make(query.a.snapshot->query_hull(), query.X_WA);
+  const auto placed_a = PlacedHull::Make(query.a.served->query_hull(), query.X_WA);
   if (!placed_a.ok()) return placed_a.status();
-  const auto placed_b = PlacedHull::Make(query.b.snapshot->query_hull(), query.X_WB);
+  const auto placed_b = PlacedHull::Make(query.b.served->query_hull(), query.X_WB);
   if (!placed_b.ok()) return placed_b.status();
   const Hull& a = placed_a->hull();
   const Hull& b = placed_b->hull();

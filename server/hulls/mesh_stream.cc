@@ -40,7 +40,7 @@ void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request)
   if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
   if (!resolved.ok()) return Finish(call_.End(resolved.status()));
   mesh_ =
-      std::shared_ptr<const Hull>(resolved->second.snapshot, &resolved->second.snapshot->hull());
+      std::shared_ptr<const Hull>(resolved->second.served, &resolved->second.served->hull());
   v1::MeshHeader* header = message_.mutable_header();
   if (request.has_simplification()) {
     const absl::Status simplified = Simplify(request.simplification(), header);

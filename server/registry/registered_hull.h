@@ -95,7 +95,7 @@ struct RegisteredHull {
   // With the changes on their way.
   StoredHull head;
   // Of committed.record.revision; null when nobody has asked since the last change.
-  std::shared_ptr<const Snapshot> snapshot;
+  std::shared_ptr<const ServedHull> served;
   // Not OK when the store cannot give the hull back.
   absl::Status damage;
   // Those in use; the store has the others.

@@ -89,7 +89,7 @@ Registry::HullPointer Registry::FindVisible(const std::string& id) const {
 Registry::HullPointer Registry::Insert(const StoredHull& stored) {
   auto hull = std::make_shared<RegisteredHull>();
   hull->committed = hull->head = stored;
-  if (stored.record.vertex_count == 0) hull->snapshot = empty_snapshot_;
+  if (stored.record.vertex_count == 0) hull->served = empty_served_;
   vertex_count_ += stored.record.vertex_count;
   hulls_[stored.record.hull_id] = hull;
   return hull;
@@ -107,8 +107,8 @@ void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Statu
   }
   hull->watches.clear();
   if (!hull->busy) locked.Discard(std::move(hull->builder));
-  locked.Discard(std::move(hull->snapshot));
-  hull->snapshot = nullptr;
+  locked.Discard(std::move(hull->served));
+  hull->served = nullptr;
   Charge(locked, *hull);
 }
 
@@ -273,7 +273,7 @@ void Registry::CommitReplacement(const HullPointer& former, Replacement& replace
   hull->committed = hull->head = change.hull;
   hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
   hull->builder_bytes = hull->builder->MemoryBytes();
-  if (record.vertex_count == 0) hull->snapshot = empty_snapshot_;
+  if (record.vertex_count == 0) hull->served = empty_served_;
   if (former == nullptr) {
     hull->state = RegisteredHull::State::kCreating;
     hull->ending = true;

@@ -19,7 +19,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/snapshot.h"
+#include "server/registry/served_hull.h"
 #include "server/settings/config.h"
 #include "server/store/hull_record.h"
 #include "server/store/store.h"
@@ -29,7 +29,7 @@ namespace hulld::server {
 // A hull as one reader sees it: the snapshot belongs to the record's revision.
 struct HullView {
   HullRecord record;
-  std::shared_ptr<const Snapshot> snapshot;
+  std::shared_ptr<const ServedHull> served;
 };
 
 // Hulls that all were current at one revision of the store.
@@ -315,8 +315,8 @@ class Registry {
 
   absl::StatusOr<std::unique_ptr<HullBuilder>> LoadBuilder(
       const StoredHull& stored, const std::function<bool()>& should_stop);
-  absl::Status MakeSnapshot(Locked& locked, RegisteredHull& hull,
-                            const std::function<bool()>& should_stop);
+  absl::Status MakeServed(Locked& locked, RegisteredHull& hull,
+                          const std::function<bool()>& should_stop);
   void Unpin(Locked& locked, const HullPointer& hull);
   void Charge(Locked& locked, RegisteredHull& hull);
   void Account(RegisteredHull& hull);
@@ -329,7 +329,8 @@ class Registry {
   // With the memory limit in force.
   const Limits limits_;
   WorkerPool& writers_;
-  const std::shared_ptr<const Snapshot> empty_snapshot_ = std::make_shared<const Snapshot>(Hull());
+  const std::shared_ptr<const ServedHull> empty_served_ =
+      std::make_shared<const ServedHull>(Hull());
 
   mutable std::mutex mutex_;
   // The rest, and all of a RegisteredHull but its builder, is guarded by mutex_.

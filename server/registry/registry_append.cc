@@ -310,7 +310,7 @@ void Registry::SubmitChunk(const HullPointer& hull, const PendingChunk& pending,
       if (record.revision != hull->committed.record.revision) {
         revision_ = record.revision;
         vertex_count_ += record.vertex_count - hull->committed.record.vertex_count;
-        locked.Discard(std::exchange(hull->snapshot, nullptr));
+        locked.Discard(std::exchange(hull->served, nullptr));
       }
       hull->committed = after;
       hull->writers[writer_id].committed = sequence;

@@ -48,10 +48,10 @@ absl::StatusOr<std::unique_ptr<HullBuilder>> Registry::LoadBuilder(
 }
 
 // Waits until the hull is quiet and makes its snapshot unless it has one, or is gone.
-absl::Status Registry::MakeSnapshot(Locked& locked, RegisteredHull& hull,
-                                    const std::function<bool()>& should_stop) {
+absl::Status Registry::MakeServed(Locked& locked, RegisteredHull& hull,
+                                  const std::function<bool()>& should_stop) {
   const auto needless = [&] {
-    return hull.state == RegisteredHull::State::kGone || hull.snapshot != nullptr;
+    return hull.state == RegisteredHull::State::kGone || hull.served != nullptr;
   };
   while (!hull.released.wait_for(locked.lock(), kCancellationPoll,
                                  [&] { return hull.quiet() || needless(); })) {
@@ -67,7 +67,7 @@ absl::Status Registry::MakeSnapshot(Locked& locked, RegisteredHull& hull,
 
   locked.Unlock();
   absl::Status status;
-  std::shared_ptr<const Snapshot> snapshot;
+  std::shared_ptr<const ServedHull> served;
   if (load) {
     absl::StatusOr<std::unique_ptr<HullBuilder>> loaded = LoadBuilder(stored, should_stop);
     status = loaded.status();
@@ -75,7 +75,7 @@ absl::Status Registry::MakeSnapshot(Locked& locked, RegisteredHull& hull,
   }
   if (builder != nullptr) {
     absl::StatusOr<Hull> made = builder->Snapshot(should_stop);
-    if (made.ok()) snapshot = std::make_shared<const Snapshot>(*std::move(made));
+    if (made.ok()) served = std::make_shared<const ServedHull>(*std::move(made));
     status = made.status();
   }
   const size_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
@@ -94,7 +94,7 @@ absl::Status Registry::MakeSnapshot(Locked& locked, RegisteredHull& hull,
       hull.builder = std::move(builder);
     }
     hull.builder_bytes = hull.builder == nullptr ? 0 : builder_bytes;
-    hull.snapshot = std::move(snapshot);
+    hull.served = std::move(served);
     if (absl::IsDataLoss(status)) {
       hull.damage = status;
       ++cache_.damaged;
@@ -125,7 +125,7 @@ absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
       }
       if (!failures[i].ok()) continue;
       const HullPointer& hull = hulls[i];
-      const bool stale = hull->snapshot == nullptr;
+      const bool stale = hull->served == nullptr;
       if (stale || attempt == 1) {
         ++hull->pins;
         pinned.push_back(hull);
@@ -135,7 +135,7 @@ absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
     }
     if (all_current) break;
     for (size_t i = 0; i < ids.size() && !stopped; ++i) {
-      if (failures[i].ok()) failures[i] = MakeSnapshot(locked, *hulls[i], should_stop);
+      if (failures[i].ok()) failures[i] = MakeServed(locked, *hulls[i], should_stop);
       stopped = Stopped(should_stop) || absl::IsCancelled(failures[i]);
     }
   }
@@ -147,7 +147,7 @@ absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
         resolved.hulls.emplace_back(failures[i]);
         continue;
       }
-      resolved.hulls.emplace_back(HullView{hulls[i]->committed.record, hulls[i]->snapshot});
+      resolved.hulls.emplace_back(HullView{hulls[i]->committed.record, hulls[i]->served});
       Charge(locked, *hulls[i]);
     }
   }
@@ -166,10 +166,10 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids) {
       resolved.hulls.emplace_back(HullNotFound(id));
     } else if (!hull->damage.ok()) {
       resolved.hulls.emplace_back(hull->damage);
-    } else if (hull->snapshot == nullptr) {
+    } else if (hull->served == nullptr) {
       return std::nullopt;
     } else {
-      resolved.hulls.emplace_back(HullView{hull->committed.record, hull->snapshot});
+      resolved.hulls.emplace_back(HullView{hull->committed.record, hull->served});
       ++cache_.hits;
       Charge(locked, *hull);
     }
@@ -199,8 +199,8 @@ void Registry::Charge(Locked&, RegisteredHull& hull) {
 
 void Registry::Account(RegisteredHull& hull) {
   size_t bytes = hull.builder == nullptr ? 0 : hull.builder_bytes;
-  if (hull.snapshot != nullptr && hull.snapshot != empty_snapshot_) {
-    bytes += hull.snapshot->MemoryBytes();
+  if (hull.served != nullptr && hull.served != empty_served_) {
+    bytes += hull.served->MemoryBytes();
   }
   cache_.bytes += bytes - hull.charged_bytes;
   hull.charged_bytes = bytes;
@@ -219,8 +219,8 @@ bool Registry::DropUnused(Locked& locked, RegisteredHull& hull) {
     hull.builder_bytes = 0;
   }
   const bool can_make_again = store_.keeps_hulls() || hull.builder != nullptr;
-  if (can_make_again && hull.snapshot.use_count() == 1) {
-    locked.Discard(std::exchange(hull.snapshot, nullptr));
+  if (can_make_again && hull.served.use_count() == 1) {
+    locked.Discard(std::exchange(hull.served, nullptr));
   }
   Account(hull);
   return hull.charged_bytes < before;
