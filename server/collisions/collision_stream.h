@@ -51,7 +51,7 @@ class CollisionStream
         readers_(readers),
         long_readers_(long_readers),
         call_(context, admission, Rpc::kStreamCollisions),
-        charge_(registry) {}
+        charge_(registry.memory()) {}
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;

@@ -32,7 +32,7 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
         writers_(writers),
         response_(response),
         call_(context, admission, Rpc::kReplaceHull),
-        charge_(registry) {}
+        charge_(registry.memory()) {}
 
   void OnReadDone(bool ok) override;
   void OnCancel() override { call_.Cancel(); }

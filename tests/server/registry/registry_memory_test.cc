@@ -190,7 +190,7 @@ TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
   limits.memory_limit = 100'000;
   Registry registry(store, limits, writers);
   {
-    MemoryCharge charge(registry);
+    MemoryCharge charge(registry.memory());
     charge.Set(100'000);
     EXPECT_TRUE(registry.CheckMemory().ok());
     charge.Set(100'001);
@@ -198,7 +198,7 @@ TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
     charge.Set(60'000);
     EXPECT_TRUE(registry.CheckMemory().ok());
     EXPECT_EQ(registry.Cache().bytes, 60'000);
-    MemoryCharge other(registry);
+    MemoryCharge other(registry.memory());
     other.Set(60'000);
     EXPECT_THAT(std::string(registry.CheckMemory().message()), HasSubstr("--memory-limit"));
   }
