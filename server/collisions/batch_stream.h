@@ -57,7 +57,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;
-  absl::Status AnswerRelations(uint64_t begin, uint64_t end, BatchColumns* columns);
   absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
 
   Registry& registry_;
@@ -71,8 +70,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   // Written before the first piece.
   QueryOptions options_;
   PlacementTable table_;
-  // Whether every pair can be answered and nothing but relations is wanted, as mostly.
-  bool relations_suffice_ = false;
 
   // Guarded by the mutex.
   bool opening_ = true;
