@@ -10,9 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/stop_poll.h"
 #include "core/query/box_tree.h"
-#include "core/query/collision.h"
 
 namespace hulld {
 namespace {
@@ -26,7 +24,7 @@ constexpr uint32_t kMostSlicePlacements = 1024;
 // What the search of one placement counted.
 struct RungTally {
   uint64_t candidates = 0;
-  RungCounts rungs;
+  decltype(SceneTotals::by_rung) by_rung = {};
 };
 
 class SceneSearch {
@@ -72,7 +70,9 @@ class SceneSearch {
       for (uint32_t i = 0; i < size; ++i) {
         std::move(slice[i].begin(), slice[i].end(), std::back_inserter(answers));
         candidates += slice_rungs[i].candidates;
-        totals.rungs += slice_rungs[i].rungs;
+        for (size_t rung = 0; rung < totals.by_rung.size(); ++rung) {
+          totals.by_rung[rung] += slice_rungs[i].by_rung[rung];
+        }
       }
       totals.candidates += candidates;
       totals.found += answers.size();
@@ -85,7 +85,7 @@ class SceneSearch {
   }
 
  private:
-  bool Stopped() const { return StopPoll(options_.query.should_stop, 1).Poll(); }
+  bool Stopped() const { return options_.query.should_stop && options_.query.should_stop(); }
 
   bool IsIgnored(uint32_t a, uint32_t b) const {
     if (options_.groups.empty() || ignored_.empty()) return false;
@@ -136,7 +136,7 @@ class SceneSearch {
       ++tally.candidates;
       absl::StatusOr<Answer> answer = Ask(a, b);
       if (absl::IsCancelled(answer.status())) break;
-      if (answer.ok()) tally.rungs.Add(answer->rung);
+      if (answer.ok()) ++tally.by_rung[static_cast<size_t>(answer->rung)];
       if (answer.ok() && !IsFound(*answer)) continue;
       answers.push_back({{a, b}, std::move(answer)});
     }
@@ -149,8 +149,11 @@ class SceneSearch {
 
   absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b) const {
     absl::StatusOr<Answer> answer = CheckCollision(placements_[a], placements_[b], first_look_);
-    if (!options_.query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
-    QueryOptions options = options_.query;
+    const QueryOptions& query = options_.query;
+    const bool wants_more = query.want_axis || query.want_analysis || query.want_certificate ||
+                            query.want_separation || query.want_witness;
+    if (!wants_more || !answer.ok() || !IsFound(*answer)) return answer;
+    QueryOptions options = query;
     options.threads = 1;
     return CheckCollision(placements_[a], placements_[b], options);
   }

@@ -4,15 +4,15 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
 
 #include "core/query/batch.h"
+#include "core/query/collision.h"
 #include "core/query/placed/placed_hull.h"
-#include "core/query/terms/answer.h"
-#include "core/query/terms/query_options.h"
 #include "core/query/terms/rung.h"
 
 namespace hulld {
@@ -48,8 +48,8 @@ struct SceneTotals {
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;
-  // Candidates by the rung that decided.
-  RungCounts rungs;
+  // Candidates by the rung that decided, in the order of Rung.
+  std::array<uint64_t, kRungCount> by_rung = {};
 };
 
 // Which of all pairs of placements collide: a tree of bounding boxes leaves the pairs whose boxes
