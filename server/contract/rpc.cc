@@ -30,8 +30,8 @@ const char* RpcName(Rpc rpc) {
       return "GetStatus";
     case Rpc::kReplaceHull:
       return "ReplaceHull";
-    case Rpc::kSaveSnapshot:
-      return "SaveSnapshot";
+    case Rpc::kSaveBackup:
+      return "SaveBackup";
   }
   HULLD_UNREACHABLE();
 }

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "server/contract/error_info.h"
+
 namespace hulld::server {
 
 RegisteredHull::RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
@@ -49,13 +51,19 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull() {
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
 
 absl::Status HullNotFound(const std::string& id) {
-  return absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first"));
+  return WithReason(
+      absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first")),
+      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {
-  return absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
-                                         record.revision, ", not ", if_revision,
-                                         " (if_revision); read it again, then retry"));
+  return WithReason(absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
+                                                    record.revision, ", not ", if_revision,
+                                                    " (if_revision); read it again, then retry")),
+                    v1::ERROR_REASON_REVISION_MISMATCH,
+                    {{"hull_id", record.hull_id},
+                     {"if_revision", if_revision},
+                     {"current_revision", record.revision}});
 }
 
 }  // namespace hulld::server

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/registry/registered_hull.h"
 #include "server/settings/memory_limit.h"
@@ -21,9 +22,11 @@ Limits WithMemoryLimit(Limits limits) {
 }
 
 absl::Status Gone(const std::string& id, const char* how) {
-  return absl::FailedPreconditionError(
-      absl::StrCat(QuotedHull(id), " was ", how,
-                   " while points were streamed into it; open the stream again and start anew"));
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(id), " was ", how,
+          " while points were streamed into it; open the stream again and start anew")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
 }
 
 }  // namespace
@@ -128,8 +131,9 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
   } else if (!if_absent) {
     Answer<CreateResult>(
         locked, done,
-        absl::AlreadyExistsError(
-            absl::StrCat(QuotedHull(id), " exists; delete it first, or set if_absent to use it")));
+        WithReason(absl::AlreadyExistsError(absl::StrCat(
+                       QuotedHull(id), " exists; delete it first, or set if_absent to use it")),
+                   v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
   } else if (existing->state.damaged()) {
     Answer<CreateResult>(locked, done, existing->state.damage());
   } else {
@@ -229,8 +233,11 @@ absl::Status Registry::CheckReplacement(const RegisteredHull* former,
     return RevisionMismatch(former->committed.record, *if_revision);
   }
   if (if_revision.value_or(0) != 0) {
-    return absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
-                                           "revision ", *if_revision, " (if_revision)"));
+    return WithReason(
+        absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
+                                        "revision ", *if_revision, " (if_revision)")),
+        v1::ERROR_REASON_REVISION_MISMATCH,
+        {{"hull_id", id}, {"if_revision", *if_revision}, {"current_revision", uint64_t{0}}});
   }
   if (!replacement.create_if_absent) return HullNotFound(id);
   return CheckHullCount();

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/registry/hull_loader.h"
@@ -34,9 +35,11 @@ struct Registry::BuiltChunk {
 namespace {
 
 absl::Status GoneWhileStreaming(const HullRecord& record) {
-  return absl::FailedPreconditionError(absl::StrCat(
-      QuotedHull(record.hull_id),
-      " was deleted or replaced while points were streamed into it; open the stream again"));
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(record.hull_id),
+          " was deleted or replaced while points were streamed into it; open the stream again")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", record.hull_id}});
 }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
@@ -230,9 +233,13 @@ absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, Registere
   if (chunk.sequence <= *committed) return Verdict::kAlreadyApplied;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("the expected sequence is ", last + 1,
-                     "; open the stream again and continue after its last_sequence"));
+    return WithReason(absl::FailedPreconditionError(absl::StrCat(
+                          "the expected sequence is ", last + 1,
+                          "; open the stream again and continue after its last_sequence")),
+                      v1::ERROR_REASON_SEQUENCE_GAP,
+                      {{"hull_id", hull.committed.record.hull_id},
+                       {"sequence", chunk.sequence},
+                       {"expected_sequence", last + 1}});
   }
   if (last == 0 && hull.head.writer_count >= limits_.max_writers_per_hull) {
     return TooManyWriters(hull.head, limits_.max_writers_per_hull);

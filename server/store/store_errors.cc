@@ -2,14 +2,18 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "server/contract/error_info.h"
+
 namespace hulld::server {
 
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
   if (status.IsNoSpace()) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the disk that holds --data-dir ", data_dir, " is full (", cause,
-                     "); nothing was changed; make room and append again, no restart is needed"));
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(
+            "the disk that holds --data-dir ", data_dir, " is full (", cause,
+            "); nothing was changed; make room and append again, no restart is needed")),
+        v1::ERROR_REASON_DISK_FULL);
   }
   return absl::UnavailableError(
       absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
@@ -48,9 +52,10 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
 }
 
 absl::Status DamagedHull(const std::string& hull_id, const std::string& finding) {
-  return absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (",
-                                          finding,
-                                          "); delete it and append it anew, or restore a backup"));
+  return WithReason(
+      absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (", finding,
+                                       "); delete it and append it anew, or restore a backup")),
+      v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", hull_id}});
 }
 
 }  // namespace hulld::server
