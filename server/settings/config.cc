@@ -112,8 +112,8 @@ class Parser {
     Add("listen", config_.listen,
         "Where to listen: host:port, [v6]:port or unix:path; port 0 picks a free port");
     app_.add_flag("--insecure", config_.insecure,
-                  "Allow --listen on addresses that other machines can reach without TLS: whoever "
-                  "is between can read and change what passes, tokens included")
+                  "Allow --listen on addresses that other machines can reach without TLS: anyone "
+                  "in between can read and change what passes, tokens included")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
@@ -150,7 +150,7 @@ class Parser {
         ->envname(EnvironmentName("metrics-insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("slow-request", slow_request_seconds_,
-        "Log requests that take longer than so many seconds; 0: none")
+        "Log requests that take longer than this many seconds; 0: none")
         ->check(CLI::Validator(CheckSeconds, ""));
   }
 
