@@ -334,9 +334,13 @@ function overload(   line, fields, row) {
   measured()
 }
 
-# One row of the summary; times in nanoseconds.
-function compare(what, ours, peer, theirs) {
-  printf "| %s | %s | %s: %s | %s |\n", what, unit(ours), peer, unit(theirs), times(theirs / ours)
+# One row of the summary; times in nanoseconds. wrong: what hulld and the peer got wrong.
+function compare(what, ours, peer, theirs, wrong) {
+  printf "| %s | %s | %s: %s | %s | %s |\n", what, unit(ours), peer, unit(theirs), times(theirs / ours), wrong
+}
+function hull(what, cloud) {
+  compare(what, 1e6 * cell[cloud, "hulld", "milliseconds"], "qhull", 1e6 * cell[cloud, "qhull", "milliseconds"],
+          cell[cloud, "hulld", "vertices_missing_or_extra"] " / " cell[cloud, "qhull", "vertices_missing_or_extra"])
 }
 function pair(what, set,   peers, n, i, best) {
   peer_names()
@@ -344,27 +348,32 @@ function pair(what, set,   peers, n, i, best) {
   for (i = 1; i <= n; i++) {
     if (best == "" || cell[set, peers[i], "ns"] + 0 < cell[set, best, "ns"] + 0) best = peers[i]
   }
-  compare(what, cell[set, "hulld", "ns"], named(best), cell[set, best, "ns"])
+  compare(what, cell[set, "hulld", "ns"], named(best), cell[set, best, "ns"],
+          cell[set, "hulld", "wrong"] " / " cell[set, best, "wrong"])
 }
-function summary() {
+function summary(   one) {
   read_rows("hull_build_" machine)
   read_rows("hull_stream_" machine)
   read_rows("query_relation_" machine)
   read_rows("query_scene_" machine)
-  head("| task, on one thread | hulld | fastest peer | times |")
-  compare("hull of 100000 points in a ball", 1e6 * cell["ball:100000", "hulld", "milliseconds"], "qhull",
-          1e6 * cell["ball:100000", "qhull", "milliseconds"])
-  compare("hull of 100000 points on a sphere", 1e6 * cell["sphere:100000", "hulld", "milliseconds"], "qhull",
-          1e6 * cell["sphere:100000", "qhull", "milliseconds"])
-  compare("one more of 100000 points on a sphere", 10 * cell["sphere:100000", "hulld one at a time", "milliseconds"], "CGAL Delaunay",
-          10 * cell["sphere:100000", "cgal delaunay one at a time", "milliseconds"])
+  head("| task, on one thread | hulld | fastest peer | times | wrong: hulld / peer |")
+  hull("hull of 100000 points in a ball", "ball:100000")
+  hull("hull of 100000 points on a sphere", "sphere:100000")
+  one = "sphere:100000"
+  # 100000 points, milliseconds: 10 ns a point for each.
+  compare("one more of 100000 points on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
+          10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
+          cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \
+          cell[one, "cgal delaunay one at a time", "vertices_missing_or_extra"])
   pair("pair of 64 vertices, far apart", "sphere:64 far")
   pair("pair of 64 vertices, 1 to 5 % apart", "sphere:64 close")
   pair("pair of 64 vertices, 1e-6 apart", "sphere:64 gap")
   pair("pair of 64 vertices, deep", "sphere:64 deep")
+  pair("pair of 64 vertices, touching", "sphere:64 contact")
   pair("pair of 10000 vertices, 1 to 5 % apart", "sphere:10000 close")
   pair("two UR5 links, 1 to 5 % apart", "ur5 close")
-  compare("all colliding pairs of 10000 UR5 links", cell["10000 of ur5", "hulld", "ns"], "FCL, tree", cell["10000 of ur5", "FCL tree", "ns"])
+  compare("all colliding pairs of 10000 UR5 links", cell["10000 of ur5", "hulld", "ns"], "FCL, tree",
+          cell["10000 of ur5", "FCL tree", "ns"], cell["10000 of ur5", "hulld", "wrong"] " / " cell["10000 of ur5", "FCL tree", "wrong"])
   measured()
 }
 
