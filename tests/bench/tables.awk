@@ -50,6 +50,7 @@ function measured(   path, line, fields) {
   getline line < path
   getline line < path
   split_row(line, fields)
+  sub(/\(virtual; /, "(", fields[8])
   printf "\n*Measured on a virtual %s, %s; rows in %s.*\n", fields[8], fields[7], files
 }
 
@@ -334,6 +335,18 @@ function overload(   line, fields, row) {
   measured()
 }
 
+function busy(   line, fields, row) {
+  head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
+  while ((getline line < ("results/server_busy_" machine ".csv")) > 0) {
+    split_row(line, fields)
+    if (row++ == 0) continue
+    sub(/^alone$/, "nothing", fields[2])
+    printf "| %s | %s | %.3g | %.3g | %.2f | %.2f |\n", fields[1], fields[2], fields[4], fields[5], fields[6], fields[7]
+  }
+  files = "[`server_busy_" machine ".csv`](" results "server_busy_" machine ".csv)"
+  measured()
+}
+
 # One row of the summary; times in nanoseconds. wrong: what hulld and the peer got wrong.
 function compare(what, ours, peer, theirs, wrong) {
   printf "| %s | %s | %s: %s | %s | %s |\n", what, unit(ours), peer, unit(theirs), times(theirs / ours), wrong
@@ -395,6 +408,7 @@ BEGIN {
   else if (table == "network") network()
   else if (table == "start") start()
   else if (table == "overload") overload()
+  else if (table == "busy") busy()
   else if (table == "summary") summary()
   else {
     print "tables.awk: no table " table > "/dev/stderr"

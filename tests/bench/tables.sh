@@ -6,7 +6,8 @@
 #   tables.sh TABLE [MACHINE]     prints one
 #
 # MACHINE names the files, as in hull_build_MACHINE.csv; epyc_gcc12 by default. A table stands in a
-# page between <!-- table NAME --> and <!-- end of table -->; tables.awk knows their names.
+# page between <!-- table NAME --> and <!-- end of table -->; tables.awk knows their names. A table
+# of another machine says so: <!-- table NAME of MACHINE -->.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 export LC_ALL=C
@@ -18,18 +19,18 @@ machine=${2:-epyc_gcc12}
 readonly pages=(../../README.md README.md)
 results_of() { [[ $1 == README.md ]] && echo results/ || echo tests/bench/results/; }
 
-# made_table TABLE PAGE
+# made_table TABLE PAGE [MACHINE]
 made_table() {
-  awk -v table="$1" -v machine="$machine" -v results="$(results_of "$2")" -f tables.awk </dev/null
+  awk -v table="$1" -v machine="${3:-$machine}" -v results="$(results_of "$2")" -f tables.awk </dev/null
 }
 
 # rewritten PAGE: the page with its tables made anew.
 rewritten() {
   local page=$1 line
   while IFS= read -r line; do
-    if [[ $line =~ ^'<!-- table '([a-z-]+)' -->'$ ]]; then
+    if [[ $line =~ ^'<!-- table '([a-z-]+)(' of '([a-z0-9_]+))?' -->'$ ]]; then
       printf '%s\n' "$line"
-      made_table "${BASH_REMATCH[1]}" "$page"
+      made_table "${BASH_REMATCH[1]}" "$page" "${BASH_REMATCH[3]}"
       while IFS= read -r line && [[ $line != '<!-- end of table -->' ]]; do :; done
     fi
     printf '%s\n' "$line"
@@ -51,6 +52,6 @@ case $what in
     ((different == 0)) || echo "Please run: bash tests/bench/tables.sh --write"
     exit $different
     ;;
-  --help) sed -n '2,9s/^# \{0,1\}//p' tables.sh ;;
+  --help) sed -n '2,10s/^# \{0,1\}//p' tables.sh ;;
   *) made_table "$what" README.md ;;
 esac
