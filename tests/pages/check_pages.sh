@@ -1,6 +1,7 @@
 #!/bin/bash
 # Checks what can be read off the pages: links lead to files and headings that exist, paths in
-# `backticks` too, the first page is short, and the tables of settings and commands are complete.
+# `backticks` too, the first page is short, and the tables of settings, errors and commands are
+# complete.
 #
 #   bash tests/pages/check_pages.sh PROGRAMS
 #
@@ -79,6 +80,10 @@ done
 while read -r flag; do
   [[ " ${flags[*]} " == *" $flag "* ]] || problem "server/README.md: hulld has no $flag"
 done < <(sed -n '/^## Settings/,/^## /p' server/README.md | grep -oE '^\| `--[a-z-]+' | grep -oE -- '--[a-z-]+')
+
+while read -r reason; do
+  grep -qw "$reason" server/README.md || problem "server/README.md: the errors lack the reason $reason"
+done < <(sed -nE 's/^ *ERROR_REASON_([A-Z_]+) = [1-9][0-9]*;$/\1/p' proto/hulld/v1/error.proto)
 
 mapfile -t commands < <("$programs/hullctl" --help | sed -n '/^Subcommands:/,$p' | sed -nE 's/^  ([a-z]+) .*/\1/p')
 ((${#commands[@]} > 10)) || problem "hullctl --help names no commands"
