@@ -164,13 +164,13 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
   return response;
 }
 
-absl::Status Client::SaveSnapshot(
-    const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive,
+absl::Status Client::SaveBackup(
+    const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
   if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
-  const auto reader = maintenance_->SaveSnapshot(&context, v1::SaveSnapshotRequest());
-  v1::SaveSnapshotResponse part;
+  const auto reader = maintenance_->SaveBackup(&context, v1::SaveBackupRequest());
+  v1::SaveBackupResponse part;
   while (reader->Read(&part)) {
     if (absl::Status status = receive(part); !status.ok()) {
       context.TryCancel();

@@ -79,11 +79,10 @@ class Client {
       const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
       std::optional<std::chrono::milliseconds> timeout = {}) const;
 
-  // Passes each part of a snapshot of the store to `receive`, in order; an error of `receive` ends
+  // Passes each part of a backup of the store to `receive`, in order; an error of `receive` ends
   // the call and is returned. Not retried; `timeout` as above.
-  absl::Status SaveSnapshot(
-      const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive,
-      std::optional<std::chrono::milliseconds> timeout = {}) const;
+  absl::Status SaveBackup(const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
+                          std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
 

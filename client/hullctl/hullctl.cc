@@ -37,7 +37,7 @@ void AddGlobalOptions(CLI::App* app, Invocation* invocation) {
            invocation->given_timeout = *timeout;
          },
          "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
-         "'snapshot save' take the time that they need unless it is given)")
+         "'backup save' take the time that they need unless it is given)")
       ->type_name("TIME");
   app->add_option_function<std::string>(
          "--output", [invocation](const std::string& kind) { invocation->json = kind == "json"; },
@@ -62,7 +62,7 @@ void AddCommands(CLI::App* app, Invocation* invocation) {
   AddVerifyCommand(app, invocation);
   AddGenerateCommand(app, invocation);
   AddStatusCommand(app, invocation);
-  AddSnapshotCommand(app, invocation);
+  AddBackupCommand(app, invocation);
   AddBenchCommand(app, invocation);
   AddPictureCommand(app, invocation);
   AddTokenCommand(app, invocation);

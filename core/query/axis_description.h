@@ -2,8 +2,8 @@
 #define HULLD_CORE_QUERY_AXIS_DESCRIPTION_H_
 
 #include "core/numeric/integer.h"
-#include "core/query/collision.h"
 #include "core/query/exact/exact_pair.h"
+#include "core/query/terms/axis.h"
 
 namespace hulld {
 

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
@@ -22,7 +23,7 @@ Box BoundingBox(const PlacedHull& placed) {
   }
   const Vector& t = placed.X_WH().t;
   const double size = placed.hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
-  if (!(size >= kFilterMinSize && size <= kFilterMaxSize)) {
+  if (!IsFilterSize(size)) {
     return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
   }
   const SupportMap& support = placed.query_hull().support();

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_pair.h"
 #include "core/query/exact/exact_search.h"
 #include "core/query/floating/float_search.h"
@@ -39,7 +40,7 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
 // Whether bounds about the centres may settle a pair that spheres do not.
 bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
   const double largest = LargestComponent(n);
-  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return false;
+  if (!IsFilterDirection(largest)) return false;
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
@@ -100,19 +101,20 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 
 absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
                                 Purpose purpose, const std::function<bool()>& should_stop) {
-  Decision decision;
+  absl::StatusOr<Decision> result(absl::in_place);
+  Decision& decision = *result;
   if (pair.usable()) {
     const PlainVector n = -pair.CenterDifference();
     if (SpheresSeparate(pair, n)) {
       decision.axis = Vector(n);
-      return decision;
+      return result;
     }
     if (cache != nullptr) {
       const FloatSearchResult found = TryCached(pair, *cache);
       decision.directions_tried += found.directions_tried;
       if (found.verdict != FloatVerdict::kUndecided) {
         Accept(found, Rung::kCached, decision);
-        return decision;
+        return result;
       }
     }
     PlainVector first = n;
@@ -122,7 +124,7 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
         if (*relation == Relation::kSeparated) decision.axis = Vector(n);
         // What it suggested failed, and would cost the next query more than these bounds.
         if (cache != nullptr) *cache = PairCache();
-        return decision;
+        return result;
       }
     }
     const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
@@ -130,7 +132,7 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
     if (cache != nullptr) Remember(found, *cache);
     if (found.verdict != FloatVerdict::kUndecided) {
       Accept(found, Rung::kFloatingPoint, decision);
-      return decision;
+      return result;
     }
   }
   ExactPair exact(pair);
@@ -142,7 +144,7 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
   if (found->axis) decision.axis = *std::move(found->axis);
   decision.pair_count = static_cast<uint32_t>(found->pairs.size());
   std::copy(found->pairs.begin(), found->pairs.end(), decision.pairs.begin());
-  return decision;
+  return result;
 }
 
 }  // namespace hulld

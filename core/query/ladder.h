@@ -8,9 +8,13 @@
 #include <functional>
 #include <variant>
 
-#include "core/query/collision.h"
+#include "core/numeric/integer.h"
+#include "core/numeric/vector.h"
 #include "core/query/floating/float_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/pair_cache.h"
+#include "core/query/terms/relation.h"
+#include "core/query/terms/rung.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

@@ -17,6 +17,7 @@
 #include "core/query/floating/float_depth.h"
 #include "core/query/floating/float_distance.h"
 #include "core/query/floating/float_search.h"
+#include "core/query/terms/query_options.h"
 #include "core/query/terms/separation_bounds.h"
 
 namespace hulld {

@@ -48,7 +48,7 @@ Permission PermissionFor(Rpc rpc) {
     case Rpc::kDeleteHull:
     case Rpc::kReplaceHull:
       return Permission::kWrite;
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return Permission::kAdmin;
   }
   return Permission::kAdmin;

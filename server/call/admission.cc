@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {
@@ -36,10 +37,10 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kAppendPoints:
     case Rpc::kReplaceHull:
     case Rpc::kStreamCollisions:
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return CallKind::kStream;
   }
-  return CallKind::kUnary;
+  HULLD_UNREACHABLE();
 }
 
 Admission::Ticket::Ticket(Ticket&& other) noexcept
@@ -62,6 +63,7 @@ Admission::Admission(const Limits& limits, Metrics& metrics) : limits_(limits), 
 }
 
 Admission::~Admission() {
+  HULLD_CHECK(running_ == 0);
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -166,9 +168,13 @@ void Admission::Leave(Ticket& ticket) {
       watched = ticket.watched_->call;
       (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
     }
-    if (ticket.kind_ == CallKind::kBatch) --batches_;
+    if (ticket.kind_ == CallKind::kBatch) {
+      HULLD_CHECK(batches_ > 0);
+      --batches_;
+    }
     if (ticket.kind_ == CallKind::kStream) {
       const auto open = streams_.find(ticket.client_);
+      HULLD_CHECK(open != streams_.end());
       if (--open->second == 0) streams_.erase(open);
     }
     if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();

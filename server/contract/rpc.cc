@@ -28,8 +28,8 @@ const char* RpcName(Rpc rpc) {
       return "GetStatus";
     case Rpc::kReplaceHull:
       return "ReplaceHull";
-    case Rpc::kSaveSnapshot:
-      return "SaveSnapshot";
+    case Rpc::kSaveBackup:
+      return "SaveBackup";
   }
   return "unknown";
 }

@@ -42,7 +42,7 @@ absl::StatusOr<std::unique_ptr<HullBuilder>> Registry::LoadBuilder(
                                   " with ", builder->vertex_count(), " vertices, not ",
                                   record.dimension, " with ", record.vertex_count)
                    : std::string(added.status().message()),
-        "); delete it and append it anew, or restore a snapshot"));
+        "); delete it and append it anew, or restore a backup"));
   }
   return builder;
 }

@@ -39,7 +39,7 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveSnapshot. A client is a token or,
+  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveBackup. A client is a token or,
   // without tokens, a peer address.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns.

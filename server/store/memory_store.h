@@ -28,7 +28,7 @@ class MemoryStore : public Store {
   absl::Status Recover() override { return absl::OkStatus(); }
   absl::StatusOr<std::string> MakeCopy() override {
     return absl::FailedPreconditionError(
-        "the store is memory (--store=memory), of which no snapshot can be saved");
+        "the store is memory (--store=memory), of which no backup can be saved");
   }
 
  private:

@@ -25,7 +25,7 @@ std::string DatabaseDirectory(const std::string& data_dir) { return data_dir + "
 // ours to touch.
 std::string ScratchDirectory(const std::string& data_dir) { return data_dir + "/hulld-scratch"; }
 
-// 'hullctl snapshot restore' leaves a file of this name in the directory that it makes.
+// 'hullctl backup restore' leaves a file of this name in the directory that it makes.
 constexpr char kRestoredMark[] = "/restored";
 
 // What a server that was killed left behind.
@@ -72,7 +72,7 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
   if (status.IsCorruption()) {
     return absl::DataLossError(absl::StrCat(
         "--data-dir ", data_dir, " is damaged (", cause,
-        "); restore a snapshot into another directory, or see 'hulld doctor --cut-log'"));
+        "); restore a backup into another directory, or see 'hulld doctor --cut-log'"));
   }
   if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
     return absl::NotFoundError(
@@ -83,9 +83,9 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
 }
 
 absl::Status Damaged(const std::string& hull_id, const absl::Status& finding) {
-  return absl::DataLossError(absl::StrCat(
-      "hull \"", hull_id, "\" is damaged in the store (", std::string(finding.message()),
-      "); delete it and append it anew, or restore a snapshot"));
+  return absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (",
+                                          std::string(finding.message()),
+                                          "); delete it and append it anew, or restore a backup"));
 }
 
 void PutSealed(rocksdb::WriteBatch& batch, const std::string& key, std::string value) {
@@ -327,7 +327,7 @@ absl::Status RocksDbStore::InitializeMeta() {
 
 // Before anything else is served or written. A store that may have lost what it had acknowledged
 // takes an ID of its own, as the revisions of what is lost will be given to other changes: one that
-// was made of a snapshot, one whose log is cut, and one that ended relaxed without syncing its log.
+// was made of a backup, one whose log is cut, and one that ended relaxed without syncing its log.
 // The new ID and the marks in the database change together, and the mark in the directory goes
 // last: a start that was interrupted is repeated by the next.
 absl::Status RocksDbStore::BeginRun() {
@@ -355,7 +355,7 @@ absl::Status RocksDbStore::BeginRun() {
     return absl::UnavailableError(absl::StrCat("cannot remove ", mark));
   }
   if (restored) {
-    spdlog::info("restored from a snapshot of store {} at revision {}; this is store {}", former_id,
+    spdlog::info("restored from a backup of store {} at revision {}; this is store {}", former_id,
                  revision_, id_);
   } else if (cut_short) {
     spdlog::warn(

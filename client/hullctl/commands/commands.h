@@ -12,7 +12,6 @@ namespace hulld {
 void AddCreateCommand(CLI::App* app, Invocation* invocation);
 void AddAppendCommand(CLI::App* app, Invocation* invocation);
 void AddReplaceCommand(CLI::App* app, Invocation* invocation);
-void AddSnapshotCommand(CLI::App* app, Invocation* invocation);
 void AddGetCommand(CLI::App* app, Invocation* invocation);
 void AddListCommand(CLI::App* app, Invocation* invocation);
 void AddDeleteCommand(CLI::App* app, Invocation* invocation);
@@ -24,6 +23,7 @@ void AddStreamCommand(CLI::App* app, Invocation* invocation);
 void AddVerifyCommand(CLI::App* app, Invocation* invocation);
 void AddGenerateCommand(CLI::App* app, Invocation* invocation);
 void AddStatusCommand(CLI::App* app, Invocation* invocation);
+void AddBackupCommand(CLI::App* app, Invocation* invocation);
 void AddBenchCommand(CLI::App* app, Invocation* invocation);
 void AddPictureCommand(CLI::App* app, Invocation* invocation);
 void AddTokenCommand(CLI::App* app, Invocation* invocation);

@@ -8,6 +8,7 @@
 
 #include "core/query/exact/exact_nearest.h"
 #include "core/query/exact/exact_pair.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

@@ -9,7 +9,7 @@
 
 #include "core/numeric/integer.h"
 #include "core/query/exact/exact_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

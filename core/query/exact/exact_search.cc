@@ -63,9 +63,7 @@ ExactSearchResult SearchOnLine(ExactPair& pair, const IntegerVector& u, const In
   const IntegerVector across = Cross(u, w);
   if (!IsZero(across)) return {Relation::kSeparated, Cross(u, across), 1, {}};
   for (const IntegerVector& n : {u, -u}) {
-    const IntegerVector farthest =
-        pair.VertexA(pair.FarthestA(n)) - pair.VertexB(pair.FarthestB(n));
-    if (Sign(Dot(n, farthest)) < 0) return {Relation::kSeparated, n, 2, {}};
+    if (Sign(Dot(n, pair.Farthest(n).w)) < 0) return {Relation::kSeparated, n, 2, {}};
   }
   return {Relation::kTouching, AnyPerpendicular(u), 3, {}};
 }
@@ -99,7 +97,7 @@ absl::StatusOr<ExactSearchResult> SearchExactly(ExactPair& pair,
     PortalSearch search(pair, should_stop);
     return SearchPortal(search);
   }
-  const IntegerVector w = pair.VertexA(0) - pair.VertexB(0);
+  const IntegerVector w = pair.Corner({0, 0}).w;
   if (span.dimension == 0) {
     if (IsZero(w)) return ExactSearchResult{Relation::kTouching, IntegerVector{1, 0, 0}, 1, {}};
     return ExactSearchResult{Relation::kSeparated, -w, 1, {}};

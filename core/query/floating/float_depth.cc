@@ -12,6 +12,7 @@
 #include "core/numeric/orientation.h"
 #include "core/query/floating/expanding_surface.h"
 #include "core/query/floating/nearest_part.h"
+#include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
 namespace {
@@ -24,10 +25,7 @@ constexpr size_t kUsualVertices = 32;
 constexpr size_t kUsualFacets = 192;
 constexpr size_t kMaxVertices = size_t{1} << 18;
 
-struct Corner {
-  PlainVector w;
-  VertexPair pair;
-};
+using Corner = MinkowskiVertex<PlainVector>;
 
 // The plane of a facet.
 struct Plane {

@@ -6,6 +6,7 @@
 
 #include "core/query/floating/float_pair.h"
 #include "core/query/terms/separation_bounds.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

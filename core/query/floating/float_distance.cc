@@ -6,6 +6,7 @@
 
 #include "core/numeric/error_bounds.h"
 #include "core/query/floating/nearest_part.h"
+#include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
 namespace {
@@ -14,10 +15,7 @@ namespace {
 // to 10000 vertices need fewer than 40.
 constexpr int kMaxSteps = 128;
 
-struct Corner {
-  Vector w;
-  VertexPair pair;
-};
+using Corner = MinkowskiVertex<Vector>;
 
 // The corners of the part of A - B that is nearest to the origin so far.
 class Walk {

@@ -5,9 +5,10 @@
 #include <vector>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/placed/plain_vector.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -23,7 +24,7 @@ class FloatPair {
         offset_(PlainVector(b.X_WH().t) - a.X_WH().t),
         size_(a.hull().max_abs_coordinate() + b.hull().max_abs_coordinate() +
               LargestComponent(offset_)),
-        usable_(size_ >= kFilterMinSize && size_ <= kFilterMaxSize) {}
+        usable_(IsFilterSize(size_)) {}
 
   const PlacedHull& a() const { return *a_; }
   const PlacedHull& b() const { return *b_; }

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
 namespace {
@@ -13,10 +15,7 @@ namespace {
 // Observed: random pairs of 10000 vertices, 1e-6 apart, need 18 on average.
 constexpr uint64_t kMaxDirections = 64;
 
-struct Corner {
-  PlainVector w;
-  VertexPair pair;
-};
+using Corner = MinkowskiVertex<PlainVector>;
 
 // The corners of the part of A - B that is nearest to the origin so far: a vertex, an edge, a
 // triangle or a tetrahedron. The newest comes last. Corners stay where they are written; only their
@@ -267,7 +266,7 @@ class FloatSearch {
   // Explores along n and gives the next direction; false when the search is over.
   bool Explore(PlainVector& n) {
     double largest = LargestComponent(n);
-    if (!(largest >= kDirectionMin && largest <= kDirectionMax)) {
+    if (!IsFilterDirection(largest)) {
       if (!(largest > 0)) return false;
       const double unit = std::ldexp(1.0, std::ilogb(largest));
       n = {n.x / unit, n.y / unit, n.z / unit};

@@ -4,9 +4,9 @@
 #include <array>
 #include <cstdint>
 
-#include "core/query/collision.h"
 #include "core/query/floating/float_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/pair_cache.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 
 namespace hulld {

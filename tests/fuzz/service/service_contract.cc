@@ -31,7 +31,7 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kCheckCollision:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return {grpc::FAILED_PRECONDITION};
     case Rpc::kGetStatus:
       return {};

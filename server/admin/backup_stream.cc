@@ -1,4 +1,4 @@
-#include "server/admin/snapshot_stream.h"
+#include "server/admin/backup_stream.h"
 
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
@@ -15,38 +15,39 @@
 namespace hulld::server {
 namespace {
 
-// A snapshot holds everybody's hulls.
+// A backup holds everybody's hulls.
 absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
   return absl::PermissionDeniedError(
       absl::StrCat("token \"", caller.name, "\" is limited to \"", caller.prefix,
-                   "\", and a snapshot holds the whole store; use a token without a prefix"));
+                   "\", and a backup holds the whole store; use a token without a prefix"));
 }
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SnapshotStream::Start(
+grpc::ServerWriteReactor<v1::SaveBackupResponse>* BackupStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Store& store,
     const Registry& registry, WorkerPool& readers) {
-  auto* stream = new SnapshotStream(context, admission, readers);
-  absl::Status begun = stream->call_.Begin();
-  if (begun.ok()) begun = CheckSeesAll(stream->call_.caller());
-  if (begun.ok()) {
-    readers.Submit([stream, &store, &registry] { stream->Open(store, registry); });
-  } else {
-    stream->Finish(stream->call_.End(begun));
-  }
-  return stream;
+  return Launch(std::shared_ptr<BackupStream>(
+      new BackupStream(context, admission, store, registry, readers)));
 }
 
-SnapshotStream::~SnapshotStream() {
+BackupStream::~BackupStream() {
   std::error_code error;
   if (!directory_.empty()) std::filesystem::remove_all(directory_, error);
 }
 
-void SnapshotStream::Open(Store& store, const Registry& registry) {
-  absl::StatusOr<std::string> directory = store.MakeCopy();
-  if (!directory.ok()) return Finish(call_.End(directory.status()));
+void BackupStream::Open() {
+  if (absl::Status s = CheckSeesAll(call().caller()); !s.ok()) return FinishCall(s);
+  RunOn(readers_, [this] {
+    if (absl::Status s = Begin(); !s.ok()) return FinishCall(s);
+    Send();
+  });
+}
+
+absl::Status BackupStream::Begin() {
+  absl::StatusOr<std::string> directory = store_.MakeCopy();
+  if (!directory.ok()) return directory.status();
   directory_ = *std::move(directory);
   std::error_code error;
   for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
@@ -56,40 +57,36 @@ void SnapshotStream::Open(Store& store, const Registry& registry) {
     }
   }
   if (error) {
-    return Finish(
-        call_.End(absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()))));
+    return absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()));
   }
   std::sort(files_.rbegin(), files_.rend());
-  spdlog::info("a snapshot of the store is being saved");
-  v1::SnapshotBegin* begin = message_.mutable_begin();
-  EncodeHeader(store, registry.Sizes().store_revision, begin->mutable_header());
+  spdlog::info("a backup of the store is being saved");
+  v1::BackupBegin* begin = reply().mutable_begin();
+  EncodeHeader(store_, registry_.Sizes().store_revision, begin->mutable_header());
   begin->set_version(HULLD_VERSION);
   begin->set_store_format(kStoreFormat);
-  StartWrite(&message_);
+  return absl::OkStatus();
 }
 
-void SnapshotStream::OnWriteDone(bool ok) {
-  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
-  if (!ok) return Finish(call_.End(absl::CancelledError("the client is gone")));
-  readers_.Submit([this] { SendNext(); });
+// Reads files, so not on gRPC's thread.
+void BackupStream::OnSent() {
+  RunOn(readers_, [this] {
+    const absl::StatusOr<bool> more = NextMessage();
+    if (!more.ok()) return FinishCall(more.status());
+    if (!*more) return FinishCall(absl::OkStatus());
+    Send();
+  });
 }
 
-void SnapshotStream::SendNext() {
-  const absl::StatusOr<bool> more = NextMessage();
-  if (!more.ok()) return Finish(call_.End(more.status()));
-  if (!*more) return Finish(call_.End(absl::OkStatus()));
-  StartWrite(&message_);
-}
-
-absl::StatusOr<bool> SnapshotStream::NextMessage() {
-  message_.Clear();
+absl::StatusOr<bool> BackupStream::NextMessage() {
+  reply().Clear();
   if (!files_.empty()) return NextPiece();
   if (std::exchange(ended_, true)) return false;
-  *message_.mutable_end() = totals_;
+  *reply().mutable_end() = totals_;
   return true;
 }
 
-absl::StatusOr<bool> SnapshotStream::NextPiece() {
+absl::StatusOr<bool> BackupStream::NextPiece() {
   const std::string& path = files_.back();
   const auto failure = [&] {
     return absl::UnavailableError(absl::StrCat("cannot read ", path, " of the copy"));
@@ -98,7 +95,7 @@ absl::StatusOr<bool> SnapshotStream::NextPiece() {
     file_ = std::ifstream(directory_ + "/" + path, std::ios::binary);
     if (!file_) return failure();
   }
-  v1::SnapshotPiece* piece = message_.mutable_piece();
+  v1::BackupPiece* piece = reply().mutable_piece();
   std::string& data = *piece->mutable_data();
   data.resize(Config::kReplyMessageBytes);
   file_.read(data.data(), static_cast<std::streamsize>(data.size()));

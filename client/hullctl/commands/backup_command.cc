@@ -2,22 +2,22 @@
 #include <memory>
 #include <string>
 
+#include "client/backup_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
-#include "client/snapshot_file.h"
 
 namespace hulld {
 namespace {
 
-struct SnapshotArguments {
+struct BackupArguments {
   std::string file;
   std::string data_dir;
 };
 
-void Print(const Invocation& run, const std::string& what, const SnapshotCheck& snapshot) {
-  const v1::ResponseHeader& header = snapshot.begin().header();
-  const v1::SnapshotEnd& totals = snapshot.totals();
+void Print(const Invocation& run, const std::string& what, const BackupCheck& backup) {
+  const v1::ResponseHeader& header = backup.begin().header();
+  const v1::BackupEnd& totals = backup.totals();
   if (run.json) {
     run.out << JsonObject()
                    .Add("storeId", header.store_id())
@@ -29,7 +29,7 @@ void Print(const Invocation& run, const std::string& what, const SnapshotCheck& 
     return;
   }
   Table table;
-  table.Row({"snapshot", what})
+  table.Row({"backup", what})
       .Row({"store", header.store_id()})
       .Row({"revision", "at least " + std::to_string(header.revision())})
       .Row({"bytes", std::to_string(totals.byte_count()) + " in " +
@@ -37,12 +37,12 @@ void Print(const Invocation& run, const std::string& what, const SnapshotCheck& 
   table.Print(run.out);
 }
 
-ExitCode Save(const Invocation& run, const SnapshotArguments& arguments) {
-  SnapshotWriter writer(arguments.file);
+ExitCode Save(const Invocation& run, const BackupArguments& arguments) {
+  BackupWriter writer(arguments.file);
   if (absl::Status s = writer.Open(); !s.ok()) return run.FailUsage(s);
   absl::Status file_error;
-  const absl::Status called = run.MakeClient().SaveSnapshot(
-      [&](const v1::SaveSnapshotResponse& part) {
+  const absl::Status called = run.MakeClient().SaveBackup(
+      [&](const v1::SaveBackupResponse& part) {
         file_error = writer.Write(part);
         return file_error;
       },
@@ -54,8 +54,8 @@ ExitCode Save(const Invocation& run, const SnapshotArguments& arguments) {
   return ExitCode::kDone;
 }
 
-ExitCode Restore(const Invocation& run, const SnapshotArguments& arguments) {
-  const auto restored = RestoreSnapshot(arguments.file, arguments.data_dir);
+ExitCode Restore(const Invocation& run, const BackupArguments& arguments) {
+  const auto restored = RestoreBackup(arguments.file, arguments.data_dir);
   if (!restored.ok()) return run.FailUsage(restored.status());
   Print(run, "restored to " + arguments.data_dir, *restored);
   return ExitCode::kDone;
@@ -63,19 +63,19 @@ ExitCode Restore(const Invocation& run, const SnapshotArguments& arguments) {
 
 }  // namespace
 
-void AddSnapshotCommand(CLI::App* app, Invocation* invocation) {
-  auto arguments = std::make_shared<SnapshotArguments>();
-  CLI::App* command = app->add_subcommand("snapshot", "Copies of a whole store in one file");
+void AddBackupCommand(CLI::App* app, Invocation* invocation) {
+  auto arguments = std::make_shared<BackupArguments>();
+  CLI::App* command = app->add_subcommand("backup", "Copies of a whole store in one file");
   command->require_subcommand(1);
-  CLI::App* save = command->add_subcommand("save", "Save a snapshot while hulld goes on serving");
+  CLI::App* save = command->add_subcommand("save", "Save a backup while hulld goes on serving");
   save->add_option("FILE", arguments->file, "File to make")->required();
   save->footer(
       "However long that takes, unless --timeout is given, which then bounds all of it. What ends\n"
       "early leaves no file.");
   save->callback([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
   CLI::App* restore =
-      command->add_subcommand("restore", "Make a data directory of a snapshot, for a new hulld");
-  restore->add_option("FILE", arguments->file, "File that 'snapshot save' made")->required();
+      command->add_subcommand("restore", "Make a data directory of a backup, for a new hulld");
+  restore->add_option("FILE", arguments->file, "File that 'backup save' made")->required();
   restore->add_option("--data-dir", arguments->data_dir, "Directory to make; must be new or empty")
       ->required();
   restore->callback([=] { invocation->action = [=] { return Restore(*invocation, *arguments); }; });

@@ -1,4 +1,4 @@
-#include "client/snapshot_file.h"
+#include "client/backup_file.h"
 
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kFirstLine[] = "hulld snapshot 1\n";
+constexpr char kFirstLine[] = "hulld backup 1\n";
 constexpr size_t kFirstLineBytes = sizeof kFirstLine - 1;
 // Above any part; a larger size can only be damage.
 constexpr uint32_t kMaxPartBytes = 64 << 20;
@@ -28,7 +28,7 @@ uint32_t Checksum(const std::string& bytes) {
 }
 
 absl::Status Damaged(const std::string& what) {
-  return absl::InvalidArgumentError(absl::StrCat("the snapshot is damaged: ", what));
+  return absl::InvalidArgumentError(absl::StrCat("the backup is damaged: ", what));
 }
 
 // Relative, and without parts that lead upwards.
@@ -60,7 +60,7 @@ bool ReadNumber(std::istream& file, uint32_t* number) {
   return true;
 }
 
-absl::StatusOr<v1::SaveSnapshotResponse> ReadPart(std::istream& file) {
+absl::StatusOr<v1::SaveBackupResponse> ReadPart(std::istream& file) {
   uint32_t size = 0;
   uint32_t checksum = 0;
   if (!ReadNumber(file, &size) || !ReadNumber(file, &checksum)) {
@@ -69,7 +69,7 @@ absl::StatusOr<v1::SaveSnapshotResponse> ReadPart(std::istream& file) {
   if (size > kMaxPartBytes) return Damaged("a part has an impossible size");
   std::string bytes(size, '\0');
   if (!file.read(bytes.data(), size)) return Damaged("it is cut short: its end is missing");
-  v1::SaveSnapshotResponse part;
+  v1::SaveBackupResponse part;
   if (Checksum(bytes) != checksum || !part.ParseFromString(bytes)) {
     return Damaged("the checksum of a part does not match");
   }
@@ -81,13 +81,13 @@ absl::Status CannotWrite(const fs::path& path) {
 }
 
 // Writes the files below `directory`.
-absl::Status WritePieces(std::istream& file, const std::string& directory, SnapshotCheck* check) {
+absl::Status WritePieces(std::istream& file, const std::string& directory, BackupCheck* check) {
   while (!check->complete()) {
-    const absl::StatusOr<v1::SaveSnapshotResponse> part = ReadPart(file);
+    const absl::StatusOr<v1::SaveBackupResponse> part = ReadPart(file);
     if (!part.ok()) return part.status();
     if (absl::Status s = check->Take(*part); !s.ok()) return s;
     if (!part->has_piece()) continue;
-    const v1::SnapshotPiece& piece = part->piece();
+    const v1::BackupPiece& piece = part->piece();
     const fs::path path = fs::path(directory) / piece.path();
     std::error_code error;
     fs::create_directories(path.parent_path(), error);
@@ -101,7 +101,7 @@ absl::Status WritePieces(std::istream& file, const std::string& directory, Snaps
   return absl::OkStatus();
 }
 
-// Where a snapshot is unpacked, in the directory that it is for: nothing else may be ours to write,
+// Where a backup is unpacked, in the directory that it is for: nothing else may be ours to write,
 // and what is mounted there cannot be replaced.
 constexpr char kStagingName[] = "restoring";
 // The part of a data directory that makes hulld take it for a store.
@@ -140,7 +140,7 @@ absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory)
 }
 
 // Moves what was unpacked to its place. The mark comes first and the database last, in one step: a
-// directory either holds no store yet, or all of the snapshot and the mark.
+// directory either holds no store yet, or all of the backup and the mark.
 absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   const fs::path mark = directory / kRestoredMark;
   std::ofstream(mark).close();
@@ -170,7 +170,7 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
 }
 
 // Of a file whose first line is read.
-absl::Status Restore(std::ifstream& file, const fs::path& target, SnapshotCheck* check) {
+absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* check) {
   const fs::path staging = target / kStagingName;
   std::error_code error;
   fs::remove_all(staging, error);
@@ -190,18 +190,18 @@ absl::Status Restore(std::ifstream& file, const fs::path& target, SnapshotCheck*
 
 }  // namespace
 
-absl::Status SnapshotCheck::Take(const v1::SaveSnapshotResponse& part) {
+absl::Status BackupCheck::Take(const v1::SaveBackupResponse& part) {
   if (complete_) return Damaged("something follows its end");
   if (!begun_ && !part.has_begin()) return Damaged("its beginning is missing");
   switch (part.part_case()) {
-    case v1::SaveSnapshotResponse::kBegin:
+    case v1::SaveBackupResponse::kBegin:
       if (std::exchange(begun_, true)) return Damaged("it begins twice");
       begin_ = part.begin();
       return absl::OkStatus();
-    case v1::SaveSnapshotResponse::kPiece:
+    case v1::SaveBackupResponse::kPiece:
       return TakePiece(part.piece());
-    case v1::SaveSnapshotResponse::kEnd: {
-      const v1::SnapshotEnd& end = part.end();
+    case v1::SaveBackupResponse::kEnd: {
+      const v1::BackupEnd& end = part.end();
       if (end.file_count() != totals_.file_count() || end.piece_count() != totals_.piece_count() ||
           end.byte_count() != totals_.byte_count()) {
         return Damaged("pieces are missing");
@@ -209,13 +209,13 @@ absl::Status SnapshotCheck::Take(const v1::SaveSnapshotResponse& part) {
       complete_ = true;
       return absl::OkStatus();
     }
-    case v1::SaveSnapshotResponse::PART_NOT_SET:
+    case v1::SaveBackupResponse::PART_NOT_SET:
       break;
   }
   return Damaged("it holds a part of an unknown kind");
 }
 
-absl::Status SnapshotCheck::TakePiece(const v1::SnapshotPiece& piece) {
+absl::Status BackupCheck::TakePiece(const v1::BackupPiece& piece) {
   if (piece.offset() == 0) {
     if (!IsInside(piece.path())) return Damaged("a file's path leads out of the directory");
     path_ = piece.path();
@@ -234,15 +234,15 @@ absl::Status SnapshotCheck::TakePiece(const v1::SnapshotPiece& piece) {
   return absl::OkStatus();
 }
 
-SnapshotWriter::SnapshotWriter(std::string path)
+BackupWriter::BackupWriter(std::string path)
     : path_(std::move(path)), partial_path_(path_ + ".partial") {}
 
-SnapshotWriter::~SnapshotWriter() {
+BackupWriter::~BackupWriter() {
   std::error_code error;
   if (opened_) fs::remove(partial_path_, error);
 }
 
-absl::Status SnapshotWriter::Open() {
+absl::Status BackupWriter::Open() {
   std::error_code error;
   if (fs::exists(path_, error)) {
     return absl::InvalidArgumentError(absl::StrCat(path_, " exists; name another file"));
@@ -254,7 +254,7 @@ absl::Status SnapshotWriter::Open() {
   return absl::OkStatus();
 }
 
-absl::Status SnapshotWriter::Write(const v1::SaveSnapshotResponse& part) {
+absl::Status BackupWriter::Write(const v1::SaveBackupResponse& part) {
   if (absl::Status s = check_.Take(part); !s.ok()) return s;
   const std::string bytes = part.SerializeAsString();
   std::string head;
@@ -266,7 +266,7 @@ absl::Status SnapshotWriter::Write(const v1::SaveSnapshotResponse& part) {
       absl::StrCat("cannot write ", partial_path_, "; is the disk full?"));
 }
 
-absl::Status SnapshotWriter::Finish() {
+absl::Status BackupWriter::Finish() {
   if (!check_.complete()) return Damaged("it is cut short: its end is missing");
   file_.close();
   std::error_code error;
@@ -280,14 +280,13 @@ absl::Status SnapshotWriter::Finish() {
   return absl::OkStatus();
 }
 
-absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
-                                              const std::string& directory) {
+absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::string& directory) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return absl::InvalidArgumentError(absl::StrCat("cannot open ", path));
   std::string line(kFirstLineBytes, '\0');
   file.read(line.data(), static_cast<std::streamsize>(line.size()));
   if (line != kFirstLine) {
-    return absl::InvalidArgumentError(absl::StrCat(path, " is no snapshot of hulld"));
+    return absl::InvalidArgumentError(absl::StrCat(path, " is no backup of hulld"));
   }
   std::error_code error;
   const fs::path target =
@@ -298,7 +297,7 @@ absl::StatusOr<SnapshotCheck> RestoreSnapshot(const std::string& path,
   }
   const absl::StatusOr<std::vector<fs::path>> made = MakeDirectories(target);
   if (!made.ok()) return made.status();
-  SnapshotCheck check;
+  BackupCheck check;
   const absl::Status status = Restore(file, target, &check);
   if (!status.ok()) {
     // Never a store without its mark.
