@@ -77,12 +77,8 @@ absl::Status BatchStream::Validate() {
                        "the batch");
 }
 
-// Sets relations_suffice_.
 absl::Status BatchStream::ResolvePlacements() {
-  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
-  relations_suffice_ = options_.method == Method::kCertifiedSearch &&
-                       IsRelationOnly(request_.wanted()) && table_.all_answerable();
-  return absl::OkStatus();
+  return table_.Resolve(registry_, options_.should_stop);
 }
 
 void BatchStream::QueueHead() {
@@ -127,29 +123,11 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
   BatchColumns columns({}, request_.wanted(), piece.next);
   do {
     const uint64_t until = std::min(piece.end, piece.next + kPairsPerLook);
-    const absl::Status answered = relations_suffice_ ? AnswerRelations(piece.next, until, &columns)
-                                                     : Answer(piece.next, until, &columns);
-    if (!answered.ok()) return answered;
+    if (absl::Status s = Answer(piece.next, until, &columns); !s.ok()) return s;
     piece.next = until;
   } while (piece.next < piece.end && Clock::now() < end);
   piece.is_done = piece.next == piece.end;
   for (v1::BatchCheckCollisionsResponse& reply : columns.Take()) piece.Add(std::move(reply));
-  return absl::OkStatus();
-}
-
-// Requires relations_suffice_.
-absl::Status BatchStream::AnswerRelations(uint64_t begin, uint64_t end, BatchColumns* columns) {
-  HULLD_CHECK(relations_suffice_);
-  std::vector<PlacedPair> pairs;
-  pairs.reserve(end - begin);
-  for (uint64_t i = begin; i < end; ++i) pairs.push_back(PairAt(i));
-  const absl::StatusOr<std::vector<RelationAnswer>> answers =
-      FindRelations(table_.placed(), pairs, options_.tolerance, options_.should_stop, 1);
-  if (!answers.ok()) return answers.status();
-  columns->Add(*answers);
-  RungCounts counts;
-  for (const RelationAnswer& answer : *answers) counts.Add(answer.rung);
-  call().metrics().CountPairs(counts);
   return absl::OkStatus();
 }
 

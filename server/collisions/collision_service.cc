@@ -115,8 +115,8 @@ absl::Status CollisionService::PairQuery::Place(const Registry& registry,
   a = *placed_a;
   b = *placed_b;
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
-  EncodeVersion(views[0]->record, response->mutable_hull_a());
-  EncodeVersion(views[1]->record, response->mutable_hull_b());
+  EncodeVersion(registry.store().id(), views[0]->record, response->mutable_hull_a());
+  EncodeVersion(registry.store().id(), views[1]->record, response->mutable_hull_b());
   return absl::OkStatus();
 }
 

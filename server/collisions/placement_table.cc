@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"
@@ -144,6 +145,7 @@ absl::Status PlacementTable::Resolve(Registry& registry, const std::function<boo
   for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved->hulls[i]);
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
   hulls_ = std::move(resolved->hulls);
+  store_id_ = registry.store().id();
   store_revision_ = resolved->store_revision;
   placed_.clear();
   placed_.reserve(entries_.size());
@@ -198,7 +200,7 @@ size_t PlacementTable::EncodeHulls(
       v1::HullVersion* const version = hulls->Add();
       const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
       const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
-      if (known) EncodeVersion(hulls_[*hull]->record, version);
+      if (known) EncodeVersion(store_id_, hulls_[*hull]->record, version);
       bytes += version->ByteSizeLong();
     }
     if (is_name || problem(i).ok()) continue;
@@ -206,6 +208,7 @@ size_t PlacementTable::EncodeHulls(
     encoded->set_placement(static_cast<uint32_t>(i));
     encoded->set_code(ToGrpc(problem(i).code()));
     encoded->set_message(std::string(problem(i).message()));
+    encoded->set_reason(ReasonOf(problem(i)));
     bytes += kEntryBytes + encoded->ByteSizeLong();
   }
   return row;

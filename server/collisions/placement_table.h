@@ -86,6 +86,8 @@ class PlacementTable {
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
   std::vector<char> changed_;
+  // Of the last Resolve.
+  std::string store_id_;
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
 };

@@ -6,6 +6,7 @@
 
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/registry/registered_hull.h"
@@ -16,13 +17,19 @@ namespace hulld::server {
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
 
 absl::Status HullNotFound(const std::string& id) {
-  return absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first"));
+  return WithReason(
+      absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first")),
+      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {
-  return absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
-                                         record.revision, ", not ", if_revision,
-                                         " (if_revision); read it again, then retry"));
+  return WithReason(absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
+                                                    record.revision, ", not ", if_revision,
+                                                    " (if_revision); read it again, then retry")),
+                    v1::ERROR_REASON_REVISION_MISMATCH,
+                    {{"hull_id", record.hull_id},
+                     {"if_revision", if_revision},
+                     {"current_revision", record.revision}});
 }
 
 namespace {
@@ -33,9 +40,11 @@ Limits WithMemoryLimit(Limits limits) {
 }
 
 absl::Status Gone(const std::string& id, const char* how) {
-  return absl::FailedPreconditionError(
-      absl::StrCat(QuotedHull(id), " was ", how,
-                   " while points were streamed into it; open the stream again and start anew"));
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(id), " was ", how,
+          " while points were streamed into it; open the stream again and start anew")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
 }
 
 }  // namespace
@@ -129,8 +138,10 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
     absl::StatusOr<CreateResult> result =
         CreateResult{revision_, existing->committed.record, false};
     if (!if_absent) {
-      result = absl::AlreadyExistsError(
-          absl::StrCat(QuotedHull(id), " exists; delete it first, or set if_absent to use it"));
+      result =
+          WithReason(absl::AlreadyExistsError(absl::StrCat(
+                         QuotedHull(id), " exists; delete it first, or set if_absent to use it")),
+                     v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}});
     } else if (!existing->damage.ok()) {
       result = existing->damage;
     }
@@ -229,8 +240,11 @@ void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>&
   absl::Status refusal;
   if (former == nullptr) {
     if (if_revision.value_or(0) != 0) {
-      refusal = absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
-                                                "revision ", *if_revision, " (if_revision)"));
+      refusal = WithReason(
+          absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
+                                          "revision ", *if_revision, " (if_revision)")),
+          v1::ERROR_REASON_REVISION_MISMATCH,
+          {{"hull_id", id}, {"if_revision", *if_revision}, {"current_revision", uint64_t{0}}});
     } else if (!replacement->create_if_absent) {
       refusal = HullNotFound(id);
     } else if (hulls_.size() >= limits_.max_hulls) {

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/registry/registered_hull.h"
@@ -13,9 +14,11 @@ namespace hulld::server {
 namespace {
 
 absl::Status GoneWhileStreaming(const HullRecord& record) {
-  return absl::FailedPreconditionError(absl::StrCat(
-      QuotedHull(record.hull_id),
-      " was deleted or replaced while points were streamed into it; open the stream again"));
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(record.hull_id),
+          " was deleted or replaced while points were streamed into it; open the stream again")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", record.hull_id}});
 }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
@@ -188,9 +191,13 @@ absl::Status Registry::CheckChunk(Locked& locked, RegisteredHull& hull, const Pe
     return absl::AlreadyExistsError("the chunk is committed");
   }
   if (chunk.sequence != last + 1) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("the expected sequence is ", last + 1,
-                     "; open the stream again and continue after its last_sequence"));
+    return WithReason(absl::FailedPreconditionError(absl::StrCat(
+                          "the expected sequence is ", last + 1,
+                          "; open the stream again and continue after its last_sequence")),
+                      v1::ERROR_REASON_SEQUENCE_GAP,
+                      {{"hull_id", hull.committed.record.hull_id},
+                       {"sequence", chunk.sequence},
+                       {"expected_sequence", last + 1}});
   }
   if (last == 0 && hull.head.writer_count >= limits_.max_writers_per_hull) {
     return TooManyWriters(hull.head, limits_.max_writers_per_hull);

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
@@ -36,13 +37,15 @@ absl::StatusOr<std::unique_ptr<HullBuilder>> Registry::LoadBuilder(
   if (absl::IsCancelled(added.status())) return added.status();
   if (!added.ok() || builder->vertex_count() != record.vertex_count ||
       builder->dimension() != record.dimension) {
-    return absl::DataLossError(absl::StrCat(
-        QuotedHull(record.hull_id), " is damaged in the store (",
-        added.ok() ? absl::StrCat("its points make a hull of dimension ", builder->dimension(),
-                                  " with ", builder->vertex_count(), " vertices, not ",
-                                  record.dimension, " with ", record.vertex_count)
-                   : std::string(added.status().message()),
-        "); delete it and append it anew, or restore a backup"));
+    return WithReason(
+        absl::DataLossError(absl::StrCat(
+            QuotedHull(record.hull_id), " is damaged in the store (",
+            added.ok() ? absl::StrCat("its points make a hull of dimension ", builder->dimension(),
+                                      " with ", builder->vertex_count(), " vertices, not ",
+                                      record.dimension, " with ", record.vertex_count)
+                       : std::string(added.status().message()),
+            "); delete it and append it anew, or restore a backup")),
+        v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", record.hull_id}});
   }
   return builder;
 }

@@ -12,6 +12,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 #include "server/process/random_id.h"
 #include "server/store/store_keys.h"
@@ -42,9 +43,11 @@ std::string_view View(const rocksdb::Slice& slice) { return {slice.data(), slice
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
   if (status.IsNoSpace()) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the disk that holds --data-dir ", data_dir, " is full (", cause,
-                     "); nothing was changed; make room and append again, no restart is needed"));
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(
+            "the disk that holds --data-dir ", data_dir, " is full (", cause,
+            "); nothing was changed; make room and append again, no restart is needed")),
+        v1::ERROR_REASON_DISK_FULL);
   }
   return absl::UnavailableError(
       absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
@@ -83,9 +86,11 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
 }
 
 absl::Status Damaged(const std::string& hull_id, const absl::Status& finding) {
-  return absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (",
-                                          std::string(finding.message()),
-                                          "); delete it and append it anew, or restore a backup"));
+  return WithReason(
+      absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (",
+                                       std::string(finding.message()),
+                                       "); delete it and append it anew, or restore a backup")),
+      v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", hull_id}});
 }
 
 void PutSealed(rocksdb::WriteBatch& batch, const std::string& key, std::string value) {
