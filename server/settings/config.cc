@@ -63,6 +63,12 @@ class Parser {
     return arguments;
   }
 
+  // Lets Parse use its arguments alone. CLI11 would read the variables of all options that they
+  // leave unset.
+  void ForgetEnvironment() {
+    for (CLI::Option* option : app_.get_options()) option->envname("");
+  }
+
   // OK with print set for --help and --version; INVALID_ARGUMENT with the parser's words.
   absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
@@ -263,7 +269,9 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   // Each variable alone first, so that an error can say where the value came from.
   for (const std::string& variable : variables) {
     if (variable.starts_with("--config=")) continue;
-    const absl::Status status = Parser().Parse({variable}, &result);
+    Parser parser;
+    parser.ForgetEnvironment();
+    const absl::Status status = parser.Parse({variable}, &result);
     if (!status.ok()) {
       const std::string flag = variable.substr(2, variable.find('=') - 2);
       return WithAdvice(status, absl::StrCat(EnvironmentName(flag), ": ").c_str());
