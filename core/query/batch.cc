@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/query/collision.h"
 
@@ -31,6 +32,7 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
     for (int64_t i = 0; i < count; ++i) {
       if (poll.Step()) continue;
       const PlacedPair pair = pairs[i];
+      HULLD_CHECK(pair.a < placements.size() && pair.b < placements.size());
       answers[i] = CheckCollision(placements[pair.a], placements[pair.b], each);
     }
   }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 
@@ -84,7 +85,8 @@ uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end
 void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const {
   if (nodes_.empty()) return;
   // Halves leave at most 32 levels.
-  uint32_t stack[40];
+  constexpr int kMostWaiting = 40;
+  uint32_t stack[kMostWaiting];
   int height = 0;
   stack[height++] = 0;
   while (height > 0) {
@@ -92,6 +94,7 @@ void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t
     const Node& node = nodes_[index];
     if (node.largest_index < first || !node.box.Meets(box)) continue;
     if (node.second != 0) {
+      HULLD_DCHECK(height + 2 <= kMostWaiting);
       stack[height++] = node.second;
       stack[height++] = index + 1;
       continue;

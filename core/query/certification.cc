@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_nearest.h"
@@ -51,6 +52,8 @@ class Surrounding {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {
       if (poll_.Step()) return absl::CancelledError("stopped in a certificate");
       corners_.push_back(pair_.Farthest(*n));
+      // No farthest vertex is outside the half-space unless the origin is strictly inside.
+      HULLD_CHECK(Sign(Dot(*n, corners_.back().w)) > 0);
     }
     for (size_t i = corners_.size(); i-- > 0;) {
       std::vector<ExactCorner> fewer = corners_;
@@ -116,6 +119,7 @@ class Surrounding {
 
 absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
                                             const std::function<bool()>& should_stop) {
+  HULLD_CHECK(decision.relation != Relation::kWithinTolerance);
   Certificate certificate;
   certificate.direction = decision.axis;
   if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) {

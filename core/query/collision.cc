@@ -119,7 +119,10 @@ absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bo
 // What is wanted of the axis: its description, and its kind for the analysis.
 void AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions& options,
              Answer& answer) {
-  if (options.want_analysis) answer.analysis = Analysis{.axes_tested = decision.directions_tried};
+  if (options.want_analysis) {
+    answer.analysis = Analysis();
+    answer.analysis->axes_tested = decision.directions_tried;
+  }
   const std::optional<IntegerVector> n = ExactAxis(decision);
   if (!n) return;
   ExactPair exact(pair);
@@ -132,15 +135,18 @@ void AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions
 absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
                                        const QueryOptions& options, PairCache* cache) {
   const FloatPair pair(a, b);
-  const absl::StatusOr<Decision> decision =
-      Decide(pair, options.tolerance, cache, Purpose::kEvidence, options.should_stop);
-  if (!decision.ok()) return decision.status();
+  Decision decision;
+  if (absl::Status s =
+          Decide(pair, options.tolerance, cache, Purpose::kEvidence, options.should_stop, decision);
+      !s.ok()) {
+    return s;
+  }
   Answer answer;
-  answer.relation = decision->relation;
-  answer.rung = decision->rung;
-  if (options.want_axis || options.want_analysis) AddAxis(pair, *decision, options, answer);
+  answer.relation = decision.relation;
+  answer.rung = decision.rung;
+  if (options.want_axis || options.want_analysis) AddAxis(pair, decision, options, answer);
   if (NeedsMore(options)) {
-    absl::Status s = AddWhatIsWanted(pair, *decision, cache == nullptr, options, answer);
+    absl::Status s = AddWhatIsWanted(pair, decision, cache == nullptr, options, answer);
     if (!s.ok()) return s;
   }
   return answer;
@@ -152,27 +158,25 @@ PairCache Mirrored(PairCache cache) {
   return cache;
 }
 
-// What the ladder decides of A and B, the axis and the pairs of which may be those of B and A.
-absl::StatusOr<Decision> DecideEither(const PlacedHull& a, const PlacedHull& b, double tolerance,
-                                      PairCache* cache, const std::function<bool()>& should_stop) {
-  if (Compare(a, b) <= 0)
-    return Decide(FloatPair(a, b), tolerance, cache, Purpose::kRelation, should_stop);
-  if (cache != nullptr) *cache = Mirrored(*cache);
-  absl::StatusOr<Decision> decision =
-      Decide(FloatPair(b, a), tolerance, cache, Purpose::kRelation, should_stop);
-  if (cache != nullptr) *cache = Mirrored(*cache);
-  return decision;
-}
-
 // The relation and nothing else, which is what most callers want of most pairs.
 absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
                                     const QueryOptions& options, PairCache* cache) {
-  const absl::StatusOr<Decision> decision =
-      DecideEither(a, b, options.tolerance, cache, options.should_stop);
-  if (!decision.ok()) return decision.status();
+  // The relation of B and A is that of A and B: only the cache tells them apart.
+  const bool swapped = Compare(a, b) > 0;
+  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  Decision decision;
+  const absl::Status decided =
+      Decide(swapped ? FloatPair(b, a) : FloatPair(a, b), options.tolerance, cache,
+             Purpose::kRelation, options.should_stop, decision);
+  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  // One variable for every return, so that it is made in its place.
   absl::StatusOr<Answer> answer(absl::in_place);
-  answer->relation = decision->relation;
-  answer->rung = decision->rung;
+  if (decided.ok()) {
+    answer->relation = decision.relation;
+    answer->rung = decision.rung;
+  } else {
+    answer = decided;
+  }
   return answer;
 }
 

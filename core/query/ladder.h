@@ -1,7 +1,7 @@
 #ifndef HULLD_CORE_QUERY_LADDER_H_
 #define HULLD_CORE_QUERY_LADDER_H_
 
-#include <absl/status/statusor.h>
+#include <absl/status/status.h>
 
 #include <array>
 #include <cstdint>
@@ -37,13 +37,13 @@ enum class Purpose {
   kEvidence,  // also for what the search found: axis and pairs
 };
 
-// The ladder: each rung answers only what its own error bound proves. Spheres round the hulls; what
-// the cache suggests; for the relation alone, how far the hulls reach along the line of their
-// centres; the hulls in floating point; exact arithmetic. Requires hulls not empty. Updates the
-// cache, which may be null. CANCELLED when should_stop said so (it may be empty); only the exact
-// rung asks it.
-absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
-                                Purpose purpose, const std::function<bool()>& should_stop);
+// The ladder. Fills `decision`, which is as made: each rung answers only what its own error bound
+// proves. Spheres round the hulls; what the cache suggests; for the relation alone, how far the
+// hulls reach along the line of their centres; the hulls in floating point; exact arithmetic.
+// Requires tolerance >= 0. Updates the cache, which may be null and otherwise is of these two
+// hulls. CANCELLED when should_stop, which may be empty, said so; only the exact rung asks it.
+absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
+                    const std::function<bool()>& should_stop, Decision& decision);
 
 }  // namespace hulld
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
@@ -83,7 +84,9 @@ class AxisTable {
   // The exact axis, turned so that it points from A towards B. Requires a gap of at least zero.
   IntegerVector Oriented(uint64_t axis) {
     const IntegerVector n = Exact(axis);
-    return SignOfGap(n) >= 0 ? n : -n;
+    if (SignOfGap(n) >= 0) return n;
+    HULLD_DCHECK(SignOfGap(-n) >= 0);
+    return -n;
   }
 
  private:
@@ -258,6 +261,7 @@ absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull&
                                    const QueryOptions& options) {
   const Hull& a = placed_a.hull();
   const Hull& b = placed_b.hull();
+  HULLD_CHECK(!a.empty() && !b.empty());
   // Before anything is computed, and again with the axes of a flat difference.
   const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
   if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;

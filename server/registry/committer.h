@@ -28,17 +28,16 @@ struct CommitStatistics {
 // Brings changes to the store, in the order in which they are submitted. One thread takes all that
 // waits as one batch, which the store keeps or refuses as a whole (group commit), again and again.
 //
-// A change may build upon those submitted before it, although they are not committed yet. So when
+// A change may build on those submitted before it, although they are not committed yet. So when
 // the store refuses a batch, everything that was submitted until then is refused with it, and the
 // submitters undo it. The store is made to recover before the next batch.
 //
-// Two locks. `order` belongs to the submitters: whoever submits holds it, which makes the order of
-// the queue that of their records, and the completions of a batch run under it, all of them in one
-// go. That is what makes a refusal safe: between the moment when the queue is emptied and the last
-// completion, nobody can submit a change that builds upon a refused one. The queue has a mutex of
-// its own, so that the committer's thread takes the next batch without waiting for the records.
-// It is always taken after `order`, and nothing is called under it. No lock is held while the store
-// works.
+// Two locks. `order` belongs to the submitters. They hold it while they submit, so the order of the
+// queue is that of their records. The completions of a batch run under it in one go, which makes a
+// refusal safe: from the moment when the queue is emptied to the last completion, no change that
+// builds on a refused one can be submitted. The queue has a mutex of its own, so that the
+// committer's thread takes the next batch without waiting for the records. That mutex is taken
+// after `order`, and nothing is called under it. No lock is held while the store works.
 class Committer {
  public:
   // Told whether a change is committed: OK, or why it was refused. Called once, on the committer's

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/contract/error_info.h"
+#include "server/store/store_errors.h"
 
 namespace hulld::server {
 
@@ -25,15 +25,11 @@ absl::StatusOr<std::unique_ptr<HullBuilder>> LoadBuilder(Store& store, const Sto
       builder->dimension() == record.dimension) {
     return builder;
   }
-  return WithReason(
-      absl::DataLossError(absl::StrCat(
-          "hull \"", record.hull_id, "\" is damaged in the store (",
-          added.ok() ? absl::StrCat("its points make a hull of dimension ", builder->dimension(),
-                                    " with ", builder->vertex_count(), " vertices, not ",
-                                    record.dimension, " with ", record.vertex_count)
-                     : std::string(added.status().message()),
-          "); delete it and append it anew, or restore a backup")),
-      v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", record.hull_id}});
+  if (!added.ok()) return DamagedHull(record.hull_id, std::string(added.status().message()));
+  return DamagedHull(record.hull_id,
+                     absl::StrCat("its points make a hull of dimension ", builder->dimension(),
+                                  " with ", builder->vertex_count(), " vertices, not ",
+                                  record.dimension, " with ", record.vertex_count));
 }
 
 }  // namespace hulld::server

@@ -14,7 +14,7 @@ namespace hulld::server {
 //       \                     ^_________Refuse__________/                 ^
 //        \___________________________Refuse_______________________________/
 //
-// and the work upon its builder, which one thread owns at a time:
+// and the work on its builder, which one thread owns at a time:
 //
 //   kIdle --Schedule--> kScheduled --StartBuilding--> kBuilding --Refuse--> kReverting
 //   kIdle --StartReading--> kReading
@@ -33,12 +33,12 @@ namespace hulld::server {
 class HullState {
  public:
   enum class Life {
-    // The creation is in flight: nobody sees the hull yet.
+    // The creation is in flight: readers do not see the hull yet.
     kCreating,
     kPresent,
     // A deletion or a replacement is in flight: readers still see the hull.
     kEnding,
-    // Nobody finds it any more; open sessions and readers may still hold it.
+    // It is found no more; open sessions and readers may still hold it.
     kGone,
   };
   enum class Work {
@@ -47,7 +47,7 @@ class HullState {
     kScheduled,
     // A chunk is being built: its thread owns the builder.
     kBuilding,
-    // A chunk is being built upon one that was refused since: what it built is to be dropped.
+    // A chunk is being built on one that was refused since: the result must be dropped.
     kReverting,
     // A reader derives what it needs: its thread owns the builder.
     kReading,
@@ -56,9 +56,9 @@ class HullState {
   // Enough chunks of one hull to keep a builder busy through the slowest sync.
   static constexpr int kMaxInFlight = 64;
 
-  // Of a hull that is committed.
+  // The state of a hull that is committed.
   static HullState Present() { return HullState(Life::kPresent, 0); }
-  // Of a hull whose creation is submitted, or put in the place of another.
+  // The state of a hull whose creation, or replacement of another, is submitted.
   static HullState Creating() { return HullState(Life::kCreating, 1); }
 
   Life life() const { return life_; }

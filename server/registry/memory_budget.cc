@@ -41,6 +41,7 @@ void MemoryBudget::Exchange(uint64_t before, uint64_t now) {
 }
 
 void MemoryBudget::Evict(Locked& owners) {
+  HULLD_CHECK(owners.Holds(owners_));
   const std::lock_guard lock(mutex_);
   for (auto place = used_.end(); bytes_ > limit_bytes_ && place != used_.begin();) {
     Account& account = **--place;

@@ -23,23 +23,23 @@ struct MemoryStatistics {
 
 // Who holds how much memory, and who lets go first once the limit is exceeded.
 //
-// There are two kinds of memory. What can be made again belongs to an Account; the account that was
-// not used for longest lets go first. What is needed until its owner is done belongs to a
-// MemoryCharge, and never goes. When the charges and what accounts cannot let go of exceed the
-// limit, Check refuses whoever wants more.
+// There are two kinds of memory. An Account counts what can be made again; the account that was not
+// used for longest lets go first. A MemoryCharge counts what is needed until its owner is done; it
+// never lets go. Check refuses more once charges, and what accounts cannot let go of, exceed the
+// limit.
 //
 // Thread-safe. Its mutex is the innermost one: it is taken while other locks are held, and it calls
 // nothing but the Drop of an account. All accounts of one budget are guarded by one mutex of their
-// owners (the registry's); Evict and Check take it as `owners`, since they call Drop.
+// owners (the registry's). Evict and Check require it, which they check, since they call Drop.
 class MemoryBudget {
  public:
   // What one owner holds and can make again. Used under the owners' mutex. The destructor may run
   // without it, if the account is empty or Evict cannot run any more.
   class Account {
    public:
-    // Lets go of what nobody uses and can be made again. Returns the bytes that are held after that
-    // (more than were set, if what is held grew since). It must not use the budget, whose mutex is
-    // held.
+    // Lets go of what is not in use and can be made again. Returns the bytes that are held after
+    // that (more than were set, if what is held grew since). It must not use the budget, whose
+    // mutex is held.
     using Drop = std::function<uint64_t(Locked& owners)>;
 
     // The budget must outlive the account, or Close must come first.
@@ -57,19 +57,20 @@ class MemoryBudget {
     friend class MemoryBudget;
     MemoryBudget& budget_;
     const Drop drop_;
-    // Guarded by the budget's mutex, except that an account that is empty is touched by nobody
-    // but its owner.
+    // Guarded by the budget's mutex. Only its owner touches an account that is empty.
     uint64_t bytes_ = 0;
     std::list<Account*>::iterator place_;
   };
 
-  // limit_bytes: --memory-limit.
-  explicit MemoryBudget(uint64_t limit_bytes) : limit_bytes_(limit_bytes) {}
+  // limit_bytes: --memory-limit. owners: the mutex that guards the accounts; it may not be
+  // constructed yet.
+  MemoryBudget(uint64_t limit_bytes, const std::mutex& owners)
+      : limit_bytes_(limit_bytes), owners_(owners) {}
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
 
   // Makes accounts let go, the one not used for longest first, until the rest is within the limit
-  // or nobody can let go of more. Cost: O(1) within the limit.
+  // or no account can let go of more. Cost: O(1) within the limit, else up to that of all accounts.
   void Evict(Locked& owners);
   // The same; RESOURCE_EXHAUSTED, with a time to retry, when the rest is beyond the limit.
   absl::Status Check(Locked& owners);
@@ -79,10 +80,11 @@ class MemoryBudget {
  private:
   friend class MemoryCharge;
   void Charge(uint64_t before, uint64_t now);
-  // Requires mutex_.
+  // Requires mutex_ (unchecked: a std::mutex does not tell).
   void Exchange(uint64_t before, uint64_t now);
 
   const uint64_t limit_bytes_;
+  const std::mutex& owners_;
   mutable std::mutex mutex_;
   // The rest is guarded by mutex_.
   uint64_t bytes_ = 0;

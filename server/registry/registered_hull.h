@@ -31,7 +31,7 @@ struct PendingChunk {
   std::function<bool()> should_stop;
   std::function<void()> on_built;
   Reply<ChunkResult> done;
-  // Of its points.
+  // Counts its points.
   MemoryCharge charge;
 };
 
@@ -53,7 +53,7 @@ struct RegisteredHull {
   void NoteUse() { account.Set(MemoryBytes()); }
   // Drops the builder, unless a thread owns it.
   void DiscardBuilder(Locked& locked);
-  // The last sequence of a writer with the chunks in flight; 0 for a writer that is not in use.
+  // The last sequence of a writer, chunks in flight included; 0 for a writer not in `writers`.
   uint64_t HeadSequence(const std::string& writer_id) const;
 
   HullState state;
@@ -61,7 +61,7 @@ struct RegisteredHull {
   StoredHull committed;
   // With the changes in flight.
   StoredHull head;
-  // Of committed.record.revision; null when nobody has asked since the last change.
+  // The hull at committed.record.revision; null until the first reader after a change asks.
   std::shared_ptr<const ServedHull> served;
   // Those in use; the store has the others.
   std::unordered_map<std::string, Sequences> writers;
@@ -88,7 +88,7 @@ struct RegisteredHull {
  private:
   // What the hull holds and can make again.
   uint64_t MemoryBytes() const;
-  // Drops what nobody uses, if it can be made again.
+  // Drops what is not in use, if it can be made again.
   uint64_t DropUnused(Locked& locked);
 };
 

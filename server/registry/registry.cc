@@ -35,7 +35,7 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers)
     : store_(store),
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
-      memory_(limits_.memory_limit),
+      memory_(limits_.memory_limit, mutex_),
       committer_(store, mutex_) {}
 
 Registry::~Registry() {

@@ -38,8 +38,8 @@ struct PendingChunk;
 //
 // Changes are made in two steps. A chunk is built first; the change that it makes is then submitted
 // to the committer. Only when that is kept does a change become visible, as a whole and in the
-// order of submission, and is answered. Meanwhile the next chunk of the same hull may be built upon
-// it: should the batch fail, so do all changes that follow it, and the hull returns to its last
+// order of submission, and is answered. Meanwhile the next chunk of the same hull may be built on
+// it: if the batch fails, so do all changes that follow it, and the hull returns to its last
 // committed state. Creation, deletion, replacement and chunks with a condition on the revision wait
 // until no change of their hull is in flight, since what they find must be committed.
 //
@@ -49,10 +49,11 @@ struct PendingChunk;
 // for the chunk in progress and its commit at most. Chunks of one hull queue up and occupy no
 // thread meanwhile. Thread-safe.
 //
-// Lock order: the mutex of the records, then that of the committer's queue or that of the budget,
-// neither of which is held while anything else is called or locked. The records and the accounts of
-// the budget need no common lock: an account is changed under both, a charge under the budget's
-// alone.
+// Lock order: first the mutex of the records; then that of the committer's queue, of the budget or
+// of the pool. None of the latter is held while another lock is taken. Callbacks run without any.
+// The committer completes each batch under the mutex of the records (its header says why); the
+// budget evicts under it, since what it drops belongs to the records; a MemoryCharge takes the
+// budget's mutex alone.
 class Registry {
  public:
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and

@@ -195,7 +195,7 @@ void Registry::RunNextChunk(const HullPointer& hull) {
   Advance(locked, hull);
 }
 
-// Of a hull that cannot grow any more.
+// Refuses the chunks of a hull that cannot grow any more.
 void Registry::RefuseChunks(const HullPointer& hull) {
   Locked locked(mutex_);
   HULLD_CHECK(hull->state.gone() || hull->state.damaged());
@@ -374,9 +374,9 @@ void Registry::CommitChunk(Locked& locked, RegisteredHull& hull, const StoredHul
   hull.NoteUse();
 }
 
-// A chunk in flight was refused, and with it all that follow: the hull is what is committed. The
-// first of them does it, the others find it done. A thread that is building upon them drops the
-// builder itself, as its state says.
+// A chunk in flight was refused, and with it all that follow: the hull returns to what is
+// committed. The first of them does it, the others find it done. A thread that is building on them
+// drops the builder itself, as its state says.
 void Registry::Revert(Locked& locked, RegisteredHull& hull) {
   hull.head = hull.committed;
   for (auto& [writer_id, sequences] : hull.writers) sequences.head = sequences.committed;

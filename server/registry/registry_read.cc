@@ -108,9 +108,9 @@ void Registry::Lookup::Unpin(Locked& locked) {
   pinned_.clear();
 }
 
-// Optimistic first: take what is ready, and make what is missing. Should a writer have changed one
-// of the hulls meanwhile, hold back the writers of all of them and try again; the chunks in
-// progress then are the last ones to wait for.
+// Optimistic first: take what is ready, and make what is missing. If a writer changed one of the
+// hulls meanwhile, hold back the writers of all of them and try again: the chunks in progress then
+// are the last ones to wait for.
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
                                            const std::function<bool()>& should_stop) {
   Locked locked(mutex_);
@@ -166,7 +166,7 @@ absl::Status Registry::WaitUntilReadable(Locked& locked, RegisteredHull& hull,
     return hull.state.quiet() || hull.state.gone() || hull.served != nullptr;
   };
   if (readable()) return absl::OkStatus();
-  // Nobody's answer waits meanwhile.
+  // Answers that are due do not wait meanwhile.
   locked.Unlock();
   locked.Lock();
   while (!hull.released.wait_for(locked.lock(), kCancellationPoll, readable)) {

@@ -15,6 +15,13 @@ cmake --install "$build" --prefix "$work/prefix" >"$work/install.log"
 cmake -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
 cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
+# What client/README.md tells its readers to write finds the package, too; tests/pages compiles the code.
+mkdir "$work/page"
+pages=$here/../pages client_page=$here/../../client/README.md
+bash "$pages/extract_code.sh" "$client_page" cmake >"$work/page/CMakeLists.txt"
+bash "$pages/extract_code.sh" "$client_page" cpp >"$work/page/example.cc"
+cmake -S "$work/page" -B "$work/page/build" -DCMAKE_PREFIX_PATH="$work/prefix" \
+  -DCMAKE_CXX_COMPILER="$compiler" >"$work/page/configure.log"
 
 "$work/prefix/bin/hulld" --store memory --listen 127.0.0.1:0 2>"$work/hulld.log" &
 server=$!

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
@@ -49,7 +50,10 @@ class ExactExpansion {
       if (poll_.Step()) return absl::CancelledError("stopped in an exact query");
       const uint32_t nearest = Nearest();
       ExactCorner farthest = pair_.Farthest(planes_[nearest].n);
-      if (Dot(planes_[nearest].n, farthest.w) == planes_[nearest].offset) return PointOn(nearest);
+      if (Dot(planes_[nearest].n, farthest.w) == planes_[nearest].offset) {
+        HULLD_CHECK(Sign(planes_[nearest].offset) > 0);
+        return PointOn(nearest);
+      }
       Expand(nearest, std::move(farthest));
     }
   }
@@ -70,6 +74,8 @@ class ExactExpansion {
         if (differs(corner.w)) return corners_.push_back(std::move(corner));
       }
     }
+    // A - B is solid.
+    HULLD_UNREACHABLE();
   }
 
   // A tetrahedron, its corner 3 inside of its facet 0, 1, 2. There is one: A - B is solid.
@@ -132,12 +138,14 @@ class ExactExpansion {
   }
 
   // Requires the corner strictly above the facet. A convex polytope's facets strictly below a point
-  // are connected, and so is their edge.
+  // are connected, and so is their edge, so that the surface always closes.
   void Expand(uint32_t facet, ExactCorner corner) {
+    HULLD_DCHECK(Sees(corner, facet));
     const auto apex = static_cast<uint32_t>(corners_.size());
     corners_.push_back(std::move(corner));
     const std::optional<uint32_t> first =
         surface_.Expand(facet, apex, [&](uint32_t i) { return Sees(corners_[apex], i); });
+    HULLD_CHECK(first.has_value());
     AddPlanes(*first);
   }
 
@@ -154,6 +162,7 @@ class ExactExpansion {
       if (!surface_.facets()[i].alive) continue;
       if (!nearest || IsNearer(planes_[i], planes_[*nearest])) nearest = i;
     }
+    HULLD_CHECK(nearest.has_value());
     return *nearest;
   }
 
@@ -194,7 +203,7 @@ class ExactExpansion {
       nearest.numerator = planes_[i].offset * planes_[i].offset;
       return nearest;
     }
-    return {};
+    HULLD_UNREACHABLE();
   }
 
   ExactPair& pair_;

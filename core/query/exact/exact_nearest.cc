@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 
 namespace hulld {
@@ -81,8 +82,10 @@ std::optional<Part> PartOf(const std::vector<ExactCorner>& c) {
       return PartOf(c[0], c[1]);
     case 3:
       return PartOf(c[0], c[1], c[2]);
-    default:
+    case 4:
       return PartOf(c[0], c[1], c[2], c[3]);
+    default:
+      HULLD_UNREACHABLE();
   }
 }
 
@@ -108,13 +111,14 @@ Part NearestPart(const std::vector<ExactCorner>& corners) {
       if (part && IsNearest(*part, corners)) return *std::move(part);
     }
   }
-  return {};
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace
 
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
                                                 const std::function<bool()>& should_stop) {
+  HULLD_CHECK(seed.size() <= 4);
   std::vector<ExactCorner> corners;
   for (const VertexPair& p : seed) corners.push_back(pair.Corner(p));
   if (corners.empty()) corners.push_back(pair.Corner({0, 0}));

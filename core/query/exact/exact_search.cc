@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/query/exact/portal_search.h"
 
 namespace hulld {
@@ -44,6 +45,7 @@ void AppendSpan(const Hull& hull, VertexOf vertex, std::vector<IntegerVector>& d
 // that in the plane.
 absl::StatusOr<ExactSearchResult> SearchInPlane(ExactPair& pair, const IntegerVector& normal,
                                                 const std::function<bool()>& should_stop) {
+  HULLD_CHECK(!IsZero(normal));
   int axis = 0;
   while (normal[axis].is_zero()) ++axis;
   PortalSearch search(pair, should_stop);

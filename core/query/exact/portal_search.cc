@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 
 namespace hulld {
@@ -92,10 +93,12 @@ class PortalSearch::Direction {
         return Cross(search_.Exact(*q_) - origin, search_.Exact(*r_) - origin);
       }
       case Kind::kRay:
+        return search_.ExactRay();
       case Kind::kOther:
         break;
     }
-    return search_.ExactRay();
+    // A direction that was given is exact from the start.
+    HULLD_UNREACHABLE();
   }
 
   const PortalSearch& search_;
@@ -187,10 +190,14 @@ int PortalSearch::SignAlong(Direction& n, const Point& w) const {
       case Kind::kAcrossSegment:
         v = n.p().w - n.q().w;
         break;
-      default:
+      case Kind::kNormal:
         u = n.q().w - n.p().w;
         v = n.r().w - n.p().w;
         break;
+      case Kind::kRay:
+        break;
+      case Kind::kOther:
+        HULLD_UNREACHABLE();
     }
     const double largest = LargestOf(u, v, w.w);
     const double bound = kDifferencesErrorFactor * largest * largest * position_error_;
@@ -312,6 +319,7 @@ void PortalSearch::Replace(const Point& w) {
       return;
     }
   }
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace hulld

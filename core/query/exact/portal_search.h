@@ -33,7 +33,7 @@ namespace hulld {
 class PortalSearch {
  public:
   // `pair` and `should_stop`, which may be empty, must outlive the search. Requires C to have
-  // dimension 3.
+  // dimension 3 (unchecked: SearchExactly finds the dimension first).
   PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop);
 
   // Thickens C: by +-half along a coordinate axis.

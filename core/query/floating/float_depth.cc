@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/orientation.h"
 #include "core/query/floating/expanding_surface.h"
@@ -257,6 +258,8 @@ class Expansion {
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
                             const SeparationGoal& goal, bool want_point,
                             std::vector<VertexPair>& vertices) {
+  HULLD_CHECK(pair.usable());
+  HULLD_CHECK(start.empty() || start.size() == 4);
   Expansion expansion(pair, goal);
   const SeparationBounds bounds = expansion.Run(start, want_point);
   if (!goal.Met(bounds.low, bounds.high)) expansion.AppendVertices(vertices);

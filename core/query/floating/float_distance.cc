@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/query/floating/nearest_part.h"
 #include "core/query/terms/minkowski_vertex.h"
@@ -115,6 +116,7 @@ class Walk {
 }  // namespace
 
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal) {
+  HULLD_CHECK(pair.usable());
   return Walk(pair, goal).Run(n);
 }
 

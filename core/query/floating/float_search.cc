@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/terms/minkowski_vertex.h"
@@ -34,6 +35,7 @@ class Simplex {
 
   // Requires count() < 4.
   void Add(const PlainVector& w, VertexPair pair) {
+    HULLD_DCHECK(count_ < 4);
     uint32_t taken = 0;
     for (uint32_t i = 0; i < count_; ++i) taken |= 1u << order_[i];
     const auto slot = static_cast<uint8_t>(std::countr_one(taken));
@@ -58,8 +60,10 @@ class Simplex {
       case 3:
         ReduceTriangle(n);
         return true;
-      default:
+      case 4:
         return ReduceTetrahedron(n);
+      default:
+        HULLD_UNREACHABLE();
     }
   }
 
@@ -174,6 +178,7 @@ class Simplex {
       case Part::kInside:
         return Keep(r, q, p);
     }
+    HULLD_UNREACHABLE();
   }
 
   void ReduceTriangle(PlainVector& n) {
@@ -336,10 +341,12 @@ class FloatSearch {
 
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first) {
+  HULLD_DCHECK(pair.usable());
   return FloatSearch(pair, tolerance).Run(first);
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
+  HULLD_DCHECK(pair.usable());
   FloatSearchResult result;
   if (cache.axis.has_value()) {
     const PlainVector n = *cache.axis;
@@ -352,6 +359,10 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
       result.axis = n;
     }
   } else if (cache.pair_count == 4) {
+    for ([[maybe_unused]] const VertexPair& known : cache.pairs) {
+      HULLD_DCHECK(known.a < pair.a().hull().vertices().size() &&
+                   known.b < pair.b().hull().vertices().size());
+    }
     const auto difference = [&](int i) { return pair.Difference(cache.pairs[i]); };
     if (HoldsOrigin(pair, difference(0), difference(1), difference(2), difference(3))) {
       result.verdict = FloatVerdict::kOverlapping;

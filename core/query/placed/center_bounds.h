@@ -8,8 +8,10 @@
 #include <limits>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/hull.h"
 #include "core/numeric/cube_map.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/placed/plain_vector.h"
 #include "core/query/placed/support_map.h"
 
@@ -39,7 +41,7 @@ class CenterBounds {
   };
   // Where a direction is among the corners; nowhere where there are none.
   class Place;
-  // Requires the largest component of n positive, and n in the range of FloatPair's directions.
+  // Requires n in the range of FloatPair's directions (IsFilterDirection).
   Place PlaceOf(const PlainVector& n) const;
   // Upper bounds of h(n) and g(n) for the n of a place, but for errors of the hull's coordinates
   // and of n (see kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h).
@@ -98,6 +100,9 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   Place place;
   if (corners_.empty()) return place;
   const OnCube on_cube(n.x, n.y, n.z);
+  // A direction turned into a hull's frame is at most sqrt(3) times longer or shorter.
+  HULLD_DCHECK(IsFilterDirection(2 * on_cube.largest()) ||
+               IsFilterDirection(on_cube.largest() / 2));
   place.largest = on_cube.largest();
   const double factor = half_ / place.largest;
   place.axis = on_cube.axis();

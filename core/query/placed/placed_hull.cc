@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
 
 namespace hulld {
@@ -32,7 +33,9 @@ PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH)
     : hull_(&hull),
       X_WH_(X_WH),
       R_WH_(RotationOf(X_WH.q)),
-      rotated_center_(R_WH_ * hull.hull().center()) {}
+      rotated_center_(R_WH_ * hull.hull().center()) {
+  HULLD_DCHECK(ValidatePose(X_WH).ok());
+}
 
 absl::StatusOr<PlacedHull> PlacedHull::Make(const QueryHull& hull, const Pose& X_WH) {
   if (absl::Status status = ValidatePose(X_WH); !status.ok()) return status;

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/hull.h"
 #include "core/numeric/cube_map.h"
 #include "core/numeric/vector.h"
@@ -45,7 +46,10 @@ class SupportMap {
 
   // A vertex far along n, the farthest where certain and almost always otherwise. Requires the hull
   // not empty. Cost: O(V) for a small hull, O(1) on average for a large one.
-  Support Farthest(const PlainVector& n) const { return cells_.empty() ? Scan(n) : LookUp(n); }
+  Support Farthest(const PlainVector& n) const {
+    HULLD_DCHECK(!vertices_.empty());
+    return cells_.empty() ? Scan(n) : LookUp(n);
+  }
 
   // The farthest: `value` is within `blur` of the largest computed value.
   Support CertainFarthest(const PlainVector& n, double blur) const {
@@ -58,7 +62,7 @@ class SupportMap {
   }
 
   // All vertices whose computed value is within `slack` of the largest, ascending. Requires slack
-  // >= blur.
+  // >= blur (unchecked: the map does not know the caller's blur).
   std::vector<uint32_t> Plateau(const PlainVector& n, double slack) const;
 
   size_t MemoryBytes() const;

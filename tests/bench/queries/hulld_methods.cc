@@ -35,20 +35,20 @@ struct Hulld {
   using Placed = PlacedHull;
 
   explicit Hulld(double tolerance) {
-    relation.tolerance = tolerance;
-    separation.want_separation = true;
-    separation.want_witness = true;
+    relation_alone.tolerance = tolerance;
+    with_separation.want_separation = true;
+    with_separation.want_witness = true;
   }
 
-  QueryOptions relation;
-  QueryOptions separation;
+  QueryOptions relation_alone;
+  QueryOptions with_separation;
 
   std::unique_ptr<Shape> MakeShape(const Hull& hull) { return std::make_unique<QueryHull>(hull); }
   Placed Place(const Shape& shape, const Pose& X_WA) {
     return OrFail(PlacedHull::Make(shape, X_WA));
   }
   Verdict Ask(const Placed& a, const Placed& b) {
-    return ToVerdict(CheckCollision(a, b, relation)->relation);
+    return ToVerdict(CheckCollision(a, b, relation_alone)->relation);
   }
   std::optional<double> Depth(const Placed& a, const Placed& b) {
     const std::optional<double> separation = Separate(a, b);
@@ -61,7 +61,7 @@ struct Hulld {
     return std::nullopt;
   }
   std::optional<double> Separate(const Placed& a, const Placed& b) {
-    const absl::StatusOr<Answer> answer = CheckCollision(a, b, separation);
+    const absl::StatusOr<Answer> answer = CheckCollision(a, b, with_separation);
     if (!answer.ok()) Fail(answer.status());
     if (!answer->separation) return std::nullopt;
     return answer->separation->value;

@@ -145,7 +145,7 @@ TEST_F(CommitterTest, ARefusedBatchTakesWhatWaitsWithIt) {
   }
 }
 
-// What is submitted once everything is undone does not build upon what was refused.
+// What is submitted once everything is undone does not build on what was refused.
 TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
   GatedStore::Gate gate;
   store_.Close(gate);
@@ -196,7 +196,7 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
   EXPECT_EQ(ended, 3);
 }
 
-TEST(CommitterDeathTest, WhoeverSubmitsHoldsTheMutexOfTheOrder) {
+TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
   GatedStore store;
   std::mutex order;
   std::mutex another;

@@ -99,7 +99,7 @@ TEST(HullState, ChunksOverlapUpToTheirLimit) {
   EXPECT_TRUE(state.quiet());
 }
 
-TEST(HullState, ARefusalTellsTheThreadThatBuildsUponIt) {
+TEST(HullState, ARefusalTellsTheThreadThatBuildsOnIt) {
   HullState state = Growing();
   state.Schedule();
   state.StartBuilding();
@@ -174,7 +174,7 @@ TEST(HullStateDeathTest, AChunkStartsOnlyInAHullThatIsIdleUnpinnedAndSound) {
   EXPECT_DEATH(HullState::Present().StartBuilding(), "check failed");
 }
 
-TEST(HullStateDeathTest, OnlyWhatWasBuiltUponWhatStandsIsSubmitted) {
+TEST(HullStateDeathTest, OnlyWhatWasBuiltOnWhatStandsIsSubmitted) {
   EXPECT_DEATH(HullState::Present().Submit(), "check failed");
   HullState reverting = Growing();
   reverting.Schedule();

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -40,7 +41,7 @@ class MemoryBudgetTest : public ::testing::Test {
   uint64_t bytes() const { return budget_.Statistics().bytes; }
 
   std::mutex owners_;
-  MemoryBudget budget_{100};
+  MemoryBudget budget_{100, owners_};
   // The numbers of the owners that were asked to let go, in order.
   std::vector<int> asked_;
 };
@@ -62,7 +63,7 @@ TEST_F(MemoryBudgetTest, CountsAccountsAndCharges) {
   EXPECT_EQ(bytes(), 0);
 }
 
-TEST_F(MemoryBudgetTest, NobodyLetsGoWithinTheLimit) {
+TEST_F(MemoryBudgetTest, NoAccountLetsGoWithinTheLimit) {
   Owner owner(*this, 1);
   owner.account.Set(100);
   Evict();
@@ -102,7 +103,7 @@ TEST_F(MemoryBudgetTest, WhatIsInUseStaysAndIsAskedAgain) {
   EXPECT_EQ(bytes(), 50);
 }
 
-TEST_F(MemoryBudgetTest, RefusesOnceNobodyCanLetGoOfMore) {
+TEST_F(MemoryBudgetTest, RefusesOnceNoAccountCanLetGoOfMore) {
   Owner owner(*this, 1, 40);
   owner.account.Set(80);
   MemoryCharge charge(budget_, 60);
@@ -115,11 +116,19 @@ TEST_F(MemoryBudgetTest, RefusesOnceNobodyCanLetGoOfMore) {
 }
 
 TEST_F(MemoryBudgetTest, AnEmptyAccountMayOutliveTheBudget) {
-  auto budget = std::make_unique<MemoryBudget>(100);
+  auto budget = std::make_unique<MemoryBudget>(100, owners_);
   MemoryBudget::Account account(*budget, [](Locked&) { return 0; });
   account.Set(50);
   account.Close();
   budget = nullptr;
+}
+
+TEST(MemoryBudgetDeathTest, AnEvictionWithoutTheMutexOfTheOwnersEndsTheProcess) {
+  std::mutex owners;
+  std::mutex another;
+  MemoryBudget budget(100, owners);
+  Locked locked(another);
+  EXPECT_DEATH(budget.Evict(locked), "check failed");
 }
 
 }  // namespace

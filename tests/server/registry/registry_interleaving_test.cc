@@ -158,7 +158,7 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
 }
 
 // The chunk is already with a thread, which has not begun, when the batch before it fails.
-TEST_F(RegistryInterleaving, AChunkIsNotBuiltUponOneThatWasRefused) {
+TEST_F(RegistryInterleaving, AChunkIsNotBuiltOnOneThatWasRefused) {
   const AppendSession refused = Open("h", "refused");
   const AppendSession kept = Open("h", "kept");
   std::promise<void> committing;

@@ -97,7 +97,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
   for (int h = 0; h < kHulls; ++h) {
     EXPECT_EQ(hulls_->View(std::to_string(h))->record.vertex_count, 1200);
   }
-  // Builders and snapshots of all of them together are beyond the limit.
+  // The builders of all of them and what is served are together beyond the limit.
   EXPECT_GT(hulls_->registry().Cache().evictions, 0);
 }
 

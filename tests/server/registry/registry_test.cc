@@ -60,7 +60,7 @@ class RegistryTest : public ::testing::Test {
   Registry registry_{store_, Limits(), writers_};
 };
 
-TEST_F(RegistryTest, ASnapshotIsMadeOnceAndSharedUntilTheNextChange) {
+TEST_F(RegistryTest, WhatIsServedIsMadeOnceAndSharedUntilTheNextChange) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}, {1, 0, 0}}).ok());
   const auto first = registry_.Resolve("h", {});
@@ -75,7 +75,7 @@ TEST_F(RegistryTest, ASnapshotIsMadeOnceAndSharedUntilTheNextChange) {
   EXPECT_EQ(third->second.served->hull().vertices()[1], Vector(2, 0, 0));
 }
 
-TEST_F(RegistryTest, TryResolveGivesUpWhereASnapshotIsMissing) {
+TEST_F(RegistryTest, TryResolveGivesUpWhereAHullIsNotReady) {
   const std::vector<std::string> ids = {"h", "none"};
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
@@ -92,7 +92,7 @@ TEST_F(RegistryTest, TryResolveGivesUpWhereASnapshotIsMissing) {
   EXPECT_FALSE(registry_.TryResolve(ids).has_value());
 }
 
-TEST_F(RegistryTest, ACurrentSnapshotIsReadWhileAChunkIsInProgress) {
+TEST_F(RegistryTest, WhatIsServedIsReadWhileAChunkIsInProgress) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
   ASSERT_TRUE(registry_.Resolve("h", {}).ok());
@@ -129,7 +129,7 @@ TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
   bool asked = false;
   ASSERT_TRUE(Append(session, 2, std::move(points), [&] {
-                // No snapshot is current and the builder is busy with this very chunk.
+                // Nothing is ready to be served, and the builder is busy with this very chunk.
                 if (!std::exchange(asked, true)) {
                   EXPECT_EQ(registry_.Resolve("h", [] { return true; }).status().code(),
                             absl::StatusCode::kCancelled);
@@ -139,7 +139,7 @@ TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
   EXPECT_TRUE(asked);
 }
 
-TEST_F(RegistryTest, AReaderThatMakesASnapshotCanBeCancelled) {
+TEST_F(RegistryTest, AReaderThatMakesWhatIsServedCanBeCancelled) {
   std::vector<Vector> points;
   for (int i = -50; i <= 50; ++i) {
     for (int j = -50; j <= 50; ++j) points.emplace_back(i, j, i * i + j * j);

@@ -1,4 +1,4 @@
-// Bytes of a store that turned into others: found out, named, and never served.
+// Bytes of a store that turned into others: recognized, named, and never served.
 
 #include <absl/strings/str_cat.h>
 
@@ -115,7 +115,7 @@ TEST_F(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothing) {
   for (const char* id : {"a", "b", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
 }
 
-// Of two such hulls nobody knows which keys are whose.
+// With two such hulls, nothing says which keys belong to which.
 TEST_F(StoreDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedToo) {
   FillThree();
   Flip(HullKey("a"));
