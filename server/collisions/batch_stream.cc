@@ -66,14 +66,6 @@ absl::Status BatchStream::Validate() {
                        "the batch");
 }
 
-// Sets relations_suffice_.
-absl::Status BatchStream::ResolvePlacements() {
-  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
-  relations_suffice_ = options_.method == Method::kCertifiedSearch &&
-                       IsRelationOnly(request_.wanted()) && table_.all_answerable();
-  return absl::OkStatus();
-}
-
 void BatchStream::QueueHead() {
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   size_t next = 0;
@@ -85,7 +77,7 @@ void BatchStream::QueueHead() {
 
 void BatchStream::Open() {
   absl::Status status = Validate();
-  if (status.ok()) status = ResolvePlacements();
+  if (status.ok()) status = table_.Resolve(registry_, options_.should_stop);
   if (call_.ShouldStop()) status = call_.StopStatus();
   const std::lock_guard lock(mutex_);
   computing_ = false;
@@ -137,30 +129,9 @@ std::vector<absl::StatusOr<Answer>> BatchStream::AnswerPairs(
   return answers;
 }
 
-// The relations of the pairs from next_pair_ up to `end`. Requires that all can be answered.
-absl::Status BatchStream::ComputeRelations(size_t end) {
-  std::vector<PlacedPair> pairs;
-  pairs.reserve(end - next_pair_);
-  for (size_t i = next_pair_; i < end; ++i) pairs.push_back(PairAt(i));
-  const auto start = std::chrono::steady_clock::now();
-  const absl::StatusOr<std::vector<RelationAnswer>> answers = FindRelations(
-      table_.placed(), pairs, options_.tolerance, options_.should_stop, executor_.threads());
-  if (!answers.ok()) return call_.ShouldStop() ? call_.StopStatus() : answers.status();
-  AdaptSlice(pairs.size(), std::chrono::steady_clock::now() - start);
-  BatchColumns columns(std::move(head_), request_.wanted(), next_pair_);
-  head_.Clear();
-  columns.Add(*answers);
-  RungCounts counts;
-  for (const RelationAnswer& answer : *answers) counts.Add(answer.rung);
-  call_.metrics().CountPairs(counts);
-  Send(columns, end);
-  return absl::OkStatus();
-}
-
 absl::Status BatchStream::ComputeSlice() {
   const size_t begin = next_pair_;
   const size_t end = SliceEnd();
-  if (relations_suffice_) return ComputeRelations(end);
   std::vector<PlacedPair> pairs;
   pairs.reserve(end - begin);
   for (size_t i = begin; i < end; ++i) {

@@ -50,7 +50,6 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
   size_t pair_count() const { return static_cast<size_t>(request_.pairs_size()) / 2; }
 
   absl::Status Validate();
-  absl::Status ResolvePlacements();
   // Requires the mutex: leaves the last piece of the table of hulls in head_, for the first
   // answers.
   void QueueHead();
@@ -60,7 +59,6 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
   size_t SliceEnd() const;
   std::vector<absl::StatusOr<Answer>> AnswerPairs(const std::vector<PlacedPair>& pairs) const;
   absl::Status ComputeSlice();
-  absl::Status ComputeRelations(size_t end);
   void Send(BatchColumns& columns, size_t end);
   void AdaptSlice(size_t pairs, std::chrono::steady_clock::duration elapsed);
   // Requires the mutex: starts whatever may start now.
@@ -79,8 +77,6 @@ class BatchStream : public grpc::ServerWriteReactor<v1::BatchCheckCollisionsResp
   v1::BatchCheckCollisionsResponse head_;
   size_t next_pair_ = 0;
   size_t slice_pairs_ = 0;
-  // Whether every pair can be answered and nothing but relations is wanted, as mostly.
-  bool relations_suffice_ = false;
 
   std::mutex mutex_;
   // The rest is guarded by the mutex.

@@ -92,20 +92,18 @@ bool IsQuick(const Resolved& resolved) {
 
 absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted, Metrics& metrics,
                     v1::CheckCollisionResponse* response) {
-  const auto placed_a = PlacedHull::Make(query.a.snapshot->query_hull(), query.X_WA);
-  if (!placed_a.ok()) return placed_a.status();
-  const auto placed_b = PlacedHull::Make(query.b.snapshot->query_hull(), query.X_WB);
-  if (!placed_b.ok()) return placed_b.status();
-  const Hull& a = placed_a->hull();
-  const Hull& b = placed_b->hull();
-  const auto answer = hulld::CheckCollision(*placed_a, *placed_b, query.options);
+  const PlacedHull placed_a(query.a.snapshot->query_hull(), query.X_WA);
+  const PlacedHull placed_b(query.b.snapshot->query_hull(), query.X_WB);
+  const Hull& a = placed_a.hull();
+  const Hull& b = placed_b.hull();
+  const auto answer = hulld::CheckCollision(placed_a, placed_b, query.options);
   if (!answer.ok()) return NameQueryLimit(answer.status());
   RungCounts counts;
   counts.Add(answer->rung);
   metrics.CountPairs(counts);
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
-  if (wanted.analysis()) EncodeAnalysis(answer->analysis, a, b, response->mutable_analysis());
+  if (answer->analysis) EncodeAnalysis(*answer->analysis, a, b, response->mutable_analysis());
   if (answer->certificate) {
     EncodeCertificate(*answer->certificate, a, b, response->mutable_certificate());
   }
@@ -124,7 +122,7 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
   return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
     absl::StatusOr<PairQuery> query = ReadQuery(registry_.limits(), call->call(), *request);
     if (!query.ok()) return call->End(query.status());
-    if (query->options.method != Method::kTextbookSat && IsRelationOnly(request->wanted())) {
+    if (query->options.WantsRelationOnly()) {
       std::optional<Resolved> resolved = registry_.TryResolve(HullIds(*request));
       if (resolved.has_value() && IsQuick(*resolved)) {
         const absl::Status taken = TakeHulls(registry_, *std::move(resolved), &*query, response);

@@ -75,7 +75,7 @@ void CollisionStream::End(const absl::Status& status) {
 
 // Whether the message can be answered here and now, on gRPC's thread.
 bool CollisionStream::IsQuick() const {
-  if (!open_ || !request_.has_update() || !IsRelationOnly(wanted_)) return false;
+  if (!open_ || !request_.has_update() || !options_.WantsRelationOnly()) return false;
   const v1::CollisionStreamUpdate& update = request_.update();
   if (update.refresh_hulls() || update.placements_size() > kMostQuickPairs) return false;
   int pairs = 0;
@@ -236,16 +236,7 @@ void CollisionStream::AskAboutPairsOf(size_t placement) {
 }
 
 absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
-  const PlacedHull& a = table_.placed()[pair.a];
-  const PlacedHull& b = table_.placed()[pair.b];
-  if (options_.tolerance != 0 || !IsRelationOnly(wanted_)) {
-    return CheckCollision(a, b, options_, &pair.cache);
-  }
-  const RelationAnswer found = FindRelation(a, b, &pair.cache);
-  Answer answer;
-  answer.relation = found.relation;
-  answer.rung = found.rung;
-  return answer;
+  return CheckCollision(table_.placed()[pair.a], table_.placed()[pair.b], options_, &pair.cache);
 }
 
 void CollisionStream::AddAnswer(uint32_t index) {

@@ -1,20 +1,11 @@
 #include "server/wire/batch_columns.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
-#include "server/wire/encode.h"
 
 namespace hulld::server {
-namespace {
-
-// A relation and a rung.
-constexpr size_t kRelationBytes = 2;
-
-}  // namespace
-
 BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                            uint64_t first_pair)
     : wanted_(wanted), next_pair_(first_pair), bytes_(head.ByteSizeLong()) {
@@ -38,24 +29,6 @@ void BatchColumns::AddUnanswered() {
 void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b) {
   bytes_ += AddAnswer(answer, a, b, wanted_, next_pair_, MessageForNext());
   ++next_pair_;
-}
-
-void BatchColumns::Add(std::span<const RelationAnswer> answers) {
-  while (!answers.empty()) {
-    v1::BatchCheckCollisionsResponse* const message = MessageForNext();
-    const size_t room = (Config::kReplyMessageBytes - bytes_ + kRelationBytes - 1) / kRelationBytes;
-    const std::span<const RelationAnswer> part = answers.first(std::min(room, answers.size()));
-    const int rows = message->relations_size() + static_cast<int>(part.size());
-    message->mutable_relations()->Reserve(rows);
-    message->mutable_rungs()->Reserve(rows);
-    for (const RelationAnswer& answer : part) {
-      message->mutable_relations()->AddAlreadyReserved(EncodeRelation(answer.relation));
-      message->mutable_rungs()->AddAlreadyReserved(EncodeRung(answer.rung));
-    }
-    bytes_ += kRelationBytes * part.size();
-    next_pair_ += part.size();
-    answers = answers.subspan(part.size());
-  }
 }
 
 std::vector<v1::BatchCheckCollisionsResponse> BatchColumns::Take() { return std::move(messages_); }
