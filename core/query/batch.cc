@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-// Pairs differ in cost by orders of magnitude, hence small pieces handed out as threads come free.
+// The cost of pairs differs by orders of magnitude, so threads take small pieces as they come free.
 constexpr int kPairsPerPiece = 16;
 
 }  // namespace
@@ -26,7 +26,7 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
   const auto count = static_cast<int64_t>(pairs.size());
 #pragma omp parallel num_threads(std::max(1, threads))
   {
-    // Most pairs take less time than the question whether to stop, hence once a piece.
+    // Asking whether to stop takes longer than most pairs do, so each thread asks once a piece.
     StopPoll poll(each.should_stop, kPairsPerPiece);
 #pragma omp for schedule(dynamic, kPairsPerPiece)
     for (int64_t i = 0; i < count; ++i) {

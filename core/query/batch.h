@@ -21,10 +21,10 @@ struct PlacedPair {
   friend bool operator==(const PlacedPair&, const PlacedPair&) = default;
 };
 
-// Answers every pair, in parallel on `threads` OpenMP threads; results[i] belongs to pairs[i] and
-// does not depend on the number of threads. After should_stop said so the rest is CANCELLED.
-// Requires indices in range. Memory: 72 bytes for each pair beside what more than the relation
-// takes.
+// Answers every pair in parallel on `threads` OpenMP threads. results[i] belongs to pairs[i] and
+// does not depend on the number of threads. The pairs that are left when should_stop says so are
+// CANCELLED. Requires indices in range. Memory: 72 bytes for each pair, and what is wanted beyond
+// the relation.
 std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> placements,
                                                     std::span<const PlacedPair> pairs,
                                                     const QueryOptions& options, int threads);

@@ -48,7 +48,7 @@ BoxTree::BoxTree(std::span<const Box> boxes) : indices_(boxes.size()) {
   for (const uint32_t index : indices_) boxes_.push_back(boxes[index]);
 }
 
-// By halves along the axis in which the boxes' centres spread widest.
+// Halves the boxes along the axis in which their centres spread widest.
 uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end) {
   const auto node = static_cast<uint32_t>(nodes_.size());
   Box bounds = {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};

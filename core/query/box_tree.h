@@ -24,14 +24,14 @@ struct Box {
 // Empty for an empty hull.
 Box BoundingBox(const PlacedHull& placed);
 
-// A hierarchy of boxes, for finding those that meet a given one. Immutable once built.
+// A hierarchy of boxes that finds those which meet a given one. Immutable once built.
 class BoxTree {
  public:
   // Cost: O(n log n).
   explicit BoxTree(std::span<const Box> boxes);
 
-  // Appends the indices, of at least `first`, of all boxes that meet `box`; in no particular order.
-  // Cost: O(log n) beyond what it finds, where boxes overlap little.
+  // Appends the indices of all boxes that meet `box`, from index `first` on, in no particular
+  // order. Cost: O(log n) beyond what it finds, where boxes overlap little.
   void AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const;
 
  private:

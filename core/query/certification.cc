@@ -28,11 +28,11 @@ IntegerVector Reduced(const IntegerVector& n) {
   return {n.x / divisor, n.y / divisor, n.z / divisor};
 }
 
-// n in the shortest form of which the support has the sign of n's own, -1 or 0.
+// n in its shortest form: the support along it has the sign of that along n, -1 or 0.
 std::variant<std::monostate, Vector, IntegerVector> Shortest(ExactPair& pair,
                                                              const IntegerVector& n, int sign) {
   IntegerVector reduced = Reduced(n);
-  // The power of two is for the eye: components of at most 2.
+  // The power of two makes components of at most 2, which are easier to read.
   const Vector rounded = ToScaledDoubles(reduced) * 0x1p-62;
   const IntegerVector exact = ToInteger(rounded, LowestBitExponent(rounded, kAboveAllExponents));
   if (SignOfSupport(pair, exact) <= sign) return rounded;
@@ -45,8 +45,8 @@ class Surrounding {
   Surrounding(ExactPair& pair, const std::function<bool()>& should_stop)
       : pair_(pair), poll_(should_stop, 1) {}
 
-  // As long as some half-space holds all vertices found and the origin on its boundary, the
-  // farthest vertex outside it is added; then those that are not needed are dropped, until each is.
+  // Adds the farthest vertex outside a half-space that holds all vertices found and has the origin
+  // on its boundary, until there is no such half-space. Then drops vertices until each is needed.
   // That leaves at most six (Steinitz 1913). Requires the origin strictly inside A - B.
   absl::StatusOr<std::vector<VertexPair>> Find() {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {

@@ -34,7 +34,7 @@ std::span<const double> Coordinates(const Vector& v) { return {v.data(), 3}; }
 
 // A total order of placed hulls by their content, so that a pair is answered the same way whichever
 // of the two comes first.
-std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
+[[gnu::noinline]] std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
   if (const auto order = Compare(Coordinates(a.X_WH().t), Coordinates(b.X_WH().t)); order != 0) {
     return order;
   }
@@ -47,6 +47,13 @@ std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
     if (order != 0) return order;
   }
   return std::weak_ordering::equivalent;
+}
+
+// Whether (A, B) is in the order of Compare. The first coordinate tells mostly.
+bool IsInOrder(const PlacedHull& a, const PlacedHull& b) {
+  const double x_a = a.X_WH().t.x();
+  const double x_b = b.X_WH().t.x();
+  return x_a == x_b ? Compare(a, b) <= 0 : x_a < x_b;
 }
 
 AxisKind Mirrored(AxisKind kind) {
@@ -161,15 +168,15 @@ PairCache Mirrored(PairCache cache) {
 // The relation and nothing else, which is what most callers want of most pairs.
 absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
                                     const QueryOptions& options, PairCache* cache) {
-  // The relation of B and A is that of A and B: only the cache tells them apart.
-  const bool swapped = Compare(a, b) > 0;
+  // The relation of B and A is that of A and B. Only the cache distinguishes them.
+  const bool swapped = !IsInOrder(a, b);
   if (swapped && cache != nullptr) *cache = Mirrored(*cache);
   Decision decision;
   const absl::Status decided =
-      Decide(swapped ? FloatPair(b, a) : FloatPair(a, b), options.tolerance, cache,
+      Decide(FloatPair(swapped ? b : a, swapped ? a : b), options.tolerance, cache,
              Purpose::kRelation, options.should_stop, decision);
   if (swapped && cache != nullptr) *cache = Mirrored(*cache);
-  // One variable for every return, so that it is made in its place.
+  // All returns name this one variable, so that the compiler constructs it in the caller's place.
   absl::StatusOr<Answer> answer(absl::in_place);
   if (decided.ok()) {
     answer->relation = decision.relation;
@@ -182,7 +189,7 @@ absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
 
 absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const PlacedHull& b,
                                                const QueryOptions& options, PairCache* cache) {
-  if (Compare(a, b) <= 0) return CertifiedSearch(a, b, options, cache);
+  if (IsInOrder(a, b)) return CertifiedSearch(a, b, options, cache);
   if (cache != nullptr) *cache = Mirrored(*cache);
   absl::StatusOr<Answer> answer = CertifiedSearch(b, a, options, cache);
   if (cache != nullptr) *cache = Mirrored(*cache);
@@ -216,14 +223,10 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
   return answer;
 }
 
-}  // namespace
-
-absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
-                                      const QueryOptions& options, PairCache* cache) {
-  // The default needs no look at the rest.
-  if (options.tolerance != 0 || options.max_error || options.clearance) {
-    if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
-  }
+// CheckCollision for every kind of question. It is kept apart from what most pairs need.
+[[gnu::noinline]] absl::StatusOr<Answer> AnswerAny(const PlacedHull& a, const PlacedHull& b,
+                                                   const QueryOptions& options, PairCache* cache) {
+  if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
   if (a.hull().empty() || b.hull().empty()) return AnswerOfEmpty(options);
   if (options.WantsRelationOnly()) return RelationOnly(a, b, options, cache);
   std::optional<std::chrono::steady_clock::time_point> start;
@@ -233,6 +236,17 @@ absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       : CertifiedSearchOfEither(a, b, options, cache);
   if (answer.ok() && start) answer->analysis->time = std::chrono::steady_clock::now() - *start;
   return answer;
+}
+
+}  // namespace
+
+absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
+                                      const QueryOptions& options, PairCache* cache) {
+  const bool valid = options.tolerance >= 0 && !options.max_error.has_value();
+  if (valid && options.WantsRelationOnly() && !a.hull().empty() && !b.hull().empty()) {
+    return RelationOnly(a, b, options, cache);
+  }
+  return AnswerAny(a, b, options, cache);
 }
 
 absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hull& b,

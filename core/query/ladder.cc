@@ -50,9 +50,10 @@ bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
   return 4 * SquaredNorm(n) < reach * reach;
 }
 
-// What the bounds about the centres tell; or else `first` becomes where the walk should look first:
-// along the normals of the surfaces between the centres, which show better than the centres where a
-// gap is, unless these are unknown or nearly cancel. Kept apart from what the farthest pairs need.
+// The relation, where the bounds about the centres show it. Otherwise `first` becomes the direction
+// in which the walk should look first: along the normals of the surfaces between the centres, which
+// show better than the centres where a gap is. It stays as it is where these normals are unknown or
+// nearly cancel. The function is kept apart from what distant pairs need.
 [[gnu::noinline]] std::optional<Relation> LookAtCenters(const FloatPair& pair, const PlainVector& n,
                                                         PlainVector& first) {
   constexpr double kLeastLikely = 0x1p-4;
@@ -79,9 +80,10 @@ Relation RelationOf(FloatVerdict verdict) {
   HULLD_UNREACHABLE();
 }
 
-void Accept(const FloatSearchResult& found, Rung rung, Decision& decision) {
+void Accept(const FloatSearchResult& found, Rung rung, Purpose purpose, Decision& decision) {
   decision.relation = RelationOf(found.verdict);
   decision.rung = rung;
+  if (purpose == Purpose::kRelation) return;
   if (found.verdict == FloatVerdict::kSeparated) decision.axis = found.axis;
   if (found.verdict == FloatVerdict::kOverlapping) {
     decision.pair_count = found.pair_count;
@@ -99,19 +101,16 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   }
 }
 
-// The rungs below exact arithmetic; false when none of them decides. Requires pair.usable().
-bool DecideInFloatingPoint(const FloatPair& pair, double tolerance, PairCache* cache,
-                           Purpose purpose, Decision& decision) {
-  const PlainVector n = -pair.CenterDifference();
-  if (SpheresSeparate(pair, n)) {
-    decision.axis = Vector(n);
-    return true;
-  }
+// The rungs between spheres and exact arithmetic; false when none of them decides. `n` leads from
+// A's centre to B's. Requires pair.usable(). Kept apart from what distant pairs need.
+[[gnu::noinline]] bool DecideInFloatingPoint(const FloatPair& pair, const PlainVector& n,
+                                             double tolerance, PairCache* cache, Purpose purpose,
+                                             Decision& decision) {
   if (cache != nullptr) {
     const FloatSearchResult found = TryCached(pair, *cache);
     decision.directions_tried += found.directions_tried;
     if (found.verdict != FloatVerdict::kUndecided) {
-      Accept(found, Rung::kCached, decision);
+      Accept(found, Rung::kCached, purpose, decision);
       return true;
     }
   }
@@ -119,8 +118,7 @@ bool DecideInFloatingPoint(const FloatPair& pair, double tolerance, PairCache* c
   if (purpose == Purpose::kRelation) {
     if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
       decision.relation = *relation;
-      if (*relation == Relation::kSeparated) decision.axis = Vector(n);
-      // What it suggested failed, and would cost the next query more than these bounds.
+      // The suggestion of the cache failed, and trying it again would cost more than these bounds.
       if (cache != nullptr) *cache = PairCache();
       return true;
     }
@@ -129,12 +127,13 @@ bool DecideInFloatingPoint(const FloatPair& pair, double tolerance, PairCache* c
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);
   if (found.verdict == FloatVerdict::kUndecided) return false;
-  Accept(found, Rung::kFloatingPoint, decision);
+  Accept(found, Rung::kFloatingPoint, purpose, decision);
   return true;
 }
 
-absl::Status DecideExactly(const FloatPair& pair, const std::function<bool()>& should_stop,
-                           Decision& decision) {
+[[gnu::noinline]] absl::Status DecideExactly(const FloatPair& pair,
+                                             const std::function<bool()>& should_stop,
+                                             Decision& decision) {
   ExactPair exact(pair);
   absl::StatusOr<ExactSearchResult> found = SearchExactly(exact, should_stop);
   if (!found.ok()) return found.status();
@@ -153,8 +152,15 @@ absl::Status DecideExactly(const FloatPair& pair, const std::function<bool()>& s
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
                     const std::function<bool()>& should_stop, Decision& decision) {
   HULLD_DCHECK(tolerance >= 0);
-  if (pair.usable() && DecideInFloatingPoint(pair, tolerance, cache, purpose, decision)) {
-    return absl::OkStatus();
+  if (pair.usable()) {
+    const PlainVector n = -pair.CenterDifference();
+    if (SpheresSeparate(pair, n)) {
+      if (purpose == Purpose::kEvidence) decision.axis = Vector(n);
+      return absl::OkStatus();
+    }
+    if (DecideInFloatingPoint(pair, n, tolerance, cache, purpose, decision)) {
+      return absl::OkStatus();
+    }
   }
   return DecideExactly(pair, should_stop, decision);
 }

@@ -18,7 +18,7 @@
 
 namespace hulld {
 
-// A relation and what showed it.
+// A relation and, where it is to be evidence, what showed it.
 struct Decision {
   Relation relation = Relation::kSeparated;
   Rung rung = Rung::kBounds;
@@ -34,14 +34,15 @@ struct Decision {
 // What a decision is for.
 enum class Purpose {
   kRelation,
-  kEvidence,  // also for what the search found: axis and pairs
+  kEvidence,  // also the axis and the pairs that the search found
 };
 
-// The ladder. Fills `decision`, which is as made: each rung answers only what its own error bound
-// proves. Spheres round the hulls; what the cache suggests; for the relation alone, how far the
-// hulls reach along the line of their centres; the hulls in floating point; exact arithmetic.
-// Requires tolerance >= 0. Updates the cache, which may be null and otherwise is of these two
-// hulls. CANCELLED when should_stop, which may be empty, said so; only the exact rung asks it.
+// The ladder. Each rung answers only what its own error bound proves: spheres round the hulls; what
+// the cache suggests; for the relation alone, how far the hulls reach along the line of their
+// centres; the hulls in floating point; exact arithmetic. Fills `decision`, which must be as
+// constructed. Requires tolerance >= 0. Updates the cache, which may be null and otherwise belongs
+// to these two hulls. CANCELLED when should_stop, which may be empty, said so; only the exact rung
+// asks it.
 absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
                     const std::function<bool()>& should_stop, Decision& decision);
 

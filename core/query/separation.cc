@@ -26,8 +26,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// The absolute value of the separation between bounds: their middle and half their width, rounded
-// up. The middle is positive, as the upper bound is.
+// The absolute value of the separation from its bounds: their middle, and half their width rounded
+// up. The middle is positive because the upper bound is.
 Separation MiddleOf(const SeparationBounds& bounds) {
   const double middle = bounds.low + (bounds.high - bounds.low) / 2;
   const double half = std::max(bounds.high - middle, middle - bounds.low);
@@ -109,8 +109,8 @@ class SeparationSearch {
   }
 
  private:
-  // Where floating point starts: the axis that it found, or four pairs whose differences surround
-  // the origin; the same whatever a cache suggested.
+  // Chooses where floating point starts: the axis that it found, or four pairs whose differences
+  // surround the origin. The choice does not depend on what a cache suggested.
   void StartFrom(const Decision& decision, bool cold) {
     towards_ = -pair_.CenterDifference();
     if (cold || decision.rung == Rung::kBounds) {
@@ -124,8 +124,8 @@ class SeparationSearch {
     start_.assign(found.pairs.begin(), found.pairs.begin() + found.pair_count);
   }
 
-  // Bounds in floating point, as close to the goal as that allows. The vertices that it met are
-  // where exact arithmetic starts.
+  // Finds bounds in floating point, as close to the goal as that allows. Exact arithmetic starts
+  // from the vertices that it met.
   void Bound(const SeparationGoal& goal, bool want_point) {
     if (!pair_.usable()) return;
     if (relation_ == Relation::kSeparated) {

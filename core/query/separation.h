@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// What is to be known of the signed separation beyond the relation.
+// What is wanted of the signed separation beyond the relation.
 struct SeparationRequest {
   bool separation = false;
   bool witness = false;
@@ -26,11 +26,11 @@ struct SeparationAnswer {
   std::optional<bool> within_clearance;
 };
 
-// Fills `answer`. Floating point with a proven bound where that is close enough, else exact
-// arithmetic, whose result is rounded. Depends on the pair alone: not on how the relation was
-// found. Requires a relation other than kWithinTolerance. `cold`: whether no cache helped to find
-// the decision, so that its pairs may be used. CANCELLED when should_stop said so (it may be
-// empty).
+// Fills `answer`: from floating point with a proven bound where that is close enough, else from
+// exact arithmetic, whose result is rounded. The values depend on the pair alone, not on how the
+// relation was found. Requires a relation other than kWithinTolerance. `cold`: whether no cache
+// helped to find the decision, so that its pairs may be used. CANCELLED when should_stop, which may
+// be empty, said so.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                             const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer);

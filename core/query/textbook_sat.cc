@@ -24,7 +24,7 @@
 namespace hulld {
 namespace {
 
-// Axes between two looks at should_stop.
+// A thread polls should_stop once in this many axes.
 constexpr uint64_t kAxesPerPoll = 64;
 constexpr uint64_t kNone = UINT64_MAX;
 
@@ -262,7 +262,7 @@ absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull&
   const Hull& a = placed_a.hull();
   const Hull& b = placed_b.hull();
   HULLD_CHECK(!a.empty() && !b.empty());
-  // Before anything is computed, and again with the axes of a flat difference.
+  // The limit is checked before anything is computed, and again with the axes of a flat difference.
   const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
   if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;
   const FloatPair filter(placed_a, placed_b);

@@ -50,7 +50,7 @@ BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admiss
 void BatchStream::Open() {
   RunOn(readers_, [this] {
     absl::Status status = Validate();
-    if (status.ok()) status = ResolvePlacements();
+    if (status.ok()) status = table_.Resolve(registry_, options_.should_stop);
     if (call().ShouldStop()) status = call().StopStatus();
     Locked([this, &status] {
       opening_ = false;
@@ -75,10 +75,6 @@ absl::Status BatchStream::Validate() {
   call().AddPairs(pair_count_);
   return ValidatePairs(request_.pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
                        "the batch");
-}
-
-absl::Status BatchStream::ResolvePlacements() {
-  return table_.Resolve(registry_, options_.should_stop);
 }
 
 void BatchStream::QueueHead() {

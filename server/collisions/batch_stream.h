@@ -53,7 +53,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
 
   // Without the mutex.
   absl::Status Validate();
-  absl::Status ResolvePlacements();
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;

@@ -108,12 +108,8 @@ absl::Status CollisionService::PairQuery::Place(const Registry& registry,
     if (!hull.ok()) return hull.status();
   }
   views = std::move(resolved->hulls);
-  const auto placed_a = PlacedHull::Make(views[0]->served->query_hull(), X_WA);
-  if (!placed_a.ok()) return placed_a.status();
-  const auto placed_b = PlacedHull::Make(views[1]->served->query_hull(), X_WB);
-  if (!placed_b.ok()) return placed_b.status();
-  a = *placed_a;
-  b = *placed_b;
+  a = PlacedHull(views[0]->served->query_hull(), X_WA);
+  b = PlacedHull(views[1]->served->query_hull(), X_WB);
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
   EncodeVersion(registry.store().id(), views[0]->record, response->mutable_hull_a());
   EncodeVersion(registry.store().id(), views[1]->record, response->mutable_hull_b());
@@ -131,8 +127,8 @@ absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metri
   metrics.CountPairs(counts);
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
-  if (wanted.analysis()) {
-    EncodeAnalysis(answer->analysis, of_a, of_b, response->mutable_analysis());
+  if (answer->analysis) {
+    EncodeAnalysis(*answer->analysis, of_a, of_b, response->mutable_analysis());
   }
   if (answer->certificate) {
     EncodeCertificate(*answer->certificate, of_a, of_b, response->mutable_certificate());
@@ -170,8 +166,7 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
 void CollisionService::Compute(PairQuery query, const v1::Wanted& wanted, UnaryCall* call,
                                v1::CheckCollisionResponse* response) {
   Metrics& metrics = call->call().metrics();
-  const bool is_search = query.options.method != Method::kTextbookSat;
-  if (is_search && IsRelationOnly(wanted) && query.IsQuick()) {
+  if (query.options.WantsRelationOnly() && query.IsQuick()) {
     return call->End(query.Answer(wanted, metrics, response));
   }
   const bool is_for_team = query.IsForTeam();

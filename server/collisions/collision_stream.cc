@@ -60,7 +60,7 @@ void CollisionStream::OnSent() {
 
 // Whether the message can be answered here and now, on gRPC's thread.
 bool CollisionStream::IsQuick() const {
-  if (!open_ || !request().has_update() || !IsRelationOnly(wanted_)) return false;
+  if (!open_ || !request().has_update() || !options_.WantsRelationOnly()) return false;
   const v1::CollisionStreamUpdate& update = request().update();
   if (update.refresh_hulls() || update.placements_size() > kMostQuickPairs) return false;
   int pairs = 0;
@@ -221,9 +221,7 @@ void CollisionStream::AskAboutPairsOf(size_t placement) {
 }
 
 absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
-  const PlacedHull& a = table_.placed()[pair.a];
-  const PlacedHull& b = table_.placed()[pair.b];
-  return CheckCollision(a, b, options_, &pair.cache);
+  return CheckCollision(table_.placed()[pair.a], table_.placed()[pair.b], options_, &pair.cache);
 }
 
 void CollisionStream::AddAnswer(uint32_t index) {

@@ -154,21 +154,14 @@ absl::Status PlacementTable::Resolve(Registry& registry, const std::function<boo
 }
 
 PlacedHull PlacementTable::Place(size_t i) const {
-  if (!is_answerable(i)) return *PlacedHull::Make(NoHull(), Pose());
+  if (!is_answerable(i)) return PlacedHull(NoHull(), Pose());
   const Entry& entry = entries_[i];
-  return *PlacedHull::Make(hulls_[*entry.hull]->served->query_hull(), entry.pose);
+  return PlacedHull(hulls_[*entry.hull]->served->query_hull(), entry.pose);
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {
   const Entry& entry = entries_[i];
   return entry.malformed.ok() ? hulls_[*entry.hull].status() : entry.malformed;
-}
-
-bool PlacementTable::all_answerable() const {
-  for (size_t i = 0; i < entries_.size(); ++i) {
-    if (!is_answerable(i)) return false;
-  }
-  return true;
 }
 
 bool PlacementTable::hull_changed(size_t i) const {

@@ -44,8 +44,6 @@ class PlacementTable {
   size_t MemoryBytes() const;
   std::span<const PlacedHull> placed() const { return placed_; }
   bool is_answerable(size_t i) const { return problem(i).ok(); }
-  // Whether all are.
-  bool all_answerable() const;
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
 

@@ -2,36 +2,21 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <cmath>
-
 #include "server/contract/limit_error.h"
 #include "server/wire/decode.h"
 
 namespace hulld::server {
 namespace {
 
-absl::Status CheckLength(const char* field, double length) {
-  if (length >= 0) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(field, " is ",
-                                                 std::isnan(length) ? "NaN" : absl::StrCat(length),
-                                                 "; it is a length of at least 0"));
-}
-
-// What a tolerance leaves open, these need.
-absl::Status CheckTolerance(Method method, const v1::Wanted& wanted, double tolerance) {
-  if (absl::Status s = CheckLength("tolerance", tolerance); !s.ok()) return s;
-  if (tolerance == 0) return absl::OkStatus();
-  const char* const excluded = method == Method::kTextbookSat ? "METHOD_TEXTBOOK_SAT"
-                               : wanted.certificate()         ? "wanted.certificate"
-                               : wanted.separation()          ? "wanted.separation"
-                               : wanted.witness()             ? "wanted.witness"
-                               : wanted.has_clearance()       ? "wanted.clearance"
-                                                              : nullptr;
-  if (excluded == nullptr) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat("tolerance is ", tolerance, ", but ", excluded,
-                                                 " needs the exact relation; leave out one of "
-                                                 "them"));
-}
+constexpr OptionNames kFieldNames = {
+    .tolerance = "tolerance",
+    .max_error = "wanted.max_error",
+    .clearance = "wanted.clearance",
+    .certificate = "wanted.certificate",
+    .separation = "wanted.separation",
+    .witness = "wanted.witness",
+    .textbook = "METHOD_TEXTBOOK_SAT",
+};
 
 }  // namespace
 
@@ -47,24 +32,17 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   options.want_certificate = wanted.certificate();
   options.want_separation = wanted.separation();
   options.want_witness = wanted.witness();
-  if (wanted.has_max_error()) {
-    if (absl::Status s = CheckLength("wanted.max_error", wanted.max_error()); !s.ok()) return s;
-    options.max_error = wanted.max_error();
-  }
-  if (wanted.has_clearance()) {
-    if (absl::Status s = CheckLength("wanted.clearance", wanted.clearance()); !s.ok()) return s;
-    options.clearance = wanted.clearance();
-  }
-  if (absl::Status s = CheckTolerance(*decoded, wanted, tolerance); !s.ok()) return s;
+  if (wanted.has_max_error()) options.max_error = wanted.max_error();
+  if (wanted.has_clearance()) options.clearance = wanted.clearance();
   options.tolerance = tolerance;
+  if (absl::Status s = ValidateOptions(options, kFieldNames); !s.ok()) return s;
+  if (wanted.clearance() < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("wanted.clearance is ", wanted.clearance(), "; it is a length of at least 0"));
+  }
   options.max_textbook_axes = limits.max_textbook_axes;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
   return options;
-}
-
-bool IsRelationOnly(const v1::Wanted& wanted) {
-  return !wanted.axis() && !wanted.analysis() && !wanted.certificate() && !wanted.separation() &&
-         !wanted.witness() && !wanted.has_clearance();
 }
 
 bool IsQuickToRelate(const Hull& hull) {

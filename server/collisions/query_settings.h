@@ -17,9 +17,6 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);
 
-// Whether nothing but the relation is wanted.
-bool IsRelationOnly(const v1::Wanted& wanted);
-
 // Whether the relation of this hull and another such takes no longer than moving the bytes of the
 // question and of the answer does, so that one of gRPC's threads may find it.
 bool IsQuickToRelate(const Hull& hull);

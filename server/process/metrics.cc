@@ -17,7 +17,8 @@ using prometheus::Family;
 using Buckets = prometheus::Histogram::BucketBoundaries;
 
 // The names of rungs, in the order of the enum.
-constexpr std::array<const char*, 4> kRungNames = {"bounds", "cached", "floating_point", "exact"};
+constexpr std::array<const char*, kRungCount> kRungNames = {"bounds", "cached", "floating_point",
+                                                            "exact"};
 constexpr std::array<Rpc, 3> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
                                               Rpc::kStreamCollisions};
 

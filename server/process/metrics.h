@@ -104,7 +104,7 @@ class Metrics : public prometheus::Collectable {
   std::array<prometheus::Counter*, kRpcCount> calls_ok_;
   std::array<prometheus::Histogram*, kRpcCount> call_seconds_;
   std::array<prometheus::Histogram*, kRpcCount> message_seconds_;
-  std::array<prometheus::Counter*, 4> pairs_;
+  std::array<prometheus::Counter*, kRungCount> pairs_;
   prometheus::Counter& exact_fallbacks_;
   prometheus::Counter& points_received_;
   prometheus::Counter& points_outside_;

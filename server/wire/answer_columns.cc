@@ -94,9 +94,9 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull
   size_t bytes =
       AddRow(EncodeRelation(answer->relation), EncodeRung(answer->rung), wanted, columns);
   bytes += AddNumbers(&*answer, wanted, columns);
-  if (wanted.analysis()) {
+  if (wanted.analysis() && answer->analysis.has_value()) {
     v1::Analysis* const analysis = columns->mutable_analyses(columns->analyses_size() - 1);
-    EncodeAnalysis(answer->analysis, a, b, analysis);
+    EncodeAnalysis(*answer->analysis, a, b, analysis);
     bytes += analysis->ByteSizeLong();
   }
   if (wanted.certificate() && answer->certificate.has_value()) {

@@ -1,11 +1,9 @@
 #include "server/wire/batch_columns.h"
 
-#include <algorithm>
 #include <utility>
 
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
-#include "server/wire/encode.h"
 
 namespace hulld::server {
 

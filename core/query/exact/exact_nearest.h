@@ -31,7 +31,7 @@ struct ExactNearest {
 
 // Finds it exactly, for hulls of every dimension: Gilbert, Johnson and Keerthi's walk (1988) in
 // integers. A part (vertex, edge, triangle) of A - B is kept of which the nearest point is strictly
-// inside; the farthest vertex towards the origin is added until there is none farther. The distance
+// inside; the farthest vertex towards the origin is added until no vertex is farther. The distance
 // decreases strictly, so that no part comes twice and the walk ends. Directions have degree at most
 // 3 in the coordinates. `seed`: pairs to start from; may be empty. Requires at most four of them.
 // CANCELLED when should_stop, which may be empty, said so.

@@ -24,7 +24,7 @@ using ExactCorner = MinkowskiVertex<IntegerVector>;
 // only these are multiplied out.
 class ExactPair {
  public:
-  // Of the hulls and poses of `filter`, which must outlive the pair.
+  // Makes the pair for the hulls and poses of `filter`, which must outlive it.
   explicit ExactPair(const FloatPair& filter);
 
   const FloatPair& filter() const { return *filter_; }

@@ -21,7 +21,7 @@ class ExpandingSurface {
     bool alive = true;
   };
 
-  // Every facet there ever was; those that are not alive keep their places.
+  // All facets that ever were; those that are not alive keep their places.
   const std::vector<Facet>& facets() const { return facets_; }
 
   // Sets memory aside for as many facets, dead ones included.
@@ -40,10 +40,11 @@ class ExpandingSurface {
                {{2, 3, 0}, {2, 1, 0}, {1, 0, 2}}};
   }
 
-  // Takes away the facets that visible(facet) names, of those connected to `start` through such
-  // ones, and closes the gap by triangles from its edge to the vertex `apex`. The index of the
-  // first of these, which are the last facets; nothing, and a surface of no further use, when the
-  // gap's edge is not one closed loop. `start` is taken to be visible.
+  // Removes the facets that are connected to `start` through facets for which visible(facet) holds,
+  // and closes the gap by triangles from its edge to the vertex `apex`. Returns the index of the
+  // first of these triangles, which are the last facets. Returns nothing, and leaves a surface of
+  // no further use, when the edge of the gap is not one closed loop. `start` is taken to be
+  // visible.
   template <typename Visible>
   std::optional<uint32_t> Expand(uint32_t start, uint32_t apex, Visible visible) {
     horizon_.clear();

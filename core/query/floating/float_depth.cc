@@ -70,7 +70,8 @@ class Expansion {
     return farthest.value + kReachErrorFactor * pair_.size();
   }
 
-  // Flat parts of A - B make it dear to be certain; that is put off until it may end the expansion.
+  // Certifying a support value is expensive on flat parts of A - B, so this is deferred until it
+  // could end the expansion.
   FloatPair::Support Reach(const PlainVector& n, double low) {
     FloatPair::Support farthest = pair_.Farthest(n);
     if (!farthest.certain && goal_.Met(low, std::min(bounds_.high, HighOf(farthest)))) {

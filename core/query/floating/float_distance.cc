@@ -31,7 +31,8 @@ class Walk {
       if (!(length > 0)) break;
       n /= length;
       FloatPair::Support farthest = pair_.Farthest(n);
-      // Flat parts of A - B make it dear to be certain; that is put off until it may end the walk.
+      // Certifying a support value is expensive on flat parts of A - B, so this is deferred until
+      // it could end the walk.
       if (!farthest.certain &&
           (goal_.Met(LowOf(farthest), bounds_.high) || Contains(farthest.pair))) {
         farthest = pair_.CertainFarthest(n, farthest);

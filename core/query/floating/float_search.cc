@@ -143,8 +143,9 @@ class Simplex {
     }
   }
 
-  // Which part of the triangle of the newest corner p and of p + e and p + f is nearest; the edge
-  // between these and its ends are not, as p was farther towards the origin. `normal`: e x f.
+  // Which part of the triangle of the newest corner p and of p + e and p + f is nearest. The edge
+  // between the latter two and its ends are not, as p was farther towards the origin: three of the
+  // seven parts that FindNearestOnTriangle tells apart need no look. `normal`: e x f.
   enum class Part { kCorner, kEdgeToQ, kEdgeToR, kInside };
   static Part NearestPart(const PlainVector& p, const PlainVector& e, const PlainVector& f,
                           const PlainVector& normal, PlainVector& n) {

@@ -63,7 +63,7 @@ class Polar {
     values_.resize(normals_.size());
   }
 
-  // Some t such that o + t d, as rounded, is in the hull, and almost as large as it may be; 0 when
+  // A value t, almost as large as possible, such that o + t d as rounded is in the hull; 0 when
   // none was found.
   double Reach(const Vector& d) {
     double largest = 0;
@@ -104,7 +104,8 @@ CenterBounds::CenterBounds(const Hull& hull, const SupportMap& support) {
   for (const Vector& v : hull.vertices()) {
     radius = std::max(radius, (v - hull.center()).cwiseAbs().maxCoeff());
   }
-  // Beyond what pairs may have, or so small against the coordinates that rounding counts.
+  // Such radii are beyond what pairs may have, or so small against the coordinates that rounding
+  // counts.
   if (!IsFilterSize(radius)) return;
   if (radius < kCenterLeastRadius * hull.max_abs_coordinate()) return;
   side_ = SideFor(hull.vertices().size());

@@ -39,7 +39,7 @@ class CenterBounds {
     double support = std::numeric_limits<double>::quiet_NaN();
     double gauge = std::numeric_limits<double>::quiet_NaN();
   };
-  // Where a direction is among the corners; nowhere where there are none.
+  // The place of a direction among the corners; no place when there are none.
   class Place;
   // Requires n in the range of FloatPair's directions (IsFilterDirection).
   Place PlaceOf(const PlainVector& n) const;
@@ -50,8 +50,8 @@ class CenterBounds {
   // About the outward normal of the hull where the ray from c along the n of a place leaves it,
   // longer where the hull is narrow. Zero where that is coarse or unknown.
   PlainVector NormalAt(const Place& place) const;
-  // Whether there are few corners, or none: then the bounds say little but of what is deep inside,
-  // and the normals nothing.
+  // Whether there are few corners or none. Then the bounds say little except about what is deep
+  // inside, and the normals say nothing.
   bool coarse() const { return side_ < kLeastFineSide; }
   // At least g(d) for all d with components of at most 1; infinite where unknown.
   double largest_gauge() const { return largest_gauge_; }
@@ -61,7 +61,8 @@ class CenterBounds {
  private:
   // Cells along a side of a face. Observed: guessing a normal from fewer does not pay.
   static constexpr uint32_t kLeastFineSide = 4;
-  // Of directions whose largest component is 1: the support function in units, the gauge per unit.
+  // The values for directions whose largest component is 1: the support function in units, and the
+  // gauge per unit.
   struct Corner {
     float support;
     float gauge;

@@ -12,8 +12,8 @@
 
 namespace hulld {
 
-// A snapshot and what queries need of it beyond the snapshot: made once, when the first query asks,
-// and kept beside it. Immutable; readable by any thread.
+// A canonical snapshot of a hull and what queries need beyond it. It is made once, when the first
+// query asks, and kept beside the snapshot. Immutable; readable by any thread.
 class QueryHull {
  public:
   // `hull` must outlive the result. Cost: that of a SupportMap and of CenterBounds.

@@ -240,7 +240,7 @@ void SupportMap::BuildCells(const Hull& hull) {
   const Vector scale = ExtentsOf(vertices_);
   scale_ = scale;
 
-  // Of each edge the normals on its two sides, in the map's directions, of unit length.
+  // The unit normals on the two sides of each edge, in the map's directions.
   std::vector<std::array<Vector, 2>> sides(hull.edges().size());
   for (size_t f = 0; f < hull.facet_count(); ++f) {
     const std::span<const uint32_t> facet = hull.facet(f);

@@ -23,11 +23,11 @@ namespace hulld {
 // in it: those whose normal cone meets the cell. The lists are made by drawing the edges of the
 // Gauss map (the arcs between the normals of neighbouring facets) into the cells; a cell without
 // any lies within one cone. Directions are first scaled by the extents of the hull, so that the
-// cells of an oblong hull are filled evenly. As rounding may misplace an arc, what a list gives is
-// certain only once its neighbours were looked at: on a convex polytope a path of edges that never
-// descends leads from every vertex to the farthest, so that a vertex whose neighbours are all
-// nearer is the farthest; where some neighbour is within `blur` of it, the plateau of vertices
-// within `blur` is flooded, which holds the path.
+// cells of an oblong hull are filled evenly. Rounding may misplace an arc, so what a list gives is
+// certain only after a look at its neighbours. On a convex polytope a path of edges that never
+// descends leads from every vertex to the farthest. So a vertex whose neighbours are all nearer is
+// the farthest. Where some neighbour is within `blur` of it, the plateau of vertices within `blur`
+// is flooded, which holds the path.
 //
 // Values n . v are computed as (n.x v.x + n.y v.y) + n.z v.z, the same bits on any instruction set.
 // `blur` must be at least twice the largest error of such a value over the vertices of the hull.
@@ -128,7 +128,7 @@ class SupportMap {
   double below_half_ = 0;
 };
 
-// Some cell also for n = 0 and for what overflows.
+// Zero and what overflows get some cell, too.
 inline uint32_t SupportMap::CellOf(const PlainVector& n_own) const {
   const OnCube n(n_own.x * scale_.x, n_own.y * scale_.y, n_own.z * scale_.z);
   const double factor = half_ / n.largest();

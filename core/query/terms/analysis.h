@@ -9,7 +9,7 @@
 
 namespace hulld {
 
-// The textbook's report, as far as the search has one, too.
+// The report of the textbook method; the search fills what applies to it.
 struct Analysis {
   std::chrono::nanoseconds time{0};
   // Textbook: up to and including the reported axis, counted as if serial, or all. Search:

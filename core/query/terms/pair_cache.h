@@ -10,8 +10,8 @@
 namespace hulld {
 
 // What a query of one pair leaves for the next one of the same hulls at other poses: an axis that
-// separated them, or vertex pairs whose differences surrounded the origin. Never an answer: what it
-// suggests is proven anew or dropped. Belongs to one caller at a time.
+// separated them, or vertex pairs whose differences surrounded the origin. It is never an answer:
+// the next query proves what it suggests anew, or drops it. It belongs to one caller at a time.
 struct PairCache {
   // World frame, from A towards B.
   std::optional<Vector> axis;

@@ -43,7 +43,8 @@ struct QueryOptions {
 
   // Whether an answer holds more than the relation and within_clearance.
   bool WantsDetails() const {
-    return want_axis || want_analysis || want_certificate || want_separation || want_witness;
+    // Every pair asks this, so it has no branches.
+    return (want_axis | want_analysis | want_certificate | want_separation | want_witness) != 0;
   }
   // Whether the search may stop as soon as it knows the relation, which is the cheapest question.
   // Nothing else decides this.
@@ -52,7 +53,7 @@ struct QueryOptions {
   }
 };
 
-// What errors call the options: the words of the caller's interface.
+// The names of the options in error messages, as the interface of the caller has them.
 struct OptionNames {
   const char* tolerance = "tolerance";
   const char* max_error = "max_error";

@@ -206,6 +206,18 @@ TEST_F(StreamCollisionsCall, EveryStepEqualsASingleCheck) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
+TEST_F(StreamCollisionsCall, AnEmptyHullIsDecidedByTheSameRungAsInASingleCheck) {
+  Put("cube", Cube());
+  Create("empty");
+  Stream stream(*collisions_);
+  const auto answer = stream.Ask(Open({PlacementOf("cube"), PlacementOf("empty")}, {0, 1}));
+  v1::CheckCollisionRequest single;
+  *single.mutable_a() = PlacementOf("cube");
+  *single.mutable_b() = PlacementOf("empty");
+  EXPECT_THAT(answer.columns().rungs(), ElementsAre(Check(single).rung()));
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
 TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
   Put("grows", {0, 0, 0});
   Put("target", Cube(5, 1));

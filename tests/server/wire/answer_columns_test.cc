@@ -38,7 +38,8 @@ v1::Wanted Everything() {
 Answer FullAnswer() {
   Answer answer;
   answer.relation = Relation::kOverlapping;
-  answer.certificate.emplace();
+  answer.rung = Rung::kExact;
+  answer.certificate = Certificate();
   answer.certificate->pairs = {{1, 2}, {3, 0}};
   answer.separation = Separation{-0.5, 0x1p-60};
   answer.witness = Witness{{1, 2, 3}, {4, 5, 6}, 0.25};
