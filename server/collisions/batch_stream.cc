@@ -15,6 +15,8 @@ namespace {
 // guess of it can do.
 constexpr uint64_t kFirstPairs = 128;
 constexpr uint64_t kMostPairs = 1 << 14;
+// Up to so many placements are decoded and placed in about a slice.
+constexpr int kMostShortPlacements = 4096;
 // The clock is read once for so many pairs.
 constexpr uint64_t kPairsPerLook = 64;
 
@@ -39,27 +41,15 @@ grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchStream::Start(
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
                          Executor& executor, const v1::BatchCheckCollisionsRequest& request)
-    : PiecedReplies(context, admission, Rpc::kBatchCheckCollisions, pool, kFirstPairs, kMostPairs),
+    : PiecedReplies(context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
+                    {kFirstPairs, kMostPairs,
+                     request.placements_size() + request.packed_placements().hulls_size() <=
+                         kMostShortPlacements}),
       registry_(registry),
-      readers_(readers),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()),
       request_(request),
       pair_count_(static_cast<uint64_t>(request.pairs_size()) / 2) {}
-
-void BatchStream::Open() {
-  RunOn(readers_, [this] {
-    absl::Status status = Validate();
-    if (status.ok()) status = ResolvePlacements();
-    if (call().ShouldStop()) status = call().StopStatus();
-    Locked([this, &status] {
-      opening_ = false;
-      if (!status.ok()) return End(status);
-      QueueHead();
-      BeginPieces(pair_count_);
-    });
-  });
-}
 
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
@@ -77,15 +67,19 @@ absl::Status BatchStream::Validate() {
                        "the batch");
 }
 
-// Sets relations_suffice_.
-absl::Status BatchStream::ResolvePlacements() {
+absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
+  if (!may_wait) return table_.TryResolve(registry_);
   if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  return true;
+}
+
+absl::Status BatchStream::Prepare() {
   relations_suffice_ = options_.method == Method::kCertifiedSearch &&
                        IsRelationOnly(request_.wanted()) && table_.all_answerable();
   return absl::OkStatus();
 }
 
-void BatchStream::QueueHead() {
+uint64_t BatchStream::Begin() {
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   has_head_ = true;
   size_t next = 0;
@@ -94,6 +88,7 @@ void BatchStream::QueueHead() {
     const size_t bytes = head_.ByteSizeLong();
     Queue(std::exchange(head_, {}), bytes);
   }
+  return pair_count_;
 }
 
 PlacedPair BatchStream::PairAt(uint64_t i) const {

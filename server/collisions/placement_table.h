@@ -39,6 +39,10 @@ class PlacementTable {
   // CANCELLED: should_stop said so.
   absl::Status Resolve(Registry& registry, const std::function<bool()>& should_stop);
 
+  // The same, but false, at once, where it would have to wait or to make what queries need of a
+  // hull.
+  bool TryResolve(Registry& registry);
+
   size_t size() const { return entries_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
@@ -74,6 +78,7 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
+  void Take(Resolved resolved);
   const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 

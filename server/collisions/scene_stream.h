@@ -43,22 +43,22 @@ class SceneStream : public PiecedReplies<v1::FindCollisionsResponse, ScenePiece>
   SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               WorkerPool& readers, TaskPool& pool, const v1::FindCollisionsRequest& request);
 
-  void Open() override;
+  absl::Status Validate() override;
+  absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
+  absl::Status Prepare() override;
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
   // The rest requires the mutex.
-  bool IsWorking() const override { return opening_ || PiecedReplies::IsWorking(); }
+  uint64_t Begin() override { return search_->size(); }
   void Deliver(ScenePiece& piece) override;
   bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
   void QueueHead();
 
   // Without the mutex.
-  absl::Status Prepare();
   size_t AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer, ScenePiece& piece,
                   v1::FindCollisionsResponse* reply);
 
   Registry& registry_;
-  WorkerPool& readers_;
   const v1::FindCollisionsRequest& request_;
 
   // Written before the first piece.
@@ -68,7 +68,6 @@ class SceneStream : public PiecedReplies<v1::FindCollisionsResponse, ScenePiece>
   std::optional<SceneSearch> search_;
 
   // Guarded by the mutex.
-  bool opening_ = true;
   v1::SceneTotals totals_;
 };
 
