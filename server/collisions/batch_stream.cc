@@ -15,9 +15,9 @@ namespace {
 // guess of it can do.
 constexpr uint64_t kFirstPairs = 128;
 constexpr uint64_t kMostPairs = 1 << 14;
-// Up to so many placements are decoded and placed in about a slice.
+// This many placements are decoded and placed in about a slice.
 constexpr int kMostShortPlacements = 4096;
-// The clock is read once for so many pairs.
+// Pairs between two looks at the clock.
 constexpr uint64_t kPairsPerLook = 64;
 
 // Adds the answers of the pairs that follow those of `message`.

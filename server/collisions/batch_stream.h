@@ -59,7 +59,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
 
   Registry& registry_;
-  // Of the team, and the turns of this call on it.
+  // The size of the team, and the turns of this call on it.
   const int team_threads_;
   TaskPool::Lane team_lane_;
   const v1::BatchCheckCollisionsRequest& request_;

@@ -30,7 +30,7 @@ struct Piece {
   uint64_t next = 0;
   uint64_t end = 0;
   std::vector<Reply> replies = {};
-  // Of each reply, and of all.
+  // The size of each reply, and of all.
   std::vector<size_t> reply_bytes = {};
   size_t bytes = 0;
   bool is_done = false;
@@ -52,7 +52,7 @@ struct Piece {
 // is worked on by one slice at a time, each of about TaskPool::kSliceTime, so that other calls get
 // their turn. A bounded number of pieces is under way, and each holds a bounded number of bytes;
 // while a bounded number of bytes waits for the client, no slice starts. So memory is bounded, and
-// a client that does not read holds back nobody.
+// a client that does not read holds up no other.
 //
 // Work: what a piece keeps from one slice to the next, derived from Piece<Reply>.
 template <typename Reply, typename Work>
@@ -237,7 +237,7 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
   bool opening_ = true;
   uint64_t unit_count_ = 0;
   uint64_t next_unit_ = 0;
-  // Of the next piece.
+  // The size of the next piece.
   uint64_t piece_units_;
   // Under way, in order.
   std::deque<std::unique_ptr<Work>> pieces_;

@@ -26,7 +26,7 @@ namespace hulld::server {
 class PlacementTable {
  public:
   PlacementTable() = default;
-  // Of a request that has one of the two forms. Notes what is malformed and what is not the
+  // Reads a request that has one of the two forms. Notes what is malformed and what is not the
   // caller's; no hull is known before Resolve. INVALID_ARGUMENT: both forms, or packed ones whose
   // lists do not fit each other. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
   // `what` holds them, as in "the batch".
@@ -69,7 +69,7 @@ class PlacementTable {
   struct Entry {
     // Index into hulls_; none when the ID is malformed or not the caller's.
     std::optional<size_t> hull;
-    // Of the ID or the pose.
+    // What is wrong with the ID or the pose.
     absl::Status malformed;
     Pose pose;
   };
@@ -83,7 +83,7 @@ class PlacementTable {
   PlacedHull Place(size_t i) const;
 
   std::vector<Entry> entries_;
-  // Of packed placements: each that was named, as an index into ids_; none when it is malformed or
+  // Each hull that packed placements name, as an index into ids_; none when it is malformed or
   // not the caller's.
   bool is_packed_ = false;
   std::vector<std::optional<size_t>> named_;

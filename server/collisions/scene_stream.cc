@@ -17,9 +17,9 @@ namespace {
 // wrong guess of it can do.
 constexpr uint64_t kFirstPlacements = 4;
 constexpr uint64_t kMostPlacements = 1024;
-// The tree of up to so many placements is built in about a slice.
+// The tree of this many placements is built in about a slice.
 constexpr int kMostShortPlacements = 512;
-// The clock is read once for so many candidates or placements.
+// Candidates or placements between two looks at the clock.
 constexpr uint64_t kStepsPerLook = 16;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;

@@ -21,7 +21,8 @@ namespace hulld::server {
 
 // A range of placements, each to be asked about with those after it.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
-  // Of placement `next`, once they are known: those not asked about yet start at next_candidate.
+  // The candidates of placement `next`, once they are known; those from next_candidate on are still
+  // to be asked about.
   bool has_candidates = false;
   std::vector<uint32_t> candidates;
   size_t next_candidate = 0;
