@@ -35,7 +35,6 @@ struct CheckedAnswer {
   const v1::Placement& b;
   v1::Relation relation;
   const v1::Certificate& certificate;
-  const std::string& store_id;
   const v1::HullVersion& hull_a;
   const v1::HullVersion& hull_b;
 };
@@ -52,8 +51,7 @@ class AnswerChecker {
 
  private:
   // Null, with the reason, when the mesh at that version cannot be had.
-  absl::StatusOr<const HullMesh*> Fetch(const std::string& store_id, const v1::HullVersion& version,
-                                        Verification* problem);
+  absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
 
   const Client& client_;
   std::map<std::string, HullMesh> meshes_;

@@ -6,12 +6,13 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/query/box_tree.h"
+#include "core/query/collision.h"
 
 namespace hulld {
 namespace {
@@ -25,10 +26,8 @@ constexpr uint32_t kMostSlicePlacements = 1024;
 // What the search of one placement counted.
 struct RungTally {
   uint64_t candidates = 0;
-  decltype(SceneTotals::by_rung) by_rung = {};
+  RungCounts rungs;
 };
-static_assert(std::tuple_size_v<decltype(SceneTotals::by_rung)> ==
-              static_cast<size_t>(Rung::kExact) + 1);
 
 class Search {
  public:
@@ -57,9 +56,7 @@ class Search {
       for (uint32_t i = 0; i < size; ++i) {
         std::move(slice[i].begin(), slice[i].end(), std::back_inserter(answers));
         candidates += slice_rungs[i].candidates;
-        for (size_t rung = 0; rung < totals.by_rung.size(); ++rung) {
-          totals.by_rung[rung] += slice_rungs[i].by_rung[rung];
-        }
+        totals.rungs += slice_rungs[i].rungs;
       }
       totals.candidates += candidates;
       totals.found += answers.size();
@@ -72,7 +69,7 @@ class Search {
   }
 
  private:
-  bool Stopped() const { return options_.query.should_stop && options_.query.should_stop(); }
+  bool Stopped() const { return StopPoll(options_.query.should_stop, 1).Poll(); }
 
   // Answers placement a with all after it.
   void SearchFrom(uint32_t a, std::vector<SceneAnswer>& answers, RungTally& tally) const {
@@ -82,7 +79,7 @@ class Search {
       ++tally.candidates;
       absl::StatusOr<Answer> answer = scene_.Ask(a, b);
       if (absl::IsCancelled(answer.status())) break;
-      if (answer.ok()) ++tally.by_rung[static_cast<size_t>(answer->rung)];
+      if (answer.ok()) tally.rungs.Add(answer->rung);
       if (answer.ok() && !scene_.IsFound(*answer)) continue;
       answers.push_back({{a, b}, std::move(answer)});
     }
@@ -177,11 +174,8 @@ bool SceneSearch::IsFound(const Answer& answer) const {
 
 absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b) const {
   absl::StatusOr<Answer> answer = CheckCollision(placements_[a], placements_[b], first_look_);
-  const QueryOptions& query = options_->query;
-  const bool wants_more = query.want_axis || query.want_analysis || query.want_certificate ||
-                          query.want_separation || query.want_witness;
-  if (!wants_more || !answer.ok() || !IsFound(*answer)) return answer;
-  QueryOptions options = query;
+  if (!options_->query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
+  QueryOptions options = options_->query;
   options.threads = 1;
   return CheckCollision(placements_[a], placements_[b], options);
 }

@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -15,8 +14,10 @@
 
 #include "core/query/batch.h"
 #include "core/query/box_tree.h"
-#include "core/query/collision.h"
 #include "core/query/placed/placed_hull.h"
+#include "core/query/terms/answer.h"
+#include "core/query/terms/query_options.h"
+#include "core/query/terms/rung.h"
 
 namespace hulld {
 
@@ -51,8 +52,8 @@ struct SceneTotals {
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;
-  // Candidates by the rung that decided, in the order of Rung.
-  std::array<uint64_t, 4> by_rung = {};
+  // Candidates by the rung that decided.
+  RungCounts rungs;
 };
 
 // A scene for callers that have threads of their own: FindCollisions is Candidates of every

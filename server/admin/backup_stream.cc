@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/settings/config.h"
 #include "server/store/store_keys.h"
 #include "server/wire/encode.h"
@@ -18,9 +19,10 @@ namespace {
 // A backup holds everybody's hulls.
 absl::Status CheckSeesAll(const Caller& caller) {
   if (caller.sees_all()) return absl::OkStatus();
-  return absl::PermissionDeniedError(
-      absl::StrCat("token \"", caller.name, "\" is limited to \"", caller.prefix,
-                   "\", and a backup holds the whole store; use a token without a prefix"));
+  return WithReason(absl::PermissionDeniedError(absl::StrCat(
+                        "token \"", caller.name, "\" is limited to \"", caller.prefix,
+                        "\", and a backup holds the whole store; use a token without a prefix")),
+                    v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
 }
 
 }  // namespace

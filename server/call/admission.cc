@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {
@@ -101,7 +102,9 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(Rpc rpc,
   if (ticket.kind_ == CallKind::kStream) ticket.client_ = client();
   const std::lock_guard lock(mutex_);
   if (draining_) {
-    return absl::UnavailableError("hulld is draining and ends soon; retry when it is back");
+    return WithReason(
+        absl::UnavailableError("hulld is draining and ends soon; retry when it is back"),
+        v1::ERROR_REASON_DRAINING);
   }
   // What tells the operator how the server is must work when it is full, too.
   if (rpc != Rpc::kGetStatus) {

@@ -4,7 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "core/base/check.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
 
@@ -73,12 +72,6 @@ absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
   return true;
 }
 
-absl::Status BatchStream::Prepare() {
-  relations_suffice_ = options_.method == Method::kCertifiedSearch &&
-                       IsRelationOnly(request_.wanted()) && table_.all_answerable();
-  return absl::OkStatus();
-}
-
 uint64_t BatchStream::Begin() {
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   has_head_ = true;
@@ -122,29 +115,11 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
   BatchColumns columns({}, request_.wanted(), piece.next);
   do {
     const uint64_t until = std::min(piece.end, piece.next + kPairsPerLook);
-    const absl::Status answered = relations_suffice_ ? AnswerRelations(piece.next, until, &columns)
-                                                     : Answer(piece.next, until, &columns);
-    if (!answered.ok()) return answered;
+    if (absl::Status s = Answer(piece.next, until, &columns); !s.ok()) return s;
     piece.next = until;
   } while (piece.next < piece.end && Clock::now() < end);
   piece.is_done = piece.next == piece.end;
   for (v1::BatchCheckCollisionsResponse& reply : columns.Take()) piece.Add(std::move(reply));
-  return absl::OkStatus();
-}
-
-// Requires relations_suffice_.
-absl::Status BatchStream::AnswerRelations(uint64_t begin, uint64_t end, BatchColumns* columns) {
-  HULLD_CHECK(relations_suffice_);
-  std::vector<PlacedPair> pairs;
-  pairs.reserve(end - begin);
-  for (uint64_t i = begin; i < end; ++i) pairs.push_back(PairAt(i));
-  const absl::StatusOr<std::vector<RelationAnswer>> answers =
-      FindRelations(table_.placed(), pairs, options_.tolerance, options_.should_stop, 1);
-  if (!answers.ok()) return answers.status();
-  columns->Add(*answers);
-  RungCounts counts;
-  for (const RelationAnswer& answer : *answers) counts.Add(answer.rung);
-  call().metrics().CountPairs(counts);
   return absl::OkStatus();
 }
 
@@ -187,7 +162,7 @@ void BatchStream::Deliver(PairsPiece& piece) {
 // A problem is named by its place, which would change.
 bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
                        v1::BatchCheckCollisionsResponse* waiting) {
-  if (reply.pair_problems_size() > 0) return false;
+  if (reply.columns().pair_problems_size() > 0) return false;
   Append(reply, waiting);
   return true;
 }

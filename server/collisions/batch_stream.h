@@ -40,7 +40,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
 
   absl::Status Validate() override;
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
-  absl::Status Prepare() override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
   // The rest requires the mutex.
   uint64_t Begin() override;
@@ -55,7 +54,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;
-  absl::Status AnswerRelations(uint64_t begin, uint64_t end, BatchColumns* columns);
   absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
 
   Registry& registry_;
@@ -68,8 +66,6 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   // Written before the first piece.
   QueryOptions options_;
   PlacementTable table_;
-  // Whether every pair can be answered and nothing but relations is wanted, as mostly.
-  bool relations_suffice_ = false;
 
   // Guarded by the mutex.
   // The last part of the table of hulls, for the first answers.

@@ -43,7 +43,7 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
 // Whether nothing is left to make before these hulls can be queried.
 bool AreReady(const Resolved& resolved) {
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
-    if (hull.ok() && !hull->snapshot->has_query_hull()) return false;
+    if (hull.ok() && !hull->served->has_query_hull()) return false;
   }
   return true;
 }
@@ -108,15 +108,15 @@ absl::Status CollisionService::PairQuery::Place(const Registry& registry,
     if (!hull.ok()) return hull.status();
   }
   views = std::move(resolved->hulls);
-  const auto placed_a = PlacedHull::Make(views[0]->snapshot->query_hull(), X_WA);
+  const auto placed_a = PlacedHull::Make(views[0]->served->query_hull(), X_WA);
   if (!placed_a.ok()) return placed_a.status();
-  const auto placed_b = PlacedHull::Make(views[1]->snapshot->query_hull(), X_WB);
+  const auto placed_b = PlacedHull::Make(views[1]->served->query_hull(), X_WB);
   if (!placed_b.ok()) return placed_b.status();
   a = *placed_a;
   b = *placed_b;
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
-  EncodeVersion(views[0]->record, response->mutable_hull_a());
-  EncodeVersion(views[1]->record, response->mutable_hull_b());
+  EncodeVersion(registry.store().id(), views[0]->record, response->mutable_hull_a());
+  EncodeVersion(registry.store().id(), views[1]->record, response->mutable_hull_b());
   return absl::OkStatus();
 }
 

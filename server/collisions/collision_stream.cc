@@ -223,14 +223,7 @@ void CollisionStream::AskAboutPairsOf(size_t placement) {
 absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
   const PlacedHull& a = table_.placed()[pair.a];
   const PlacedHull& b = table_.placed()[pair.b];
-  if (options_.tolerance != 0 || !IsRelationOnly(wanted_)) {
-    return CheckCollision(a, b, options_, &pair.cache);
-  }
-  const RelationAnswer found = FindRelation(a, b, &pair.cache);
-  Answer answer;
-  answer.relation = found.relation;
-  answer.rung = found.rung;
-  return answer;
+  return CheckCollision(a, b, options_, &pair.cache);
 }
 
 void CollisionStream::AddAnswer(uint32_t index) {
@@ -245,7 +238,6 @@ void CollisionStream::AddAnswer(uint32_t index) {
   pair.relation = relation;
   if (only_changes_ && messages_ > 0 && !changed) return;
   v1::AnswerColumns* const columns = reply().mutable_columns();
-  const auto position = static_cast<uint64_t>(reply().pairs_size());
   reply().add_pairs(index);
   reply_bytes_ += kIndexBytes;
   if (!answerable) {
@@ -253,7 +245,7 @@ void CollisionStream::AddAnswer(uint32_t index) {
     return;
   }
   reply_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
-                                    table_.placed()[pair.b].hull(), wanted_, position, columns);
+                                    table_.placed()[pair.b].hull(), wanted_, columns);
 }
 
 void CollisionStream::SendPart(bool last) {

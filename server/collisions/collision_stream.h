@@ -54,7 +54,7 @@ class CollisionStream
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
-        charge_(registry) {}
+        charge_(registry.memory()) {}
 
   void Open() override { Read(); }
   void OnMessage() override;

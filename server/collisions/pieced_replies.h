@@ -96,7 +96,7 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
   virtual absl::Status Validate() = 0;
   // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
   virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
-  virtual absl::Status Prepare() = 0;
+  virtual absl::Status Prepare() { return absl::OkStatus(); }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
   // without the mutex, on any thread, by one thread at a time for each piece.

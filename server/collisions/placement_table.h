@@ -78,7 +78,7 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
-  void Take(Resolved resolved);
+  void Take(const Registry& registry, Resolved resolved);
   const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 
@@ -91,6 +91,8 @@ class PlacementTable {
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
   std::vector<char> changed_;
+  // Of the last Resolve.
+  std::string store_id_;
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
 };

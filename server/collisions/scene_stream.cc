@@ -184,12 +184,12 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
 
 size_t SceneStream::AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer,
                              ScenePiece& piece, v1::FindCollisionsResponse* reply) {
-  const auto position = static_cast<uint64_t>(reply->pairs_size()) / 2;
+  const int position = reply->pairs_size() / 2;
   reply->add_pairs(a);
   reply->add_pairs(b);
   const size_t bytes = AddAnswer(answer, table_.placed()[a].hull(), table_.placed()[b].hull(),
-                                 request_.wanted(), position, reply->mutable_columns());
-  Count(reply->columns().relations(static_cast<int>(position)), &piece.totals);
+                                 request_.wanted(), reply->mutable_columns());
+  Count(reply->columns().relations(position), &piece.totals);
   return kPairBytes + bytes;
 }
 

@@ -33,7 +33,7 @@ class ReplaceStream
         registry_(registry),
         writers_(writers),
         response_(response),
-        charge_(registry) {}
+        charge_(registry.memory()) {}
 
   void Open() override { Read(); }
   void OnMessage() override;

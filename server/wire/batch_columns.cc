@@ -8,12 +8,6 @@
 #include "server/wire/encode.h"
 
 namespace hulld::server {
-namespace {
-
-// A relation and a rung.
-constexpr size_t kRelationBytes = 2;
-
-}  // namespace
 
 BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                            uint64_t first_pair)
@@ -22,40 +16,22 @@ BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Want
   messages_.push_back(std::move(head));
 }
 
-v1::BatchCheckCollisionsResponse* BatchColumns::MessageForNext() {
+v1::AnswerColumns* BatchColumns::ColumnsForNext() {
   if (bytes_ >= Config::kReplyMessageBytes) {
     messages_.emplace_back().set_first_pair(next_pair_);
     bytes_ = 0;
   }
-  return &messages_.back();
+  return messages_.back().mutable_columns();
 }
 
 void BatchColumns::AddUnanswered() {
-  bytes_ += server::AddUnanswered(wanted_, MessageForNext());
+  bytes_ += server::AddUnanswered(wanted_, ColumnsForNext());
   ++next_pair_;
 }
 
 void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b) {
-  bytes_ += AddAnswer(answer, a, b, wanted_, next_pair_, MessageForNext());
+  bytes_ += AddAnswer(answer, a, b, wanted_, ColumnsForNext());
   ++next_pair_;
-}
-
-void BatchColumns::Add(std::span<const RelationAnswer> answers) {
-  while (!answers.empty()) {
-    v1::BatchCheckCollisionsResponse* const message = MessageForNext();
-    const size_t room = (Config::kReplyMessageBytes - bytes_ + kRelationBytes - 1) / kRelationBytes;
-    const std::span<const RelationAnswer> part = answers.first(std::min(room, answers.size()));
-    const int rows = message->relations_size() + static_cast<int>(part.size());
-    message->mutable_relations()->Reserve(rows);
-    message->mutable_rungs()->Reserve(rows);
-    for (const RelationAnswer& answer : part) {
-      message->mutable_relations()->AddAlreadyReserved(EncodeRelation(answer.relation));
-      message->mutable_rungs()->AddAlreadyReserved(EncodeRung(answer.rung));
-    }
-    bytes_ += kRelationBytes * part.size();
-    next_pair_ += part.size();
-    answers = answers.subspan(part.size());
-  }
 }
 
 std::vector<v1::BatchCheckCollisionsResponse> BatchColumns::Take() { return std::move(messages_); }

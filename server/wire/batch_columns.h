@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/hull/hull.h"
@@ -23,16 +22,14 @@ class BatchColumns {
 
   // The answer of the next pair, of hulls a and b, or why there is none.
   void Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b);
-  // The answers of the next pairs, of which nothing else is wanted.
-  void Add(std::span<const RelationAnswer> answers);
   // The next pair has no answer, for a reason that stands elsewhere.
   void AddUnanswered();
 
   std::vector<v1::BatchCheckCollisionsResponse> Take();
 
  private:
-  // The message that takes the next row.
-  v1::BatchCheckCollisionsResponse* MessageForNext();
+  // Of the message that takes the next row.
+  v1::AnswerColumns* ColumnsForNext();
 
   const v1::Wanted wanted_;
   uint64_t next_pair_;

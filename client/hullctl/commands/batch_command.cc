@@ -25,6 +25,7 @@ struct BatchArguments {
 struct Problem {
   int code = 0;
   std::string message;
+  v1::ErrorReason reason = v1::ERROR_REASON_UNSPECIFIED;
 };
 
 // Asks in calls of bounded size, each with only the placements that its pairs need, and prints
@@ -90,19 +91,22 @@ class BatchRun {
     if (part.has_header()) *head_.mutable_header() = part.header();
     head_.mutable_hulls()->MergeFrom(part.hulls());
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
-      placement_problems_[problem.placement()] = {problem.code(), problem.message()};
+      placement_problems_[problem.placement()] = {problem.code(), problem.message(),
+                                                  problem.reason()};
     }
     std::unordered_map<uint64_t, Problem> pair_problems;
-    for (const v1::PairProblem& problem : part.pair_problems()) {
-      pair_problems[problem.pair()] = {problem.code(), problem.message()};
+    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
+      pair_problems[part.first_pair() + problem.row()] = {problem.code(), problem.message(),
+                                                          problem.reason()};
     }
-    const size_t count = static_cast<size_t>(part.relations_size());
+    const size_t count = static_cast<size_t>(part.columns().relations_size());
     if (count == 0) return absl::OkStatus();
-    if (begin + part.first_pair() != *next || count > end - *next || !AreParallel(part, count)) {
+    if (begin + part.first_pair() != *next || count > end - *next ||
+        !AreParallel(part.columns(), count)) {
       return absl::InternalError("the answers do not follow one another");
     }
     for (size_t i = 0; i < count; ++i, ++*next) {
-      const AnswerRow row = RowAt(part, static_cast<int>(i));
+      const AnswerRow row = RowAt(part.columns(), static_cast<int>(i));
       const Problem* problem = nullptr;
       std::optional<Verification> verification;
       if (row.relation == v1::RELATION_UNSPECIFIED) {
@@ -120,7 +124,8 @@ class BatchRun {
 
   const Problem* FindProblem(const std::unordered_map<uint64_t, Problem>& pair_problems,
                              size_t pair) const {
-    static const Problem* const kUnknown = new Problem{0, "the server gave no cause"};
+    static const Problem* const kUnknown =
+        new Problem{0, "the server gave no cause", v1::ERROR_REASON_UNSPECIFIED};
     if (const auto found = pair_problems.find(pair); found != pair_problems.end()) {
       return &found->second;
     }
@@ -138,10 +143,10 @@ class BatchRun {
     if (a >= hulls || b >= hulls || row.certificate == nullptr) {
       return absl::InternalError("the answers lack the hulls or the certificates they are about");
     }
-    auto verification = checker_.Check(
-        {request_->placements(static_cast<int>(a)), request_->placements(static_cast<int>(b)),
-         row.relation, *row.certificate, head_.header().store_id(),
-         head_.hulls(static_cast<int>(a)), head_.hulls(static_cast<int>(b))});
+    auto verification =
+        checker_.Check({request_->placements(static_cast<int>(a)),
+                        request_->placements(static_cast<int>(b)), row.relation, *row.certificate,
+                        head_.hulls(static_cast<int>(a)), head_.hulls(static_cast<int>(b))});
     if (!verification.ok()) return verification;
     if (verification->verdict == Verdict::kInvalid) {
       ++invalid_;
@@ -182,6 +187,7 @@ class BatchRun {
       object.AddJson("problem", JsonObject()
                                     .AddJson("code", std::to_string(problem->code))
                                     .Add("message", problem->message)
+                                    .Add("reason", v1::ErrorReason_Name(problem->reason))
                                     .Close());
     }
     return object.Close();

@@ -40,7 +40,7 @@ class SceneRun {
     }
     std::unordered_map<uint64_t, std::string> problems;
     for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      problems[problem.pair()] = problem.message();
+      problems[problem.row()] = problem.message();
     }
     const int count = part.pairs_size() / 2;
     if (part.pairs_size() % 2 != 0 || !AreParallel(part.columns(), static_cast<size_t>(count))) {

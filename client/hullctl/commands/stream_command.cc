@@ -17,6 +17,7 @@ std::string ProblemJson(const v1::PairProblem& problem) {
   return JsonObject()
       .AddJson("code", std::to_string(problem.code()))
       .Add("message", problem.message())
+      .Add("reason", v1::ErrorReason_Name(problem.reason()))
       .Close();
 }
 
@@ -27,8 +28,7 @@ absl::StatusOr<std::string> AnswerJson(const v1::StreamCollisionsResponse& answe
     return absl::InternalError("the answer's columns and pairs disagree");
   }
   std::unordered_map<uint64_t, const v1::PairProblem*> problems;
-  for (const v1::PairProblem& problem : columns.pair_problems())
-    problems[problem.pair()] = &problem;
+  for (const v1::PairProblem& problem : columns.pair_problems()) problems[problem.row()] = &problem;
   std::string rows;
   for (int i = 0; i < answer.pairs_size(); ++i) {
     JsonObject row;

@@ -106,7 +106,7 @@ class LoadSubjects::LoadClient {
     uint64_t answered = 0;
     const absl::Status status = client_.BatchCheckCollisions(
         batch_, [&answered](const v1::BatchCheckCollisionsResponse& part) {
-          answered += static_cast<uint64_t>(part.relations_size());
+          answered += static_cast<uint64_t>(part.columns().relations_size());
           return absl::OkStatus();
         });
     if (!status.ok()) return status;

@@ -140,7 +140,7 @@ Sample AnswerBatch(RemoteSubject& subject, const Batch& batch, double seconds) {
     grpc::ClientContext context;
     const auto reader = subject.stub(0).BatchCheckCollisions(&context, batch.request);
     for (v1::BatchCheckCollisionsResponse part; reader->Read(&part);) {
-      answered += part.relations_size();
+      answered += part.columns().relations_size();
     }
     CheckOk(reader->Finish(), "a batch");
     if (answered != batch.pairs.size()) CheckOk(absl::InternalError("too few"), "a batch");
@@ -149,7 +149,7 @@ Sample AnswerBatch(RemoteSubject& subject, const Batch& batch, double seconds) {
 
 Sample AnswerBatchInProcess(const Batch& batch, double seconds) {
   return Repeat(1, seconds, static_cast<double>(batch.pairs.size()), [&](int, size_t) {
-    CheckOk(FindRelations(batch.placed, batch.pairs, 0, {}, kThreads).status(), "a batch");
+    CheckOk(CheckCollisions(batch.placed, batch.pairs, {}, kThreads).back().status(), "a batch");
   });
 }
 

@@ -175,11 +175,11 @@ TEST_F(FindCollisionsCall, EqualsABatchOfAllPairs) {
   auto stream = collisions_->BatchCheckCollisions(&context, batch);
   v1::BatchCheckCollisionsResponse part;
   while (stream->Read(&part)) {
-    for (int i = 0; i < part.relations_size(); ++i) {
+    for (int i = 0; i < part.columns().relations_size(); ++i) {
       const int at = 2 * (static_cast<int>(part.first_pair()) + i);
-      ++counts[part.relations(i)];
-      if (part.relations(i) == v1::RELATION_SEPARATED) continue;
-      expected[{batch.pairs(at), batch.pairs(at + 1)}] = part.relations(i);
+      ++counts[part.columns().relations(i)];
+      if (part.columns().relations(i) == v1::RELATION_SEPARATED) continue;
+      expected[{batch.pairs(at), batch.pairs(at + 1)}] = part.columns().relations(i);
     }
   }
   ASSERT_TRUE(stream->Finish().ok());
