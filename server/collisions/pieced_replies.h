@@ -210,8 +210,8 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
       pieces_.push_back(std::move(piece));
     }
     for (const std::unique_ptr<Work>& piece : pieces_) {
-      const bool has_room = piece == pieces_.front() || piece->bytes < kMostHeldBytes;
-      if (piece->is_running || piece->is_done || !has_room) continue;
+      if (piece->is_running || piece->is_done) continue;
+      if (piece != pieces_.front() && piece->bytes >= kMostHeldBytes) continue;
       piece->is_running = true;
       ++running_;
       Submit(*piece);
