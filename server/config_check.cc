@@ -81,7 +81,7 @@ std::vector<std::string> ExposureWarnings(const Config& config) {
   }
   if (config.tokens_file.empty() && config.tls_client_ca.empty()) {
     warnings.push_back(
-        "whoever can reach this server may read and change everything; limit that with "
+        "everybody who can reach this server may read and change everything; limit that with "
         "--tokens-file or --tls-client-ca");
   }
   return warnings;

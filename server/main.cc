@@ -39,7 +39,7 @@ void LogStore(const Config& config) {
 }
 
 // Waits for SIGTERM or SIGINT. Until then it looks at the files again at each SIGHUP, and now and
-// then for memory that nobody needs.
+// then for memory that is no longer needed.
 int WaitForEnd(const sigset_t& signals, Server& server) {
   // A choice: memory is back soon after a peak, and looking costs 0.1 ms.
   constexpr timespec kPause = {.tv_sec = 10, .tv_nsec = 0};

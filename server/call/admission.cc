@@ -165,7 +165,7 @@ bool Admission::WaitIdle(std::chrono::steady_clock::time_point deadline) {
 void Admission::Leave(Ticket& ticket) {
   grpc_call* watched = nullptr;
   {
-    // Notified under the lock: whoever waits may destroy this as soon as it is released.
+    // Notified under the lock, as the thread that waits may destroy this once it is released.
     const std::lock_guard lock(mutex_);
     if (ticket.is_watched_) {
       watched = ticket.watched_->call;

@@ -26,7 +26,7 @@ namespace hulld::server {
 enum class CallKind {
   // One request, one short answer.
   kUnary,
-  // Pairs by the thousand, for the executor: --max-concurrent-batches.
+  // Thousands of pairs, computed in slices: --max-concurrent-batches.
   kBatch,
   // One request, an answer of many messages.
   kDownload,
@@ -65,9 +65,9 @@ class Admission {
 
     Admission* admission_;
     CallKind kind_;
-    // Of streams alone.
+    // Empty unless the call is a stream.
     std::string client_;
-    // Of downloads and batches under --max-request-time.
+    // Set for downloads and batches, while --max-request-time limits them.
     std::list<Watched>::iterator watched_;
     bool is_watched_ = false;
   };

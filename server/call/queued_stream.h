@@ -71,7 +71,7 @@ class QueuedStream : public CallStream<Reactor> {
     for (const Waiting& dropped : waiting_) unsent_bytes_ -= dropped.bytes;
     waiting_.clear();
   }
-  // Of the replies that wait and the one that is being written.
+  // The size of the replies that wait and of the one that is being written.
   size_t unsent_bytes() const { return unsent_bytes_; }
 
   // Sets the end, unless one is set.
@@ -106,7 +106,7 @@ class QueuedStream : public CallStream<Reactor> {
     Locked([this] { Abandon(); });
   }
 
-  // Nobody reads any more.
+  // The client reads no more.
   void Abandon() {
     this->call().Cancel();
     DropWaiting();

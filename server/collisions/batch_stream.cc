@@ -4,7 +4,6 @@
 #include <memory>
 #include <utility>
 
-#include "core/base/check.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
 
@@ -15,7 +14,9 @@ namespace {
 // guess of it can do.
 constexpr uint64_t kFirstPairs = 128;
 constexpr uint64_t kMostPairs = 1 << 14;
-// The clock is read once for so many pairs.
+// This many placements are decoded and placed in about a slice.
+constexpr int kMostShortPlacements = 4096;
+// Pairs between two looks at the clock.
 constexpr uint64_t kPairsPerLook = 64;
 
 // Adds the answers of the pairs that follow those of `message`.
@@ -39,27 +40,15 @@ grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchStream::Start(
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
                          Executor& executor, const v1::BatchCheckCollisionsRequest& request)
-    : PiecedReplies(context, admission, Rpc::kBatchCheckCollisions, pool, kFirstPairs, kMostPairs),
+    : PiecedReplies(context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
+                    {kFirstPairs, kMostPairs,
+                     request.placements_size() + request.packed_placements().hulls_size() <=
+                         kMostShortPlacements}),
       registry_(registry),
-      readers_(readers),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()),
       request_(request),
       pair_count_(static_cast<uint64_t>(request.pairs_size()) / 2) {}
-
-void BatchStream::Open() {
-  RunOn(readers_, [this] {
-    absl::Status status = Validate();
-    if (status.ok()) status = table_.Resolve(registry_, options_.should_stop);
-    if (call().ShouldStop()) status = call().StopStatus();
-    Locked([this, &status] {
-      opening_ = false;
-      if (!status.ok()) return End(status);
-      QueueHead();
-      BeginPieces(pair_count_);
-    });
-  });
-}
 
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
@@ -77,7 +66,13 @@ absl::Status BatchStream::Validate() {
                        "the batch");
 }
 
-void BatchStream::QueueHead() {
+absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
+  if (!may_wait) return table_.TryResolve(registry_);
+  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  return true;
+}
+
+uint64_t BatchStream::Begin() {
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
   has_head_ = true;
   size_t next = 0;
@@ -86,6 +81,7 @@ void BatchStream::QueueHead() {
     const size_t bytes = head_.ByteSizeLong();
     Queue(std::exchange(head_, {}), bytes);
   }
+  return pair_count_;
 }
 
 PlacedPair BatchStream::PairAt(uint64_t i) const {
@@ -166,7 +162,7 @@ void BatchStream::Deliver(PairsPiece& piece) {
 // A problem is named by its place, which would change.
 bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
                        v1::BatchCheckCollisionsResponse* waiting) {
-  if (reply.pair_problems_size() > 0) return false;
+  if (reply.columns().pair_problems_size() > 0) return false;
   Append(reply, waiting);
   return true;
 }

@@ -38,29 +38,26 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
               WorkerPool& readers, TaskPool& pool, Executor& executor,
               const v1::BatchCheckCollisionsRequest& request);
 
-  void Open() override;
+  absl::Status Validate() override;
+  absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
   // The rest requires the mutex.
-  bool IsWorking() const override { return opening_ || PiecedReplies::IsWorking(); }
+  uint64_t Begin() override;
   uint64_t EndOfPiece(uint64_t begin, uint64_t end) const override;
   void Submit(PairsPiece& piece) override;
   void Deliver(PairsPiece& piece) override;
   bool Join(const v1::BatchCheckCollisionsResponse& reply,
             v1::BatchCheckCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
-  // Leaves the last part of the table of hulls in head_, for the first answers.
-  void QueueHead();
 
   // Without the mutex.
-  absl::Status Validate();
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;
   absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
 
   Registry& registry_;
-  WorkerPool& readers_;
-  // Of the team, and the turns of this call on it.
+  // The size of the team, and the turns of this call on it.
   const int team_threads_;
   TaskPool::Lane team_lane_;
   const v1::BatchCheckCollisionsRequest& request_;
@@ -71,7 +68,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   PlacementTable table_;
 
   // Guarded by the mutex.
-  bool opening_ = true;
+  // The last part of the table of hulls, for the first answers.
   v1::BatchCheckCollisionsResponse head_;
   bool has_head_ = false;
 };

@@ -16,11 +16,11 @@
 namespace hulld::server {
 namespace {
 
-// The clock is read once for so many pairs.
+// Pairs between two looks at the clock.
 constexpr size_t kPairsPerLook = 16;
 // Decoding the poses of an update up to this size takes less than a slice.
 constexpr int kMostShortUpdate = 4096;
-// Of an update that is answered where it arrives.
+// An update that concerns no more pairs is answered where it arrives.
 constexpr int kMostQuickPairs = 8;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;

@@ -81,10 +81,10 @@ class CollisionStream
   TaskPool& pool_;
   // The slices of long answers.
   TaskPool::Lane lane_;
-  // Of placements and pairs.
+  // Covers placements and pairs.
   MemoryCharge charge_;
 
-  // Of the reply.
+  // The size of the reply, estimated.
   size_t reply_bytes_ = 0;
   uint64_t messages_ = 0;
 
@@ -101,7 +101,7 @@ class CollisionStream
   std::vector<uint32_t> pairs_of_;
   std::vector<size_t> pairs_begin_;
 
-  // Of the message that is being answered: the pairs to answer, ascending, and the next of them.
+  // The pairs that the current message asks about, ascending, and the next of them to answer.
   std::vector<uint32_t> asked_;
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;

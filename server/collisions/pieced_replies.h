@@ -2,6 +2,7 @@
 #define HULLD_SERVER_COLLISIONS_PIECED_REPLIES_H_
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -16,6 +17,7 @@
 #include "core/base/check.h"
 #include "server/call/queued_stream.h"
 #include "server/process/task_pool.h"
+#include "server/process/worker_pool.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -28,7 +30,7 @@ struct Piece {
   uint64_t next = 0;
   uint64_t end = 0;
   std::vector<Reply> replies = {};
-  // Of each reply, and of all.
+  // The size of each reply, and of all.
   std::vector<size_t> reply_bytes = {};
   size_t bytes = 0;
   bool is_done = false;
@@ -50,7 +52,7 @@ struct Piece {
 // is worked on by one slice at a time, each of about TaskPool::kSliceTime, so that other calls get
 // their turn. A bounded number of pieces is under way, and each holds a bounded number of bytes;
 // while a bounded number of bytes waits for the client, no slice starts. So memory is bounded, and
-// a client that does not read holds back nobody.
+// a client that does not read holds up no other.
 //
 // Work: what a piece keeps from one slice to the next, derived from Piece<Reply>.
 template <typename Reply, typename Work>
@@ -67,13 +69,34 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
   // Replies up to this size join the one that waits before them.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
 
-  PiecedReplies(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc, TaskPool& pool,
-                uint64_t first_units, uint64_t most_units)
+  // Where the call is prepared and computed.
+  struct Threads {
+    // For what may wait.
+    WorkerPool& readers;
+    TaskPool& pool;
+  };
+  // How pieces grow, and whether preparing takes about a slice when nothing has to be waited for.
+  struct Shape {
+    uint64_t first_units;
+    uint64_t most_units;
+    bool is_short;
+  };
+
+  PiecedReplies(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc,
+                const Threads& threads, const Shape& shape)
       : Base(context, admission, rpc),
-        lane_(pool),
-        most_pieces_(2 * static_cast<size_t>(pool.threads())),
-        most_units_(most_units),
-        piece_units_(first_units) {}
+        readers_(threads.readers),
+        is_short_(shape.is_short),
+        lane_(threads.pool),
+        most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
+        most_units_(shape.most_units),
+        piece_units_(shape.first_units) {}
+
+  // The call is prepared step by step, without the mutex, on one thread at a time.
+  virtual absl::Status Validate() = 0;
+  // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
+  virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
+  virtual absl::Status Prepare() { return absl::OkStatus(); }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
   // without the mutex, on any thread, by one thread at a time for each piece.
@@ -81,12 +104,8 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
 
   // The rest requires the mutex.
 
-  // Starts the work on the units [0, count).
-  void BeginPieces(uint64_t count) {
-    HULLD_CHECK(!begun_);
-    begun_ = true;
-    unit_count_ = count;
-  }
+  // Queues what comes first; the number of units.
+  virtual uint64_t Begin() = 0;
   // Where the piece that starts at `begin` ends, at most `end`; for units whose cost is known.
   virtual uint64_t EndOfPiece(uint64_t begin, uint64_t end) const {
     static_cast<void>(begin);
@@ -140,12 +159,35 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
     }
   }
 
-  bool IsWorking() const override { return running_ > 0; }
-  size_t running() const { return running_; }
-
  private:
+  // A short call whose hulls are ready need not wait for another thread.
+  void Open() final {
+    if (is_short_) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
+    this->RunOn(readers_, [this] { OpenWith(Validate(), true); });
+  }
+
+  void OpenWith(absl::Status status, bool may_wait) {
+    if (status.ok()) {
+      const absl::StatusOr<bool> resolved = ResolveHulls(may_wait);
+      if (resolved.ok() && !*resolved) {
+        HULLD_CHECK(!may_wait);
+        return this->RunOn(readers_, [this] { OpenWith(absl::OkStatus(), true); });
+      }
+      status = resolved.status();
+    }
+    if (status.ok()) status = Prepare();
+    if (this->call().ShouldStop()) status = this->call().StopStatus();
+    this->Locked([this, &status] {
+      opening_ = false;
+      if (!status.ok()) return this->End(status);
+      unit_count_ = Begin();
+    });
+  }
+
+  bool IsWorking() const final { return opening_ || running_ > 0; }
+
   void StartWork() final {
-    if (!begun_) return;
+    if (opening_) return;
     while (!pieces_.empty() && !pieces_.front()->is_running) {
       Work& front = *pieces_.front();
       Deliver(front);
@@ -168,8 +210,8 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
       pieces_.push_back(std::move(piece));
     }
     for (const std::unique_ptr<Work>& piece : pieces_) {
-      const bool has_room = piece == pieces_.front() || piece->bytes < kMostHeldBytes;
-      if (piece->is_running || piece->is_done || !has_room) continue;
+      if (piece->is_running || piece->is_done) continue;
+      if (piece != pieces_.front() && piece->bytes >= kMostHeldBytes) continue;
       piece->is_running = true;
       ++running_;
       Submit(*piece);
@@ -185,15 +227,17 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
     piece_units_ = static_cast<uint64_t>(std::clamp(wished, 1.0, static_cast<double>(most_units_)));
   }
 
+  WorkerPool& readers_;
+  const bool is_short_;
   TaskPool::Lane lane_;
   const size_t most_pieces_;
   const uint64_t most_units_;
 
   // The rest is guarded by the mutex; a running piece belongs to its slice.
-  bool begun_ = false;
+  bool opening_ = true;
   uint64_t unit_count_ = 0;
   uint64_t next_unit_ = 0;
-  // Of the next piece.
+  // The size of the next piece.
   uint64_t piece_units_;
   // Under way, in order.
   std::deque<std::unique_ptr<Work>> pieces_;

@@ -141,16 +141,30 @@ size_t PlacementTable::MemoryBytes() const {
 absl::Status PlacementTable::Resolve(Registry& registry, const std::function<bool()>& should_stop) {
   absl::StatusOr<Resolved> resolved = registry.Resolve(ids_, should_stop);
   if (!resolved.ok()) return resolved.status();
+  Take(registry, *std::move(resolved));
+  return absl::OkStatus();
+}
+
+bool PlacementTable::TryResolve(Registry& registry) {
+  std::optional<Resolved> resolved = registry.TryResolve(ids_);
+  if (!resolved.has_value()) return false;
+  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
+    if (hull.ok() && !hull->served->has_query_hull()) return false;
+  }
+  Take(registry, *std::move(resolved));
+  return true;
+}
+
+void PlacementTable::Take(const Registry& registry, Resolved resolved) {
   changed_.assign(ids_.size(), true);
-  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved->hulls[i]);
+  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
-  hulls_ = std::move(resolved->hulls);
+  hulls_ = std::move(resolved.hulls);
   store_id_ = registry.store().id();
-  store_revision_ = resolved->store_revision;
+  store_revision_ = resolved.store_revision;
   placed_.clear();
   placed_.reserve(entries_.size());
   for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
-  return absl::OkStatus();
 }
 
 PlacedHull PlacementTable::Place(size_t i) const {

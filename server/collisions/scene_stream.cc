@@ -17,7 +17,9 @@ namespace {
 // wrong guess of it can do.
 constexpr uint64_t kFirstPlacements = 4;
 constexpr uint64_t kMostPlacements = 1024;
-// The clock is read once for so many candidates or placements.
+// The tree of this many placements is built in about a slice.
+constexpr int kMostShortPlacements = 512;
+// Candidates or placements between two looks at the clock.
 constexpr uint64_t kStepsPerLook = 16;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
@@ -95,25 +97,14 @@ grpc::ServerWriteReactor<v1::FindCollisionsResponse>* SceneStream::Start(
 SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
                          const v1::FindCollisionsRequest& request)
-    : PiecedReplies(context, admission, Rpc::kFindCollisions, pool, kFirstPlacements,
-                    kMostPlacements),
+    : PiecedReplies(context, admission, Rpc::kFindCollisions, {readers, pool},
+                    {kFirstPlacements, kMostPlacements,
+                     request.placements_size() + request.packed_placements().hulls_size() <=
+                         kMostShortPlacements}),
       registry_(registry),
-      readers_(readers),
       request_(request) {}
 
-void SceneStream::Open() {
-  RunOn(readers_, [this] {
-    absl::Status status = Prepare();
-    if (call().ShouldStop()) status = call().StopStatus();
-    Locked([this, &status] {
-      opening_ = false;
-      if (!status.ok()) return End(status);
-      BeginPieces(search_->size());
-    });
-  });
-}
-
-absl::Status SceneStream::Prepare() {
+absl::Status SceneStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request_.wanted(), request_.tolerance(),
                        registry_.limits(), call().lifetime());
@@ -129,7 +120,16 @@ absl::Status SceneStream::Prepare() {
   options_.groups = {request_.groups().data(), static_cast<size_t>(request_.groups_size())};
   if (request_.has_movers()) options_.movers = request_.movers();
   options_.query = *std::move(options);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
+  if (!may_wait) return table_.TryResolve(registry_);
   if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
+  return true;
+}
+
+absl::Status SceneStream::Prepare() {
   // What is known goes out while the tree is built.
   Locked([this] { QueueHead(); });
   absl::StatusOr<SceneSearch> search = SceneSearch::Make(table_.placed(), options_);

@@ -21,7 +21,8 @@ namespace hulld::server {
 
 // A range of placements, each to be asked about with those after it.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
-  // Of placement `next`, once they are known: those not asked about yet start at next_candidate.
+  // The candidates of placement `next`, once they are known; those from next_candidate on are still
+  // to be asked about.
   bool has_candidates = false;
   std::vector<uint32_t> candidates;
   size_t next_candidate = 0;
@@ -43,22 +44,22 @@ class SceneStream : public PiecedReplies<v1::FindCollisionsResponse, ScenePiece>
   SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               WorkerPool& readers, TaskPool& pool, const v1::FindCollisionsRequest& request);
 
-  void Open() override;
+  absl::Status Validate() override;
+  absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
+  absl::Status Prepare() override;
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
   // The rest requires the mutex.
-  bool IsWorking() const override { return opening_ || PiecedReplies::IsWorking(); }
+  uint64_t Begin() override { return search_->size(); }
   void Deliver(ScenePiece& piece) override;
   bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
   void QueueHead();
 
   // Without the mutex.
-  absl::Status Prepare();
   size_t AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer, ScenePiece& piece,
                   v1::FindCollisionsResponse* reply);
 
   Registry& registry_;
-  WorkerPool& readers_;
   const v1::FindCollisionsRequest& request_;
 
   // Written before the first piece.
@@ -68,7 +69,6 @@ class SceneStream : public PiecedReplies<v1::FindCollisionsResponse, ScenePiece>
   std::optional<SceneSearch> search_;
 
   // Guarded by the mutex.
-  bool opening_ = true;
   v1::SceneTotals totals_;
 };
 

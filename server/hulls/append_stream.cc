@@ -140,7 +140,7 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
   HULLD_DCHECK(unbuilt_ >= 0 && uncommitted_ >= 0);
   if (!result.ok()) return FailAt(sequence, OrStopped(result.status()));
   call().metrics().CountPoints(result->counts);
-  if (call().ShouldStop()) return;  // nobody reads it
+  if (call().ShouldStop()) return;  // the client is gone
   // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
   if (LastWaiting() == nullptr) Queue({});
   HULLD_CHECK(!LastWaiting()->has_opened());

@@ -47,7 +47,7 @@ class ReplaceStream
   Registry& registry_;
   WorkerPool& writers_;
   v1::ReplaceHullResponse* response_;
-  // Of the builder, until the registry has it.
+  // Covers the builder until the registry has it.
   MemoryCharge charge_;
   Replacement replacement_;
   uint64_t messages_ = 0;

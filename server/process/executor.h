@@ -17,7 +17,7 @@ class Executor {
   // threads: of the team. metrics: what waits of batches. Requires threads > 0.
   explicit Executor(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
 
-  // Of the team.
+  // The size of the team.
   int threads() const { return threads_; }
   // The one thread.
   TaskPool& opener() { return opener_; }

@@ -41,7 +41,7 @@ using Clock = std::chrono::steady_clock;
 constexpr char kBall[] = "busy/ball";
 constexpr int kVertices = 64;
 constexpr std::chrono::seconds kMostPerCall(20);
-// Of one kind of work in one round.
+// For one kind of work in one round.
 constexpr std::chrono::seconds kMostPerTurn(2);
 
 // A process that computes until this goes.

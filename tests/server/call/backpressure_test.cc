@@ -14,7 +14,7 @@
 #include "tests/server/harness/test_server.h"
 
 #ifdef HULLD_SANITIZED
-// Of every sanitizer's runtime; GCC 12 comes without its header.
+// Every sanitizer's runtime has it; GCC 12 comes without its header.
 extern "C" size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
@@ -113,8 +113,8 @@ TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
   EXPECT_FALSE(unread->Finish().ok());
 }
 
-// Every pair is found, with a certificate of some hundred bytes. The client reads on in the end:
-// that it did not, held back nobody, so there is no reason to end the call.
+// Every pair is found, with a certificate of some hundred bytes. The unread scene holds up no other
+// call, so it need not be ended, and is complete when the client reads on.
 TEST_F(Backpressure, ASceneThatNobodyReadsIsNotSearchedAhead) {
   constexpr int kPlacements = 600;
   constexpr double kPairs = kPlacements * (kPlacements - 1) / 2.0;
