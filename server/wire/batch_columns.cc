@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// A relation and a rung.
+// Bytes of a relation and a rung.
 constexpr size_t kRelationBytes = 2;
 
 }  // namespace
