@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "core/base/check.h"
 #include "server/access/secret_file.h"
 #include "server/access/tls_identity.h"
 #include "server/access/token_table.h"
@@ -71,7 +72,8 @@ absl::Status CheckDataDir(const std::string& path) {
 
 std::vector<std::string> ExposureWarnings(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
-  if (!address.ok() || address->is_local()) return {};
+  HULLD_CHECK(address.ok());
+  if (address->is_local()) return {};
   std::vector<std::string> warnings;
   if (!config.has_tls()) {
     warnings.push_back(

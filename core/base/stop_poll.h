@@ -4,28 +4,52 @@
 #include <cstdint>
 #include <functional>
 
+#include "core/base/check.h"
+
 namespace hulld {
 
-// Asks should_stop, which may be empty and must outlive this, once in kStepsPerPoll steps of work.
+// Polls a caller's should_stop from within long work: at the first step, so that work which nobody
+// waits for any more does not begin, and then once in so many steps. A caller that said stop is not
+// asked again. One thread's; threads that share work have a poll each.
 class StopPoll {
  public:
-  // Steps are exact operations of at most about 10 us each, most of them far less.
+  // For steps that take at most about 10 us each, most of them far less.
   static constexpr uint64_t kStepsPerPoll = 1024;
 
-  explicit StopPoll(const std::function<bool()>& should_stop) : should_stop_(should_stop) {}
+  // Never stops.
+  StopPoll() = default;
+  // should_stop may be empty; it must outlive this. Requires steps_per_poll > 0; 1 polls at every
+  // step.
+  explicit StopPoll(const std::function<bool()>& should_stop,
+                    uint64_t steps_per_poll = kStepsPerPoll)
+      : should_stop_(should_stop ? &should_stop : nullptr), steps_per_poll_(steps_per_poll) {
+    HULLD_CHECK(steps_per_poll > 0);
+  }
+  explicit StopPoll(std::function<bool()>&&, uint64_t = kStepsPerPoll) = delete;
   StopPoll(const StopPoll&) = delete;
   StopPoll& operator=(const StopPoll&) = delete;
 
-  // Counts a step; whether to stop, now or since an earlier one.
-  bool Step() {
-    if (++steps_ % kStepsPerPoll == 0 && !stopped_) stopped_ = should_stop_ && should_stop_();
+  // Counts steps of work about to be done. Returns whether to stop: now, or since an earlier step.
+  bool Step(uint64_t steps = 1) {
+    if (steps_left_ >= steps) {
+      steps_left_ -= steps;
+      return stopped_;
+    }
+    steps_left_ = steps_per_poll_ - 1;
+    return Poll();
+  }
+  // Polls at once, however few steps were done.
+  bool Poll() {
+    if (!stopped_ && should_stop_ != nullptr) stopped_ = (*should_stop_)();
     return stopped_;
   }
   bool stopped() const { return stopped_; }
 
  private:
-  const std::function<bool()>& should_stop_;
-  uint64_t steps_ = 0;
+  const std::function<bool()>* should_stop_ = nullptr;
+  uint64_t steps_per_poll_ = kStepsPerPoll;
+  // Steps that may still be done without asking.
+  uint64_t steps_left_ = 0;
   bool stopped_ = false;
 };
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/stop_poll.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 
 namespace hulld {
@@ -21,8 +22,6 @@ struct IntegerPoints {
   int exponent;
   std::vector<IntegerVector> points;
 };
-
-constexpr int kAboveAllExponents = 1024;
 
 // Incomplete when stopped.
 IntegerPoints ToIntegers(std::span<const Vector> points, std::span<const Vector> also,
@@ -250,7 +249,7 @@ class FacetFilter {
     const double size = offset.cwiseAbs().sum();
     // The normal errs by 2^-52 relative to its largest component (below 2^63), offset and dot
     // product by a few 2^-53.
-    return size > 1e-280 && normal_.dot(offset) < -0x1p-48 * 0x1p63 * size;
+    return size > kAuditMinOffset && normal_.dot(offset) < -0x1p-48 * 0x1p63 * size;
   }
 
  private:

@@ -1,8 +1,11 @@
 #ifndef HULLD_CORE_NUMERIC_ERROR_BOUNDS_H_
 #define HULLD_CORE_NUMERIC_ERROR_BOUNDS_H_
 
+#include "core/numeric/exponent_limits.h"
+
 // Every floating-point error bound of core, with its derivation. All assume IEEE doubles, round to
-// nearest, gradual underflow (no FTZ/DAZ) and no contraction to FMA.
+// nearest, gradual underflow (no FTZ/DAZ), no contraction to FMA, and exponents within the range of
+// exponent_limits.h that belongs to the bound.
 namespace hulld {
 
 // Unit roundoff: |fl(x op y) - x op y| <= u |x op y| without underflow.
@@ -16,41 +19,16 @@ inline constexpr double kOrient3dErrorFactor = (7 + 56 * kUnitRoundoff) * kUnitR
 // The same for 2x2. Proven: Shewchuk 1997 (ccwerrboundA).
 inline constexpr double kOrient2dErrorFactor = (3 + 16 * kUnitRoundoff) * kUnitRoundoff;
 
-// What underflow adds to the two bounds above. A product that underflows errs by at most 2^-1075;
-// sums never err by underflow. 2x2: two products. 3x3 with differences of at most D: six products
-// times D, and three products: (6 D + 3) 2^-1075 and roundings of these, less than (D + 1) times
-// this. Proven.
-inline constexpr double kUnderflowError = 0x1p-1070;
-
-// Expansion arithmetic of degree-3 polynomials in coordinate differences is exact when every
-// non-zero coordinate is at least the first in magnitude (its lowest bit is then at least 2^-358,
-// so every product of three is a multiple of 2^-1074) and none exceeds the second (differences
-// below 2^331, sums of products below 2^996, so that splitting cannot overflow). Proven.
-inline constexpr double kExpansionMin = 0x1p-306;
-inline constexpr double kExpansionMax = 0x1p330;
-
 // The plane of a triangle a, b, c in floating point, with edges e = b - a and f = c - a: the normal
 // n = e x f errs by at most 8 u |e||f| per component (|.| the largest component), hence n . (p - a)
 // by 24 u |e||f| (|p| + |a|); the products and sums of n . p - fl(n . a) by (18 + 6) u |e||f| (|p|
 // + |a|). In total 48 u |e||f| (|p| + |a|) without underflow; 64 u leaves slack for rounding the
 // bound itself. Proven.
 inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
-// The bound is kept as a float per |p| + |a|. Outside this range e and f are first scaled by powers
-// of two to |e|, |f| in [1/2, 1). So, and with |p| + |a| at least kPlaneMinCoordinate and at most
-// kPlaneMaxCoordinate, no product overflows (2^166 * 2^600), and underflow, at most 2^-1070 in all,
-// is below 2^-50 of the slack, 16 u |e||f| (|p| + |a|) >= 2^-1011. Outside these a plane is never
-// certain. Proven.
-inline constexpr double kPlaneMinSlope = 0x1p-120;
-inline constexpr double kPlaneMaxSlope = 0x1p120;
-inline constexpr double kPlaneMinCoordinate = 0x1p-960;
-inline constexpr double kPlaneMaxCoordinate = 0x1p600;
 
 // y . (A x B) for differences y, A, B of doubles, |A|, |B|, |y| at most D: at most 48 u D^3 as
-// above; 64 u leaves slack. Used for D within these bounds, so that nothing overflows or
-// underflows. Proven.
+// above; 64 u leaves slack. For D between kTripleProductMin and kTripleProductMax. Proven.
 inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
-inline constexpr double kTripleProductMin = 0x1p-300;
-inline constexpr double kTripleProductMax = 0x1p300;
 
 // What a direction map takes off its radii; its rounding errors are below half of this (see
 // DirectionMap::Finish).
@@ -61,19 +39,9 @@ inline constexpr double kDirectionMapMargin = 0x1p-20;
 // |f|), the norm by sqrt(3) of that and 8 u of itself; a sum of s and t above 1 by u moves the
 // point by at most 2 u (|e| + |f|). 32 u covers it; kLeastPositive what underflow adds. Proven.
 inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
-inline constexpr double kLeastPositive = 0x1p-1060;
 
-// Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
-// largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
-// between these two, with directions whose largest component is between the second two. Then
-// nothing overflows: the largest quantities are a cube of 8 S, 2^909, and a direction times 8 S,
-// 2^703. Nor does underflow matter: the least bounds are 24 W^2 d with W > 6 d and d = 128 u S (see
-// kTetrahedronErrorFactor), at least 2^-1029, and 512 u |n| S, at least 2^-744; a product that
-// underflows errs by 2^-1075, far below their slack. Proven.
-inline constexpr double kFilterMinSize = 0x1p-300;
-inline constexpr double kFilterMaxSize = 0x1p300;
-inline constexpr double kDirectionMin = 0x1p-400;
-inline constexpr double kDirectionMax = 0x1p400;
+// Queries in floating point: S is the size of a pair, |.| the largest absolute component, and all
+// bounds hold for S between kFilterMinSize and kFilterMaxSize.
 
 // Entries of the rotation matrix R(q)/|q|^2, computed from q scaled by a power of two to a largest
 // component in [1/2, 1): each numerator is a sum of at most 4 products (error at most 7 u |q|^2),

@@ -3,6 +3,7 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
 
 namespace hulld {
@@ -52,9 +53,6 @@ inline IntegerVector AnyPerpendicular(const IntegerVector& d) {
   if (!d.y.is_zero() || !d.z.is_zero()) return {0, d.z, -d.y};
   return {0, 0, d.x};
 }
-
-// Above the exponent of any double's lowest bit.
-inline constexpr int kAboveAllExponents = 1024;
 
 // The exponent e of the lowest set bit of x: x is an odd multiple of 2^e. Requires x finite and not
 // 0. Exact, subnormals included.

@@ -10,6 +10,7 @@
 
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/expansion.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 
 namespace hulld {
@@ -36,7 +37,7 @@ std::optional<int> FilteredOrient3d(const Vector& r, const Vector& s, const Vect
   const double permanent = (std::abs(s_yt_z) + std::abs(s_zt_y)) * std::abs(r.x()) +
                            (std::abs(t_yr_z) + std::abs(t_zr_y)) * std::abs(s.x()) +
                            (std::abs(r_ys_z) + std::abs(r_zs_y)) * std::abs(t.x());
-  if (!(permanent < 0x1p1000)) return std::nullopt;
+  if (!(permanent < kPermanentMax)) return std::nullopt;
   // A sum of absolute values stands for the largest: it is cheaper than nine comparisons.
   const double size = std::abs(r.x()) + std::abs(r.y()) + std::abs(r.z()) + std::abs(s.x()) +
                       std::abs(s.y()) + std::abs(s.z()) + std::abs(t.x()) + std::abs(t.y()) +
@@ -156,8 +157,7 @@ int ExpansionOrient3d(const Vector& a, const Vector& b, const Vector& c, const V
 }
 
 int IntegerOrient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d) {
-  constexpr int kAboveAll = 1024;
-  int exponent = kAboveAll;
+  int exponent = kAboveAllExponents;
   for (const Vector* p : {&a, &b, &c, &d}) exponent = LowestBitExponent(*p, exponent);
   const IntegerVector origin = ToInteger(a, exponent);
   const IntegerVector r = ToInteger(b, exponent) - origin;
@@ -176,7 +176,7 @@ int ExactOrient2d(const Vector& a, const Vector& b, const Vector& c, CoordinateP
         .sign();
   }
   ++counts.integer;
-  int exponent = 1024;
+  int exponent = kAboveAllExponents;
   for (const Vector* p : {&a, &b, &c}) exponent = LowestBitExponent(*p, exponent);
   const IntegerVector origin = ToInteger(a, exponent);
   const IntegerVector r = ToInteger(b, exponent) - origin;

@@ -5,11 +5,10 @@
 #include <limits>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
-
-constexpr double kLeastDouble = std::numeric_limits<double>::denorm_min();
 
 // Bits of the quotients before they are rounded: 64 after a square root.
 constexpr int kQuotientBits = 128;
@@ -27,8 +26,7 @@ Integer Shifted(const Integer& value, int shift) {
 Rounded Round(double mantissa, int exponent) {
   const double value = std::ldexp(mantissa, exponent);
   if (std::isinf(value)) {
-    return {std::copysign(std::numeric_limits<double>::max(), mantissa),
-            std::numeric_limits<double>::infinity()};
+    return {std::copysign(kLargestDouble, mantissa), std::numeric_limits<double>::infinity()};
   }
   if (value == 0) return {std::copysign(kLeastDouble, mantissa), kLeastDouble};
   return {value, std::abs(value) * kRoundedRelativeError + kLeastDouble};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/query/exact/exact_search.h"
 
 namespace hulld {
@@ -47,6 +48,9 @@ SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n) {
   return axis;
 }
 
-Vector UnitDirection(const IntegerVector& n) { return ToScaledDoubles(n).normalized(); }
+Vector UnitDirection(const IntegerVector& n) {
+  HULLD_CHECK(!IsZero(n));
+  return ToScaledDoubles(n).normalized();
+}
 
 }  // namespace hulld

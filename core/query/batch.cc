@@ -3,7 +3,10 @@
 #include <absl/status/status.h>
 
 #include <algorithm>
-#include <atomic>
+
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
+#include "core/query/collision.h"
 
 namespace hulld {
 namespace {
@@ -21,38 +24,18 @@ std::vector<absl::StatusOr<Answer>> CheckCollisions(std::span<const PlacedHull> 
   QueryOptions each = options;
   each.threads = 1;
   const auto count = static_cast<int64_t>(pairs.size());
-#pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
-  for (int64_t i = 0; i < count; ++i) {
-    if (each.should_stop && each.should_stop()) {
-      answers[i] = absl::CancelledError("stopped");
-      continue;
-    }
-    answers[i] = CheckCollision(placements[pairs[i].a], placements[pairs[i].b], each);
-  }
-  return answers;
-}
-
-absl::StatusOr<std::vector<RelationAnswer>> FindRelations(std::span<const PlacedHull> placements,
-                                                          std::span<const PlacedPair> pairs,
-                                                          double tolerance,
-                                                          const std::function<bool()>& should_stop,
-                                                          int threads) {
-  std::vector<RelationAnswer> answers(pairs.size());
-  const auto count = static_cast<int64_t>(pairs.size());
-  std::atomic<bool> stopped = false;
-#pragma omp parallel for schedule(dynamic, kPairsPerPiece) num_threads(std::max(1, threads))
-  for (int64_t i = 0; i < count; ++i) {
-    if (stopped.load(std::memory_order_relaxed)) continue;
-    if (i % kPairsPerPiece == 0 && should_stop && should_stop()) stopped = true;
-    const absl::StatusOr<RelationAnswer> answer =
-        FindRelation(placements[pairs[i].a], placements[pairs[i].b], tolerance, should_stop);
-    if (answer.ok()) {
-      answers[i] = *answer;
-    } else {
-      stopped = true;
+#pragma omp parallel num_threads(std::max(1, threads))
+  {
+    // Most pairs take less time than the question whether to stop, hence once a piece.
+    StopPoll poll(each.should_stop, kPairsPerPiece);
+#pragma omp for schedule(dynamic, kPairsPerPiece)
+    for (int64_t i = 0; i < count; ++i) {
+      if (poll.Step()) continue;
+      const PlacedPair pair = pairs[i];
+      HULLD_CHECK(pair.a < placements.size() && pair.b < placements.size());
+      answers[i] = CheckCollision(placements[pair.a], placements[pair.b], each);
     }
   }
-  if (stopped) return absl::CancelledError("stopped");
   return answers;
 }
 

@@ -5,7 +5,9 @@
 #include <limits>
 #include <numeric>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
@@ -22,7 +24,7 @@ Box BoundingBox(const PlacedHull& placed) {
   }
   const Vector& t = placed.X_WH().t;
   const double size = placed.hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
-  if (!(size >= kFilterMinSize && size <= kFilterMaxSize)) {
+  if (!IsFilterSize(size)) {
     return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
   }
   const SupportMap& support = placed.query_hull().support();
@@ -83,7 +85,8 @@ uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end
 void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const {
   if (nodes_.empty()) return;
   // Halves leave at most 32 levels.
-  uint32_t stack[40];
+  constexpr int kMostWaiting = 40;
+  uint32_t stack[kMostWaiting];
   int height = 0;
   stack[height++] = 0;
   while (height > 0) {
@@ -91,6 +94,7 @@ void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t
     const Node& node = nodes_[index];
     if (node.largest_index < first || !node.box.Meets(box)) continue;
     if (node.second != 0) {
+      HULLD_DCHECK(height + 2 <= kMostWaiting);
       stack[height++] = node.second;
       stack[height++] = index + 1;
       continue;

@@ -9,6 +9,9 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_nearest.h"
 
 namespace hulld {
@@ -16,7 +19,7 @@ namespace {
 
 // Sign of the largest n.(a - b).
 int SignOfSupport(ExactPair& pair, const IntegerVector& n) {
-  return Sign(Dot(n, pair.VertexA(pair.FarthestA(n)) - pair.VertexB(pair.FarthestB(n))));
+  return Sign(Dot(n, pair.Farthest(n).w));
 }
 
 // n without common divisor.
@@ -40,39 +43,35 @@ std::variant<std::monostate, Vector, IntegerVector> Shortest(ExactPair& pair,
 class Surrounding {
  public:
   Surrounding(ExactPair& pair, const std::function<bool()>& should_stop)
-      : pair_(pair), should_stop_(should_stop) {}
+      : pair_(pair), poll_(should_stop, 1) {}
 
   // As long as some half-space holds all vertices found and the origin on its boundary, the
   // farthest vertex outside it is added; then those that are not needed are dropped, until each is.
   // That leaves at most six (Steinitz 1913). Requires the origin strictly inside A - B.
   absl::StatusOr<std::vector<VertexPair>> Find() {
     while (const std::optional<IntegerVector> n = Escape(corners_)) {
-      if (should_stop_ && should_stop_()) return absl::CancelledError("stopped in a certificate");
-      const VertexPair farthest = {pair_.FarthestA(*n), pair_.FarthestB(*n)};
-      corners_.push_back({pair_.VertexA(farthest.a) - pair_.VertexB(farthest.b), farthest});
+      if (poll_.Step()) return absl::CancelledError("stopped in a certificate");
+      corners_.push_back(pair_.Farthest(*n));
+      // No farthest vertex is outside the half-space unless the origin is strictly inside.
+      HULLD_CHECK(Sign(Dot(*n, corners_.back().w)) > 0);
     }
     for (size_t i = corners_.size(); i-- > 0;) {
-      std::vector<Corner> fewer = corners_;
+      std::vector<ExactCorner> fewer = corners_;
       fewer.erase(fewer.begin() + i);
       if (!Escape(fewer)) corners_ = std::move(fewer);
     }
     std::vector<VertexPair> pairs;
-    for (const Corner& corner : corners_) pairs.push_back(corner.pair);
+    for (const ExactCorner& corner : corners_) pairs.push_back(corner.pair);
     return pairs;
   }
 
  private:
-  struct Corner {
-    IntegerVector w;
-    VertexPair pair;
-  };
-
   // A direction n, not zero, with n.w <= 0 for all corners; none when the origin is strictly inside
   // their hull. The directions form a cone; when the corners span R^3 its extreme rays are cross
   // products of two of them, and when they span a plane its normal is such a product as well. The
   // direction is in the middle of the cone, the sum of its rays at about equal lengths: the corner
   // found along it cuts the cone deep, so that few are needed.
-  static std::optional<IntegerVector> Escape(const std::vector<Corner>& corners) {
+  static std::optional<IntegerVector> Escape(const std::vector<ExactCorner>& corners) {
     bool parallel = true;
     std::vector<IntegerVector> rays;
     for (size_t i = 0; i < corners.size(); ++i) {
@@ -94,7 +93,7 @@ class Surrounding {
     }
     if (!rays.empty()) return Middle(rays);
     if (!parallel) return std::nullopt;
-    for (const Corner& corner : corners) {
+    for (const ExactCorner& corner : corners) {
       if (!IsZero(corner.w)) return AnyPerpendicular(corner.w);
     }
     return IntegerVector{1, 0, 0};
@@ -112,14 +111,15 @@ class Surrounding {
   }
 
   ExactPair& pair_;
-  const std::function<bool()>& should_stop_;
-  std::vector<Corner> corners_;
+  StopPoll poll_;
+  std::vector<ExactCorner> corners_;
 };
 
 }  // namespace
 
 absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
                                             const std::function<bool()>& should_stop) {
+  HULLD_CHECK(decision.relation != Relation::kWithinTolerance);
   Certificate certificate;
   certificate.direction = decision.axis;
   if (const IntegerVector* n = std::get_if<IntegerVector>(&decision.axis)) {

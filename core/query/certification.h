@@ -13,8 +13,8 @@ namespace hulld {
 
 // What makes the decision checkable. Where the decision came from floating point with all that is
 // needed, it is copied; otherwise found in exact arithmetic. Requires a relation other than
-// kWithinTolerance, and `exact` of the same pair. CANCELLED when should_stop said so (it may be
-// empty).
+// kWithinTolerance, and `exact` of the same pair (unchecked: a decision does not name its pair).
+// CANCELLED when should_stop, which may be empty, said so.
 absl::StatusOr<Certificate> MakeCertificate(ExactPair& exact, const Decision& decision,
                                             const std::function<bool()>& should_stop);
 

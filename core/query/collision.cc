@@ -1,16 +1,15 @@
 #include "core/query/collision.h"
 
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <compare>
 #include <limits>
 #include <span>
 #include <utility>
 
+#include "core/numeric/exponent_limits.h"
 #include "core/query/axis_description.h"
 #include "core/query/certification.h"
 #include "core/query/exact/exact_pair.h"
@@ -58,7 +57,9 @@ AxisKind Mirrored(AxisKind kind) {
 
 // The answer for (B, A) from that for (A, B).
 Answer Mirrored(Answer answer) {
-  if (answer.analysis.stage) answer.analysis.stage = Mirrored(*answer.analysis.stage);
+  if (answer.analysis && answer.analysis->stage) {
+    answer.analysis->stage = Mirrored(*answer.analysis->stage);
+  }
   if (answer.axis) {
     answer.axis->direction = -answer.axis->direction;
     answer.axis->kind = Mirrored(answer.axis->kind);
@@ -84,7 +85,7 @@ std::optional<IntegerVector> ExactAxis(const Decision& decision) {
   return std::nullopt;
 }
 
-// Whether the answer needs more than the relation.
+// Whether the answer needs more than the relation, the axis and the analysis.
 bool NeedsMore(const QueryOptions& options) {
   return options.want_certificate || options.want_separation || options.want_witness ||
          options.clearance.has_value();
@@ -110,18 +111,23 @@ absl::Status AddWhatIsWanted(const FloatPair& pair, const Decision& decision, bo
     return s;
   }
   answer.separation = found.separation;
-  answer.witness = found.witness;
+  if (found.witness) answer.witness = *found.witness;
   answer.within_clearance = found.within_clearance;
   return absl::OkStatus();
 }
 
+// What is wanted of the axis: its description, and its kind for the analysis.
 void AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions& options,
              Answer& answer) {
+  if (options.want_analysis) {
+    answer.analysis = Analysis();
+    answer.analysis->axes_tested = decision.directions_tried;
+  }
   const std::optional<IntegerVector> n = ExactAxis(decision);
   if (!n) return;
   ExactPair exact(pair);
   SeparatingAxis axis = DescribeAxis(exact, *n);
-  answer.analysis.stage = axis.kind;
+  if (options.want_analysis) answer.analysis->stage = axis.kind;
   if (options.want_axis) answer.axis = std::move(axis);
 }
 
@@ -129,16 +135,18 @@ void AddAxis(const FloatPair& pair, const Decision& decision, const QueryOptions
 absl::StatusOr<Answer> CertifiedSearch(const PlacedHull& a, const PlacedHull& b,
                                        const QueryOptions& options, PairCache* cache) {
   const FloatPair pair(a, b);
-  const absl::StatusOr<Decision> decision =
-      Decide(pair, options.tolerance, cache, Purpose::kEvidence, options.should_stop);
-  if (!decision.ok()) return decision.status();
+  Decision decision;
+  if (absl::Status s =
+          Decide(pair, options.tolerance, cache, Purpose::kEvidence, options.should_stop, decision);
+      !s.ok()) {
+    return s;
+  }
   Answer answer;
-  answer.relation = decision->relation;
-  answer.rung = decision->rung;
-  answer.analysis.axes_tested = decision->directions_tried;
-  if (options.want_axis || options.want_analysis) AddAxis(pair, *decision, options, answer);
+  answer.relation = decision.relation;
+  answer.rung = decision.rung;
+  if (options.want_axis || options.want_analysis) AddAxis(pair, decision, options, answer);
   if (NeedsMore(options)) {
-    absl::Status s = AddWhatIsWanted(pair, *decision, cache == nullptr, options, answer);
+    absl::Status s = AddWhatIsWanted(pair, decision, cache == nullptr, options, answer);
     if (!s.ok()) return s;
   }
   return answer;
@@ -150,28 +158,25 @@ PairCache Mirrored(PairCache cache) {
   return cache;
 }
 
-// What the ladder decides of A and B, the axis and the pairs of which may be those of B and A.
-absl::StatusOr<Decision> DecideEither(const PlacedHull& a, const PlacedHull& b, double tolerance,
-                                      PairCache* cache, const std::function<bool()>& should_stop) {
-  if (Compare(a, b) <= 0)
-    return Decide(FloatPair(a, b), tolerance, cache, Purpose::kRelation, should_stop);
-  if (cache != nullptr) *cache = Mirrored(*cache);
-  absl::StatusOr<Decision> decision =
-      Decide(FloatPair(b, a), tolerance, cache, Purpose::kRelation, should_stop);
-  if (cache != nullptr) *cache = Mirrored(*cache);
-  return decision;
-}
-
 // The relation and nothing else, which is what most callers want of most pairs.
 absl::StatusOr<Answer> RelationOnly(const PlacedHull& a, const PlacedHull& b,
                                     const QueryOptions& options, PairCache* cache) {
-  const absl::StatusOr<Decision> decision =
-      DecideEither(a, b, options.tolerance, cache, options.should_stop);
-  if (!decision.ok()) return decision.status();
+  // The relation of B and A is that of A and B: only the cache tells them apart.
+  const bool swapped = Compare(a, b) > 0;
+  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  Decision decision;
+  const absl::Status decided =
+      Decide(swapped ? FloatPair(b, a) : FloatPair(a, b), options.tolerance, cache,
+             Purpose::kRelation, options.should_stop, decision);
+  if (swapped && cache != nullptr) *cache = Mirrored(*cache);
+  // One variable for every return, so that it is made in its place.
   absl::StatusOr<Answer> answer(absl::in_place);
-  answer->relation = decision->relation;
-  answer->rung = decision->rung;
-  answer->analysis.axes_tested = decision->directions_tried;
+  if (decided.ok()) {
+    answer->relation = decision.relation;
+    answer->rung = decision.rung;
+  } else {
+    answer = decided;
+  }
   return answer;
 }
 
@@ -197,12 +202,13 @@ absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
   if (!more.ok()) return more;
   more->rung = answer->rung;
   more->axis = std::move(answer->axis);
-  more->analysis = answer->analysis;
+  more->analysis = std::move(answer->analysis);
   return more;
 }
 
 Answer AnswerOfEmpty(const QueryOptions& options) {
   Answer answer;
+  if (options.want_analysis) answer.analysis = Analysis();
   if (options.want_separation) {
     answer.separation = Separation{std::numeric_limits<double>::infinity(), 0};
   }
@@ -210,49 +216,22 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
   return answer;
 }
 
-absl::Status CheckLength(const char* name, double length) {
-  if (length >= 0) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat(name, std::isnan(length) ? " is NaN" : " is negative"));
-}
-
-absl::Status ValidateOptions(const QueryOptions& options) {
-  if (absl::Status s = CheckLength("tolerance", options.tolerance); !s.ok()) return s;
-  if (absl::Status s = CheckLength("max_error", options.max_error.value_or(0)); !s.ok()) return s;
-  if (std::isnan(options.clearance.value_or(0))) {
-    return absl::InvalidArgumentError("clearance is NaN");
-  }
-  if (options.tolerance == 0) return absl::OkStatus();
-  const char* excluded = options.want_separation                  ? "separation"
-                         : options.want_witness                   ? "witness points"
-                         : options.want_certificate               ? "certificate"
-                         : options.clearance.has_value()          ? "clearance"
-                         : options.method == Method::kTextbookSat ? "textbook method"
-                                                                  : nullptr;
-  if (excluded == nullptr) return absl::OkStatus();
-  return absl::InvalidArgumentError(absl::StrCat(
-      "the ", excluded, " needs the relation, which a tolerance > 0 may leave open; ask with 0"));
-}
-
 }  // namespace
 
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {
-  if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
-  if (options.method == Method::kCertifiedSearch && !options.want_axis && !options.want_analysis &&
-      !NeedsMore(options) && !a.hull().empty() && !b.hull().empty()) {
-    return RelationOnly(a, b, options, cache);
+  // The default needs no look at the rest.
+  if (options.tolerance != 0 || options.max_error || options.clearance) {
+    if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
   }
+  if (a.hull().empty() || b.hull().empty()) return AnswerOfEmpty(options);
+  if (options.WantsRelationOnly()) return RelationOnly(a, b, options, cache);
   std::optional<std::chrono::steady_clock::time_point> start;
   if (options.want_analysis) start = std::chrono::steady_clock::now();
-  absl::StatusOr<Answer> answer;
-  if (a.hull().empty() || b.hull().empty()) {
-    answer = AnswerOfEmpty(options);
-  } else {
-    answer = options.method == Method::kTextbookSat ? Textbook(a, b, options)
-                                                    : CertifiedSearchOfEither(a, b, options, cache);
-  }
-  if (answer.ok() && start) answer->analysis.time = std::chrono::steady_clock::now() - *start;
+  absl::StatusOr<Answer> answer = options.method == Method::kTextbookSat
+                                      ? Textbook(a, b, options)
+                                      : CertifiedSearchOfEither(a, b, options, cache);
+  if (answer.ok() && start) answer->analysis->time = std::chrono::steady_clock::now() - *start;
   return answer;
 }
 
@@ -265,25 +244,6 @@ absl::StatusOr<Answer> CheckCollision(const Hull& a, const Pose& X_WA, const Hul
   const absl::StatusOr<PlacedHull> placed_b = PlacedHull::Make(query_b, X_WB);
   if (!placed_b.ok()) return placed_b.status();
   return CheckCollision(*placed_a, *placed_b, options);
-}
-
-absl::StatusOr<RelationAnswer> FindRelation(const PlacedHull& a, const PlacedHull& b,
-                                            double tolerance,
-                                            const std::function<bool()>& should_stop) {
-  if (a.hull().empty() || b.hull().empty()) {
-    return RelationAnswer{Relation::kSeparated, Answer().rung};
-  }
-  const absl::StatusOr<Decision> decision = DecideEither(a, b, tolerance, nullptr, should_stop);
-  if (!decision.ok()) return decision.status();
-  return RelationAnswer{decision->relation, decision->rung};
-}
-
-RelationAnswer FindRelation(const PlacedHull& a, const PlacedHull& b, PairCache* cache,
-                            double tolerance) {
-  if (a.hull().empty() || b.hull().empty()) return {Relation::kSeparated, Rung::kBounds};
-  const absl::StatusOr<Decision> decision = DecideEither(a, b, tolerance, cache, {});
-  // Nothing stops the search.
-  return {decision->relation, decision->rung};
 }
 
 }  // namespace hulld

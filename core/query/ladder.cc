@@ -4,7 +4,9 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_pair.h"
 #include "core/query/exact/exact_search.h"
 #include "core/query/floating/float_search.h"
@@ -39,7 +41,7 @@ std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVe
 // Whether bounds about the centres may settle a pair that spheres do not.
 bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
   const double largest = LargestComponent(n);
-  if (!(largest >= kDirectionMin && largest <= kDirectionMax)) return false;
+  if (!IsFilterDirection(largest)) return false;
   const QueryHull& a = pair.a().query_hull();
   const QueryHull& b = pair.b().query_hull();
   if (!a.center_bounds().coarse() && !b.center_bounds().coarse()) return true;
@@ -65,15 +67,16 @@ bool CentersMayTell(const FloatPair& pair, const PlainVector& n) {
 
 Relation RelationOf(FloatVerdict verdict) {
   switch (verdict) {
+    case FloatVerdict::kSeparated:
+      return Relation::kSeparated;
     case FloatVerdict::kOverlapping:
       return Relation::kOverlapping;
     case FloatVerdict::kWithinTolerance:
       return Relation::kWithinTolerance;
-    case FloatVerdict::kSeparated:
     case FloatVerdict::kUndecided:
       break;
   }
-  return Relation::kSeparated;
+  HULLD_UNREACHABLE();
 }
 
 void Accept(const FloatSearchResult& found, Rung rung, Decision& decision) {
@@ -96,43 +99,42 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   }
 }
 
-}  // namespace
-
-absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
-                                Purpose purpose, const std::function<bool()>& should_stop) {
-  Decision decision;
-  if (pair.usable()) {
-    const PlainVector n = -pair.CenterDifference();
-    if (SpheresSeparate(pair, n)) {
-      decision.axis = Vector(n);
-      return decision;
-    }
-    if (cache != nullptr) {
-      const FloatSearchResult found = TryCached(pair, *cache);
-      decision.directions_tried += found.directions_tried;
-      if (found.verdict != FloatVerdict::kUndecided) {
-        Accept(found, Rung::kCached, decision);
-        return decision;
-      }
-    }
-    PlainVector first = n;
-    if (purpose == Purpose::kRelation) {
-      if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
-        decision.relation = *relation;
-        if (*relation == Relation::kSeparated) decision.axis = Vector(n);
-        // What it suggested failed, and would cost the next query more than these bounds.
-        if (cache != nullptr) *cache = PairCache();
-        return decision;
-      }
-    }
-    const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
+// The rungs below exact arithmetic; false when none of them decides. Requires pair.usable().
+bool DecideInFloatingPoint(const FloatPair& pair, double tolerance, PairCache* cache,
+                           Purpose purpose, Decision& decision) {
+  const PlainVector n = -pair.CenterDifference();
+  if (SpheresSeparate(pair, n)) {
+    decision.axis = Vector(n);
+    return true;
+  }
+  if (cache != nullptr) {
+    const FloatSearchResult found = TryCached(pair, *cache);
     decision.directions_tried += found.directions_tried;
-    if (cache != nullptr) Remember(found, *cache);
     if (found.verdict != FloatVerdict::kUndecided) {
-      Accept(found, Rung::kFloatingPoint, decision);
-      return decision;
+      Accept(found, Rung::kCached, decision);
+      return true;
     }
   }
+  PlainVector first = n;
+  if (purpose == Purpose::kRelation) {
+    if (const std::optional<Relation> relation = LookAtCenters(pair, n, first)) {
+      decision.relation = *relation;
+      if (*relation == Relation::kSeparated) decision.axis = Vector(n);
+      // What it suggested failed, and would cost the next query more than these bounds.
+      if (cache != nullptr) *cache = PairCache();
+      return true;
+    }
+  }
+  const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
+  decision.directions_tried += found.directions_tried;
+  if (cache != nullptr) Remember(found, *cache);
+  if (found.verdict == FloatVerdict::kUndecided) return false;
+  Accept(found, Rung::kFloatingPoint, decision);
+  return true;
+}
+
+absl::Status DecideExactly(const FloatPair& pair, const std::function<bool()>& should_stop,
+                           Decision& decision) {
   ExactPair exact(pair);
   absl::StatusOr<ExactSearchResult> found = SearchExactly(exact, should_stop);
   if (!found.ok()) return found.status();
@@ -140,9 +142,21 @@ absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCac
   decision.rung = Rung::kExact;
   decision.directions_tried += found->directions_tried;
   if (found->axis) decision.axis = *std::move(found->axis);
+  HULLD_CHECK(found->pairs.size() <= decision.pairs.size());
   decision.pair_count = static_cast<uint32_t>(found->pairs.size());
   std::copy(found->pairs.begin(), found->pairs.end(), decision.pairs.begin());
-  return decision;
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
+                    const std::function<bool()>& should_stop, Decision& decision) {
+  HULLD_DCHECK(tolerance >= 0);
+  if (pair.usable() && DecideInFloatingPoint(pair, tolerance, cache, purpose, decision)) {
+    return absl::OkStatus();
+  }
+  return DecideExactly(pair, should_stop, decision);
 }
 
 }  // namespace hulld

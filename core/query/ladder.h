@@ -1,16 +1,20 @@
 #ifndef HULLD_CORE_QUERY_LADDER_H_
 #define HULLD_CORE_QUERY_LADDER_H_
 
-#include <absl/status/statusor.h>
+#include <absl/status/status.h>
 
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <variant>
 
-#include "core/query/collision.h"
+#include "core/numeric/integer.h"
+#include "core/numeric/vector.h"
 #include "core/query/floating/float_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/pair_cache.h"
+#include "core/query/terms/relation.h"
+#include "core/query/terms/rung.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -33,13 +37,13 @@ enum class Purpose {
   kEvidence,  // also for what the search found: axis and pairs
 };
 
-// The ladder: each rung answers only what its own error bound proves. Spheres round the hulls; what
-// the cache suggests; for the relation alone, how far the hulls reach along the line of their
-// centres; the hulls in floating point; exact arithmetic. Requires hulls not empty. Updates the
-// cache, which may be null. CANCELLED when should_stop said so (it may be empty); only the exact
-// rung asks it.
-absl::StatusOr<Decision> Decide(const FloatPair& pair, double tolerance, PairCache* cache,
-                                Purpose purpose, const std::function<bool()>& should_stop);
+// The ladder. Fills `decision`, which is as made: each rung answers only what its own error bound
+// proves. Spheres round the hulls; what the cache suggests; for the relation alone, how far the
+// hulls reach along the line of their centres; the hulls in floating point; exact arithmetic.
+// Requires tolerance >= 0. Updates the cache, which may be null and otherwise is of these two
+// hulls. CANCELLED when should_stop, which may be empty, said so; only the exact rung asks it.
+absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, Purpose purpose,
+                    const std::function<bool()>& should_stop, Decision& decision);
 
 }  // namespace hulld
 

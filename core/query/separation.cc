@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/rational.h"
 #include "core/query/exact/exact_depth.h"
@@ -17,6 +18,7 @@
 #include "core/query/floating/float_depth.h"
 #include "core/query/floating/float_distance.h"
 #include "core/query/floating/float_search.h"
+#include "core/query/terms/query_options.h"
 #include "core/query/terms/separation_bounds.h"
 
 namespace hulld {
@@ -232,6 +234,7 @@ class SeparationSearch {
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,
                             const SeparationRequest& request,
                             const std::function<bool()>& should_stop, SeparationAnswer& answer) {
+  HULLD_CHECK(decision.relation != Relation::kWithinTolerance);
   SeparationSearch search(pair, decision, cold, should_stop);
   if (request.separation || request.witness) {
     if (absl::Status s = search.AddValues(request, answer); !s.ok()) return s;

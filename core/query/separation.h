@@ -6,9 +6,9 @@
 #include <functional>
 #include <optional>
 
-#include "core/query/collision.h"
 #include "core/query/floating/float_pair.h"
 #include "core/query/ladder.h"
+#include "core/query/terms/separation.h"
 
 namespace hulld {
 

@@ -10,7 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 #include "core/numeric/vector.h"
 #include "core/query/axis_description.h"
@@ -72,8 +75,8 @@ class AxisTable {
       const double bound = kGapNormalFactor * normal.error * filter_.size() +
                            kGapPositionFactor * normal.n.cwiseAbs().maxCoeff() * d;
       // Written so that a bound that underflowed to zero, or a NaN, is never certain.
-      if (bound > kLeastBound && gap > bound) return Gap::kSeparated;
-      if (bound > kLeastBound && gap < -bound) return Gap::kOverlap;
+      if (bound > kGapMinBound && gap > bound) return Gap::kSeparated;
+      if (bound > kGapMinBound && gap < -bound) return Gap::kOverlap;
     }
     return ExactGap(Exact(axis));
   }
@@ -81,13 +84,12 @@ class AxisTable {
   // The exact axis, turned so that it points from A towards B. Requires a gap of at least zero.
   IntegerVector Oriented(uint64_t axis) {
     const IntegerVector n = Exact(axis);
-    return SignOfGap(n) >= 0 ? n : -n;
+    if (SignOfGap(n) >= 0) return n;
+    HULLD_DCHECK(SignOfGap(-n) >= 0);
+    return -n;
   }
 
  private:
-  // Far above the underflow threshold, so that the bound itself is accurate.
-  static constexpr double kLeastBound = 0x1p-900;
-
   // Facet corners, or the ends of an edge of A and of an edge of B.
   std::pair<Edge, Edge> EdgePair(uint64_t axis) const {
     const uint64_t pair = axis - facets_a_ - facets_b_;
@@ -218,17 +220,20 @@ struct Scan {
 
   void Run(AxisTable& axes, const QueryOptions& options) {
     const auto blocks = static_cast<int64_t>((axes.size() + kAxesPerPoll - 1) / kAxesPerPoll);
-#pragma omp parallel for schedule(dynamic) \
-    num_threads(std::max(1, options.threads)) if (options.threads > 1)
-    for (int64_t block = 0; block < blocks; ++block) {
-      if (stopped.load(std::memory_order_relaxed)) continue;
-      const uint64_t first = static_cast<uint64_t>(block) * kAxesPerPoll;
-      if (first > separated.load(std::memory_order_relaxed)) continue;
-      if (options.should_stop && options.should_stop()) {
-        stopped = true;
-        continue;
+#pragma omp parallel num_threads(std::max(1, options.threads)) if (options.threads > 1)
+    {
+      StopPoll poll(options.should_stop, 1);
+#pragma omp for schedule(dynamic)
+      for (int64_t block = 0; block < blocks; ++block) {
+        if (stopped.load(std::memory_order_relaxed)) continue;
+        const uint64_t first = static_cast<uint64_t>(block) * kAxesPerPoll;
+        if (first > separated.load(std::memory_order_relaxed)) continue;
+        if (poll.Step()) {
+          stopped = true;
+          continue;
+        }
+        RunBlock(axes, first, std::min(first + kAxesPerPoll, axes.size()));
       }
-      RunBlock(axes, first, std::min(first + kAxesPerPoll, axes.size()));
     }
   }
 
@@ -256,6 +261,7 @@ absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull&
                                    const QueryOptions& options) {
   const Hull& a = placed_a.hull();
   const Hull& b = placed_b.hull();
+  HULLD_CHECK(!a.empty() && !b.empty());
   // Before anything is computed, and again with the axes of a flat difference.
   const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
   if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;
@@ -269,25 +275,30 @@ absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull&
 
   Answer answer;
   answer.rung = Rung::kExact;
-  answer.analysis.axes_total = axes.size();
-  answer.analysis.axes_tested = axes.size();
   uint64_t found = kNone;
   if (scan.separated != kNone) {
     answer.relation = Relation::kSeparated;
     found = scan.separated;
-    answer.analysis.axes_tested = found + 1;
   } else if (scan.zero != kNone) {
     answer.relation = Relation::kTouching;
     found = scan.zero;
   } else {
     answer.relation = Relation::kOverlapping;
   }
-  if (found == kNone) return answer;
-  answer.analysis.stage = axes.KindOf(found);
-  answer.analysis.axis_index = found;
-  if (options.want_axis) {
-    answer.axis = DescribeAxis(exact, axes.Oriented(found));
-    answer.axis->kind = axes.KindOf(found);
+  if (options.want_analysis) {
+    Analysis analysis;
+    analysis.axes_total = axes.size();
+    analysis.axes_tested = answer.relation == Relation::kSeparated ? found + 1 : axes.size();
+    if (found != kNone) {
+      analysis.stage = axes.KindOf(found);
+      analysis.axis_index = found;
+    }
+    answer.analysis = analysis;
+  }
+  if (options.want_axis && found != kNone) {
+    SeparatingAxis axis = DescribeAxis(exact, axes.Oriented(found));
+    axis.kind = axes.KindOf(found);
+    answer.axis = std::move(axis);
   }
   return answer;
 }

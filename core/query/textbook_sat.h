@@ -3,7 +3,9 @@
 
 #include <absl/status/statusor.h>
 
-#include "core/query/collision.h"
+#include "core/query/placed/placed_hull.h"
+#include "core/query/terms/answer.h"
+#include "core/query/terms/query_options.h"
 
 namespace hulld {
 

@@ -30,15 +30,8 @@ absl::Status CheckSeesAll(const Caller& caller) {
 grpc::ServerWriteReactor<v1::SaveBackupResponse>* BackupStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Store& store,
     const Registry& registry, WorkerPool& readers) {
-  auto* stream = new BackupStream(context, admission, readers);
-  absl::Status begun = stream->call_.Begin();
-  if (begun.ok()) begun = CheckSeesAll(stream->call_.caller());
-  if (begun.ok()) {
-    readers.Submit([stream, &store, &registry] { stream->Open(store, registry); });
-  } else {
-    stream->Finish(stream->call_.End(begun));
-  }
-  return stream;
+  return Launch(std::shared_ptr<BackupStream>(
+      new BackupStream(context, admission, store, registry, readers)));
 }
 
 BackupStream::~BackupStream() {
@@ -46,9 +39,17 @@ BackupStream::~BackupStream() {
   if (!directory_.empty()) std::filesystem::remove_all(directory_, error);
 }
 
-void BackupStream::Open(Store& store, const Registry& registry) {
-  absl::StatusOr<std::string> directory = store.MakeCopy();
-  if (!directory.ok()) return Finish(call_.End(directory.status()));
+void BackupStream::Open() {
+  if (absl::Status s = CheckSeesAll(call().caller()); !s.ok()) return FinishCall(s);
+  RunOn(readers_, [this] {
+    if (absl::Status s = Begin(); !s.ok()) return FinishCall(s);
+    Send();
+  });
+}
+
+absl::Status BackupStream::Begin() {
+  absl::StatusOr<std::string> directory = store_.MakeCopy();
+  if (!directory.ok()) return directory.status();
   directory_ = *std::move(directory);
   std::error_code error;
   for (auto entry = std::filesystem::recursive_directory_iterator(directory_, error);
@@ -58,36 +59,32 @@ void BackupStream::Open(Store& store, const Registry& registry) {
     }
   }
   if (error) {
-    return Finish(
-        call_.End(absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()))));
+    return absl::UnavailableError(absl::StrCat("cannot list the copy: ", error.message()));
   }
   std::sort(files_.rbegin(), files_.rend());
   spdlog::info("a backup of the store is being saved");
-  v1::BackupBegin* begin = message_.mutable_begin();
-  EncodeHeader(store, registry.Sizes().store_revision, begin->mutable_header());
+  v1::BackupBegin* begin = reply().mutable_begin();
+  EncodeHeader(store_, registry_.Sizes().store_revision, begin->mutable_header());
   begin->set_version(HULLD_VERSION);
   begin->set_store_format(kStoreFormat);
-  StartWrite(&message_);
+  return absl::OkStatus();
 }
 
-void BackupStream::OnWriteDone(bool ok) {
-  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
-  if (!ok) return Finish(call_.End(absl::CancelledError("the client is gone")));
-  readers_.Submit([this] { SendNext(); });
-}
-
-void BackupStream::SendNext() {
-  const absl::StatusOr<bool> more = NextMessage();
-  if (!more.ok()) return Finish(call_.End(more.status()));
-  if (!*more) return Finish(call_.End(absl::OkStatus()));
-  StartWrite(&message_);
+// Reads files, so not on gRPC's thread.
+void BackupStream::OnSent() {
+  RunOn(readers_, [this] {
+    const absl::StatusOr<bool> more = NextMessage();
+    if (!more.ok()) return FinishCall(more.status());
+    if (!*more) return FinishCall(absl::OkStatus());
+    Send();
+  });
 }
 
 absl::StatusOr<bool> BackupStream::NextMessage() {
-  message_.Clear();
+  reply().Clear();
   if (!files_.empty()) return NextPiece();
   if (std::exchange(ended_, true)) return false;
-  *message_.mutable_end() = totals_;
+  *reply().mutable_end() = totals_;
   return true;
 }
 
@@ -100,7 +97,7 @@ absl::StatusOr<bool> BackupStream::NextPiece() {
     file_ = std::ifstream(directory_ + "/" + path, std::ios::binary);
     if (!file_) return failure();
   }
-  v1::BackupPiece* piece = message_.mutable_piece();
+  v1::BackupPiece* piece = reply().mutable_piece();
   std::string& data = *piece->mutable_data();
   data.resize(Config::kReplyMessageBytes);
   file_.read(data.data(), static_cast<std::streamsize>(data.size()));

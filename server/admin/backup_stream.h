@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "hulld/v1/maintenance.pb.h"
-#include "server/call/call.h"
+#include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/store/store.h"
@@ -19,30 +19,37 @@
 namespace hulld::server {
 
 // One SaveBackup call: makes a copy of the store, sends its files piece by piece, each read when
-// the one before is sent, and removes the copy. It owns itself until gRPC is done with it.
-class BackupStream : public grpc::ServerWriteReactor<v1::SaveBackupResponse> {
+// the one before is sent, and removes the copy.
+class BackupStream : public PulledStream<grpc::ServerWriteReactor<v1::SaveBackupResponse>,
+                                         v1::SaveBackupResponse> {
  public:
+  // Removes the copy.
+  ~BackupStream() override;
+
   static grpc::ServerWriteReactor<v1::SaveBackupResponse>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Store& store,
       const Registry& registry, WorkerPool& readers);
 
  private:
-  BackupStream(grpc::CallbackServerContext& context, Admission& admission, WorkerPool& readers)
-      : readers_(readers), call_(context, admission, Rpc::kSaveBackup) {}
-  ~BackupStream() override;
+  BackupStream(grpc::CallbackServerContext& context, Admission& admission, Store& store,
+               const Registry& registry, WorkerPool& readers)
+      : PulledStream(context, admission, Rpc::kSaveBackup),
+        store_(store),
+        registry_(registry),
+        readers_(readers) {}
 
-  void OnWriteDone(bool ok) override;
-  void OnCancel() override { call_.Cancel(); }
-  void OnDone() override { delete this; }
+  void Open() override;
+  void OnSent() override;
 
-  void Open(Store& store, const Registry& registry);
-  void SendNext();
-  // Fills message_ with the next part; false when all are sent.
+  // Makes the copy, and the message that precedes its files.
+  absl::Status Begin();
+  // Fills the reply with the next part; false when all are sent.
   absl::StatusOr<bool> NextMessage();
   absl::StatusOr<bool> NextPiece();
 
+  Store& store_;
+  const Registry& registry_;
   WorkerPool& readers_;
-  Call call_;
   std::string directory_;
   // Relative to directory_; the last is sent first.
   std::vector<std::string> files_;
@@ -50,7 +57,6 @@ class BackupStream : public grpc::ServerWriteReactor<v1::SaveBackupResponse> {
   uint64_t offset_ = 0;
   v1::BackupEnd totals_;
   bool ended_ = false;
-  v1::SaveBackupResponse message_;
 };
 
 }  // namespace hulld::server

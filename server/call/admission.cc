@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 
@@ -40,7 +41,7 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kSaveBackup:
       return CallKind::kStream;
   }
-  return CallKind::kUnary;
+  HULLD_UNREACHABLE();
 }
 
 Admission::Ticket::Ticket(Ticket&& other) noexcept
@@ -63,6 +64,7 @@ Admission::Admission(const Limits& limits, Metrics& metrics) : limits_(limits), 
 }
 
 Admission::~Admission() {
+  HULLD_CHECK(running_ == 0);
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -169,9 +171,13 @@ void Admission::Leave(Ticket& ticket) {
       watched = ticket.watched_->call;
       (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
     }
-    if (ticket.kind_ == CallKind::kBatch) --batches_;
+    if (ticket.kind_ == CallKind::kBatch) {
+      HULLD_CHECK(batches_ > 0);
+      --batches_;
+    }
     if (ticket.kind_ == CallKind::kStream) {
       const auto open = streams_.find(ticket.client_);
+      HULLD_CHECK(open != streams_.end());
       if (--open->second == 0) streams_.erase(open);
     }
     if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();

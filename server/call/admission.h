@@ -99,7 +99,7 @@ class Admission {
   size_t running() const { return running_.load(std::memory_order_relaxed); }
 
  private:
-  // Both require the mutex.
+  // Both require the mutex; unchecked, as a std::mutex cannot tell who holds it.
   absl::Status CheckRoom(CallKind kind, const std::string& client);
   void Watch(grpc_call* call, Ticket* ticket);
 

@@ -156,7 +156,7 @@ absl::Status PlacementTable::Resolve(Registry& registry, const std::function<boo
 PlacedHull PlacementTable::Place(size_t i) const {
   if (!is_answerable(i)) return *PlacedHull::Make(NoHull(), Pose());
   const Entry& entry = entries_[i];
-  return *PlacedHull::Make(hulls_[*entry.hull]->snapshot->query_hull(), entry.pose);
+  return *PlacedHull::Make(hulls_[*entry.hull]->served->query_hull(), entry.pose);
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {

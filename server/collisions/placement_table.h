@@ -49,7 +49,7 @@ class PlacementTable {
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
 
-  // Requires a valid pose.
+  // Requires a valid pose, which is checked where the hull is placed.
   void Move(size_t i, const Pose& X_WH);
 
   // The store's revision of the last Resolve.

@@ -1,5 +1,7 @@
 #include "server/contract/rpc.h"
 
+#include "core/base/check.h"
+
 namespace hulld::server {
 
 const char* RpcName(Rpc rpc) {
@@ -31,7 +33,7 @@ const char* RpcName(Rpc rpc) {
     case Rpc::kSaveBackup:
       return "SaveBackup";
   }
-  return "unknown";
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace hulld::server

@@ -107,12 +107,12 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   const auto& [revision, view] = *resolved;
   EncodeHeader(registry_.store(), revision, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
-  response->set_edge_count(view.snapshot->hull().edges().size());
-  response->set_facet_count(view.snapshot->hull().facet_count());
-  EncodeBox(view.snapshot->hull(), response);
+  response->set_edge_count(view.served->hull().edges().size());
+  response->set_facet_count(view.served->hull().facet_count());
+  EncodeBox(view.served->hull(), response);
   if (request.audit()) {
     const absl::Status finding =
-        AuditHull(view.snapshot->hull(), [&call] { return call.ShouldStop(); });
+        AuditHull(view.served->hull(), [&call] { return call.ShouldStop(); });
     if (absl::IsCancelled(finding)) return finding;
     response->mutable_audit()->set_ok(finding.ok());
     if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "core/hull/hull.h"
@@ -23,8 +22,6 @@ class BatchColumns {
 
   // The answer for the next pair, of hulls a and b, or why there is none.
   void Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b);
-  // The answers for the next pairs, when nothing but the relation is wanted.
-  void Add(std::span<const RelationAnswer> answers);
   // The next pair has no answer; its placements give the cause.
   void AddUnanswered();
 

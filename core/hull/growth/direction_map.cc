@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/simd_path.h"
 
 #ifdef HULLD_HAS_AVX2_PATH
@@ -30,12 +31,7 @@ void DirectionMap::AppendCell(double reach, uint32_t hint) {
 }
 
 Vector DirectionMap::CornerDirection(int face, int i, int j) const {
-  const int axis = face / 2;
-  Vector direction;
-  direction[axis] = face % 2 == 0 ? 1 : -1;
-  direction[kNext[axis]] = (i - half_) / half_;
-  direction[kNext[axis + 1]] = (j - half_) / half_;
-  return direction;
+  return CubeDirection(static_cast<uint32_t>(face), (i - half_) / half_, (j - half_) / half_);
 }
 
 // The gauge g of the set round c is convex and subadditive. A point's computed direction u is
@@ -94,8 +90,8 @@ __attribute__((target("avx2"))) inline __m256d CellIndices(__m256d component, __
 
 }  // namespace
 
-// Four points at a time, operation by operation as PlaceOf computes, so that the results are the
-// same. Returns how many points it has done.
+// Four points at a time, operation by operation as PlaceOf and OnCube compute, so that the results
+// are the same. Returns how many points it has done.
 __attribute__((target("avx2"))) size_t DirectionMap::AppendSurvivorsAvx2(
     std::span<const Vector> points, std::vector<uint32_t>& survivors) const {
   const __m256d center_x = _mm256_set1_pd(center_.x());
@@ -106,8 +102,8 @@ __attribute__((target("avx2"))) size_t DirectionMap::AppendSurvivorsAvx2(
   const __m256d half = _mm256_set1_pd(half_);
   const __m256d n = _mm256_set1_pd(n_);
   const __m256d last = _mm256_set1_pd(n_ - 1);
-  const __m256d least = _mm256_set1_pd(kLeastDistance);
-  const __m256d largest = _mm256_set1_pd(kLargestDistance);
+  const __m256d least = _mm256_set1_pd(kMapMinDistance);
+  const __m256d largest = _mm256_set1_pd(kMapMaxDistance);
   size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
     const double* p = points[i].data();

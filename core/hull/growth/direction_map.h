@@ -8,7 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "core/hull/hull.h"
+#include "core/numeric/cube_map.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 
@@ -51,22 +53,16 @@ class DirectionMap {
   // The same for a map of any resolution.
   static Place PlaceIn(const Vector& center, int resolution, const Vector& point) {
     const Vector v = point - center;
-    const double x = std::abs(v.x());
-    const double y = std::abs(v.y());
-    const double z = std::abs(v.z());
-    // No branches that depend on the direction.
-    const double larger = std::max(x, y);
-    const double m = std::max(larger, z);
-    const int of_two = y > x ? 1 : 0;
-    const int axis = z > larger ? 2 : of_two;
+    const OnCube on_cube(v.x(), v.y(), v.z());
+    const double m = on_cube.largest();
     if (m == 0) return {0, 0};
-    if (!(m >= kLeastDistance && m <= kLargestDistance)) return {0, INFINITY};
+    if (!(m >= kMapMinDistance && m <= kMapMaxDistance)) return {0, INFINITY};
     const double half = 0.5 * resolution;
     const double scale = half / m;
-    const int i = std::min(resolution - 1, static_cast<int>(v[kNext[axis]] * scale + half));
-    const int j = std::min(resolution - 1, static_cast<int>(v[kNext[axis + 1]] * scale + half));
-    const int face = 2 * axis + static_cast<int>(v[axis] < 0);
-    return {static_cast<size_t>((face * resolution + i) * resolution + j), m};
+    const int i = std::min(resolution - 1, static_cast<int>(on_cube.first() * scale + half));
+    const int j = std::min(resolution - 1, static_cast<int>(on_cube.second() * scale + half));
+    const auto side = static_cast<uint32_t>(resolution);
+    return {CubeCell(on_cube.face(), side, static_cast<uint32_t>(i), static_cast<uint32_t>(j)), m};
   }
   bool IsCertainlyInside(const Place& place) const {
     return rejects_ && place.distance < radii_[place.cell];
@@ -93,9 +89,6 @@ class DirectionMap {
   size_t AppendSurvivorsAvx2(std::span<const Vector> points,
                              std::vector<uint32_t>& survivors) const;
 
-  static constexpr int kNext[] = {1, 2, 0, 1};
-  static constexpr double kLeastDistance = 0x1p-1000;
-  static constexpr double kLargestDistance = 0x1p1000;
 
   Vector center_;
   int n_;

@@ -16,6 +16,7 @@
 #include "core/hull/growth/polygon_boundary.h"
 #include "core/hull/growth/surface.h"
 #include "core/hull/growth/vertex_table.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"
 
 namespace hulld {
@@ -30,7 +31,6 @@ constexpr size_t kPointsPerPoll = 256;
 constexpr size_t kExtremesSample = 4096;
 // From this many points on, threads save more than they cost.
 constexpr size_t kWorthThreads = 65536;
-constexpr double kLargest = std::numeric_limits<double>::max();
 // From this many points on, the order of insertion is worth choosing.
 constexpr size_t kWorthOrdering = 128;
 
@@ -38,7 +38,7 @@ constexpr size_t kWorthOrdering = 128;
 bool AreFinite(std::span<const Vector> points) {
   int64_t bad = 0;
   for (const Vector& p : points) {
-    for (int k = 0; k < 3; ++k) bad |= std::abs(p[k]) <= kLargest ? 0 : 1;
+    for (int k = 0; k < 3; ++k) bad |= std::abs(p[k]) <= kLargestDouble ? 0 : 1;
   }
   return bad == 0;
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"
 #include "core/numeric/vector.h"
 

@@ -12,7 +12,7 @@
 #include "core/hull/growth/chunked_vector.h"
 #include "core/hull/growth/direction_map.h"
 #include "core/hull/growth/vertex_table.h"
-#include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 

@@ -3,34 +3,44 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/numeric/nearest_on_triangle.h"
 
 namespace hulld {
 namespace {
 
 // Coordinates of the point of the triangle a, a + e, a + f nearest to a + p, as a + s e + t f with
-// s, t >= 0 and s + t <= 1. Source: Ericson 2005, Real-Time Collision Detection, section 5.1.5.
+// s, t >= 0 and s + t <= 1, up to rounding.
 std::pair<double, double> NearestOnTriangle(const Vector& e, const Vector& f, const Vector& p) {
-  const double d1 = e.dot(p);
-  const double d2 = f.dot(p);
-  if (d1 <= 0 && d2 <= 0) return {0, 0};
-  const double d3 = e.dot(p - e);
-  const double d4 = f.dot(p - e);
-  if (d3 >= 0 && d4 <= d3) return {1, 0};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
-  const double d5 = e.dot(p - f);
-  const double d6 = f.dot(p - f);
-  if (d6 >= 0 && d5 <= d6) return {0, 1};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    const double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-    return {1 - t, t};
+  const TriangleNearest nearest = FindNearestOnTriangle([&](int corner) -> EdgeProjections {
+    if (corner == 0) return {e.dot(p), f.dot(p)};
+    const Vector x = p - (corner == 1 ? e : f);
+    return {e.dot(x), f.dot(x)};
+  });
+  const auto& [part, a, b, c] = nearest;
+  switch (part) {
+    case TrianglePart::kA:
+      return {0, 0};
+    case TrianglePart::kB:
+      return {1, 0};
+    case TrianglePart::kC:
+      return {0, 1};
+    case TrianglePart::kAB:
+      return {b / (a + b), 0};
+    case TrianglePart::kAC:
+      return {0, c / (a + c)};
+    case TrianglePart::kBC: {
+      const double t = c / (b + c);
+      return {1 - t, t};
+    }
+    case TrianglePart::kInside: {
+      const double per_sum = 1 / (a + b + c);
+      return {b * per_sum, c * per_sum};
+    }
   }
-  const double denominator = 1 / (va + vb + vc);
-  return {vb * denominator, vc * denominator};
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace

@@ -9,6 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/query/floating/expanding_surface.h"
 
@@ -17,13 +20,6 @@ namespace {
 
 // Keys this close, relatively, are compared exactly: some 2^-50 of error each.
 constexpr double kRelativeKeyError = 0x1p-40;
-// And those so small that they may have underflowed.
-constexpr double kLeastKey = 0x1p-1000;
-
-struct Corner {
-  IntegerVector w;
-  VertexPair pair;
-};
 
 // The plane n.w = offset of a facet, n outward; `key` is its signed distance from the origin in
 // floating point, in units of a common power of two.
@@ -45,41 +41,41 @@ int CompareDistance(const Plane& f, const Plane& g) {
 class ExactExpansion {
  public:
   ExactExpansion(ExactPair& pair, const std::function<bool()>& should_stop)
-      : pair_(pair), should_stop_(should_stop) {}
+      : pair_(pair), poll_(should_stop, 1) {}
 
   absl::StatusOr<ExactNearest> Run(std::span<const VertexPair> seed) {
     Start(seed);
-    for (const VertexPair& p : seed) Insert(At(p));
+    for (const VertexPair& p : seed) Insert(pair_.Corner(p));
     for (;;) {
-      if (should_stop_ && should_stop_()) return absl::CancelledError("stopped in an exact query");
+      if (poll_.Step()) return absl::CancelledError("stopped in an exact query");
       const uint32_t nearest = Nearest();
-      Corner farthest = Farthest(planes_[nearest].n);
-      if (Dot(planes_[nearest].n, farthest.w) == planes_[nearest].offset) return PointOn(nearest);
+      ExactCorner farthest = pair_.Farthest(planes_[nearest].n);
+      if (Dot(planes_[nearest].n, farthest.w) == planes_[nearest].offset) {
+        HULLD_CHECK(Sign(planes_[nearest].offset) > 0);
+        return PointOn(nearest);
+      }
       Expand(nearest, std::move(farthest));
     }
   }
 
  private:
-  Corner At(VertexPair p) const { return {pair_.VertexA(p.a) - pair_.VertexB(p.b), p}; }
-  Corner Farthest(const IntegerVector& n) const {
-    return At({pair_.FarthestA(n), pair_.FarthestB(n)});
-  }
-
   // Adds a corner for which differs(w) holds: of the seed, or farthest along one of the directions
   // or against it.
   template <typename Differs>
   void AddCorner(std::span<const VertexPair> seed, std::vector<IntegerVector> directions,
                  Differs differs) {
     for (const VertexPair& p : seed) {
-      Corner corner = At(p);
+      ExactCorner corner = pair_.Corner(p);
       if (differs(corner.w)) return corners_.push_back(std::move(corner));
     }
     for (const IntegerVector& n : directions) {
       for (const IntegerVector& towards : {n, -n}) {
-        Corner corner = Farthest(towards);
+        ExactCorner corner = pair_.Farthest(towards);
         if (differs(corner.w)) return corners_.push_back(std::move(corner));
       }
     }
+    // A - B is solid.
+    HULLD_UNREACHABLE();
   }
 
   // A tetrahedron, its corner 3 inside of its facet 0, 1, 2. There is one: A - B is solid.
@@ -100,7 +96,7 @@ class ExactExpansion {
 
   // The size of the corners, for the keys.
   void SetUnit() {
-    for (const Corner& corner : corners_) {
+    for (const ExactCorner& corner : corners_) {
       for (int i = 0; i < 3; ++i) {
         if (corner.w[i].is_zero()) continue;
         unit_exponent_ = std::max(unit_exponent_, ToScaledDouble(corner.w[i]).exponent + 62);
@@ -137,21 +133,23 @@ class ExactExpansion {
     }
   }
 
-  bool Sees(const Corner& corner, uint32_t facet) const {
+  bool Sees(const ExactCorner& corner, uint32_t facet) const {
     return Dot(planes_[facet].n, corner.w) > planes_[facet].offset;
   }
 
   // Requires the corner strictly above the facet. A convex polytope's facets strictly below a point
-  // are connected, and so is their edge.
-  void Expand(uint32_t facet, Corner corner) {
+  // are connected, and so is their edge, so that the surface always closes.
+  void Expand(uint32_t facet, ExactCorner corner) {
+    HULLD_DCHECK(Sees(corner, facet));
     const auto apex = static_cast<uint32_t>(corners_.size());
     corners_.push_back(std::move(corner));
     const std::optional<uint32_t> first =
         surface_.Expand(facet, apex, [&](uint32_t i) { return Sees(corners_[apex], i); });
+    HULLD_CHECK(first.has_value());
     AddPlanes(*first);
   }
 
-  void Insert(Corner corner) {
+  void Insert(ExactCorner corner) {
     for (uint32_t i = 0; i < planes_.size(); ++i) {
       if (surface_.facets()[i].alive && Sees(corner, i)) return Expand(i, std::move(corner));
     }
@@ -164,11 +162,13 @@ class ExactExpansion {
       if (!surface_.facets()[i].alive) continue;
       if (!nearest || IsNearer(planes_[i], planes_[*nearest])) nearest = i;
     }
+    HULLD_CHECK(nearest.has_value());
     return *nearest;
   }
 
   static bool IsNearer(const Plane& f, const Plane& g) {
-    const double slack = kRelativeKeyError * std::max(std::abs(f.key), std::abs(g.key)) + kLeastKey;
+    const double slack =
+        kRelativeKeyError * std::max(std::abs(f.key), std::abs(g.key)) + kDepthKeyMin;
     if (f.key < g.key - slack) return true;
     if (f.key > g.key + slack) return false;
     return CompareDistance(f, g) < 0;
@@ -203,12 +203,12 @@ class ExactExpansion {
       nearest.numerator = planes_[i].offset * planes_[i].offset;
       return nearest;
     }
-    return {};
+    HULLD_UNREACHABLE();
   }
 
   ExactPair& pair_;
-  const std::function<bool()>& should_stop_;
-  std::vector<Corner> corners_;
+  StopPoll poll_;
+  std::vector<ExactCorner> corners_;
   ExpandingSurface surface_;
   std::vector<Plane> planes_;
   int unit_exponent_ = INT32_MIN / 2;

@@ -8,18 +8,16 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
+
 namespace hulld {
 namespace {
-
-struct Corner {
-  IntegerVector w;
-  VertexPair pair;
-};
 
 // A part of a simplex: the point of its affine hull that is nearest to the origin has these
 // weights, all positive.
 struct Part {
-  std::vector<Corner> corners;
+  std::vector<ExactCorner> corners;
   std::vector<Integer> weights;
   Integer weight_sum;
   // A positive multiple of the vector from that point to the origin; zero when it is the origin.
@@ -35,9 +33,11 @@ bool AllPositive(const std::vector<Integer>& weights) {
 // The functions below give nothing where the corners are affinely dependent or the nearest point of
 // their affine hull is not strictly between them.
 
-std::optional<Part> PartOf(const Corner& p) { return Part{{p}, {1}, 1, -p.w, Dot(p.w, p.w), 1}; }
+std::optional<Part> PartOf(const ExactCorner& p) {
+  return Part{{p}, {1}, 1, -p.w, Dot(p.w, p.w), 1};
+}
 
-std::optional<Part> PartOf(const Corner& p, const Corner& q) {
+std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q) {
   const IntegerVector e = q.w - p.w;
   std::vector<Integer> weights = {Dot(q.w, e), -Dot(p.w, e)};
   if (!AllPositive(weights)) return std::nullopt;
@@ -47,7 +47,7 @@ std::optional<Part> PartOf(const Corner& p, const Corner& q) {
   return Part{{p, q}, std::move(weights), length, std::move(towards), Dot(moment, moment), length};
 }
 
-std::optional<Part> PartOf(const Corner& p, const Corner& q, const Corner& r) {
+std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r) {
   const IntegerVector n = Cross(q.w - p.w, r.w - p.w);
   std::vector<Integer> weights = {Dot(n, Cross(q.w, r.w)), Dot(n, Cross(r.w, p.w)),
                                   Dot(n, Cross(p.w, q.w))};
@@ -59,8 +59,9 @@ std::optional<Part> PartOf(const Corner& p, const Corner& q, const Corner& r) {
   return Part{{p, q, r}, std::move(weights), area, towards, height * height, area};
 }
 
-std::optional<Part> PartOf(const Corner& p, const Corner& q, const Corner& r, const Corner& s) {
-  const auto volume = [](const Corner& u, const Corner& v, const Corner& w) {
+std::optional<Part> PartOf(const ExactCorner& p, const ExactCorner& q, const ExactCorner& r,
+                           const ExactCorner& s) {
+  const auto volume = [](const ExactCorner& u, const ExactCorner& v, const ExactCorner& w) {
     return Dot(u.w, Cross(v.w, w.w));
   };
   std::vector<Integer> weights = {volume(q, s, r), volume(p, r, s), volume(p, s, q),
@@ -73,7 +74,7 @@ std::optional<Part> PartOf(const Corner& p, const Corner& q, const Corner& r, co
   return Part{{p, q, r, s}, std::move(weights), std::move(sum), {0, 0, 0}, 0, 1};
 }
 
-std::optional<Part> PartOf(const std::vector<Corner>& c) {
+std::optional<Part> PartOf(const std::vector<ExactCorner>& c) {
   switch (c.size()) {
     case 1:
       return PartOf(c[0]);
@@ -81,26 +82,28 @@ std::optional<Part> PartOf(const std::vector<Corner>& c) {
       return PartOf(c[0], c[1]);
     case 3:
       return PartOf(c[0], c[1], c[2]);
-    default:
+    case 4:
       return PartOf(c[0], c[1], c[2], c[3]);
+    default:
+      HULLD_UNREACHABLE();
   }
 }
 
 // Whether no corner is nearer to the origin, along the direction there, than the part.
-bool IsNearest(const Part& part, const std::vector<Corner>& corners) {
+bool IsNearest(const Part& part, const std::vector<ExactCorner>& corners) {
   const Integer reach = Dot(part.towards_origin, part.corners[0].w);
-  return std::all_of(corners.begin(), corners.end(), [&](const Corner& corner) {
+  return std::all_of(corners.begin(), corners.end(), [&](const ExactCorner& corner) {
     return Dot(part.towards_origin, corner.w) <= reach;
   });
 }
 
 // The part of the simplex whose inside holds its point nearest to the origin. There is one, with
 // affinely independent corners, also where those of the simplex are not (Caratheodory).
-Part NearestPart(const std::vector<Corner>& corners) {
+Part NearestPart(const std::vector<ExactCorner>& corners) {
   for (uint32_t size = 1; size <= corners.size(); ++size) {
     for (uint32_t subset = 1; subset < (1u << corners.size()); ++subset) {
       if (static_cast<uint32_t>(__builtin_popcount(subset)) != size) continue;
-      std::vector<Corner> chosen;
+      std::vector<ExactCorner> chosen;
       for (size_t i = 0; i < corners.size(); ++i) {
         if (subset >> i & 1) chosen.push_back(corners[i]);
       }
@@ -108,25 +111,24 @@ Part NearestPart(const std::vector<Corner>& corners) {
       if (part && IsNearest(*part, corners)) return *std::move(part);
     }
   }
-  return {};
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace
 
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
                                                 const std::function<bool()>& should_stop) {
-  const auto corner = [&](VertexPair p) {
-    return Corner{pair.VertexA(p.a) - pair.VertexB(p.b), p};
-  };
-  std::vector<Corner> corners;
-  for (const VertexPair& p : seed) corners.push_back(corner(p));
-  if (corners.empty()) corners.push_back(corner({0, 0}));
+  HULLD_CHECK(seed.size() <= 4);
+  std::vector<ExactCorner> corners;
+  for (const VertexPair& p : seed) corners.push_back(pair.Corner(p));
+  if (corners.empty()) corners.push_back(pair.Corner({0, 0}));
+  StopPoll poll(should_stop, 1);
   for (;;) {
-    if (should_stop && should_stop()) return absl::CancelledError("stopped in an exact query");
+    if (poll.Step()) return absl::CancelledError("stopped in an exact query");
     Part part = NearestPart(corners);
     const IntegerVector& n = part.towards_origin;
     if (!IsZero(n)) {
-      Corner farthest = corner({pair.FarthestA(n), pair.FarthestB(n)});
+      ExactCorner farthest = pair.Farthest(n);
       if (Dot(n, farthest.w) > Dot(n, part.corners[0].w)) {
         corners = std::move(part.corners);
         corners.push_back(std::move(farthest));
@@ -136,7 +138,7 @@ absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const
     ExactNearest nearest{{{}, std::move(part.weights), std::move(part.weight_sum)},
                          std::move(part.numerator),
                          std::move(part.denominator)};
-    for (const Corner& c : part.corners) nearest.point.pairs.push_back(c.pair);
+    for (const ExactCorner& c : part.corners) nearest.point.pairs.push_back(c.pair);
     return nearest;
   }
 }

@@ -9,7 +9,7 @@
 
 #include "core/numeric/integer.h"
 #include "core/query/exact/exact_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -33,8 +33,8 @@ struct ExactNearest {
 // integers. A part (vertex, edge, triangle) of A - B is kept of which the nearest point is strictly
 // inside; the farthest vertex towards the origin is added until there is none farther. The distance
 // decreases strictly, so that no part comes twice and the walk ends. Directions have degree at most
-// 3 in the coordinates. `seed`: at most four pairs to start from; may be empty. CANCELLED when
-// should_stop said so (it may be empty).
+// 3 in the coordinates. `seed`: pairs to start from; may be empty. Requires at most four of them.
+// CANCELLED when should_stop, which may be empty, said so.
 absl::StatusOr<ExactNearest> FindNearestExactly(ExactPair& pair, std::span<const VertexPair> seed,
                                                 const std::function<bool()>& should_stop);
 

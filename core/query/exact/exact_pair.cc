@@ -4,6 +4,9 @@
 #include <array>
 #include <numeric>
 
+#include "core/numeric/exponent_limits.h"
+#include "core/query/terms/pose.h"
+
 namespace hulld {
 namespace {
 

@@ -8,9 +8,12 @@
 #include "core/hull/hull.h"
 #include "core/numeric/integer.h"
 #include "core/query/floating/float_pair.h"
-#include "core/query/terms/pose.h"
+#include "core/query/terms/minkowski_vertex.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
+
+using ExactCorner = MinkowskiVertex<IntegerVector>;
 
 // A pair of posed hulls in integers, exactly.
 //
@@ -36,6 +39,8 @@ class ExactPair {
 
   const IntegerVector& VertexA(uint32_t i) { return Vertex(a_, i); }
   const IntegerVector& VertexB(uint32_t i) { return Vertex(b_, i); }
+  // The vertex a - b of A - B.
+  ExactCorner Corner(VertexPair pair) { return {VertexA(pair.a) - VertexB(pair.b), pair}; }
   // Multiplies out every vertex: from then on all functions may be called by several threads at
   // once.
   void CacheAllVertices();
@@ -54,6 +59,9 @@ class ExactPair {
   uint32_t FarthestB(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
     return Farthest(b_, candidates, -n).front();
   }
+
+  // The vertex of A - B farthest along n: of the lowest such vertex of A, and of B.
+  ExactCorner Farthest(const IntegerVector& n) { return Corner({FarthestA(n), FarthestB(n)}); }
 
   // A positive multiple of a point in the relative interior of A - B: the difference of the means
   // of the hulls' inner vertices.

@@ -5,6 +5,7 @@
 #include <span>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/query/exact/portal_search.h"
 
 namespace hulld {
@@ -44,6 +45,7 @@ void AppendSpan(const Hull& hull, VertexOf vertex, std::vector<IntegerVector>& d
 // that in the plane.
 absl::StatusOr<ExactSearchResult> SearchInPlane(ExactPair& pair, const IntegerVector& normal,
                                                 const std::function<bool()>& should_stop) {
+  HULLD_CHECK(!IsZero(normal));
   int axis = 0;
   while (normal[axis].is_zero()) ++axis;
   PortalSearch search(pair, should_stop);
@@ -63,9 +65,7 @@ ExactSearchResult SearchOnLine(ExactPair& pair, const IntegerVector& u, const In
   const IntegerVector across = Cross(u, w);
   if (!IsZero(across)) return {Relation::kSeparated, Cross(u, across), 1, {}};
   for (const IntegerVector& n : {u, -u}) {
-    const IntegerVector farthest =
-        pair.VertexA(pair.FarthestA(n)) - pair.VertexB(pair.FarthestB(n));
-    if (Sign(Dot(n, farthest)) < 0) return {Relation::kSeparated, n, 2, {}};
+    if (Sign(Dot(n, pair.Farthest(n).w)) < 0) return {Relation::kSeparated, n, 2, {}};
   }
   return {Relation::kTouching, AnyPerpendicular(u), 3, {}};
 }
@@ -99,7 +99,7 @@ absl::StatusOr<ExactSearchResult> SearchExactly(ExactPair& pair,
     PortalSearch search(pair, should_stop);
     return SearchPortal(search);
   }
-  const IntegerVector w = pair.VertexA(0) - pair.VertexB(0);
+  const IntegerVector w = pair.Corner({0, 0}).w;
   if (span.dimension == 0) {
     if (IsZero(w)) return ExactSearchResult{Relation::kTouching, IntegerVector{1, 0, 0}, 1, {}};
     return ExactSearchResult{Relation::kSeparated, -w, 1, {}};

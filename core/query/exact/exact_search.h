@@ -8,8 +8,10 @@
 #include <optional>
 #include <vector>
 
-#include "core/query/collision.h"
+#include "core/numeric/integer.h"
 #include "core/query/exact/exact_pair.h"
+#include "core/query/terms/relation.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 
 namespace hulld {
@@ -92,10 +93,12 @@ class PortalSearch::Direction {
         return Cross(search_.Exact(*q_) - origin, search_.Exact(*r_) - origin);
       }
       case Kind::kRay:
+        return search_.ExactRay();
       case Kind::kOther:
         break;
     }
-    return search_.ExactRay();
+    // A direction that was given is exact from the start.
+    HULLD_UNREACHABLE();
   }
 
   const PortalSearch& search_;
@@ -111,7 +114,7 @@ class PortalSearch::Direction {
 
 PortalSearch::PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop)
     : pair_(pair),
-      should_stop_(should_stop),
+      poll_(should_stop, 1),
       filtered_(pair.filter().usable()),
       position_error_(kMinkowskiErrorFactor * pair.filter().size()) {}
 
@@ -122,7 +125,7 @@ void PortalSearch::Thicken(int axis, Integer half) {
 }
 
 IntegerVector PortalSearch::Exact(const Point& point) const {
-  IntegerVector w = pair_.VertexA(point.pair.a) - pair_.VertexB(point.pair.b);
+  IntegerVector w = pair_.Corner(point.pair).w;
   if (axis_ >= 0) w[axis_] += point.side < 0 ? Integer(-half_) : half_;
   return w;
 }
@@ -187,10 +190,14 @@ int PortalSearch::SignAlong(Direction& n, const Point& w) const {
       case Kind::kAcrossSegment:
         v = n.p().w - n.q().w;
         break;
-      default:
+      case Kind::kNormal:
         u = n.q().w - n.p().w;
         v = n.r().w - n.p().w;
         break;
+      case Kind::kRay:
+        break;
+      case Kind::kOther:
+        HULLD_UNREACHABLE();
     }
     const double largest = LargestOf(u, v, w.w);
     const double bound = kDifferencesErrorFactor * largest * largest * position_error_;
@@ -234,7 +241,7 @@ PortalSearch::Point PortalSearch::Farthest(Direction& n) {
 
 // Explores along n; a result when that settles it.
 std::optional<PortalSearch::Result> PortalSearch::Explore(Direction& n, Point* farthest) {
-  if (should_stop_ && should_stop_()) return Result{};
+  if (poll_.Step()) return Result{};
   *farthest = Farthest(n);
   if (SignAlong(n, *farthest) < 0) return Result{Verdict::kSeparated, n.exact(), {}};
   return std::nullopt;
@@ -281,7 +288,7 @@ PortalSearch::Result PortalSearch::RefinePortal() {
     if (side > 0) return {Verdict::kOverlapping, {}, {}};
     Point w;
     Direction n(*this, Kind::kNormal, &p, &q, &r);
-    if (should_stop_ && should_stop_()) return {};
+    if (poll_.Step()) return {};
     w = Farthest(n);
     const bool is_corner = std::any_of(portal_.begin(), portal_.end(), [&](const Point& corner) {
       return corner.pair == w.pair && corner.side == w.side;
@@ -312,6 +319,7 @@ void PortalSearch::Replace(const Point& w) {
       return;
     }
   }
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace hulld

@@ -6,8 +6,10 @@
 #include <functional>
 #include <optional>
 
+#include "core/base/stop_poll.h"
+#include "core/numeric/integer.h"
 #include "core/query/exact/exact_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -31,7 +33,7 @@ namespace hulld {
 class PortalSearch {
  public:
   // `pair` and `should_stop`, which may be empty, must outlive the search. Requires C to have
-  // dimension 3.
+  // dimension 3 (unchecked: SearchExactly finds the dimension first).
   PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop);
 
   // Thickens C: by +-half along a coordinate axis.
@@ -84,7 +86,7 @@ class PortalSearch {
   void Replace(const Point& w);
 
   ExactPair& pair_;
-  const std::function<bool()>& should_stop_;
+  StopPoll poll_;
   // Whether floating point may decide.
   bool filtered_;
   // Bound of the error of a point's components, where filtered.

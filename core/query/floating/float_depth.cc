@@ -8,10 +8,12 @@
 #include <span>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/orientation.h"
 #include "core/query/floating/expanding_surface.h"
 #include "core/query/floating/nearest_part.h"
+#include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
 namespace {
@@ -24,10 +26,7 @@ constexpr size_t kUsualVertices = 32;
 constexpr size_t kUsualFacets = 192;
 constexpr size_t kMaxVertices = size_t{1} << 18;
 
-struct Corner {
-  PlainVector w;
-  VertexPair pair;
-};
+using Corner = MinkowskiVertex<PlainVector>;
 
 // The plane of a facet.
 struct Plane {
@@ -259,6 +258,8 @@ class Expansion {
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
                             const SeparationGoal& goal, bool want_point,
                             std::vector<VertexPair>& vertices) {
+  HULLD_CHECK(pair.usable());
+  HULLD_CHECK(start.empty() || start.size() == 4);
   Expansion expansion(pair, goal);
   const SeparationBounds bounds = expansion.Run(start, want_point);
   if (!goal.Met(bounds.low, bounds.high)) expansion.AppendVertices(vertices);

@@ -6,6 +6,7 @@
 
 #include "core/query/floating/float_pair.h"
 #include "core/query/terms/separation_bounds.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -22,7 +23,8 @@ namespace hulld {
 //
 // `start`: four pairs whose differences are the corners of a tetrahedron, as a rule round the
 // origin; or none. The bounds may miss the goal; then `vertices` gets the pairs of all vertices of
-// the polytope. Requires pair.usable() and the relation OVERLAPPING.
+// the polytope. Requires pair.usable(), and the relation OVERLAPPING (unchecked: otherwise the
+// lower bound is 0).
 SeparationBounds BoundDepth(const FloatPair& pair, std::span<const VertexPair> start,
                             const SeparationGoal& goal, bool want_point,
                             std::vector<VertexPair>& vertices);

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/query/floating/nearest_part.h"
+#include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
 namespace {
@@ -14,10 +16,7 @@ namespace {
 // to 10000 vertices need fewer than 40.
 constexpr int kMaxSteps = 128;
 
-struct Corner {
-  Vector w;
-  VertexPair pair;
-};
+using Corner = MinkowskiVertex<Vector>;
 
 // The corners of the part of A - B that is nearest to the origin so far.
 class Walk {
@@ -117,6 +116,7 @@ class Walk {
 }  // namespace
 
 SeparationBounds BoundDistance(const FloatPair& pair, const Vector& n, const SeparationGoal& goal) {
+  HULLD_CHECK(pair.usable());
   return Walk(pair, goal).Run(n);
 }
 

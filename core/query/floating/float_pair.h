@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/placed/plain_vector.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -23,7 +25,9 @@ class FloatPair {
         offset_(PlainVector(b.X_WH().t) - a.X_WH().t),
         size_(a.hull().max_abs_coordinate() + b.hull().max_abs_coordinate() +
               LargestComponent(offset_)),
-        usable_(size_ >= kFilterMinSize && size_ <= kFilterMaxSize) {}
+        usable_(IsFilterSize(size_)) {
+    HULLD_DCHECK(!a.hull().empty() && !b.hull().empty());
+  }
 
   const PlacedHull& a() const { return *a_; }
   const PlacedHull& b() const { return *b_; }
@@ -51,7 +55,9 @@ class FloatPair {
   // How far a certain value may be from the true maximum. Requires the largest component of n_W
   // between kDirectionMin and kDirectionMax.
   double SupportError(const PlainVector& n_W) const {
-    return kSupportErrorFactor * LargestComponent(n_W) * size_;
+    const double largest = LargestComponent(n_W);
+    HULLD_DCHECK(IsFilterDirection(largest));
+    return kSupportErrorFactor * largest * size_;
   }
 
   // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
@@ -77,8 +83,12 @@ class FloatPair {
 
  private:
   static Vector InnerPoint(const PlacedHull& placed);
-  double Slack(const Vector& n_W, double error) const {
-    return 2 * SupportError(n_W) + kDirectionErrorFactor * error * size_;
+  // How far the value of a candidate may be below the largest. Products of edges may be beyond the
+  // range of directions: even then nothing overflows, and what underflows, 2^-1070, is far below
+  // the part of `error`, which is at least 2^-41 S^3.
+  double Slack(const PlainVector& n_W, double error) const {
+    return 2 * (kSupportErrorFactor * LargestComponent(n_W) * size_) +
+           kDirectionErrorFactor * error * size_;
   }
   static PlainVector Rotated(const PlacedHull& placed, uint32_t i) {
     return OutOfOwnFrame(placed, placed.hull().vertices()[i]);

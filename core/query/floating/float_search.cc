@@ -4,7 +4,10 @@
 #include <bit>
 #include <cmath>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
 namespace {
@@ -13,10 +16,7 @@ namespace {
 // Observed: random pairs of 10000 vertices, 1e-6 apart, need 18 on average.
 constexpr uint64_t kMaxDirections = 64;
 
-struct Corner {
-  PlainVector w;
-  VertexPair pair;
-};
+using Corner = MinkowskiVertex<PlainVector>;
 
 // The corners of the part of A - B that is nearest to the origin so far: a vertex, an edge, a
 // triangle or a tetrahedron. The newest comes last. Corners stay where they are written; only their
@@ -35,6 +35,7 @@ class Simplex {
 
   // Requires count() < 4.
   void Add(const PlainVector& w, VertexPair pair) {
+    HULLD_DCHECK(count_ < 4);
     uint32_t taken = 0;
     for (uint32_t i = 0; i < count_; ++i) taken |= 1u << order_[i];
     const auto slot = static_cast<uint8_t>(std::countr_one(taken));
@@ -59,8 +60,10 @@ class Simplex {
       case 3:
         ReduceTriangle(n);
         return true;
-      default:
+      case 4:
         return ReduceTetrahedron(n);
+      default:
+        HULLD_UNREACHABLE();
     }
   }
 
@@ -175,6 +178,7 @@ class Simplex {
       case Part::kInside:
         return Keep(r, q, p);
     }
+    HULLD_UNREACHABLE();
   }
 
   void ReduceTriangle(PlainVector& n) {
@@ -267,7 +271,7 @@ class FloatSearch {
   // Explores along n and gives the next direction; false when the search is over.
   bool Explore(PlainVector& n) {
     double largest = LargestComponent(n);
-    if (!(largest >= kDirectionMin && largest <= kDirectionMax)) {
+    if (!IsFilterDirection(largest)) {
       if (!(largest > 0)) return false;
       const double unit = std::ldexp(1.0, std::ilogb(largest));
       n = {n.x / unit, n.y / unit, n.z / unit};
@@ -337,10 +341,12 @@ class FloatSearch {
 
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first) {
+  HULLD_DCHECK(pair.usable());
   return FloatSearch(pair, tolerance).Run(first);
 }
 
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
+  HULLD_DCHECK(pair.usable());
   FloatSearchResult result;
   if (cache.axis.has_value()) {
     const PlainVector n = *cache.axis;
@@ -353,6 +359,10 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
       result.axis = n;
     }
   } else if (cache.pair_count == 4) {
+    for ([[maybe_unused]] const VertexPair& known : cache.pairs) {
+      HULLD_DCHECK(known.a < pair.a().hull().vertices().size() &&
+                   known.b < pair.b().hull().vertices().size());
+    }
     const auto difference = [&](int i) { return pair.Difference(cache.pairs[i]); };
     if (HoldsOrigin(pair, difference(0), difference(1), difference(2), difference(3))) {
       result.verdict = FloatVerdict::kOverlapping;

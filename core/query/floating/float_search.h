@@ -4,9 +4,9 @@
 #include <array>
 #include <cstdint>
 
-#include "core/query/collision.h"
 #include "core/query/floating/float_pair.h"
-#include "core/query/terms/certificate.h"
+#include "core/query/terms/pair_cache.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
@@ -34,7 +34,8 @@ struct FloatSearchResult {
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first);
 
-// Proves anew what the cache of an earlier query suggests; undecided where it cannot.
+// Proves anew what the cache of an earlier query suggests; undecided where it cannot. Requires
+// pair.usable(), and that the pairs of the cache are vertices of these hulls.
 FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache);
 
 }  // namespace hulld

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 
+#include "core/numeric/nearest_on_triangle.h"
 #include "core/numeric/vector.h"
 
 namespace hulld {
@@ -33,24 +34,34 @@ inline NearestPart NearestOnEdge(const Vector& p, const Vector& q, uint8_t i, ui
   return {2, {i, j}, {1 - t, t}, point, -t * e - p};
 }
 
-// In floating point, up to rounding. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
+// In floating point, up to rounding.
 inline NearestPart NearestOnTriangle(const Vector& a, const Vector& b, const Vector& c) {
   const Vector e = b - a;
   const Vector f = c - a;
-  const double d1 = -e.dot(a), d2 = -f.dot(a);
-  if (d1 <= 0 && d2 <= 0) return {1, {0}, {1}, a, -a};
-  const double d3 = -e.dot(b), d4 = -f.dot(b);
-  if (d3 >= 0 && d4 <= d3) return {1, {1}, {1}, b, -b};
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return NearestOnEdge(a, b, 0, 1);
-  const double d5 = -e.dot(c), d6 = -f.dot(c);
-  if (d6 >= 0 && d5 <= d6) return {1, {2}, {1}, c, -c};
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return NearestOnEdge(a, c, 0, 2);
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) return NearestOnEdge(b, c, 1, 2);
+  const TriangleNearest nearest = FindNearestOnTriangle([&](int corner) -> EdgeProjections {
+    const Vector& p = corner == 0 ? a : corner == 1 ? b : c;
+    return {-e.dot(p), -f.dot(p)};
+  });
+  switch (nearest.part) {
+    case TrianglePart::kA:
+      return {1, {0}, {1}, a, -a};
+    case TrianglePart::kB:
+      return {1, {1}, {1}, b, -b};
+    case TrianglePart::kC:
+      return {1, {2}, {1}, c, -c};
+    case TrianglePart::kAB:
+      return NearestOnEdge(a, b, 0, 1);
+    case TrianglePart::kAC:
+      return NearestOnEdge(a, c, 0, 2);
+    case TrianglePart::kBC:
+      return NearestOnEdge(b, c, 1, 2);
+    case TrianglePart::kInside:
+      break;
+  }
   // Rounding may turn a weight near 0 negative, and a sliver may have none.
-  const double x = std::max(va, 0.0), y = std::max(vb, 0.0), z = std::max(vc, 0.0);
+  const double x = std::max(nearest.a, 0.0);
+  const double y = std::max(nearest.b, 0.0);
+  const double z = std::max(nearest.c, 0.0);
   const double sum = x + y + z;
   if (!(sum > 0)) return {1, {0}, {1}, a, -a};
   const double u = x / sum, v = y / sum, w = z / sum;

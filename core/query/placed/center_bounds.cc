@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"
 
 namespace hulld {
@@ -104,7 +105,7 @@ CenterBounds::CenterBounds(const Hull& hull, const SupportMap& support) {
     radius = std::max(radius, (v - hull.center()).cwiseAbs().maxCoeff());
   }
   // Beyond what pairs may have, or so small against the coordinates that rounding counts.
-  if (!(radius >= kFilterMinSize && radius <= kFilterMaxSize)) return;
+  if (!IsFilterSize(radius)) return;
   if (radius < kCenterLeastRadius * hull.max_abs_coordinate()) return;
   side_ = SideFor(hull.vertices().size());
   half_ = 0.5 * side_;
@@ -117,13 +118,9 @@ CenterBounds::CenterBounds(const Hull& hull, const SupportMap& support) {
 
 Vector CenterBounds::DirectionOf(uint32_t corner) const {
   const uint32_t row = side_ + 1;
-  const uint32_t face = corner / (row * row);
-  const uint32_t axis = face / 2;
-  Vector n;
-  n[axis] = face % 2 == 0 ? 1 : -1;
-  n[(axis + 1) % 3] = (corner / row % row) / half_ - 1;
-  n[(axis + 2) % 3] = (corner % row) / half_ - 1;
-  return n;
+  const double s = (corner / row % row) / half_ - 1;
+  const double t = (corner % row) / half_ - 1;
+  return CubeDirection(corner / (row * row), s, t);
 }
 
 void CenterBounds::AddSupports(const Hull& hull, const SupportMap& support, double radius) {

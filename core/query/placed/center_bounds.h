@@ -8,7 +8,10 @@
 #include <limits>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/hull.h"
+#include "core/numeric/cube_map.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/query/placed/plain_vector.h"
 #include "core/query/placed/support_map.h"
 
@@ -38,7 +41,7 @@ class CenterBounds {
   };
   // Where a direction is among the corners; nowhere where there are none.
   class Place;
-  // Requires the largest component of n positive, and n in the range of FloatPair's directions.
+  // Requires n in the range of FloatPair's directions (IsFilterDirection).
   Place PlaceOf(const PlainVector& n) const;
   // Upper bounds of h(n) and g(n) for the n of a place, but for errors of the hull's coordinates
   // and of n (see kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h).
@@ -96,28 +99,23 @@ class CenterBounds::Place {
 inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   Place place;
   if (corners_.empty()) return place;
-  const double components[5] = {n.x, n.y, n.z, n.x, n.y};
-  const double x = std::abs(n.x);
-  const double y = std::abs(n.y);
-  const double z = std::abs(n.z);
-  const double larger = std::max(x, y);
-  place.largest = std::max(larger, z);
+  const OnCube on_cube(n.x, n.y, n.z);
+  // A direction turned into a hull's frame is at most sqrt(3) times longer or shorter.
+  HULLD_DCHECK(IsFilterDirection(2 * on_cube.largest()) ||
+               IsFilterDirection(on_cube.largest() / 2));
+  place.largest = on_cube.largest();
   const double factor = half_ / place.largest;
-  // Arithmetic of truth values, as compilers turn conditions into branches.
-  const uint32_t is_y = y > x;
-  const uint32_t is_z = z > larger;
-  place.axis = (is_y & (is_z - 1)) | (2 * is_z);
-  place.negative = std::signbit(components[place.axis]);
-  place.across_s = components[place.axis + 1] * factor;
-  place.across_t = components[place.axis + 2] * factor;
+  place.axis = on_cube.axis();
+  place.negative = on_cube.negative();
+  place.across_s = on_cube.first() * factor;
+  place.across_t = on_cube.second() * factor;
   const double u = place.across_s + half_;
   const double v = place.across_t + half_;
-  const uint32_t face = 2 * place.axis + static_cast<uint32_t>(place.negative);
   const uint32_t last = side_ - 1;
   const uint32_t i = std::min(static_cast<uint32_t>(static_cast<int32_t>(u)), last);
   const uint32_t j = std::min(static_cast<uint32_t>(static_cast<int32_t>(v)), last);
   const uint32_t row = side_ + 1;
-  place.low = corners_.data() + (face * row + i) * row + j;
+  place.low = corners_.data() + CubeCell(CubeFace(place.axis, place.negative), row, i, j);
   place.high = place.low + row;
   // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
   place.s = std::clamp(u - i, 0.0, 1.0);

@@ -3,19 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/check.h"
+#include "core/numeric/exponent_limits.h"
+
 namespace hulld {
 namespace {
-
-// Between these no square of the largest component overflows or underflows.
-constexpr double kLeastUnscaled = 0x1p-100;
-constexpr double kMostUnscaled = 0x1p100;
 
 // R(q) / |q|^2, within kRotationEntryError.
 Eigen::Matrix3d RotationOf(const std::array<double, 4>& q) {
   auto [w, x, y, z] = q;
   const double largest =
       std::max(std::max(std::abs(w), std::abs(x)), std::max(std::abs(y), std::abs(z)));
-  if (!(largest >= kLeastUnscaled && largest <= kMostUnscaled)) {
+  if (!(largest >= kQuaternionMin && largest <= kQuaternionMax)) {
     int exponent = 0;
     std::frexp(largest, &exponent);
     for (double* component : {&w, &x, &y, &z}) *component = std::ldexp(*component, -exponent);
@@ -34,7 +33,9 @@ PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH)
     : hull_(&hull),
       X_WH_(X_WH),
       R_WH_(RotationOf(X_WH.q)),
-      rotated_center_(R_WH_ * hull.hull().center()) {}
+      rotated_center_(R_WH_ * hull.hull().center()) {
+  HULLD_DCHECK(ValidatePose(X_WH).ok());
+}
 
 absl::StatusOr<PlacedHull> PlacedHull::Make(const QueryHull& hull, const Pose& X_WH) {
   if (absl::Status status = ValidatePose(X_WH); !status.ok()) return status;

@@ -13,6 +13,8 @@ class PlacedHull {
  public:
   // `hull` must outlive the result. INVALID_ARGUMENT: ValidatePose.
   static absl::StatusOr<PlacedHull> Make(const QueryHull& hull, const Pose& X_WH);
+  // The same for a pose that was validated before. Requires a valid pose (ValidatePose).
+  PlacedHull(const QueryHull& hull, const Pose& X_WH);
 
   const QueryHull& query_hull() const { return *hull_; }
   const Hull& hull() const { return hull_->hull(); }
@@ -23,8 +25,6 @@ class PlacedHull {
   const Vector& rotated_center() const { return rotated_center_; }
 
  private:
-  PlacedHull(const QueryHull& hull, const Pose& X_WH);
-
   const QueryHull* hull_;
   Pose X_WH_;
   Eigen::Matrix3d R_WH_;

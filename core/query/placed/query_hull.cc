@@ -4,7 +4,9 @@
 #include <cmath>
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 
 namespace hulld {
@@ -41,6 +43,7 @@ uint32_t VertexOffFirstFacet(const Hull& hull) {
     farthest = i;
     largest = distance;
   }
+  HULLD_CHECK(farthest.has_value());
   return *farthest;
 }
 
@@ -66,6 +69,7 @@ QueryHull::QueryHull(const Hull& hull)
 }
 
 void QueryHull::AddInnerVertex(size_t vertex) {
+  HULLD_DCHECK(inner_count_ < inner_vertices_.size());
   inner_vertices_[inner_count_++] = static_cast<uint32_t>(vertex);
 }
 

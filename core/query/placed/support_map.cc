@@ -116,13 +116,13 @@ class SupportMap::ArcDrawing {
 
   // The arc between directions m and n, where the cones of two vertices meet.
   void Draw(const Vector& m, const Vector& n, uint32_t first, uint32_t second) {
-    for (int axis = 0; axis < 3; ++axis) {
+    for (uint32_t axis = 0; axis < 3; ++axis) {
       for (const double sign : {1.0, -1.0}) {
         double from = 0;
         double to = 1;
         // The part of m + t (n - m) on this face: the face's component is positive and at least as
         // large as each of the others, but for rounding.
-        for (const int other : {kAfter[axis], kAfter[axis + 1]}) {
+        for (const uint32_t other : {kCubeAxisAfter[axis], kCubeAxisAfter[axis + 1]}) {
           for (const double side : {1.0, -1.0}) {
             Clip(sign * m[axis] + side * m[other], sign * n[axis] + side * n[other], &from, &to);
           }
@@ -162,20 +162,20 @@ class SupportMap::ArcDrawing {
     return static_cast<uint32_t>(std::clamp(place, 0.0, side_ - 1.0));
   }
 
-  void DrawOnFace(int axis, double sign, const Vector& m, const Vector& n, uint32_t first,
+  void DrawOnFace(uint32_t axis, double sign, const Vector& m, const Vector& n, uint32_t first,
                   uint32_t second) {
     const double m_along = sign * m[axis];
     const double n_along = sign * n[axis];
     if (!(m_along > 0 && n_along > 0)) return;
-    double x0 = Place(m[kAfter[axis]], m_along);
-    double y0 = Place(m[kAfter[axis + 1]], m_along);
-    double x1 = Place(n[kAfter[axis]], n_along);
-    double y1 = Place(n[kAfter[axis + 1]], n_along);
+    double x0 = Place(m[kCubeAxisAfter[axis]], m_along);
+    double y0 = Place(m[kCubeAxisAfter[axis + 1]], m_along);
+    double x1 = Place(n[kCubeAxisAfter[axis]], n_along);
+    double y1 = Place(n[kCubeAxisAfter[axis + 1]], n_along);
     if (x0 > x1) {
       std::swap(x0, x1);
       std::swap(y0, y1);
     }
-    const uint32_t face = 2 * axis + (sign < 0 ? 1 : 0);
+    const uint32_t face = CubeFace(axis, sign < 0);
     const double slope = x1 > x0 ? (y1 - y0) / (x1 - x0) : 0;
     for (uint32_t i = Index(x0 - kArcMargin); i <= Index(x1 + kArcMargin); ++i) {
       double low = y0;
@@ -186,7 +186,7 @@ class SupportMap::ArcDrawing {
       }
       if (low > high) std::swap(low, high);
       for (uint32_t j = Index(low - kArcMargin); j <= Index(high + kArcMargin); ++j) {
-        const uint32_t cell = (face * side_ + i) * side_ + j;
+        const uint32_t cell = CubeCell(face, side_, i, j);
         entries_.push_back({cell, first});
         entries_.push_back({cell, second});
       }
@@ -288,13 +288,9 @@ void SupportMap::FillCells(std::vector<CellVertex> entries) {
 
 // A direction of the hull's frame in the middle of a cell.
 Vector SupportMap::CenterOf(uint32_t cell) const {
-  const uint32_t face = cell / (side_ * side_);
-  const int axis = static_cast<int>(face / 2);
-  Vector n;
-  n[axis] = face % 2 == 0 ? 1 : -1;
-  n[kAfter[axis]] = (2.0 * (cell / side_ % side_) + 1) / side_ - 1;
-  n[kAfter[axis + 1]] = (2.0 * (cell % side_) + 1) / side_ - 1;
-  return n.cwiseQuotient(Vector(scale_));
+  const double s = (2.0 * (cell / side_ % side_) + 1) / side_ - 1;
+  const double t = (2.0 * (cell % side_) + 1) / side_ - 1;
+  return CubeDirection(cell / (side_ * side_), s, t).cwiseQuotient(Vector(scale_));
 }
 
 SupportMap::Support SupportMap::LookUpLong(const Cell& cell, const PlainVector& n) const {

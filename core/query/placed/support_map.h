@@ -8,7 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/hull.h"
+#include "core/numeric/cube_map.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/plain_vector.h"
 
@@ -44,7 +46,10 @@ class SupportMap {
 
   // A vertex far along n, the farthest where certain and almost always otherwise. Requires the hull
   // not empty. Cost: O(V) for a small hull, O(1) on average for a large one.
-  Support Farthest(const PlainVector& n) const { return cells_.empty() ? Scan(n) : LookUp(n); }
+  Support Farthest(const PlainVector& n) const {
+    HULLD_DCHECK(!vertices_.empty());
+    return cells_.empty() ? Scan(n) : LookUp(n);
+  }
 
   // The farthest: `value` is within `blur` of the largest computed value.
   Support CertainFarthest(const PlainVector& n, double blur) const {
@@ -57,14 +62,12 @@ class SupportMap {
   }
 
   // All vertices whose computed value is within `slack` of the largest, ascending. Requires slack
-  // >= blur.
+  // >= blur (unchecked: the map does not know the caller's blur).
   std::vector<uint32_t> Plateau(const PlainVector& n, double slack) const;
 
   size_t MemoryBytes() const;
 
  private:
-  // The cube map's face along component `axis` has the two components after it as coordinates.
-  static constexpr int kAfter[4] = {1, 2, 0, 1};
   // Four vertices, as structure of arrays; the last one repeated where there are fewer.
   struct Block {
     double x[4];
@@ -125,21 +128,10 @@ class SupportMap {
   double below_half_ = 0;
 };
 
-// Without branches on data: directions come in no foreseeable order. Some cell also for n = 0 and
-// for what overflows.
+// Some cell also for n = 0 and for what overflows.
 inline uint32_t SupportMap::CellOf(const PlainVector& n_own) const {
-  // The first two again, so that the components after any one need no table.
-  const double n[5] = {n_own.x * scale_.x, n_own.y * scale_.y, n_own.z * scale_.z,
-                       n_own.x * scale_.x, n_own.y * scale_.y};
-  const double x = std::abs(n[0]);
-  const double y = std::abs(n[1]);
-  const double z = std::abs(n[2]);
-  const double larger = std::max(x, y);
-  const double factor = half_ / std::max(larger, z);
-  // Arithmetic of truth values, as compilers turn conditions into branches.
-  const uint32_t is_y = y > x;
-  const uint32_t is_z = z > larger;
-  const uint32_t axis = (is_y & (is_z - 1)) | (2 * is_z);
+  const OnCube n(n_own.x * scale_.x, n_own.y * scale_.y, n_own.z * scale_.z);
+  const double factor = half_ / n.largest();
   // Written so that NaN becomes a number.
   const auto index = [&](double component) {
     double place = component * factor;
@@ -147,8 +139,7 @@ inline uint32_t SupportMap::CellOf(const PlainVector& n_own) const {
     place = place > -below_half_ ? place : -below_half_;
     return static_cast<uint32_t>(static_cast<int64_t>(place + half_));
   };
-  const uint32_t face = 2 * axis + static_cast<uint32_t>(std::signbit(n[axis]));
-  return (face * side_ + index(n[axis + 1])) * side_ + index(n[axis + 2]);
+  return CubeCell(n.face(), side_, index(n.first()), index(n.second()));
 }
 
 inline SupportMap::Support SupportMap::LookUp(const PlainVector& n) const {
@@ -160,7 +151,7 @@ inline SupportMap::Support SupportMap::LookUp(const PlainVector& n) const {
   const double v3 = ValueOf(cell.ids[3], n);
   const double low_value = std::max(v0, v1);
   const double high_value = std::max(v2, v3);
-  // Arithmetic of truth values, as above.
+  // Arithmetic of truth values, as compilers turn conditions into branches.
   const uint32_t low = v1 > v0;
   const uint32_t high = 2 + (v3 > v2);
   const uint32_t is_high = high_value > low_value;

@@ -1,22 +1,14 @@
 #ifndef HULLD_CORE_QUERY_TERMS_CERTIFICATE_H_
 #define HULLD_CORE_QUERY_TERMS_CERTIFICATE_H_
 
-#include <cstdint>
 #include <variant>
 #include <vector>
 
 #include "core/numeric/integer.h"
 #include "core/numeric/vector.h"
+#include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
-
-// A vertex of A and a vertex of B, by index into Hull::vertices(); it stands for the point a - b of
-// A - B.
-struct VertexPair {
-  uint32_t a;
-  uint32_t b;
-  friend bool operator==(const VertexPair&, const VertexPair&) = default;
-};
 
 // What makes a relation checkable in O(V) exact operations by code that trusts nothing, from the
 // vertices and the poses.

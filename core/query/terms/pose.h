@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "core/hull/hull.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 

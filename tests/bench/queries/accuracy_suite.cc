@@ -160,8 +160,8 @@ class Maker {
     constexpr int kHalvings = 60;
     for (int i = 0; i < kHalvings; ++i) {
       const double middle = 0.5 * (colliding + separated);
-      const bool apart =
-          FindRelation(placed_a, *PlacedHull::Make(b, at(middle))).relation == Relation::kSeparated;
+      const bool apart = CheckCollision(placed_a, *PlacedHull::Make(b, at(middle)))->relation ==
+                         Relation::kSeparated;
       (apart ? separated : colliding) = middle;
     }
     Add(X_WA, at(separated + gap * reach), std::string(family) + ", " + setting.name);

@@ -34,14 +34,21 @@ struct Hulld {
   using Shape = QueryHull;
   using Placed = PlacedHull;
 
-  double tolerance;
+  explicit Hulld(double tolerance) {
+    relation_alone.tolerance = tolerance;
+    with_separation.want_separation = true;
+    with_separation.want_witness = true;
+  }
+
+  QueryOptions relation_alone;
+  QueryOptions with_separation;
 
   std::unique_ptr<Shape> MakeShape(const Hull& hull) { return std::make_unique<QueryHull>(hull); }
   Placed Place(const Shape& shape, const Pose& X_WA) {
     return OrFail(PlacedHull::Make(shape, X_WA));
   }
   Verdict Ask(const Placed& a, const Placed& b) {
-    return ToVerdict(FindRelation(a, b, nullptr, tolerance).relation);
+    return ToVerdict(CheckCollision(a, b, relation_alone)->relation);
   }
   std::optional<double> Depth(const Placed& a, const Placed& b) {
     const std::optional<double> separation = Separate(a, b);
@@ -54,12 +61,10 @@ struct Hulld {
     return std::nullopt;
   }
   std::optional<double> Separate(const Placed& a, const Placed& b) {
-    QueryOptions options;
-    options.want_separation = true;
-    options.want_witness = true;
-    const Answer answer = OrFail(CheckCollision(a, b, options));
-    if (!answer.separation) return std::nullopt;
-    return answer.separation->value;
+    const absl::StatusOr<Answer> answer = CheckCollision(a, b, with_separation);
+    if (!answer.ok()) Fail(answer.status());
+    if (!answer->separation) return std::nullopt;
+    return answer->separation->value;
   }
 };
 
@@ -98,12 +103,12 @@ double BestSeparation(const Hull& a, const Pose& X_WA, const Hull& b, const Pose
 std::unique_ptr<QueryMethod> MakeHulld() { return MakeHulldWithin(0, "hulld"); }
 
 std::unique_ptr<QueryMethod> MakeHulldWithin(double tolerance, std::string name) {
-  return std::make_unique<MethodOf<Hulld>>(std::move(name), Hulld{tolerance});
+  return std::make_unique<MethodOf<Hulld>>(std::move(name), Hulld(tolerance));
 }
 
 std::unique_ptr<QueryMethod> MakeHulldSimplified(double max_error, std::string name) {
   return std::make_unique<MethodOf<HulldSimplified>>(std::move(name),
-                                                     HulldSimplified{max_error, {0}});
+                                                     HulldSimplified{max_error, Hulld(0)});
 }
 
 }  // namespace hulld::bench

@@ -73,7 +73,7 @@ class Workload {
     questions_ = MakeQuerySet(set_, regime_, kQuestions);
     for (size_t i = 0; i < questions_.a.size(); ++i) {
       const bool apart =
-          FindRelation(questions_.a[i], questions_.b[i]).relation == Relation::kSeparated;
+          CheckCollision(questions_.a[i], questions_.b[i])->relation == Relation::kSeparated;
       truth_.push_back(apart ? Verdict::kApart : Verdict::kColliding);
     }
   }
@@ -189,15 +189,18 @@ void FollowMotion(benchmark::State& state, Workload& workload, bool warm) {
   if (set.queries.empty()) return state.SkipWithError("skipped: no data");
   const std::vector<std::vector<PlacedHull>> frames = MakeFrames(set);
   std::vector<PairCache> caches(set.queries.size());
-  for (size_t i = 0; i < caches.size(); ++i) FindRelation(set.a[i], frames.back()[i], &caches[i]);
+  const QueryOptions options;
+  for (size_t i = 0; i < caches.size(); ++i) {
+    benchmark::DoNotOptimize(CheckCollision(set.a[i], frames.back()[i], options, &caches[i]));
+  }
   size_t frame = 0;
   size_t cached = 0;
   size_t asked = 0;
   for (auto _ : state) {
     const std::vector<PlacedHull>& b = frames[frame];
     for (size_t i = 0; i < b.size(); ++i) {
-      const RelationAnswer answer = FindRelation(set.a[i], b[i], warm ? &caches[i] : nullptr);
-      cached += answer.rung == Rung::kCached ? 1 : 0;
+      const auto answer = CheckCollision(set.a[i], b[i], options, warm ? &caches[i] : nullptr);
+      cached += answer->rung == Rung::kCached ? 1 : 0;
     }
     asked += b.size();
     frame = (frame + 1) % frames.size();
@@ -226,7 +229,8 @@ void AnswerBatch(benchmark::State& state, Workload& workload, int threads) {
   }
   const double start = ProcessSeconds();
   for (auto _ : state) {
-    benchmark::DoNotOptimize(CheckCollisions(placements, pairs, {}, threads));
+    const auto answers = CheckCollisions(placements, pairs, {}, threads);
+    benchmark::DoNotOptimize(answers.data());
   }
   const double seconds = ProcessSeconds() - start;
   state.counters["cpu_ns"] =

@@ -115,8 +115,8 @@ Pose Place(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pose X_WB,
   double separated = 1.01 * reach;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (colliding + separated);
-    const bool apart =
-        FindRelation(placed_a, *PlacedHull::Make(b, at(middle))).relation == Relation::kSeparated;
+    const bool apart = CheckCollision(placed_a, *PlacedHull::Make(b, at(middle)))->relation ==
+                       Relation::kSeparated;
     (apart ? separated : colliding) = middle;
   }
   switch (regime) {

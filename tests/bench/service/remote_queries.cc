@@ -149,7 +149,7 @@ Sample AnswerBatch(RemoteSubject& subject, const Batch& batch, double seconds) {
 
 Sample AnswerBatchInProcess(const Batch& batch, double seconds) {
   return Repeat(1, seconds, static_cast<double>(batch.pairs.size()), [&](int, size_t) {
-    CheckOk(FindRelations(batch.placed, batch.pairs, 0, {}, kThreads).status(), "a batch");
+    CheckOk(CheckCollisions(batch.placed, batch.pairs, {}, kThreads).back().status(), "a batch");
   });
 }
 

@@ -65,7 +65,7 @@ Vector Place(const QueryHull& a, const Vector& t_WA, const QueryHull& b, const L
     Pose X_WB;
     X_WB.t = start + middle * direction;
     const bool apart =
-        FindRelation(placed_a, *PlacedHull::Make(b, X_WB)).relation == Relation::kSeparated;
+        CheckCollision(placed_a, *PlacedHull::Make(b, X_WB))->relation == Relation::kSeparated;
     (apart ? separated : colliding) = middle;
   }
   const double distance = (1 - level.inwards) * (level.from_collision ? colliding : separated) +

@@ -11,7 +11,8 @@ namespace {
 
 // What is wrong with a textbook report; empty when nothing is.
 std::string AnalysisFault(const Hull& a, const Hull& b, const Answer& answer) {
-  const Analysis& analysis = answer.analysis;
+  if (!answer.analysis) return "no analysis";
+  const Analysis& analysis = *answer.analysis;
   if (analysis.axes_tested > analysis.axes_total) return "more axes tested than there are";
   if (a.dimension() == 3 && b.dimension() == 3) {
     const uint64_t expected =
@@ -63,6 +64,7 @@ testing::AssertionResult RelationCheck::AskOnce(const Hull& a, const Pose& X_WA,
   QueryOptions options;
   options.method = method;
   options.want_axis = true;
+  options.want_analysis = textbook;
   options.want_certificate = !textbook;
   const absl::StatusOr<Answer> answer = CheckCollision(a, X_WA, b, X_WB, options);
   if (!answer.ok()) return failure() << answer.status();

@@ -39,7 +39,7 @@ class RelationCheck {
 
   int questions_ = 0;
   std::array<int, 4> relations_ = {};
-  std::array<int, 4> rungs_ = {};
+  std::array<int, kRungCount> rungs_ = {};
   std::array<int, 5> kinds_ = {};
   std::array<int, 5> textbook_kinds_ = {};
 };

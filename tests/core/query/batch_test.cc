@@ -49,10 +49,10 @@ Crowd MakeCrowd(uint64_t seed) {
 void ExpectSameAnswer(const Answer& actual, const Answer& expected) {
   EXPECT_EQ(actual.relation, expected.relation);
   EXPECT_EQ(actual.rung, expected.rung);
-  EXPECT_EQ(actual.analysis.axes_tested, expected.analysis.axes_tested);
-  EXPECT_EQ(actual.analysis.axes_total, expected.analysis.axes_total);
-  EXPECT_EQ(actual.analysis.stage, expected.analysis.stage);
-  EXPECT_EQ(actual.analysis.axis_index, expected.analysis.axis_index);
+  EXPECT_EQ(actual.analysis->axes_tested, expected.analysis->axes_tested);
+  EXPECT_EQ(actual.analysis->axes_total, expected.analysis->axes_total);
+  EXPECT_EQ(actual.analysis->stage, expected.analysis->stage);
+  EXPECT_EQ(actual.analysis->axis_index, expected.analysis->axis_index);
   ASSERT_EQ(actual.axis.has_value(), expected.axis.has_value());
   if (!expected.axis) return;
   EXPECT_EQ(actual.axis->direction, expected.axis->direction);
@@ -68,6 +68,7 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
     QueryOptions options;
     options.method = method;
     options.want_axis = true;
+    options.want_analysis = true;
     // The textbook on all pairs would be slow: every seventh will do.
     std::vector<PlacedPair> pairs;
     for (size_t i = 0; i < crowd.pairs.size(); i += method == Method::kTextbookSat ? 7 : 1) {
@@ -97,33 +98,48 @@ TEST(Batch, EqualsOneByOneOnAnyNumberOfThreads) {
 
 TEST(Batch, RelationsAloneAreThoseOfWholeAnswers) {
   const Crowd crowd = MakeCrowd(704);
-  for (const double tolerance : {0.0, 0.5}) {
-    QueryOptions options;
-    options.tolerance = tolerance;
-    const auto expected = CheckCollisions(crowd.placements, crowd.pairs, options, 1);
-    std::array<int, 4> seen = {};
-    for (int threads : {1, 2, 8}) {
-      const auto answers = FindRelations(crowd.placements, crowd.pairs, tolerance, {}, threads);
-      ASSERT_TRUE(answers.ok());
-      ASSERT_EQ(answers->size(), crowd.pairs.size());
-      for (size_t i = 0; i < crowd.pairs.size(); ++i) {
-        ASSERT_EQ((*answers)[i].relation, expected[i]->relation) << "pair " << i;
-        ASSERT_EQ((*answers)[i].rung, expected[i]->rung) << "pair " << i;
-        ++seen[static_cast<size_t>((*answers)[i].relation)];
-      }
+  QueryOptions whole;
+  whole.want_axis = true;
+  whole.want_certificate = true;
+  const auto expected = CheckCollisions(crowd.placements, crowd.pairs, whole, 1);
+  std::array<int, 3> seen = {};
+  for (int threads : {1, 2, 8}) {
+    const auto answers = CheckCollisions(crowd.placements, crowd.pairs, {}, threads);
+    ASSERT_EQ(answers.size(), crowd.pairs.size());
+    for (size_t i = 0; i < crowd.pairs.size(); ++i) {
+      ASSERT_EQ(answers[i]->relation, expected[i]->relation) << "pair " << i;
+      EXPECT_FALSE(answers[i]->axis || answers[i]->certificate || answers[i]->analysis);
+      ++seen[static_cast<size_t>(answers[i]->relation)];
     }
-    for (size_t i = 0; i < 3; ++i) EXPECT_GT(seen[i], tolerance > 0 ? 0 : 60) << i;
-    EXPECT_EQ(seen[3] > 60, tolerance > 0);
   }
+  for (const int count : seen) EXPECT_GT(count, 60);
 }
 
-TEST(Batch, RelationsAloneAreCancelledAsAWhole) {
+TEST(Batch, ATolerancesAnswersDoNotDependOnThreads) {
+  const Crowd crowd = MakeCrowd(704);
+  QueryOptions options;
+  options.tolerance = 0.5;
+  const auto expected = CheckCollisions(crowd.placements, crowd.pairs, options, 1);
+  std::array<int, 4> seen = {};
+  for (int threads : {2, 8}) {
+    const auto answers = CheckCollisions(crowd.placements, crowd.pairs, options, threads);
+    for (size_t i = 0; i < crowd.pairs.size(); ++i) {
+      ASSERT_EQ(answers[i]->relation, expected[i]->relation) << "pair " << i;
+      ASSERT_EQ(answers[i]->rung, expected[i]->rung) << "pair " << i;
+      ++seen[static_cast<size_t>(answers[i]->relation)];
+    }
+  }
+  EXPECT_GT(seen[static_cast<size_t>(Relation::kWithinTolerance)], 60);
+}
+
+TEST(Batch, PollsLessOftenThanItAnswersAndStopsForGood) {
   const Crowd crowd = MakeCrowd(705);
   for (int threads : {1, 4}) {
     std::atomic<int> polls = 0;
-    const auto answers = FindRelations(
-        crowd.placements, crowd.pairs, 0, [&] { return ++polls > 10; }, threads);
-    EXPECT_EQ(answers.status().code(), absl::StatusCode::kCancelled);
+    QueryOptions options;
+    options.should_stop = [&] { return ++polls > 10; };
+    const auto answers = CheckCollisions(crowd.placements, crowd.pairs, options, threads);
+    EXPECT_EQ(answers.back().status().code(), absl::StatusCode::kCancelled);
     // Polled again and again, but not for every pair of those that take no time.
     EXPECT_LT(polls, 1000);
   }
@@ -133,7 +149,6 @@ TEST(Batch, NoPairsGiveNoAnswers) {
   const Crowd crowd = MakeCrowd(702);
   EXPECT_TRUE(CheckCollisions(crowd.placements, {}, {}, 4).empty());
   EXPECT_TRUE(CheckCollisions({}, {}, {}, 1).empty());
-  EXPECT_TRUE(FindRelations(crowd.placements, {}, 0, {}, 4)->empty());
 }
 
 TEST(Batch, CancellationCancelsTheRestAndNothingElse) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/query/batch.h"
 #include "core/query/collision.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
@@ -32,6 +33,7 @@ QueryOptions Options(Method method) {
   QueryOptions options;
   options.method = method;
   options.want_axis = true;
+  options.want_analysis = true;
   return options;
 }
 
@@ -42,6 +44,34 @@ TEST(Collision, AnEmptyHullIsSeparatedFromAll) {
   EXPECT_TRUE(check.Ask(empty, Pose(), empty, Pose(), Relation::kSeparated));
   EXPECT_TRUE(check.Ask(empty, Pose(), UnitCube(), Pose(), Relation::kSeparated));
   EXPECT_TRUE(check.Ask(empty, Pose(), BuildHull(origin), At(1, 2, 3), Relation::kSeparated));
+}
+
+// Found beside each other: a single call said EXACT, a stream said BOUNDS.
+TEST(Collision, AnEmptyHullIsDecidedByTheSameRungHoweverItIsAsked) {
+  const Hull empty;
+  const Hull cube = UnitCube();
+  const QueryHull query_empty(empty);
+  const QueryHull query_cube(cube);
+  const std::vector<PlacedHull> placements = {*PlacedHull::Make(query_empty, Pose()),
+                                              *PlacedHull::Make(query_cube, Pose())};
+  PairCache cache;
+  QueryOptions everything;
+  everything.want_axis = true;
+  everything.want_analysis = true;
+  everything.want_certificate = true;
+  everything.want_separation = true;
+  everything.want_witness = true;
+  everything.clearance = 1;
+  for (const PlacedPair& pair : {PlacedPair{0, 1}, PlacedPair{1, 0}, PlacedPair{0, 0}}) {
+    const PlacedHull& a = placements[pair.a];
+    const PlacedHull& b = placements[pair.b];
+    EXPECT_EQ(CheckCollision(a, b)->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b, {}, &cache)->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b, everything)->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b, Options(Method::kTextbookSat))->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollisions(placements, {&pair, 1}, {}, 1)[0]->rung, Rung::kBounds);
+    EXPECT_EQ(CheckCollision(a, b)->relation, Relation::kSeparated);
+  }
 }
 
 TEST(Collision, RefusesInvalidPosesOfEitherHull) {
@@ -95,7 +125,8 @@ TEST(Collision, AxesOfAFlatDifferenceCountAgainstTheLimit) {
   options.method = Method::kTextbookSat;
   // 1 + 1 normals, 3 x 3 cross products; the plane's normal and 3 + 3 in-plane normals.
   options.max_textbook_axes = 18;
-  EXPECT_EQ(CheckCollision(triangle, Pose(), triangle, Pose(), options)->analysis.axes_total, 18u);
+  options.want_analysis = true;
+  EXPECT_EQ(CheckCollision(triangle, Pose(), triangle, Pose(), options)->analysis->axes_total, 18u);
   options.max_textbook_axes = 17;
   EXPECT_TRUE(absl::IsResourceExhausted(
       CheckCollision(triangle, Pose(), triangle, Pose(), options).status()));
@@ -105,14 +136,14 @@ TEST(Collision, StageIsTheKindOfTheAxisWhetherOrNotTheAxisIsWanted) {
   const Hull cube = UnitCube();
   for (const Pose& pose : {At(2, 0, 0), At(1, 0, 0), At(1, 1, 1), At(3, 2, 1)}) {
     QueryOptions options;
-    EXPECT_FALSE(CheckCollision(cube, Pose(), cube, pose, options)->analysis.stage.has_value());
+    EXPECT_FALSE(CheckCollision(cube, Pose(), cube, pose, options)->analysis.has_value());
     options.want_analysis = true;
     const Answer stage_only = CheckCollision(cube, Pose(), cube, pose, options).value();
     EXPECT_FALSE(stage_only.axis.has_value());
     options.want_axis = true;
     const Answer both = CheckCollision(cube, Pose(), cube, pose, options).value();
     ASSERT_TRUE(both.axis.has_value());
-    EXPECT_EQ(stage_only.analysis.stage, both.axis->kind);
+    EXPECT_EQ(stage_only.analysis->stage, both.axis->kind);
   }
 }
 
@@ -128,10 +159,10 @@ TEST(Collision, TextbookNamesTheFacetThatSeparates) {
   EXPECT_THAT(answer.axis->feature_a.facet, testing::Optional(5u));
   EXPECT_THAT(answer.axis->feature_a.vertices, ElementsAre(4, 5, 6, 7));
   EXPECT_THAT(answer.axis->feature_b.vertices, ElementsAre(0, 1, 2, 3));
-  EXPECT_EQ(answer.analysis.axes_total, 6u + 6u + 12u * 12u);
-  EXPECT_THAT(answer.analysis.axis_index, testing::Optional(0u));
-  EXPECT_EQ(answer.analysis.axes_tested, 1u);
-  EXPECT_THAT(answer.analysis.stage, testing::Optional(AxisKind::kFacetA));
+  EXPECT_EQ(answer.analysis->axes_total, 6u + 6u + 12u * 12u);
+  EXPECT_THAT(answer.analysis->axis_index, testing::Optional(0u));
+  EXPECT_EQ(answer.analysis->axes_tested, 1u);
+  EXPECT_THAT(answer.analysis->stage, testing::Optional(AxisKind::kFacetA));
 }
 
 // Only the cross product of two edges separates these two needles of cubes.
@@ -208,9 +239,9 @@ TEST(Collision, TextbookReportsTheSameOnAnyNumberOfThreads) {
       const Answer answer = CheckCollision(a, X_WA, other, X_WB, options).value();
       EXPECT_EQ(answer.relation, expected.relation);
       EXPECT_EQ(answer.rung, expected.rung);
-      EXPECT_EQ(answer.analysis.axes_tested, expected.analysis.axes_tested);
-      EXPECT_EQ(answer.analysis.axis_index, expected.analysis.axis_index);
-      EXPECT_EQ(answer.analysis.stage, expected.analysis.stage);
+      EXPECT_EQ(answer.analysis->axes_tested, expected.analysis->axes_tested);
+      EXPECT_EQ(answer.analysis->axis_index, expected.analysis->axis_index);
+      EXPECT_EQ(answer.analysis->stage, expected.analysis->stage);
       ExpectSameAxis(answer, expected);
     }
   }
@@ -227,7 +258,7 @@ TEST(Collision, AnswersAreTheSameEachTime) {
     const Answer second = CheckCollision(a, Pose(), b, X_WB, options).value();
     EXPECT_EQ(first.relation, second.relation);
     EXPECT_EQ(first.rung, second.rung);
-    EXPECT_EQ(first.analysis.axes_tested, second.analysis.axes_tested);
+    EXPECT_EQ(first.analysis->axes_tested, second.analysis->axes_tested);
     ExpectSameAxis(first, second);
   }
 }

@@ -65,7 +65,7 @@ Found BruteForce(const Scene& scene, IsAsked is_asked, uint64_t* asked) {
     for (uint32_t b = a + 1; b < scene.placements.size(); ++b) {
       if (!is_asked(a, b)) continue;
       ++*asked;
-      const Relation relation = FindRelation(scene.placements[a], scene.placements[b]).relation;
+      const Relation relation = CheckCollision(scene.placements[a], scene.placements[b])->relation;
       if (relation != Relation::kSeparated) found.emplace_back(PlacedPair{a, b}, relation);
     }
   }

@@ -251,10 +251,14 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
     return status.code() == absl::StatusCode::kInvalidArgument ? std::string(status.message())
                                                                : status.ToString();
   };
-  EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = nan; }), "tolerance is NaN");
-  EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = -1; }), "tolerance is negative");
-  EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = nan; }), "max_error is NaN");
-  EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = -kLeast; }), "max_error is negative");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = nan; }),
+            "tolerance is NaN; it is a length of at least 0");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.tolerance = -1; }),
+            "tolerance is -1; it is a length of at least 0");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = nan; }),
+            "max_error is NaN; it is a length of at least 0");
+  EXPECT_EQ(message([&](QueryOptions& o) { o.max_error = -0.5; }),
+            "max_error is -0.5; it is a length of at least 0");
   EXPECT_EQ(message([&](QueryOptions& o) { o.clearance = nan; }), "clearance is NaN");
   const auto with_tolerance = [&](auto change) {
     return message([&](QueryOptions& o) {
@@ -262,14 +266,15 @@ TEST(Separation, OptionsThatMeanNothingAreRefused) {
       change(o);
     });
   };
-  const std::string rest = " needs the relation, which a tolerance > 0 may leave open; ask with 0";
+  const std::string start = "tolerance is 1, but ";
+  const std::string rest = " needs the exact relation; leave out one of them";
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_separation = true; }),
-            "the separation" + rest);
+            start + "want_separation" + rest);
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.want_certificate = true; }),
-            "the certificate" + rest);
-  EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.clearance = 0; }), "the clearance" + rest);
+            start + "want_certificate" + rest);
+  EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.clearance = 0; }), start + "clearance" + rest);
   EXPECT_EQ(with_tolerance([](QueryOptions& o) { o.method = Method::kTextbookSat; }),
-            "the textbook method" + rest);
+            start + "the textbook method" + rest);
   EXPECT_EQ(message([](QueryOptions& o) { o.max_error = kInfinity; }), "OK");
 }
 

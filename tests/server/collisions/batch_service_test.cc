@@ -492,7 +492,7 @@ TEST_F(BatchCall, ADeadlineEndsALongBatch) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-TEST_F(BatchCall, BatchesTakeTurnsOnTheExecutor) {
+TEST_F(BatchCall, BatchesTakeTurns) {
   Put("cube", Cube());
   // One pair of these is over soon; all of them are not.
   Put("small", Sphere(100));

@@ -437,7 +437,7 @@ TEST(HullBuilder, ASnapshotStopsWheneverItIsToldTo) {
   ASSERT_TRUE(whole.ok()) << whole.status();
   EXPECT_TRUE(SameBits(*whole, hull));
   // Two passes over 2 V - 4 triangles.
-  EXPECT_EQ(polls, 2 * (2 * 20000 - 4) / 1024);
+  EXPECT_EQ(polls, (2 * (2 * 20000 - 4) + 1023) / 1024);
   for (int last = 1; last <= polls; ++last) {
     int asked = 0;
     const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });

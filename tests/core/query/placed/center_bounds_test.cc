@@ -162,7 +162,7 @@ TEST(CenterBounds, RelationsAreThoseOfTheSearch) {
     const PlacedHull placed_b = PlacedHull::Make(b, X_WB).value();
     QueryOptions options;
     options.want_axis = true;
-    const RelationAnswer plain = FindRelation(placed_a, placed_b);
+    const Answer plain = CheckCollision(placed_a, placed_b).value();
     ASSERT_EQ(plain.relation, CheckCollision(placed_a, placed_b, options)->relation)
         << one.name << ", " << other.name << " seed " << seed << " round " << round;
     if (plain.rung == Rung::kBounds) ++settled[plain.relation == Relation::kOverlapping];
@@ -178,9 +178,9 @@ TEST(CenterBounds, LimitsOfTheLineOfCentres) {
   const auto ask = [&](const Vector& t) {
     Pose X_WB;
     X_WB.t = t;
-    return FindRelation(PlacedHull::Make(query_hull, Pose()).value(),
-                        PlacedHull::Make(query_hull, X_WB).value())
-        .relation;
+    return CheckCollision(PlacedHull::Make(query_hull, Pose()).value(),
+                          PlacedHull::Make(query_hull, X_WB).value())
+        ->relation;
   };
   EXPECT_EQ(ask(Vector(0, 0, 0)), Relation::kOverlapping);
   EXPECT_EQ(ask(Vector(0x1p-1000, 0, 0)), Relation::kOverlapping);

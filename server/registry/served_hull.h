@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_SNAPSHOT_H_
-#define HULLD_SERVER_REGISTRY_SNAPSHOT_H_
+#ifndef HULLD_SERVER_REGISTRY_SERVED_HULL_H_
+#define HULLD_SERVER_REGISTRY_SERVED_HULL_H_
 
 #include <atomic>
 #include <cstddef>
@@ -12,12 +12,13 @@
 
 namespace hulld::server {
 
-// A hull's canonical snapshot and what is derived from it, made when the first request needs it and
-// kept with it. Thread-safe.
-class Snapshot {
+// What readers of one version of a hull share: its canonical snapshot and what is derived from
+// that, made when the first request needs it and kept with it. Thread-safe.
+class ServedHull {
  public:
-  explicit Snapshot(Hull hull) : hull_(std::move(hull)) {}
+  explicit ServedHull(Hull hull) : hull_(std::move(hull)) {}
 
+  // The canonical snapshot.
   const Hull& hull() const { return hull_; }
 
   // What collision queries need of the hull. The first call makes it.
@@ -31,7 +32,7 @@ class Snapshot {
   // Whether query_hull() would only return.
   bool has_query_hull() const { return query_hull_bytes_.load(std::memory_order_acquire) > 0; }
 
-  // What it holds in memory by now.
+  // What it holds in memory by now. Bytes.
   size_t MemoryBytes() const {
     return sizeof(*this) + hull_.MemoryBytes() + query_hull_bytes_.load(std::memory_order_relaxed);
   }
@@ -46,4 +47,4 @@ class Snapshot {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_SNAPSHOT_H_
+#endif  // HULLD_SERVER_REGISTRY_SERVED_HULL_H_

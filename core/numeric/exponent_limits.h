@@ -1,0 +1,97 @@
+#ifndef HULLD_CORE_NUMERIC_EXPONENT_LIMITS_H_
+#define HULLD_CORE_NUMERIC_EXPONENT_LIMITS_H_
+
+#include <limits>
+
+// The range of exponents within which each stage of core computes, with its derivation. Outside its
+// range a stage leaves the decision to the next one. Differences of doubles overflow near 2^1024,
+// Dekker's product splits by multiplying with 2^27 + 1 and overflows above 2^996, and a product
+// that underflows errs by up to 2^-1075. The relative error bounds are in error_bounds.h.
+namespace hulld {
+
+// The largest finite double, and the least positive one.
+inline constexpr double kLargestDouble = std::numeric_limits<double>::max();
+inline constexpr double kLeastDouble = std::numeric_limits<double>::denorm_min();
+
+// Above the exponent of any double's lowest bit.
+inline constexpr int kAboveAllExponents = 1024;
+
+// What underflow adds to the bounds of Orient2d and Orient3d. A product that underflows errs by at
+// most 2^-1075; sums never err by underflow. 2x2: two products. 3x3 with differences of at most D:
+// six products times D, and three products: (6 D + 3) 2^-1075 and roundings of these, less than (D
+// + 1) times this. Proven.
+inline constexpr double kUnderflowError = 0x1p-1070;
+
+// A permanent of Orient3d below this has not overflowed, nor has the bound made of it. Proven.
+inline constexpr double kPermanentMax = 0x1p1000;
+
+// Expansion arithmetic of degree-3 polynomials in coordinate differences is exact when every
+// non-zero coordinate is at least the first in magnitude (its lowest bit is then at least 2^-358,
+// so every product of three is a multiple of 2^-1074) and none exceeds the second (differences
+// below 2^331, sums of products below 2^996, so that splitting cannot overflow). Proven.
+inline constexpr double kExpansionMin = 0x1p-306;
+inline constexpr double kExpansionMax = 0x1p330;
+
+// The plane of a triangle (see kPlaneErrorFactor): its bound is kept as a float per |p| + |a|.
+// Outside this range of slopes e and f are first scaled by powers of two to |e|, |f| in [1/2, 1).
+// So, and with |p| + |a| at least kPlaneMinCoordinate and at most kPlaneMaxCoordinate, no product
+// overflows (2^166 * 2^600), and underflow, at most 2^-1070 in all, is below 2^-50 of the slack, 16
+// u |e||f| (|p| + |a|) >= 2^-1011. Outside these a plane is never certain. Proven.
+inline constexpr double kPlaneMinSlope = 0x1p-120;
+inline constexpr double kPlaneMaxSlope = 0x1p120;
+inline constexpr double kPlaneMinCoordinate = 0x1p-960;
+inline constexpr double kPlaneMaxCoordinate = 0x1p600;
+
+// y . (A x B) with |A|, |B|, |y| at most D (see kTripleProductErrorFactor): nothing overflows or
+// underflows for D within these. Proven.
+inline constexpr double kTripleProductMin = 0x1p-300;
+inline constexpr double kTripleProductMax = 0x1p300;
+
+// A direction map divides by the distance of a point from its center and multiplies distances with
+// at most half its resolution, 2^9: within these no quotient or product overflows or loses a bit by
+// underflow. Proven.
+inline constexpr double kMapMinDistance = 0x1p-1000;
+inline constexpr double kMapMaxDistance = 0x1p1000;
+
+// The audit's filter, n . p with |n| below 2^63 and a bound of 2^15 |p|, runs for |p| above this:
+// three products that underflow, 2^-1075 each, are far below the bound. Proven.
+inline constexpr double kAuditMinOffset = 0x1p-930;
+
+// What underflow adds to the distance from a triangle (see kSubsetDistanceErrorFactor) and to a
+// radius. Proven.
+inline constexpr double kLeastPositive = 0x1p-1060;
+
+// Queries in floating point. S is the size of a pair: M_A + M_B + |t_B - t_A|, where M is a hull's
+// largest absolute coordinate and |.| the largest absolute component. The stage runs only when S is
+// between these two, with directions whose largest component is between the second two. Then
+// nothing overflows: the largest quantities are a cube of 8 S, 2^909, and a direction times 8 S,
+// 2^703. Nor does underflow matter: the least bounds are 24 W^2 d with W > 6 d and d = 128 u S (see
+// kTetrahedronErrorFactor), at least 2^-1029, and 512 u |n| S, at least 2^-744; a product that
+// underflows errs by 2^-1075, far below their slack. Proven.
+inline constexpr double kFilterMinSize = 0x1p-300;
+inline constexpr double kFilterMaxSize = 0x1p300;
+inline constexpr double kDirectionMin = 0x1p-400;
+inline constexpr double kDirectionMax = 0x1p400;
+inline constexpr bool IsFilterSize(double size) {
+  return size >= kFilterMinSize && size <= kFilterMaxSize;
+}
+inline constexpr bool IsFilterDirection(double largest_component) {
+  return largest_component >= kDirectionMin && largest_component <= kDirectionMax;
+}
+
+// The largest component of a quaternion that is used as it is: no sum of four of its squares
+// overflows, and no square that counts underflows. Proven.
+inline constexpr double kQuaternionMin = 0x1p-100;
+inline constexpr double kQuaternionMax = 0x1p100;
+
+// The bound of a gap along a textbook axis is itself accurate above this, far above the underflow
+// threshold. Proven.
+inline constexpr double kGapMinBound = 0x1p-900;
+
+// Distances of planes from the origin, in floating point, that differ by less than this may have
+// underflowed. Proven.
+inline constexpr double kDepthKeyMin = 0x1p-1000;
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_NUMERIC_EXPONENT_LIMITS_H_

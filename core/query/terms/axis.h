@@ -1,0 +1,40 @@
+#ifndef HULLD_CORE_QUERY_TERMS_AXIS_H_
+#define HULLD_CORE_QUERY_TERMS_AXIS_H_
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/numeric/vector.h"
+
+namespace hulld {
+
+enum class AxisKind {
+  kFacetA,    // normal of a facet of A
+  kFacetB,    // normal of a facet of B
+  kEdgeEdge,  // cross product of an edge of A and an edge of B
+  kFlat,      // a direction that only flat Minkowski differences need
+  kGeneral,   // a support direction found by search
+};
+
+// The vertices of one hull that lie farthest along an axis.
+struct Feature {
+  std::vector<uint32_t> vertices;  // indices into Hull::vertices(), ascending
+  std::optional<uint32_t> facet;   // when the feature is a whole facet
+};
+
+// World frame, from A towards B: max n.A <= min n.B over the reals for the n that was found, of
+// which `direction` is the rounding to unit length.
+//
+// FACET_A and FACET_B name the line: the direction may be minus the facet's outward normal, as in
+// the textbook, which tests each line once. The features are those of the direction.
+struct SeparatingAxis {
+  Vector direction;
+  AxisKind kind;
+  Feature feature_a;  // where A reaches farthest along n
+  Feature feature_b;  // where B reaches least far
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_TERMS_AXIS_H_

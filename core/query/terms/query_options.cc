@@ -1,0 +1,45 @@
+#include "core/query/terms/query_options.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+
+namespace hulld {
+namespace {
+
+absl::Status CheckLength(const char* name, double length) {
+  if (length >= 0) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(name, " is ",
+                                                 std::isnan(length) ? "NaN" : absl::StrCat(length),
+                                                 "; it is a length of at least 0"));
+}
+
+// The name of an option that needs the exact relation; null when there is none.
+const char* ExactOption(const QueryOptions& options, const OptionNames& names) {
+  return options.method == Method::kTextbookSat ? names.textbook
+         : options.want_certificate             ? names.certificate
+         : options.want_separation              ? names.separation
+         : options.want_witness                 ? names.witness
+         : options.clearance.has_value()        ? names.clearance
+                                                : nullptr;
+}
+
+}  // namespace
+
+absl::Status ValidateOptions(const QueryOptions& options, const OptionNames& names) {
+  if (absl::Status s = CheckLength(names.tolerance, options.tolerance); !s.ok()) return s;
+  if (absl::Status s = CheckLength(names.max_error, options.max_error.value_or(0)); !s.ok()) {
+    return s;
+  }
+  if (std::isnan(options.clearance.value_or(0))) {
+    return absl::InvalidArgumentError(absl::StrCat(names.clearance, " is NaN"));
+  }
+  if (options.tolerance == 0) return absl::OkStatus();
+  const char* const exact = ExactOption(options, names);
+  if (exact == nullptr) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat(names.tolerance, " is ", options.tolerance, ", but ", exact,
+                   " needs the exact relation; leave out one of them"));
+}
+
+}  // namespace hulld

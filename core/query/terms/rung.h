@@ -1,0 +1,30 @@
+#ifndef HULLD_CORE_QUERY_TERMS_RUNG_H_
+#define HULLD_CORE_QUERY_TERMS_RUNG_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace hulld {
+
+// What decided an answer.
+enum class Rung : uint8_t {
+  kBounds,         // a hull is empty, or spheres round the hulls; for the relation alone, also how
+                   // far the hulls reach along the line of their centres
+  kCached,         // the axis or the vertex pairs of the previous query of the pair
+  kFloatingPoint,  // the hulls, in floating point with a proven error bound
+  kExact,          // exact arithmetic
+};
+inline constexpr size_t kRungCount = 4;
+
+// How many answers each rung gave.
+struct RungCounts {
+  // In the order of Rung.
+  std::array<uint64_t, kRungCount> by_rung = {};
+
+  void Add(Rung rung) { ++by_rung[static_cast<size_t>(rung)]; }
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_TERMS_RUNG_H_
