@@ -167,10 +167,10 @@ void BatchStream::Deliver(PairsPiece& piece) {
   DeliverReplies(piece);
 }
 
-// A problem is named by its place, which would change.
+// A problem names its row, which would change.
 bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
                        v1::BatchCheckCollisionsResponse* waiting) {
-  if (reply.pair_problems_size() > 0) return false;
+  if (reply.columns().pair_problems_size() > 0) return false;
   Append(reply, waiting);
   return true;
 }
