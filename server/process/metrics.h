@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
-#include "core/query/collision.h"
+#include "core/query/terms/rung.h"
 #include "server/contract/rpc.h"
 
 namespace hulld::server {
@@ -53,14 +53,6 @@ struct PoolMetrics {
   prometheus::Gauge& waiting;
   // hulld_queue_wait_seconds{pool=...}: how long a task waited before a thread took it.
   prometheus::Histogram& wait_seconds;
-};
-
-// Pairs answered, by the rung that decided each. Code that answers many pairs sums them up first,
-// so that counting costs nothing per pair worth measuring.
-struct RungCounts {
-  std::array<uint64_t, 4> by_rung = {};
-
-  void Add(Rung rung) { ++by_rung[static_cast<size_t>(rung)]; }
 };
 
 // Everything that a running server counts and times, and its exposition to Prometheus. One per
