@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr char kFirstLine[] = "hulld backup 1\n";
 constexpr size_t kFirstLineBytes = sizeof kFirstLine - 1;
-// Above any part; a larger size can only be damage.
+// More than any part has; a larger size is damage.
 constexpr uint32_t kMaxPartBytes = 64 << 20;
 
 uint32_t Checksum(const std::string& bytes) {
@@ -31,7 +31,7 @@ absl::Status Damaged(const std::string& what) {
   return absl::InvalidArgumentError(absl::StrCat("the backup is damaged: ", what));
 }
 
-// Relative, and without parts that lead upwards.
+// Whether the path is relative and has no parts that lead upwards.
 bool IsInside(const std::string& path) {
   const fs::path parts(path);
   if (path.empty() || parts.is_absolute()) return false;
@@ -101,14 +101,14 @@ absl::Status WritePieces(std::istream& file, const std::string& directory, Backu
   return absl::OkStatus();
 }
 
-// Where a backup is unpacked, in the directory that it is for: nothing else may be ours to write,
-// and what is mounted there cannot be replaced.
+// Where a backup is unpacked: within its target directory, because we may have no right to write
+// elsewhere, and because a mounted directory cannot be replaced.
 constexpr char kStagingName[] = "restoring";
 // The part of a data directory that makes hulld take it for a store.
 constexpr char kDatabaseName[] = "rocksdb";
 
-// Whether nothing is there but what a restoring that was killed left behind, and what a file system
-// has in its root.
+// Whether the directory holds nothing but the remains of a restore that was killed, and what a file
+// system has in its root.
 bool IsFree(const fs::path& directory) {
   std::error_code error;
   bool restoring = false;
@@ -126,7 +126,7 @@ bool IsFree(const fs::path& directory) {
   return !error && (!marked || restoring);
 }
 
-// Makes a directory and what is missing above it; returns those that it made, the lowest first.
+// Makes a directory and the missing ones above it. Returns those that it made, the lowest first.
 absl::StatusOr<std::vector<fs::path>> MakeDirectories(const fs::path& directory) {
   std::error_code error;
   std::vector<fs::path> made;
@@ -169,7 +169,7 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
   return absl::OkStatus();
 }
 
-// Of a file whose first line is read.
+// Restores from a file whose first line has been read.
 absl::Status Restore(std::ifstream& file, const fs::path& target, BackupCheck* check) {
   const fs::path staging = target / kStagingName;
   std::error_code error;
@@ -300,7 +300,7 @@ absl::StatusOr<BackupCheck> RestoreBackup(const std::string& path, const std::st
   BackupCheck check;
   const absl::Status status = Restore(file, target, &check);
   if (!status.ok()) {
-    // Never a store without its mark.
+    // A store must never be left without its mark.
     if (!fs::exists(target / kDatabaseName, error)) fs::remove(target / kRestoredMark, error);
     fs::remove_all(target / kStagingName, error);
     if (!made->empty()) fs::remove(target, error);

@@ -14,7 +14,7 @@ namespace hulld {
 
 // A backup of a store in one file: a line that says what it is, then the parts of SaveBackup,
 // each after its size and the CRC-32 of its bytes (32 bits each, little endian). The part `end` is
-// the last, so that a file that was cut short is found out.
+// the last, which reveals a file that was cut short.
 
 // Checks that parts make up a whole backup, in their order.
 class BackupCheck {
@@ -23,7 +23,7 @@ class BackupCheck {
   absl::Status Take(const v1::SaveBackupResponse& part);
   // Whether `end` came.
   bool complete() const { return complete_; }
-  // Of what came so far; all of the backup once it is complete.
+  // What the backup says of itself, and the sums over the parts so far.
   const v1::BackupBegin& begin() const { return begin_; }
   const v1::BackupEnd& totals() const { return totals_; }
 
@@ -38,8 +38,8 @@ class BackupCheck {
   uint64_t file_bytes_ = 0;
 };
 
-// Writes a backup to a file that must not exist, piece by piece; it gets its name only when it is
-// complete and on disk.
+// Writes a backup to a new file, piece by piece. The file gets its name only when it is complete
+// and on disk.
 class BackupWriter {
  public:
   explicit BackupWriter(std::string path);
@@ -62,14 +62,14 @@ class BackupWriter {
   BackupCheck check_;
 };
 
-// A file of this name in a data directory tells hulld that the directory was made of a backup.
-// Changes after a backup raise revisions that the store it was taken of has raised too, so hulld
-// gives the new store an ID of its own: nobody may take one for the other.
+// A file of this name in a data directory tells hulld that the directory was made from a backup.
+// The store that the backup was taken from and the restored one give the same revisions to
+// different changes, so hulld gives the restored one an ID of its own.
 inline constexpr char kRestoredMark[] = "restored";
 
-// Makes a data directory of a backup: all of it, or no store. The directory need not be there; if
-// it is, it must be empty (but for lost+found, and for what was left of a call that was killed),
-// and only what is in it is written. Returns what the backup said of itself; the store that hulld
+// Makes a data directory from a backup: all of it, or no store. The directory need not exist. If it
+// does, it must be empty (but for lost+found, and for the remains of a call that was killed), and
+// nothing outside it is written. Returns what the backup said of itself; the store that hulld
 // makes of the directory has another ID. INVALID_ARGUMENT: the file is no backup, is damaged or
 // cut short; FAILED_PRECONDITION: the directory is there and not empty; UNAVAILABLE: it cannot be
 // written.

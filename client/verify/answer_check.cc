@@ -22,7 +22,7 @@ absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const v1::HullVersion& vers
                                                      Verification* problem) {
   const std::string& id = version.hull_id();
   auto known = meshes_.find(id);
-  // One that is newer than the answer will not grow older.
+  // A mesh that is newer than the answer stays so; fetching it again would not help.
   if (known == meshes_.end() || known->second.header.hull().revision() < version.revision()) {
     absl::StatusOr<HullMesh> mesh = client_.GetHullMesh(id);
     if (absl::IsNotFound(mesh.status())) {

@@ -159,7 +159,7 @@ void BatchStream::Deliver(PairsPiece& piece) {
   DeliverReplies(piece);
 }
 
-// A problem is named by its place, which would change.
+// A problem names its row, which would change.
 bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
                        v1::BatchCheckCollisionsResponse* waiting) {
   if (reply.columns().pair_problems_size() > 0) return false;

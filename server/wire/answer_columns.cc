@@ -12,7 +12,7 @@
 namespace hulld::server {
 namespace {
 
-// What an element of a repeated message field takes beside its own bytes: a tag and its length.
+// Bytes of an element of a repeated message field beside its own: a tag and a length.
 constexpr size_t kElementOverhead = 5;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kWitnessNumbers = 6;
@@ -34,7 +34,7 @@ void AddWitness(const Witness& witness, v1::AnswerColumns* columns) {
   columns->add_witness_errors(witness.error);
 }
 
-// The columns of fixed size.
+// Fills the columns of fixed size.
 size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   size_t bytes = 0;
   if (wanted.separation()) {
@@ -56,7 +56,7 @@ size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColu
   return bytes;
 }
 
-// EncodeAxis, but a feature that is too large leaves the pair without answer.
+// As EncodeAxis, but a feature that is too large leaves the pair without an answer.
 size_t AddAxis(const SeparatingAxis& found, const Hull& a, const Hull& b,
                v1::AnswerColumns* columns) {
   v1::Axis* const axis = columns->mutable_axes(columns->axes_size() - 1);

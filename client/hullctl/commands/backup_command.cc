@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
 
@@ -63,23 +62,22 @@ ExitCode Restore(const Invocation& run, const BackupArguments& arguments) {
 
 }  // namespace
 
-void AddBackupCommand(CLI::App* app, Invocation* invocation) {
+void AddBackupCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BackupArguments>();
-  CLI::App* command = app->add_subcommand("backup", "Copies of a whole store in one file");
-  command->require_subcommand(1);
-  CLI::App* save = command->add_subcommand("save", "Save a backup while hulld goes on serving");
-  save->add_option("FILE", arguments->file, "File to make")->required();
-  save->footer(
+  Command command = program.AddCommand("backup", "Copies of a whole store in one file");
+  command.RequireCommand();
+  Command save = command.AddCommand("save", "Save a backup while hulld goes on serving");
+  save.AddText("FILE", &arguments->file, "File to make").Required();
+  save.SetFooter(
       "However long that takes, unless --timeout is given, which then bounds all of it. What ends\n"
       "early leaves no file.");
-  save->callback([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
-  CLI::App* restore =
-      command->add_subcommand("restore", "Make a data directory of a backup, for a new hulld");
-  restore->add_option("FILE", arguments->file, "File that 'backup save' made")->required();
-  restore->add_option("--data-dir", arguments->data_dir, "Directory to make; must be new or empty")
-      ->required();
-  restore->callback([=] { invocation->action = [=] { return Restore(*invocation, *arguments); }; });
-  for (CLI::App* part : command->get_subcommands({})) part->fallthrough();
+  save.OnGiven([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
+  Command restore =
+      command.AddCommand("restore", "Make a data directory of a backup, for a new hulld");
+  restore.AddText("FILE", &arguments->file, "File that 'backup save' made").Required();
+  restore.AddText("--data-dir", &arguments->data_dir, "Directory to make; must be new or empty")
+      .Required();
+  restore.OnGiven([=] { invocation->action = [=] { return Restore(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

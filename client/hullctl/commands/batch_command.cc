@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <unordered_map>
@@ -50,7 +49,7 @@ class BatchRun {
   }
 
   uint64_t failed() const { return failed_; }
-  // Whose certificates do not prove them, and whose could not be checked.
+  // Pairs whose certificates do not prove them, and pairs that could not be checked.
   uint64_t invalid() const { return invalid_; }
   uint64_t unchecked() const { return unchecked_; }
 
@@ -267,15 +266,14 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
 
 }  // namespace
 
-void AddBatchCommand(CLI::App* app, Invocation* invocation) {
+void AddBatchCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BatchArguments>();
-  CLI::App* command = app->add_subcommand("batch", "Ask about many pairs from a file");
-  command->add_option("FILE", arguments->file, "Placements and pairs; - is standard input")
-      ->required();
+  Command command = program.AddCommand("batch", "Ask about many pairs from a file");
+  command.AddText("FILE", &arguments->file, "Placements and pairs; - is standard input").Required();
   AddQueryOptions(command, &arguments->wishes);
-  command->add_flag("--colliding", arguments->colliding, "Leave out the pairs that are separated");
-  command->footer(kBatchFileHelp);
-  command->callback([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
+  command.AddFlag("--colliding", &arguments->colliding, "Leave out the pairs that are separated");
+  command.SetFooter(kBatchFileHelp);
+  command.OnGiven([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

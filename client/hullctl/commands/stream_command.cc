@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <unordered_map>
 
@@ -97,11 +96,11 @@ ExitCode Stream(const Invocation& run, const std::string& path) {
 
 }  // namespace
 
-void AddStreamCommand(CLI::App* app, Invocation* invocation) {
+void AddStreamCommand(Command program, Invocation* invocation) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = app->add_subcommand("stream", "Ask again and again while poses change");
-  command->add_option("FILE", *path, "JSON, one object per line; - is standard input")->required();
-  command->footer(
+  Command command = program.AddCommand("stream", "Ask again and again while poses change");
+  command.AddText("FILE", path.get(), "JSON, one object per line; - is standard input").Required();
+  command.SetFooter(
       "The first line is a CollisionStreamOpen of the contract, each other line a\n"
       "CollisionStreamUpdate; each is answered by one line of JSON before the next is read.\n"
       "Poses are seven numbers for each placement named: quaternion w x y z, translation x y z.\n"
@@ -110,7 +109,7 @@ void AddStreamCommand(CLI::App* app, Invocation* invocation) {
       "  {\"placements\":[{\"hullId\":\"arm\"},{\"hullId\":\"box\"}],\"pairs\":[0,1]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.5,0,0]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.6,0,0],\"refreshHulls\":true}");
-  command->callback([=] { invocation->action = [=] { return Stream(*invocation, *path); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Stream(*invocation, *path); }; });
 }
 
 }  // namespace hulld

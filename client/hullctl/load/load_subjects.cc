@@ -85,7 +85,7 @@ class LoadSubjects::LoadClient {
       case LoadMode::kMixed:
         break;
     }
-    // Of ten requests eight check, one is a batch and one appends.
+    // Eight of ten requests check, one is a batch and one appends.
     if (i % 10 == 4) return Batch();
     if (i % 10 == 9) return Append();
     return Check(i);

@@ -25,7 +25,8 @@ struct AnswerRow {
 // Whether each column is empty or holds `count` entries.
 bool AreParallel(const v1::AnswerColumns& columns, size_t count);
 
-// Requires parallel columns and i below their number of entries.
+// Row i of the columns. Requires AreParallel(columns, count) and i < count; unchecked, as callers
+// ask AreParallel once for all rows.
 AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 
 // For people, separated by tabs, the relation first.

@@ -133,6 +133,24 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
   }
 }
 
+TEST_F(HullctlTest, AnUnknownCommandIsNamedWithTheNearestOne) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const Ran ran = RunTool(arguments);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(ran.out, "");
+    return ran.err.substr(0, ran.err.find('\n'));
+  };
+  EXPECT_EQ(error({"chek", "a", "b"}), "Unknown command \"chek\". Did you mean \"check\"?");
+  EXPECT_EQ(error({"chekc", "a", "b"}), "Unknown command \"chekc\". Did you mean \"check\"?");
+  EXPECT_EQ(error({"--output", "json", "del", "a", "--verify"}),
+            "Unknown command \"del\". Did you mean \"delete\"?");
+  EXPECT_EQ(error({"backup", "sav", "f"}), "Unknown command \"sav\". Did you mean \"save\"?");
+  EXPECT_EQ(error({"fly"}), "Unknown command \"fly\".");
+  EXPECT_EQ(error({}), "A subcommand is required");
+  EXPECT_EQ(error({"backup"}), "A subcommand is required");
+  EXPECT_EQ(error({"check", "a"}), "B is required");
+}
+
 TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
   const Ran help = RunTool({"--help"});
   EXPECT_EQ(help.code, 0);
