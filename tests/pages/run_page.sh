@@ -22,6 +22,10 @@ if grep -q "$models" "$page" && [[ ! -d $models ]]; then
   exit 77
 fi
 
+for program in hulld hullctl; do
+  [[ -x $programs/$program ]] || { echo "there is no $programs/$program"; exit 2; }
+done
+
 rm -rf "$work" && mkdir -p "$work/steps" "$work/home" || exit 2
 work=$(cd "$work" && pwd)
 (cd "$(dirname "$page")" && awk -v out="$work/steps" -f "$here/page_steps.awk" "$(basename "$page")") || exit 2
