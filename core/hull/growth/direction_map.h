@@ -89,7 +89,6 @@ class DirectionMap {
   size_t AppendSurvivorsAvx2(std::span<const Vector> points,
                              std::vector<uint32_t>& survivors) const;
 
-
   Vector center_;
   int n_;
   double half_;
