@@ -1,5 +1,7 @@
 #include "client/append_connection.h"
 
+#include <grpc/support/log.h>
+
 #include <utility>
 
 namespace hulld {
@@ -34,6 +36,7 @@ void AppendConnection::Write(std::shared_ptr<const v1::AppendPointsRequest> requ
   const v1::AppendPointsRequest* message = request.get();
   {
     const std::lock_guard lock(mutex_);
+    GPR_ASSERT(writing_ == nullptr);
     writing_ = std::move(request);
   }
   StartWrite(message);
@@ -63,10 +66,17 @@ bool AppendConnection::ended() {
 }
 
 grpc::Status AppendConnection::Close() {
+  GPR_ASSERT(ended());
   ReleaseHold();
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return done_; });
   return status_;
+}
+
+const grpc::ClientContext& AppendConnection::context() {
+  const std::lock_guard lock(mutex_);
+  GPR_ASSERT(done_);
+  return context_;
 }
 
 void AppendConnection::OnReadDone(bool ok) {

@@ -28,7 +28,8 @@ class AppendConnection final
 
   // True when Write may be called.
   bool writable();
-  // Sends `request`, which is kept until gRPC is done with it. Requires writable().
+  // Sends `request`, which is kept until gRPC is done with it. Requires that no write is under way
+  // (checked), as writable() says.
   void Write(std::shared_ptr<const v1::AppendPointsRequest> request);
   void WritesDone();
 
@@ -41,10 +42,10 @@ class AppendConnection final
 
   // True when no further response will come; responses not yet taken are still there.
   bool ended();
-  // The final status. Requires ended().
+  // The final status. Requires ended() (checked).
   grpc::Status Close();
-  // For what the server told beside the status. Requires that Close returned.
-  const grpc::ClientContext& context() const { return context_; }
+  // Holds what the server sent beside the status. Requires that Close returned (checked).
+  const grpc::ClientContext& context();
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;

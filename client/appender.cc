@@ -22,6 +22,12 @@ uint64_t PointsIn(const v1::PointBlock& block) {
   return static_cast<uint64_t>(block.xyz_size() + block.xyz_float_size()) / 3;
 }
 
+// How an ended connection ended.
+absl::Status EndOf(AppendConnection* connection) {
+  const grpc::Status status = connection->Close();
+  return FromGrpcStatus(status, connection->context());
+}
+
 }  // namespace
 
 Appender::Appender(std::shared_ptr<v1::HullService::Stub> stub, v1::AppendOpen open,
@@ -43,8 +49,7 @@ absl::Status Appender::Fail(absl::Status status) {
 }
 
 absl::StatusOr<v1::AppendOpened> Appender::Connect() {
-  // Written nothing yet, and the old stream gone, before the new one exists: the server then sees
-  // one stream per writer.
+  // The old stream ends before the new one exists, so that the server sees one stream per writer.
   written_ = 0;
   connection_ = nullptr;
   connection_ = std::make_unique<AppendConnection>(stub_.get());
@@ -59,7 +64,7 @@ absl::StatusOr<v1::AppendOpened> Appender::Connect() {
   }
   v1::AppendPointsResponse response;
   if (!connection_->TakeResponse(&response)) {
-    absl::Status status = FromGrpcStatus(connection_->Close(), connection_->context());
+    absl::Status status = EndOf(connection_.get());
     if (status.ok()) status = absl::InternalError("the server ended the stream unopened");
     return status;
   }
@@ -81,8 +86,8 @@ absl::Status Appender::OpenFirst() {
   next_sequence_ = opened_.last_sequence() + 1;
   totals_.hull_revision = opened_.hull().revision();
   totals_.vertex_count = opened_.hull().vertex_count();
-  // The hull exists now. Were it gone at a reconnect, creating it again would hide that points were
-  // lost.
+  // The hull exists now. If it is gone at a reconnect, creating it again would hide that points
+  // were lost.
   open_.set_create_if_absent(false);
   return absl::OkStatus();
 }
@@ -138,7 +143,7 @@ absl::Status Appender::Append(v1::PointBlock points) {
   ++totals_.chunks_sent;
   totals_.points_sent += chunk.points;
   unacknowledged_.push_back(std::move(chunk));
-  // Leaves room for the next one.
+  // Leaves room for the next chunk.
   return PumpUntil(std::max<size_t>(options_.max_in_flight_chunks, 1) - 1,
                    std::max<size_t>(options_.max_in_flight_bytes, 1) - 1);
 }
@@ -158,7 +163,7 @@ absl::Status Appender::PumpUntil(size_t chunks, size_t bytes) {
         if (absl::Status status = TakeResponse(response); !status.ok()) return status;
         continue;
       }
-      absl::Status status = FromGrpcStatus(connection_->Close(), connection_->context());
+      absl::Status status = EndOf(connection_.get());
       if (status.ok())
         status = absl::InternalError("the server ended the stream before its last ack");
       if (status = Reconnect(std::move(status)); !status.ok()) return status;
@@ -222,11 +227,9 @@ absl::Status Appender::Finish() {
     v1::AppendPointsResponse ignored;
     if (!connection_->TakeResponse(&ignored) && !connection_->WaitForEvent(false, deadline)) break;
   }
-  // Everything is acknowledged: that a server which drains, or is gone, did not say goodbye changes
-  // nothing.
-  absl::Status status = connection_->ended()
-                            ? FromGrpcStatus(connection_->Close(), connection_->context())
-                            : absl::OkStatus();
+  // Everything is acknowledged, so it does not matter that a server which drains, or is gone, did
+  // not end the stream properly.
+  absl::Status status = connection_->ended() ? EndOf(connection_.get()) : absl::OkStatus();
   connection_ = nullptr;
   failed_ = absl::FailedPreconditionError("the append stream is finished");
   return absl::IsUnavailable(status) ? absl::OkStatus() : status;

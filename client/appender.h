@@ -19,7 +19,7 @@ namespace hulld {
 class AppendConnection;
 
 struct AppendOptions {
-  // Names who writes. Empty: a random name.
+  // Names the writer. Empty: a random name.
   std::string writer_id;
   bool create_if_absent = false;
   // Chunks sent but not acknowledged are kept for resending; Append waits while they reach either
@@ -43,12 +43,12 @@ struct AppendTotals {
 };
 
 // A stream of chunks into one hull: pipelined, with a bounded number in flight. When the connection
-// breaks, or the server ends the stream and says when to come again, it reconnects as the same
-// writer, asks for the last committed sequence and resends what is missing, so that each chunk is
-// applied once. It does not carry on when the hull or the store is another one than before: what
-// was acknowledged would be missing there.
+// breaks, or the server ends the stream and says when to retry, it reconnects as the same writer,
+// asks for the last committed sequence and resends what is missing, so that each chunk is applied
+// once. It stops when the hull or the store is another one than before: what was acknowledged would
+// be missing there.
 //
-// For one thread. Destroying it cancels what is not acknowledged.
+// Only one thread may use it. Its destructor cancels what is not acknowledged.
 class Appender {
  public:
   ~Appender();
@@ -59,9 +59,8 @@ class Appender {
   const v1::AppendOpened& opened() const { return opened_; }
   const std::string& writer_id() const { return open_.writer_id(); }
 
-  // Queues one chunk, numbered after the writer's last. Waits while too much is in flight. After an
-  // error, which is the stream's and may concern an earlier chunk, every further call returns it
-  // again.
+  // Queues one chunk, numbered after the writer's last. Waits while too much is in flight. An
+  // error is the stream's and may concern an earlier chunk; every further call returns it again.
   absl::Status Append(v1::PointBlock points);
 
   // Waits until every chunk is acknowledged, and ends the stream.

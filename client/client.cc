@@ -12,18 +12,18 @@
 namespace hulld {
 namespace {
 
-// Replies are cut at about 1 MiB by the server; this only bounds what a wrong one can make us hold.
+// The server cuts replies at about 1 MiB. This bounds the memory that a faulty server can claim.
 constexpr int kMaxReceiveBytes = 64 << 20;
 
 std::shared_ptr<grpc::Channel> Connect(const ClientOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
-  // A retry shall find a server that has come back meanwhile, rather than gRPC's memory of the
+  // A retry must find a server that has come back meanwhile, rather than gRPC's memory of the
   // failure.
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 50);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   if (options.own_connection) arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  // gRPC would ask the proxy of the environment even for this machine's own services.
+  // Otherwise gRPC uses the proxy of the environment even for services on this machine.
   if (IsLoopback(options.server)) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   return OpenChannel(options.server, options.security, arguments);
 }
@@ -48,7 +48,7 @@ absl::Status AddPart(const v1::GetHullMeshResponse& part, HullMesh* mesh) {
   return absl::InternalError("the mesh stream holds a message of an unknown kind");
 }
 
-// Whoever draws or writes the mesh relies on it.
+// Code that draws or writes the mesh relies on this.
 absl::Status CheckConsistent(const HullMesh& mesh) {
   if (mesh.xyz.size() != 3 * mesh.header.vertex_count() ||
       mesh.facet_sizes.size() != mesh.header.facet_count()) {
@@ -164,13 +164,13 @@ absl::StatusOr<v1::ReplaceHullResponse> Client::ReplaceHull(
   return response;
 }
 
-absl::Status Client::SaveSnapshot(
-    const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive,
+absl::Status Client::SaveBackup(
+    const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
     std::optional<std::chrono::milliseconds> timeout) const {
   grpc::ClientContext context;
   if (timeout.has_value()) context.set_deadline(std::chrono::system_clock::now() + *timeout);
-  const auto reader = maintenance_->SaveSnapshot(&context, v1::SaveSnapshotRequest());
-  v1::SaveSnapshotResponse part;
+  const auto reader = maintenance_->SaveBackup(&context, v1::SaveBackupRequest());
+  v1::SaveBackupResponse part;
   while (reader->Read(&part)) {
     if (absl::Status status = receive(part); !status.ok()) {
       context.TryCancel();

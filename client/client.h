@@ -56,8 +56,8 @@ struct HullMesh {
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
 // came. Calls that are safe to repeat (all but DeleteHull, and CreateHull without if_absent) are
 // retried as options.retry says after UNAVAILABLE, and after RESOURCE_EXHAUSTED when the server
-// says when to come again. ValidateSecurity
-// tells beforehand whether options.security can work.
+// says when to retry. ReasonOf and MetadataOf (grpc_status.h) tell why hulld refused a call.
+// ValidateSecurity tells beforehand whether options.security can work.
 class Client {
  public:
   explicit Client(ClientOptions options = {});
@@ -71,23 +71,22 @@ class Client {
   absl::StatusOr<std::unique_ptr<Appender>> OpenAppend(const std::string& hull_id,
                                                        AppendOptions options = {}) const;
 
-  // Puts a new hull in the place of one: `feed` passes blocks of points to the sink it is given; an
-  // error of either ends the call and changes nothing. Not retried. It takes as long as the points
-  // are many, so that options.timeout does not bound it: `timeout` does, all of it, when given.
+  // Replaces a hull: `feed` passes blocks of points to the sink that it is given. An error of
+  // either ends the call and changes nothing. Not retried. The call takes time in proportion to the
+  // points, so options.timeout does not bound it. `timeout`, when given, bounds all of it.
   using PointSink = std::function<absl::Status(const v1::PointBlock&)>;
   absl::StatusOr<v1::ReplaceHullResponse> ReplaceHull(
       const v1::ReplaceOpen& open, const std::function<absl::Status(const PointSink&)>& feed,
       std::optional<std::chrono::milliseconds> timeout = {}) const;
 
-  // Passes each part of a snapshot of the store to `receive`, in order; an error of `receive` ends
+  // Passes each part of a backup of the store to `receive`, in order; an error of `receive` ends
   // the call and is returned. Not retried; `timeout` as above.
-  absl::Status SaveSnapshot(
-      const std::function<absl::Status(const v1::SaveSnapshotResponse&)>& receive,
-      std::optional<std::chrono::milliseconds> timeout = {}) const;
+  absl::Status SaveBackup(const std::function<absl::Status(const v1::SaveBackupResponse&)>& receive,
+                          std::optional<std::chrono::milliseconds> timeout = {}) const;
 
   absl::StatusOr<v1::GetHullResponse> GetHull(const std::string& hull_id, bool audit = false) const;
 
-  // INTERNAL when the stream contradicts itself.
+  // INTERNAL: the stream contradicts itself.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
   // The same with all that a request can ask for, such as a simplification.
   absl::StatusOr<HullMesh> GetHullMesh(const v1::GetHullMeshRequest& request) const;
@@ -124,8 +123,8 @@ class Client {
 
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;
 
-  // What grpc.health.v1 says of the whole server: OK when it is serving, FAILED_PRECONDITION when
-  // it is not, UNIMPLEMENTED when the server has no health service. Not retried.
+  // What grpc.health.v1 reports about the whole server: OK when it is serving, FAILED_PRECONDITION
+  // when it is not, UNIMPLEMENTED when the server has no health service. Not retried.
   absl::Status CheckHealth() const;
 
   const ClientOptions& options() const { return options_; }

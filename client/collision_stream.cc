@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// Appends a piece of an answer to what came before. Problems name positions in the columns.
+// Appends a piece of an answer to what came before. Problems name rows of their own piece.
 void Append(const v1::StreamCollisionsResponse& piece, v1::StreamCollisionsResponse* answer) {
   const int before = answer->pairs_size();
   const int problems = answer->columns().pair_problems_size();
@@ -17,7 +17,7 @@ void Append(const v1::StreamCollisionsResponse& piece, v1::StreamCollisionsRespo
   v1::AnswerColumns* const columns = answer->mutable_columns();
   for (int i = problems; i < columns->pair_problems_size(); ++i) {
     v1::PairProblem* const problem = columns->mutable_pair_problems(i);
-    problem->set_pair(problem->pair() + static_cast<uint64_t>(before));
+    problem->set_row(problem->row() + static_cast<uint64_t>(before));
   }
 }
 

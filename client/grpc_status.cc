@@ -5,12 +5,17 @@
 
 #include <cstdint>
 
+#include "hulld/rpc/error_details.pb.h"
+
 namespace hulld {
 namespace {
 
 // Keys of the trailing metadata, and of the payloads that carry their values.
 constexpr char kRequestId[] = "x-request-id";
 constexpr char kRetry[] = "grpc-retry-pushback-ms";
+// The type of the detail, and of the payload that carries its value.
+constexpr char kErrorInfo[] = "type.googleapis.com/google.rpc.ErrorInfo";
+constexpr char kDomain[] = "hulld";
 
 void CarryOver(const char* key, const grpc::ClientContext& context, absl::Status* status) {
   const auto& trailing = context.GetServerTrailingMetadata();
@@ -19,7 +24,27 @@ void CarryOver(const char* key, const grpc::ClientContext& context, absl::Status
   status->SetPayload(key, absl::Cord(std::string(found->second.data(), found->second.size())));
 }
 
+std::optional<rpc::ErrorInfo> InfoOf(const absl::Status& status) {
+  const absl::optional<absl::Cord> payload = status.GetPayload(kErrorInfo);
+  rpc::ErrorInfo info;
+  if (!payload.has_value() || !info.ParseFromString(std::string(*payload)) ||
+      info.domain() != kDomain) {
+    return std::nullopt;
+  }
+  return info;
+}
+
 }  // namespace
+
+absl::Status FromGrpcStatus(const grpc::Status& status) {
+  absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+  rpc::Status details;
+  if (result.ok() || !details.ParseFromString(status.error_details())) return result;
+  for (const google::protobuf::Any& detail : details.details()) {
+    if (detail.type_url() == kErrorInfo) result.SetPayload(kErrorInfo, absl::Cord(detail.value()));
+  }
+  return result;
+}
 
 absl::Status FromGrpcStatus(const grpc::Status& status, const grpc::ClientContext& context) {
   absl::Status result = FromGrpcStatus(status);
@@ -27,6 +52,21 @@ absl::Status FromGrpcStatus(const grpc::Status& status, const grpc::ClientContex
   CarryOver(kRequestId, context, &result);
   CarryOver(kRetry, context, &result);
   return result;
+}
+
+v1::ErrorReason ReasonOf(const absl::Status& status) {
+  v1::ErrorReason reason = v1::ERROR_REASON_UNSPECIFIED;
+  const std::optional<rpc::ErrorInfo> info = InfoOf(status);
+  if (info.has_value()) v1::ErrorReason_Parse("ERROR_REASON_" + info->reason(), &reason);
+  return reason;
+}
+
+std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key) {
+  const std::optional<rpc::ErrorInfo> info = InfoOf(status);
+  if (!info.has_value()) return std::nullopt;
+  const auto entry = info->metadata().find(key);
+  if (entry == info->metadata().end()) return std::nullopt;
+  return entry->second;
 }
 
 std::string RequestIdOf(const absl::Status& status) {

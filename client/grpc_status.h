@@ -9,16 +9,24 @@
 #include <optional>
 #include <string>
 
+#include "hulld/v1/error.pb.h"
+
 namespace hulld {
 
-// The same code and message.
-inline absl::Status FromGrpcStatus(const grpc::Status& status) {
-  return absl::Status(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
-}
+// The same code and message, with the reason that the server gave.
+absl::Status FromGrpcStatus(const grpc::Status& status);
 
-// The same with what the server told beside it, for the two functions below. `context` is that of
-// the ended call.
+// The same with the request ID and the time to retry, too. `context` is that of the ended call.
 absl::Status FromGrpcStatus(const grpc::Status& status, const grpc::ClientContext& context);
+
+// Why hulld refused or failed. ERROR_REASON_UNSPECIFIED: hulld gave no reason, or the error is not
+// hulld's: gRPC gives errors of its own, as when it reaches no server. A reason that this version
+// of the contract does not know reads as unspecified, too.
+v1::ErrorReason ReasonOf(const absl::Status& status);
+
+// A value that error.proto lists for the reason, such as "expected_sequence"; nullopt when the
+// server did not give it.
+std::optional<std::string> MetadataOf(const absl::Status& status, const std::string& key);
 
 // The ID under which the server's log knows the call that ended so; empty when unknown.
 std::string RequestIdOf(const absl::Status& status);

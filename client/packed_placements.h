@@ -7,8 +7,8 @@
 
 namespace hulld {
 
-// The same placements, each hull named once, in the order in which they come: some 60 bytes each
-// instead of a hundred, which a server reads many times as fast.
+// The same placements in the same order, with each hull named once: about 60 bytes each instead of
+// 100, and many times faster for the server to read.
 v1::PackedPlacements PackPlacements(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements);
 

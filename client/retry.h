@@ -11,7 +11,7 @@ namespace hulld {
 using Deadline = std::chrono::system_clock::time_point;
 
 // When a call that is safe to repeat is repeated: after UNAVAILABLE, which says that the server was
-// not reached or is draining, and when the server has too much to do and says when to come again.
+// not reached or is draining, and when the server is overloaded and says when to retry.
 // Waits double from initial_backoff to max_backoff, and are at least as long as the server asks.
 struct RetryPolicy {
   // Attempts in all; 1 turns retries off.
@@ -25,7 +25,7 @@ struct RetryPolicy {
 // The wait after `failures` >= 1 failed attempts.
 std::chrono::milliseconds BackoffAfter(const RetryPolicy& policy, int failures);
 
-// Whether a call that ended so may be repeated, if it is safe to repeat.
+// Whether a call that ended with this status may be repeated, if it is safe to repeat.
 bool MayRetry(const absl::Status& status);
 
 // Waits as the policy says after `failures` failed attempts, the last of which ended with `status`.

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "core/base/check.h"
 #include "server/access/secret_file.h"
 #include "server/access/tls_identity.h"
 #include "server/access/token_table.h"
@@ -71,7 +72,8 @@ absl::Status CheckDataDir(const std::string& path) {
 
 std::vector<std::string> ExposureWarnings(const Config& config) {
   const absl::StatusOr<ListenAddress> address = ParseListenAddress(config.listen);
-  if (!address.ok() || address->is_local()) return {};
+  HULLD_CHECK(address.ok());
+  if (address->is_local()) return {};
   std::vector<std::string> warnings;
   if (!config.has_tls()) {
     warnings.push_back(
@@ -79,7 +81,7 @@ std::vector<std::string> ExposureWarnings(const Config& config) {
   }
   if (config.tokens_file.empty() && config.tls_client_ca.empty()) {
     warnings.push_back(
-        "whoever can reach this server may read and change everything; limit that with "
+        "everybody who can reach this server may read and change everything; limit that with "
         "--tokens-file or --tls-client-ca");
   }
   return warnings;

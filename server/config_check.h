@@ -26,7 +26,7 @@ absl::Status CheckListening(const Config& config);
 // INVALID_ARGUMENT names --data-dir.
 absl::Status CheckDataDir(const std::string& path);
 
-// What whoever runs the server should know of who can reach it, a sentence each. Requires a valid
+// What an operator should know about who can reach the server, a sentence each. Requires a valid
 // config.listen.
 std::vector<std::string> ExposureWarnings(const Config& config);
 

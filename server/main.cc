@@ -11,7 +11,6 @@
 #include "server/config_check.h"
 #include "server/process/heap.h"
 #include "server/process/log.h"
-#include "server/process/thread_priority.h"
 #include "server/server.h"
 #include "server/settings/config.h"
 
@@ -40,7 +39,7 @@ void LogStore(const Config& config) {
 }
 
 // Waits for SIGTERM or SIGINT. Until then it looks at the files again at each SIGHUP, and now and
-// then for memory that nobody needs.
+// then for memory that is no longer needed.
 int WaitForEnd(const sigset_t& signals, Server& server) {
   // A choice: memory is back soon after a peak, and looking costs 0.1 ms.
   constexpr timespec kPause = {.tv_sec = 10, .tv_nsec = 0};
@@ -75,7 +74,6 @@ void LogStart(const Config& config, const Server& server) {
 // Serves until SIGTERM or SIGINT, then drains. Returns the exit status.
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
-  PreferShortTurns();
   BoundArenas();
   // Blocked before any thread exists, so that every thread inherits it and this one can wait.
   const sigset_t signals = HandledSignals();

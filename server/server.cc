@@ -20,6 +20,11 @@ namespace {
 // At least two, so that one long task does not hold up all others.
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
 
+int AnswerThreads(const Config& config) {
+  if (config.threads > 0) return config.threads;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   if (config.store == "memory") return std::make_unique<MemoryStore>();
   RocksDbOptions options;
@@ -30,9 +35,6 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
   return RocksDbStore::Open(std::move(options));
 }
 
-// Long tasks give way to those of microseconds, but not as far as batches do.
-constexpr int kLongReadersNiceness = 1;
-
 }  // namespace
 
 Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
@@ -42,14 +44,16 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       writers_(PoolThreads(), metrics_.AddPool("writers")),
       registry_(*store_, config.limits, writers_),
       readers_(PoolThreads(), metrics_.AddPool("readers")),
-      long_readers_(PoolThreads(), metrics_.AddPool("long_readers"), kLongReadersNiceness),
-      executor_(config.threads, metrics_.AddPool("executor")),
+      long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
+      pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
+      executor_(pool_.threads(), metrics_.AddPool("executor")),
       hull_service_(registry_, admission_, writers_, readers_, long_readers_),
-      collision_service_(registry_, admission_, readers_, long_readers_, executor_),
+      collision_service_(registry_, admission_, readers_, long_readers_, pool_, executor_),
       status_service_(registry_, admission_),
       maintenance_service_(*store_, registry_, admission_, long_readers_) {
   admission_.SetAuthenticator(guard_->authenticator());
-  admission_.SetBacklog([this] { return readers_.waiting() + long_readers_.waiting(); });
+  admission_.SetBacklog(
+      [this] { return readers_.waiting() + long_readers_.waiting() + pool_.waiting(); });
   AddSizesToMetrics();
 }
 

@@ -17,6 +17,7 @@
 #include "server/process/executor.h"
 #include "server/process/metrics.h"
 #include "server/process/metrics_endpoint.h"
+#include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/settings/config.h"
@@ -66,12 +67,14 @@ class Server {
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
-  // Chunks and replacements, and everything else that may take longer than moving bytes. Three
-  // pools, so that readers never wait for writers, nor those of microseconds for those of seconds.
+  // Chunks and replacements, and what may wait for the store or for a writer. Three pools, so that
+  // readers never wait for writers, nor those of microseconds for those of seconds.
   WorkerPool writers_;
   Registry registry_;
   WorkerPool readers_;
   WorkerPool long_readers_;
+  // Answers.
+  TaskPool pool_;
   Executor executor_;
   HullService hull_service_;
   CollisionService collision_service_;

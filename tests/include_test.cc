@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -61,9 +64,76 @@ TEST(Includes, CoreKnowsNoServiceLogOrFile) {
               "fmt/", "CLI/", "assimp", "fstream", "iostream", "filesystem", "cstdio", "stdio.h"});
 }
 
-TEST(Includes, CorePartsUseOnlyWhatIsBelowThem) {
-  ExpectNone("core/numeric", {"core/hull/", "core/query/"});
-  ExpectNone("core/hull", {"core/query/"});
+// The rooms in the direction of the data: a file includes headers of its own room and of those
+// above it in this list. Tests and the parent folder of a room are no exceptions.
+constexpr std::string_view kRooms[] = {
+    "core/base",
+    "core/numeric",
+    "core/hull",
+    "core/hull/growth",
+    "core/hull/simplification",
+    "core/query/terms",
+    "core/query/placed",
+    "core/query/floating",
+    "core/query/exact",
+    "core/query",
+    "server/settings",
+    "server/contract",
+    "server/process",
+    "server/store",
+    "server/registry",
+    "server/access",
+    "server/call",
+    "server/wire",
+    "server/hulls",
+    "server/collisions",
+    "server/admin",
+    "server",
+    "client",
+    "client/formats",
+    "client/verify",
+    "client/hullctl/command_line",
+    "client/hullctl/printing",
+    "client/hullctl/load",
+    "client/hullctl/picture",
+    "client/hullctl/commands",
+    "client/hullctl",
+};
+
+// The place of a folder in kRooms; nullopt for one that is not there.
+std::optional<size_t> PlaceOf(const std::string& folder) {
+  const auto* room = std::find(std::begin(kRooms), std::end(kRooms), folder);
+  if (room == std::end(kRooms)) return std::nullopt;
+  return room - std::begin(kRooms);
+}
+
+TEST(Includes, RoomsUseOnlyWhatIsBelowThem) {
+  size_t arrows = 0;
+  for (const std::string top : {"core", "server", "client"}) {
+    for (const Include& include : IncludesUnder(top)) {
+      const std::string folder = fs::path(include.file).parent_path().string();
+      const std::optional<size_t> place = PlaceOf(folder);
+      ASSERT_TRUE(place.has_value()) << folder << " is not among the rooms of this test";
+      const std::optional<size_t> used = PlaceOf(fs::path(include.header).parent_path().string());
+      if (!used.has_value()) continue;  // a header of another library
+      EXPECT_LE(*used, *place) << include.file << " includes " << include.header;
+      arrows += *used < *place ? 1 : 0;
+    }
+  }
+  EXPECT_GT(arrows, 200);
+}
+
+TEST(Includes, NoRoomIsCrowded) {
+  constexpr int kMostFiles = 24;
+  const fs::path root = HULLD_SOURCE_DIR;
+  for (const std::string top : {"core", "server", "client", "tests", "proto", "docker"}) {
+    std::map<std::string, int> files;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / top)) {
+      if (!entry.is_regular_file()) continue;
+      ++files[fs::relative(entry.path().parent_path(), root).string()];
+    }
+    for (const auto& [folder, count] : files) EXPECT_LE(count, kMostFiles) << folder;
+  }
 }
 
 TEST(Includes, CoreUsesNoOtherLibrary) {

@@ -154,4 +154,14 @@ absl::Status ByteSource::Truncated(const std::string& what) const {
       absl::StrCat(name_, ": ends at byte ", offset(), " ", what, "; is it complete?"));
 }
 
+absl::StatusOr<std::string> ReadText(const std::string& path) {
+  const auto source = ByteSource::Open(path);
+  if (!source.ok()) return source.status();
+  std::string text;
+  std::string_view line;
+  while ((*source)->ReadLine(&line)) text.append(line).append("\n");
+  if (!(*source)->status().ok()) return (*source)->status();
+  return text;
+}
+
 }  // namespace hulld

@@ -15,8 +15,8 @@
 
 namespace hulld {
 
-// A file or pipe read once from front to back, as lines or as bytes, through one buffer: what it
-// holds in memory does not grow with the file. Knows where it is, for errors.
+// A file or pipe that is read once from front to back, as lines or as bytes, through one buffer.
+// Its memory does not grow with the file. It knows its position, for errors.
 //
 // Lines end at LF or CR LF, or at CR when the first line does. A UTF-8 byte order mark is skipped.
 class ByteSource {
@@ -43,11 +43,11 @@ class ByteSource {
   const absl::Status& status() const { return status_; }
 
   const std::string& name() const { return name_; }
-  // Of the line last read, from 1.
+  // The number of the line last read, from 1.
   uint64_t line() const { return line_; }
-  // Of the next byte, from 0.
+  // The position of the next byte, from 0.
   uint64_t offset() const { return base_ + begin_; }
-  // Will be told the bytes taken from the file so far, whenever the buffer is filled.
+  // Calls `progress` with the bytes taken from the file so far, whenever the buffer is filled.
   void ReportProgress(std::function<void(uint64_t bytes)> progress) {
     progress_ = std::move(progress);
   }
@@ -82,6 +82,9 @@ class ByteSource {
   absl::Status status_;
   std::function<void(uint64_t)> progress_;
 };
+
+// All of a text, each line followed by LF. Errors are those of ByteSource.
+absl::StatusOr<std::string> ReadText(const std::string& path);
 
 }  // namespace hulld
 

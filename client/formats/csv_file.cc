@@ -40,8 +40,8 @@ void SplitRow(std::string_view row, char separator, std::vector<std::string_view
   }
 }
 
-// A header has names alone. What starts like a number was meant as one, even if it is none, such as
-// 1,5.
+// A header holds only names. A cell that starts like a number was meant as one, even if it is
+// malformed, such as 1,5.
 bool IsHeader(const std::vector<std::string_view>& cells) {
   double ignored;
   for (const std::string_view cell : cells) {

@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// A mesh to look at, held whole in memory.
+// A mesh for drawing, held whole in memory.
 struct TriangleMesh {
   std::vector<std::array<double, 3>> vertices;
   // Indices into vertices, all in range.

@@ -16,7 +16,7 @@ namespace hulld {
 bool ParseObjCorner(std::string_view token, int64_t* vertex);
 
 // Checks the faces of an OBJ file for a reader that wants its points alone: a face that names a
-// vertex that there is not tells of a file that is broken.
+// vertex that does not exist shows that the file is broken.
 class ObjFaceCheck {
  public:
   // `corners`: what follows `f` on the source's present line. vertices: how many came before.

@@ -66,7 +66,7 @@ absl::Status ReadOff(ByteSource* source, PointCollector* points) {
     if (status.ok()) status = AddTextPoint(*source, content, points);
     if (!status.ok()) return status;
   }
-  // Nobody wants the faces here, but a file that lacks some was cut short.
+  // The faces are not needed, but a file that lacks some was cut short.
   for (uint64_t i = 0; i < reader.face_count(); ++i) {
     if (absl::Status status = reader.NextFace(i, &content); !status.ok()) return status;
   }

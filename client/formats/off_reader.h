@@ -10,8 +10,8 @@
 
 namespace hulld {
 
-// Walks an OFF file line by line: keyword, counts, vertices, faces. Of the variants, those that
-// start each vertex line with its position are known: OFF, COFF, NOFF, STOFF and their
+// Walks an OFF file line by line: keyword, counts, vertices, faces. It knows
+// the variants that start each vertex line with the position: OFF, COFF, NOFF, STOFF and their
 // combinations.
 class OffReader {
  public:

@@ -253,7 +253,7 @@ absl::Status ReadBody(const Header& header, bool binary, Body body, PointCollect
   const auto error_at = [&body](const std::string& message) { return body.Error(message); };
   for (const Element& element : header.elements) {
     const bool is_vertex = element.name == "vertex";
-    // Takes no bytes, however many there are said to be.
+    // An element without properties takes no bytes, whatever its count.
     if (element.properties.empty()) continue;
     const bool as_float = is_vertex && binary && HoldsFloats(element);
     std::array<double, 3> xyz = {};

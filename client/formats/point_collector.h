@@ -37,7 +37,7 @@ struct ReadCounts {
   uint64_t skipped = 0;
 };
 
-// Gathers the points that a reader finds into blocks, and holds the rule for points that are not
+// Gathers the points that a reader finds into blocks, and applies the rule for points that are not
 // finite.
 class PointCollector {
  public:

@@ -12,9 +12,9 @@ bool IsSpace(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
-// std::from_chars says "out of range" alike of 1e999 and of 1e-999. Tells them apart by the decimal
-// exponent of the first digit that is not 0; a valid number outside of the range of double has one
-// above 300 or below -300.
+// std::from_chars says "out of range" for both 1e999 and 1e-999. This tells them apart by the
+// decimal exponent of the first digit that is not 0; a valid number outside the range of double has
+// one above 300 or below -300.
 bool IsHuge(std::string_view text) {
   long long exponent = -1;
   bool in_fraction = false;

@@ -28,8 +28,8 @@ bool ParseUnsigned(std::string_view text, uint64_t* value);
 // The shortest decimal text that ParseDouble reads back as the same bits.
 std::string ShortestText(double value);
 
-// Takes the next token off the front of `rest`: characters that are neither space nor tab nor their
-// like. Empty at the end.
+// Takes the next token off the front of `rest`: characters that are not white space. Empty at the
+// end.
 std::string_view NextToken(std::string_view* rest);
 
 // Without spaces at both ends.

@@ -1,9 +1,9 @@
 #include "client/hullctl/hullctl.h"
 
-#include <CLI/CLI.hpp>
-#include <algorithm>
+#include <optional>
 
 #include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/connection_options.h"
 #include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/command_line/invocation.h"
@@ -12,82 +12,80 @@
 namespace hulld {
 namespace {
 
-std::string Message(const absl::Status& status) {
-  return std::string(status.message().data(), status.message().size());
+void AddGlobalOptions(Command program, Invocation* invocation) {
+  program
+      .AddParsed(
+          "-s,--server",
+          [invocation](const std::string& server) {
+            const absl::Status status = ValidateServer(server);
+            if (status.ok()) invocation->server = server;
+            return status;
+          },
+          std::string("Where hulld listens (default ") + kDefaultServer + ")")
+      .ValueName("HOST:PORT")
+      .Environment("HULLCTL_SERVER");
+  program
+      .AddParsed(
+          "--timeout",
+          [invocation](const std::string& text) {
+            const auto timeout = ParseDuration(text);
+            if (!timeout.ok()) return timeout.status();
+            invocation->timeout = *timeout;
+            invocation->given_timeout = *timeout;
+            return absl::OkStatus();
+          },
+          "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
+          "'backup save' take the time that they need unless it is given)")
+      .ValueName("TIME");
+  program
+      .AddParsed(
+          "--output",
+          [invocation](const std::string& kind) {
+            invocation->json = kind == "json";
+            return absl::OkStatus();
+          },
+          "How answers are printed (default table)")
+      .ValueName("table|json")
+      .OneOf({"table", "json"});
+  AddConnectionOptions(program, invocation);
 }
 
-void AddGlobalOptions(CLI::App* app, Invocation* invocation) {
-  app->set_version_flag("--version", std::string("hullctl ") + HULLD_VERSION);
-  app->add_option_function<std::string>(
-         "-s,--server",
-         [invocation](const std::string& server) {
-           const absl::Status status = ValidateServer(server);
-           if (!status.ok()) throw CLI::ValidationError("--server", Message(status));
-           invocation->server = server;
-         },
-         std::string("Where hulld listens (default ") + kDefaultServer + ")")
-      ->type_name("HOST:PORT")
-      ->envname("HULLCTL_SERVER");
-  app->add_option_function<std::string>(
-         "--timeout",
-         [invocation](const std::string& text) {
-           const auto timeout = ParseDuration(text);
-           if (!timeout.ok()) throw CLI::ValidationError("--timeout", Message(timeout.status()));
-           invocation->timeout = *timeout;
-           invocation->given_timeout = *timeout;
-         },
-         "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
-         "'snapshot save' take the time that they need unless it is given)")
-      ->type_name("TIME");
-  app->add_option_function<std::string>(
-         "--output", [invocation](const std::string& kind) { invocation->json = kind == "json"; },
-         "How answers are printed (default table)")
-      ->type_name("table|json")
-      ->check(CLI::IsMember({"table", "json"}));
-  AddConnectionOptions(app, invocation);
-}
-
-void AddCommands(CLI::App* app, Invocation* invocation) {
-  AddCreateCommand(app, invocation);
-  AddAppendCommand(app, invocation);
-  AddReplaceCommand(app, invocation);
-  AddGetCommand(app, invocation);
-  AddListCommand(app, invocation);
-  AddDeleteCommand(app, invocation);
-  AddMeshCommand(app, invocation);
-  AddCheckCommand(app, invocation);
-  AddBatchCommand(app, invocation);
-  AddSceneCommand(app, invocation);
-  AddStreamCommand(app, invocation);
-  AddVerifyCommand(app, invocation);
-  AddGenerateCommand(app, invocation);
-  AddStatusCommand(app, invocation);
-  AddSnapshotCommand(app, invocation);
-  AddBenchCommand(app, invocation);
-  AddPictureCommand(app, invocation);
-  AddTokenCommand(app, invocation);
-  app->require_subcommand(1);
-  // Global options may stand behind the command, too.
-  for (CLI::App* command : app->get_subcommands({})) command->fallthrough();
+void AddCommands(Command program, Invocation* invocation) {
+  AddCreateCommand(program, invocation);
+  AddAppendCommand(program, invocation);
+  AddReplaceCommand(program, invocation);
+  AddGetCommand(program, invocation);
+  AddListCommand(program, invocation);
+  AddDeleteCommand(program, invocation);
+  AddMeshCommand(program, invocation);
+  AddCheckCommand(program, invocation);
+  AddBatchCommand(program, invocation);
+  AddSceneCommand(program, invocation);
+  AddStreamCommand(program, invocation);
+  AddVerifyCommand(program, invocation);
+  AddGenerateCommand(program, invocation);
+  AddStatusCommand(program, invocation);
+  AddBackupCommand(program, invocation);
+  AddBenchCommand(program, invocation);
+  AddPictureCommand(program, invocation);
+  AddTokenCommand(program, invocation);
+  program.RequireCommand();
 }
 
 }  // namespace
 
 int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
-  CLI::App app("Keeps convex hulls on a hulld server and asks it whether they collide.", "hullctl");
-  app.footer(std::string(kExitCodeHelp) +
-             "\nJSON output follows the mapping of proto3: 64-bit integers are strings.");
+  CommandLine command_line(
+      "hullctl", HULLD_VERSION,
+      "Keeps convex hulls on a hulld server and asks it whether they collide.");
+  Command program = command_line.root();
+  program.SetFooter(std::string(kExitCodeHelp) +
+                    "\nJSON output follows the mapping of proto3: 64-bit integers are strings.");
   Invocation invocation(out, err);
-  AddGlobalOptions(&app, &invocation);
-  AddCommands(&app, &invocation);
-  // CLI11 takes the arguments from the back.
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  try {
-    app.parse(reversed);
-  } catch (const CLI::ParseError& error) {
-    if (app.exit(error, out, err) == 0) return static_cast<int>(ExitCode::kDone);
-    return static_cast<int>(ExitCode::kUsage);
-  }
+  AddGlobalOptions(program, &invocation);
+  AddCommands(program, &invocation);
+  const std::optional<ExitCode> ended = command_line.Parse(arguments, out, err);
+  if (ended.has_value()) return static_cast<int>(*ended);
   const absl::Status completed = CompleteConnectionOptions(&invocation);
   if (!completed.ok()) return static_cast<int>(invocation.FailUsage(completed));
   const ExitCode code = invocation.action();

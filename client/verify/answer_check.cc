@@ -18,12 +18,11 @@ bool IsSame(const v1::HullInfo& hull, const v1::HullVersion& version) {
 
 }  // namespace
 
-absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const std::string& store_id,
-                                                     const v1::HullVersion& version,
+absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const v1::HullVersion& version,
                                                      Verification* problem) {
   const std::string& id = version.hull_id();
   auto known = meshes_.find(id);
-  // One that is newer than the answer will not grow older.
+  // A mesh that is newer than the answer stays so; fetching it again would not help.
   if (known == meshes_.end() || known->second.header.hull().revision() < version.revision()) {
     absl::StatusOr<HullMesh> mesh = client_.GetHullMesh(id);
     if (absl::IsNotFound(mesh.status())) {
@@ -34,7 +33,7 @@ absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const std::string& store_id
     known = meshes_.insert_or_assign(id, *std::move(mesh)).first;
   }
   const v1::MeshHeader& header = known->second.header;
-  if (header.header().store_id() != store_id) {
+  if (header.header().store_id() != version.store_id()) {
     *problem = {Verdict::kCannotCheck, "the server holds another store than the answer's"};
     return nullptr;
   }
@@ -58,10 +57,10 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
     return Verification{Verdict::kInvalid, "the answer is about other hulls than the request"};
   }
   Verification verification;
-  const auto a = Fetch(answer.store_id, answer.hull_a, &verification);
+  const auto a = Fetch(answer.hull_a, &verification);
   if (!a.ok()) return a.status();
   if (*a == nullptr) return verification;
-  const auto b = Fetch(answer.store_id, answer.hull_b, &verification);
+  const auto b = Fetch(answer.hull_b, &verification);
   if (!b.ok()) return b.status();
   if (*b == nullptr) return verification;
   const absl::Status checked =
@@ -82,7 +81,7 @@ absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,
     const v1::CheckCollisionResponse& answer = verified.response;
     absl::StatusOr<Verification> verification =
         checker.Check({request.a(), request.b(), answer.relation(), answer.certificate(),
-                       answer.header().store_id(), answer.hull_a(), answer.hull_b()});
+                       answer.hull_a(), answer.hull_b()});
     if (!verification.ok()) return verification.status();
     verified.verification = *std::move(verification);
     if (verified.verification.verdict != Verdict::kMoved) break;

@@ -35,32 +35,30 @@ struct CheckedAnswer {
   const v1::Placement& b;
   v1::Relation relation;
   const v1::Certificate& certificate;
-  const std::string& store_id;
   const v1::HullVersion& hull_a;
   const v1::HullVersion& hull_b;
 };
 
-// Checks answers against hulls as the server shows them to anyone (GetHullMesh).
+// Checks answers against the hulls that GetHullMesh returns.
 class AnswerChecker {
  public:
   // `client` must outlive this.
   explicit AnswerChecker(const Client& client) : client_(client) {}
 
-  // Fetches the hulls that it does not have yet. Errors are those of the fetching, but a hull that
-  // is gone is kCannotCheck.
+  // Fetches the hulls that it does not have yet and returns the errors of that. A hull that was
+  // deleted is kMoved.
   absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
 
  private:
-  // Null, with the reason, when the mesh at that version cannot be had.
-  absl::StatusOr<const HullMesh*> Fetch(const std::string& store_id, const v1::HullVersion& version,
-                                        Verification* problem);
+  // Null, with the reason, when the server no longer has the mesh at that version.
+  absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
 
   const Client& client_;
   std::map<std::string, HullMesh> meshes_;
 };
 
-// Asks, and checks the answer, anew when a hull changes in between, a few times. The answer that
-// was checked last comes with its verification.
+// Asks and checks the answer; a few times, as long as a hull changes in between. Returns the last
+// answer and its verification.
 struct VerifiedResponse {
   v1::CheckCollisionResponse response;
   Verification verification;

@@ -19,8 +19,8 @@ struct PlacedVertices {
 // Whether the certificate proves that A and B are in this relation, in exact arithmetic over the
 // doubles given, from the definitions in collision.proto and geometry.proto alone: this code shares
 // nothing with the server's. OK, or FAILED_PRECONDITION with what the certificate fails to show.
-// What it holds beyond its relation's needs is not looked at. Vertices that come with coordinates
-// must be those of their index.
+// Parts that the relation does not need are ignored. Vertices that come with coordinates must be
+// those of their index.
 //
 // An empty hull is separated from everything, and needs no certificate for that.
 //

@@ -1,5 +1,7 @@
 #include "client/verify/exact_vector.h"
 
+#include <absl/base/macros.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -51,12 +53,14 @@ bool IsInTriangle(const BigVector& a, const BigVector& b, const BigVector& c) {
 }  // namespace
 
 void CommonExponent::Include(double number) {
+  ABSL_ASSERT(std::isfinite(number));
   if (number != 0) exponent_ = std::min(exponent_, Split(number).exponent);
 }
 
 BigInteger CommonExponent::ToInteger(double number) const {
   const Parts parts = Split(number);
   if (parts.mantissa == 0) return 0;
+  ABSL_ASSERT(parts.exponent >= exponent_);
   return BigInteger(parts.mantissa) << (parts.exponent - exponent_);
 }
 
@@ -78,7 +82,7 @@ bool HoldsOriginOnBoundary(std::span<const BigVector> points) {
 
 // 0 is inside unless all points lie on one side of a plane through 0, or in it. The normals of such
 // planes form a cone; it is pointed when the points span space, and then has an edge, which is
-// across two of the points. So the cross products of two points are all that need be tried.
+// across two of the points. So it suffices to try the cross products of two points.
 bool HoldsOriginInside(std::span<const BigVector> points) {
   bool spans_space = false;
   for (size_t i = 0; i < points.size(); ++i) {

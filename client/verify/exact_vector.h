@@ -32,21 +32,23 @@ inline bool IsZero(const BigVector& a) { return a[0] == 0 && a[1] == 0 && a[2] =
 // Numbers as integers times a common power of two.
 class CommonExponent {
  public:
-  // Widens the exponent so that it serves this number, too. Requires it finite.
+  // Widens the exponent so that it serves this number, too. Requires that it is finite
+  // (checked in debug builds).
   void Include(double number);
   void Include(std::span<const double> numbers) {
     for (const double number : numbers) Include(number);
   }
-  // number / 2^exponent. Requires that it was included.
+  // number / 2^exponent. Requires that it was included (checked in debug builds).
   BigInteger ToInteger(double number) const;
 
  private:
-  // Of the least lowest bit so far; none is above this one.
+  // The exponent of the lowest bit of all numbers so far; no double has a higher one than this.
   int exponent_ = 1024;
 };
 
 // Whether 0 is in the convex hull of the points. Requires that all lie in a closed half space that
-// has 0 on its boundary. Cost: the cube of their number.
+// has 0 on its boundary; unchecked, as callers find the half space by exact arithmetic just before.
+// Cost: the cube of their number.
 bool HoldsOriginOnBoundary(std::span<const BigVector> points);
 
 // Whether 0 is in the interior of the convex hull of the points.

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
@@ -61,7 +62,9 @@ absl::Status CheckVertices(const Hull& hull) {
 }
 
 // The normal of a facet by its first corner, not normalized; zero if the corner is straight.
+// Requires at least three corners.
 IntegerVector NormalOf(const std::vector<IntegerVector>& v, std::span<const uint32_t> facet) {
+  HULLD_CHECK(facet.size() >= 3);
   return Cross(v[facet[1]] - v[facet[0]], v[facet[2]] - v[facet[0]]);
 }
 
@@ -299,9 +302,10 @@ bool FlatContains(const std::vector<IntegerVector>& v, const Hull& hull, const I
       return SegmentContains(v[0], v[1], p);
     case 0:
       return v[0] == p;
-    default:
+    case -1:
       return false;
   }
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace
@@ -317,8 +321,7 @@ absl::Status AuditHull(const Hull& hull, const std::function<bool()>& should_sto
 }
 
 absl::Status AuditContainment(const Hull& hull, std::span<const Vector> points) {
-  static const std::function<bool()> kNeverStop;
-  StopPoll poll(kNeverStop);
+  StopPoll poll;
   const IntegerPoints v = ToIntegers(hull.vertices(), points, poll);
   if (hull.dimension() == 3) return SolidContainment(v, hull, points);
   for (size_t i = 0; i < points.size(); ++i) {

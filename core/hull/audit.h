@@ -18,8 +18,8 @@ namespace hulld {
 // Cost: O(V) exact operations, about 10 us each.
 absl::Status AuditHull(const Hull& hull, const std::function<bool()>& should_stop = {});
 
-// Checks that every point is in the closed hull. OK, or INTERNAL naming the first point that is
-// not. Cost: O(n F).
+// Checks that every point is in the closed hull. Requires finite points (checked). OK, or INTERNAL
+// naming the first point that is not. Cost: O(n F).
 absl::Status AuditContainment(const Hull& hull, std::span<const Vector> points);
 
 }  // namespace hulld

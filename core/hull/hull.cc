@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace hulld {
 namespace {
 
@@ -27,6 +29,8 @@ Hull::Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> fa
       facet_starts_(std::move(facet_starts)),
       facet_vertices_(std::move(facet_vertices)),
       edges_(std::move(edges)) {
+  HULLD_CHECK(dimension_ >= -1 && dimension_ <= 3);
+  HULLD_CHECK(facet_starts_.empty() || facet_starts_.back() == facet_vertices_.size());
   for (const Vector& v : vertices_) {
     max_abs_coordinate_ = std::max(max_abs_coordinate_, v.cwiseAbs().maxCoeff());
   }

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/numeric/vector.h"
 
 namespace hulld {
@@ -31,7 +32,8 @@ class Hull {
   Hull() = default;
 
   // Assembles a snapshot from parts that already are canonical. `facet_starts` has one entry per
-  // facet and one more. Requires what the class comment promises; AuditHull checks it.
+  // facet and one more. Requires what the class comment promises; only what costs O(1) is checked
+  // here, as AuditHull checks all of it.
   Hull(int dimension, std::vector<Vector> vertices, std::vector<uint32_t> facet_starts,
        std::vector<uint32_t> facet_vertices, std::vector<Edge> edges);
 
@@ -40,8 +42,9 @@ class Hull {
   std::span<const Vector> vertices() const { return vertices_; }
   std::span<const Edge> edges() const { return edges_; }
   size_t facet_count() const { return facet_starts_.empty() ? 0 : facet_starts_.size() - 1; }
-  // The vertex indices of facet i, 0 <= i < facet_count().
+  // The vertex indices of facet i. Requires i < facet_count().
   std::span<const uint32_t> facet(size_t i) const {
+    HULLD_DCHECK(i < facet_count());
     return std::span(facet_vertices_)
         .subspan(facet_starts_[i], facet_starts_[i + 1] - facet_starts_[i]);
   }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/base/check.h"
+
 namespace hulld {
 
 // Expansions: a real number as an unevaluated sum of doubles that do not overlap, smallest first,
@@ -26,8 +28,9 @@ inline SumWithError TwoSum(double a, double b) {
   return {sum, (a - a_virtual) + (b - b_virtual)};
 }
 
-// As TwoSum; requires |a| >= |b| or a == 0.
+// As TwoSum. Requires |a| >= |b| or a == 0.
 inline SumWithError FastTwoSum(double a, double b) {
+  HULLD_DCHECK(std::abs(a) >= std::abs(b) || a == 0);
   const double sum = a + b;
   return {sum, b - (sum - a)};
 }
@@ -70,6 +73,7 @@ class Expansion {
   }
 
   void Append(double component) {
+    HULLD_DCHECK(component == 0 || size_ < N);
     if (component != 0) components_[size_++] = component;
   }
 

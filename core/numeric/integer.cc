@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/base/check.h"
+
 namespace hulld {
 namespace {
 
@@ -22,6 +24,7 @@ Decomposed Decompose(double x) {
 }  // namespace
 
 int LowestBitExponent(double x) {
+  HULLD_CHECK(x != 0 && std::isfinite(x));
   const Decomposed d = Decompose(x);
   return d.exponent + __builtin_ctzll(static_cast<uint64_t>(d.mantissa));
 }
@@ -35,9 +38,11 @@ int LowestBitExponent(const Vector& v, int otherwise) {
 
 Integer ToInteger(double x, int exponent) {
   if (x == 0) return 0;
+  HULLD_CHECK(std::isfinite(x));
   const Decomposed d = Decompose(x);
   const int shift = d.exponent - exponent;
   if (shift >= 0) return Integer(d.mantissa) << shift;
+  HULLD_CHECK(shift > -53 && d.mantissa % (int64_t{1} << -shift) == 0);
   // A multiple of 2^exponent: the bits that fall out are zero, so division is exact for either
   // sign.
   return Integer(d.mantissa / (int64_t{1} << -shift));
@@ -59,6 +64,7 @@ unsigned BitLength(const IntegerVector& v) {
 
 Vector ToScaledDoubles(const IntegerVector& v) {
   const int bits = static_cast<int>(BitLength(v));
+  HULLD_CHECK(bits > 0);
   Vector result;
   for (int i = 0; i < 3; ++i) {
     const int shift = bits - 63;

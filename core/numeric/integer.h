@@ -3,6 +3,7 @@
 
 #include <boost/multiprecision/cpp_int.hpp>
 
+#include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
 
@@ -48,8 +49,9 @@ inline bool IsZero(const IntegerVector& a) {
   return a.x.is_zero() && a.y.is_zero() && a.z.is_zero();
 }
 inline int Sign(const Integer& a) { return a.sign(); }
-// A direction across d; requires d not zero.
+// A direction across d. Requires d not zero.
 inline IntegerVector AnyPerpendicular(const IntegerVector& d) {
+  HULLD_CHECK(!IsZero(d));
   if (!d.y.is_zero() || !d.z.is_zero()) return {0, d.z, -d.y};
   return {0, 0, d.x};
 }

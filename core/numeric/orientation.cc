@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/expansion.h"
 #include "core/numeric/exponent_limits.h"
@@ -120,6 +121,7 @@ using FourPoints = std::array<Vector, 4>;
 std::optional<FourPoints> ScaledToExpansionRange(const FourPoints& points) {
   double largest = 0;
   for (const Vector& p : points) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  HULLD_CHECK(largest > 0);
   const int exponent = std::ilogb(kExpansionMax) - 1 - std::ilogb(largest);
   // Two factors, as one may exceed the range of doubles.
   const double first = std::ldexp(1.0, exponent / 2);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 
@@ -19,6 +20,7 @@ int BitsOf(const Integer& value) {
 
 // value * 2^shift, rounded down. Requires value >= 0.
 Integer Shifted(const Integer& value, int shift) {
+  HULLD_DCHECK(Sign(value) >= 0);
   return shift >= 0 ? Integer(value << shift) : Integer(value >> -shift);
 }
 
@@ -42,6 +44,7 @@ ScaledDouble ToScaledDouble(const Integer& value) {
 }
 
 Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exponent) {
+  HULLD_CHECK(Sign(denominator) > 0);
   if (numerator.is_zero()) return {0, 0};
   const int shift = kQuotientBits + BitsOf(denominator) - BitsOf(numerator);
   const Integer magnitude = abs(numerator);
@@ -53,6 +56,7 @@ Rounded RoundRatio(const Integer& numerator, const Integer& denominator, int exp
 }
 
 Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, int exponent) {
+  HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0);
   if (numerator.is_zero()) return {0, 0};
   const int half = (kQuotientBits + BitsOf(denominator) - BitsOf(numerator)) / 2;
   const Integer quotient = half >= 0 ? Integer((numerator << 2 * half) / denominator)
@@ -63,6 +67,7 @@ Rounded RoundSquareRoot(const Integer& numerator, const Integer& denominator, in
 
 int CompareSquareRoot(const Integer& numerator, const Integer& denominator, int exponent,
                       double threshold) {
+  HULLD_CHECK(Sign(numerator) >= 0 && Sign(denominator) > 0 && threshold >= 0);
   if (threshold == 0) return Sign(numerator);
   const int lowest = LowestBitExponent(threshold);
   const Integer odd = ToInteger(threshold, lowest);

@@ -3,6 +3,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 
 namespace hulld {
 
@@ -13,6 +15,10 @@ using Vector = Eigen::Vector3d;
 inline double Dot(const Vector& a, const Vector& b) { return a.dot(b); }
 inline Vector Cross(const Vector& a, const Vector& b) { return a.cross(b); }
 inline bool IsZero(const Vector& a) { return a.x() == 0 && a.y() == 0 && a.z() == 0; }
+// The largest absolute component. Faster than Eigen's for three, and as exact.
+inline double LargestComponent(const Vector& a) {
+  return std::max(std::abs(a.x()), std::max(std::abs(a.y()), std::abs(a.z())));
+}
 inline int Sign(double a) { return (a > 0) - (a < 0); }
 
 }  // namespace hulld

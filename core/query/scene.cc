@@ -6,11 +6,13 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <set>
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/query/box_tree.h"
+#include "core/query/collision.h"
 
 namespace hulld {
 namespace {
@@ -24,45 +26,29 @@ constexpr uint32_t kMostSlicePlacements = 1024;
 // What the search of one placement counted.
 struct RungTally {
   uint64_t candidates = 0;
-  decltype(SceneTotals::by_rung) by_rung = {};
+  RungCounts rungs;
 };
 
-class SceneSearch {
+class Search {
  public:
-  SceneSearch(std::span<const PlacedHull> placements, const SceneOptions& options)
-      : placements_(placements), options_(options), first_look_(options.query) {
-    first_look_.want_axis = false;
-    first_look_.want_analysis = false;
-    first_look_.want_certificate = false;
-    first_look_.want_separation = false;
-    first_look_.want_witness = false;
-    first_look_.threads = 1;
-    for (const GroupPair& pair : options.ignored_groups) {
-      ignored_.insert(std::minmax(pair.first, pair.second));
-    }
-  }
+  Search(const SceneSearch& scene, const SceneOptions& options)
+      : scene_(scene), options_(options) {}
 
   absl::StatusOr<SceneTotals> Run(const std::function<void(std::span<const SceneAnswer>)>& emit) {
-    const auto count = static_cast<uint32_t>(placements_.size());
-    boxes_.resize(count);
-    const int threads = std::max(1, options_.threads);
-#pragma omp parallel for schedule(static) num_threads(threads)
-    for (uint32_t i = 0; i < count; ++i) boxes_[i] = BoundingBox(placements_[i]);
-    const BoxTree tree(boxes_);
     SceneTotals totals;
-    totals.pairs = CountPairs();
+    totals.pairs = scene_.pairs();
+    const int threads = std::max(1, options_.threads);
     std::vector<std::vector<SceneAnswer>> slice(kMostSlicePlacements);
     std::vector<RungTally> slice_rungs(kMostSlicePlacements);
     uint32_t slice_placements = kFirstSlicePlacements;
     std::vector<SceneAnswer> answers;
-    const uint32_t end = options_.movers ? std::min(*options_.movers, count) : count;
-    for (uint32_t begin = 0, size = 0; begin < end; begin += size) {
-      size = std::min(slice_placements, end - begin);
+    for (uint32_t begin = 0, size = 0; begin < scene_.size(); begin += size) {
+      size = std::min(slice_placements, scene_.size() - begin);
 #pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
       for (uint32_t i = 0; i < size; ++i) {
         slice[i].clear();
         slice_rungs[i] = {};
-        if (!Stopped()) Search(tree, begin + i, slice[i], slice_rungs[i]);
+        if (!Stopped()) SearchFrom(begin + i, slice[i], slice_rungs[i]);
       }
       if (Stopped()) return absl::CancelledError("stopped in a scene");
       answers.clear();
@@ -70,9 +56,7 @@ class SceneSearch {
       for (uint32_t i = 0; i < size; ++i) {
         std::move(slice[i].begin(), slice[i].end(), std::back_inserter(answers));
         candidates += slice_rungs[i].candidates;
-        for (size_t rung = 0; rung < totals.by_rung.size(); ++rung) {
-          totals.by_rung[rung] += slice_rungs[i].by_rung[rung];
-        }
+        totals.rungs += slice_rungs[i].rungs;
       }
       totals.candidates += candidates;
       totals.found += answers.size();
@@ -85,98 +69,123 @@ class SceneSearch {
   }
 
  private:
-  bool Stopped() const { return options_.query.should_stop && options_.query.should_stop(); }
-
-  bool IsIgnored(uint32_t a, uint32_t b) const {
-    if (options_.groups.empty() || ignored_.empty()) return false;
-    return ignored_.contains(std::minmax(options_.groups[a], options_.groups[b]));
-  }
-
-  // Pairs that are asked about, by counting groups rather than pairs.
-  uint64_t CountPairs() const {
-    const auto pairs_among = [](uint64_t n) { return n * (n - (n > 0)) / 2; };
-    const uint64_t count = placements_.size();
-    const uint64_t movers = options_.movers ? std::min<uint64_t>(*options_.movers, count) : count;
-    uint64_t pairs = pairs_among(count) - pairs_among(count - movers);
-    if (options_.groups.empty()) return pairs;
-    // Of each group how many are movers and how many are not.
-    std::map<uint32_t, std::pair<uint64_t, uint64_t>> sizes;
-    for (uint32_t i = 0; i < count; ++i) {
-      auto& [moving, resting] = sizes[options_.groups[i]];
-      ++(i < movers ? moving : resting);
-    }
-    for (const auto& [first, second] : ignored_) {
-      const auto [m, r] = sizes[first];
-      const auto [n, s] = sizes[second];
-      pairs -= first == second ? pairs_among(m) + m * r : m * n + m * s + r * n;
-    }
-    return pairs;
-  }
+  bool Stopped() const { return StopPoll(options_.query.should_stop, 1).Poll(); }
 
   // Answers placement a with all after it.
-  void Search(const BoxTree& tree, uint32_t a, std::vector<SceneAnswer>& answers,
-              RungTally& tally) const {
-    Box box = boxes_[a];
-    if (const double clearance = options_.query.clearance.value_or(0); clearance > 0) {
-      // Rounded up, one unit in the last place being the most that the sums err.
-      const auto grown = [&](double x, double towards) {
-        return std::nextafter(x + std::copysign(clearance, towards), towards);
-      };
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      for (int axis = 0; axis < 3; ++axis) {
-        box.low[axis] = grown(box.low[axis], -kInfinity);
-        box.high[axis] = grown(box.high[axis], kInfinity);
-      }
-    }
-    std::vector<uint32_t> meeting;
-    tree.AppendMeeting(box, a + 1, meeting);
-    std::sort(meeting.begin(), meeting.end());
-    for (const uint32_t b : meeting) {
-      if (IsIgnored(a, b)) continue;
+  void SearchFrom(uint32_t a, std::vector<SceneAnswer>& answers, RungTally& tally) const {
+    std::vector<uint32_t> candidates;
+    scene_.Candidates(a, candidates);
+    for (const uint32_t b : candidates) {
       ++tally.candidates;
-      absl::StatusOr<Answer> answer = Ask(a, b);
+      absl::StatusOr<Answer> answer = scene_.Ask(a, b);
       if (absl::IsCancelled(answer.status())) break;
-      if (answer.ok()) ++tally.by_rung[static_cast<size_t>(answer->rung)];
-      if (answer.ok() && !IsFound(*answer)) continue;
+      if (answer.ok()) tally.rungs.Add(answer->rung);
+      if (answer.ok() && !scene_.IsFound(*answer)) continue;
       answers.push_back({{a, b}, std::move(answer)});
     }
   }
 
-  bool IsFound(const Answer& answer) const {
-    if (options_.query.clearance) return answer.within_clearance.value_or(false);
-    return answer.relation != Relation::kSeparated;
-  }
-
-  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b) const {
-    absl::StatusOr<Answer> answer = CheckCollision(placements_[a], placements_[b], first_look_);
-    const QueryOptions& query = options_.query;
-    const bool wants_more = query.want_axis || query.want_analysis || query.want_certificate ||
-                            query.want_separation || query.want_witness;
-    if (!wants_more || !answer.ok() || !IsFound(*answer)) return answer;
-    QueryOptions options = query;
-    options.threads = 1;
-    return CheckCollision(placements_[a], placements_[b], options);
-  }
-
-  const std::span<const PlacedHull> placements_;
+  const SceneSearch& scene_;
   const SceneOptions& options_;
-  // The relation, and whether it is within the clearance.
-  QueryOptions first_look_;
-  std::set<std::pair<uint32_t, uint32_t>> ignored_;
-  std::vector<Box> boxes_;
 };
 
 }  // namespace
 
-absl::StatusOr<SceneTotals> FindCollisions(
-    std::span<const PlacedHull> placements, const SceneOptions& options,
-    const std::function<void(std::span<const SceneAnswer>)>& emit) {
+SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOptions& options)
+    : placements_(placements), options_(&options), first_look_(options.query) {
+  first_look_.want_axis = false;
+  first_look_.want_analysis = false;
+  first_look_.want_certificate = false;
+  first_look_.want_separation = false;
+  first_look_.want_witness = false;
+  first_look_.threads = 1;
+  for (const GroupPair& pair : options.ignored_groups) {
+    ignored_.insert(std::minmax(pair.first, pair.second));
+  }
+  const auto count = static_cast<uint32_t>(placements.size());
+  boxes_.resize(count);
+#pragma omp parallel for schedule(static) num_threads(std::max(1, options.threads))
+  for (uint32_t i = 0; i < count; ++i) boxes_[i] = BoundingBox(placements_[i]);
+  tree_ = BoxTree(boxes_);
+  pairs_ = CountPairs();
+  size_ = options.movers ? std::min(*options.movers, count) : count;
+}
+
+absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
+                                              const SceneOptions& options) {
   if (!options.groups.empty() && options.groups.size() != placements.size()) {
     return absl::InvalidArgumentError(absl::StrCat("groups holds ", options.groups.size(),
                                                    " groups for ", placements.size(),
                                                    " placements; give one each, or none"));
   }
-  return SceneSearch(placements, options).Run(emit);
+  return SceneSearch(placements, options);
+}
+
+bool SceneSearch::IsIgnored(uint32_t a, uint32_t b) const {
+  if (options_->groups.empty() || ignored_.empty()) return false;
+  return ignored_.contains(std::minmax(options_->groups[a], options_->groups[b]));
+}
+
+// Pairs that are asked about, by counting groups rather than pairs.
+uint64_t SceneSearch::CountPairs() const {
+  const auto pairs_among = [](uint64_t n) { return n * (n - (n > 0)) / 2; };
+  const uint64_t count = placements_.size();
+  const uint64_t movers = options_->movers ? std::min<uint64_t>(*options_->movers, count) : count;
+  uint64_t pairs = pairs_among(count) - pairs_among(count - movers);
+  if (options_->groups.empty()) return pairs;
+  // Of each group how many are movers and how many are not.
+  std::map<uint32_t, std::pair<uint64_t, uint64_t>> sizes;
+  for (uint32_t i = 0; i < count; ++i) {
+    auto& [moving, resting] = sizes[options_->groups[i]];
+    ++(i < movers ? moving : resting);
+  }
+  for (const auto& [first, second] : ignored_) {
+    const auto [m, r] = sizes[first];
+    const auto [n, s] = sizes[second];
+    pairs -= first == second ? pairs_among(m) + m * r : m * n + m * s + r * n;
+  }
+  return pairs;
+}
+
+void SceneSearch::Candidates(uint32_t a, std::vector<uint32_t>& candidates) const {
+  HULLD_DCHECK(a < size_);
+  Box box = boxes_[a];
+  if (const double clearance = options_->query.clearance.value_or(0); clearance > 0) {
+    // Rounded up, one unit in the last place being the most that the sums err.
+    const auto grown = [&](double x, double towards) {
+      return std::nextafter(x + std::copysign(clearance, towards), towards);
+    };
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    for (int axis = 0; axis < 3; ++axis) {
+      box.low[axis] = grown(box.low[axis], -kInfinity);
+      box.high[axis] = grown(box.high[axis], kInfinity);
+    }
+  }
+  candidates.clear();
+  tree_.AppendMeeting(box, a + 1, candidates);
+  std::erase_if(candidates, [&](uint32_t b) { return IsIgnored(a, b); });
+  std::sort(candidates.begin(), candidates.end());
+}
+
+bool SceneSearch::IsFound(const Answer& answer) const {
+  if (options_->query.clearance) return answer.within_clearance.value_or(false);
+  return answer.relation != Relation::kSeparated;
+}
+
+absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b) const {
+  absl::StatusOr<Answer> answer = CheckCollision(placements_[a], placements_[b], first_look_);
+  if (!options_->query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
+  QueryOptions options = options_->query;
+  options.threads = 1;
+  return CheckCollision(placements_[a], placements_[b], options);
+}
+
+absl::StatusOr<SceneTotals> FindCollisions(
+    std::span<const PlacedHull> placements, const SceneOptions& options,
+    const std::function<void(std::span<const SceneAnswer>)>& emit) {
+  const absl::StatusOr<SceneSearch> scene = SceneSearch::Make(placements, options);
+  if (!scene.ok()) return scene.status();
+  return Search(*scene, options).Run(emit);
 }
 
 }  // namespace hulld

@@ -4,15 +4,19 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "core/query/batch.h"
-#include "core/query/collision.h"
+#include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
+#include "core/query/terms/answer.h"
+#include "core/query/terms/query_options.h"
 #include "core/query/terms/rung.h"
 
 namespace hulld {
@@ -48,8 +52,49 @@ struct SceneTotals {
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;
-  // Candidates by the rung that decided, in the order of Rung.
-  std::array<uint64_t, kRungCount> by_rung = {};
+  // Candidates by the rung that decided.
+  RungCounts rungs;
+};
+
+// A scene for callers that have threads of their own: FindCollisions is Candidates of every
+// placement, and of each candidate Ask. Const functions may be called by several threads at once.
+class SceneSearch {
+ public:
+  // Both must outlive this. Cost: O(n log n); boxes are computed on options.threads.
+  // INVALID_ARGUMENT: `groups` is neither empty nor one for each placement.
+  static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
+                                          const SceneOptions& options);
+
+  // Pairs that the groups and movers leave.
+  uint64_t pairs() const { return pairs_; }
+  // Placements that have candidates of their own: all, or the movers.
+  uint32_t size() const { return size_; }
+
+  // The placements after `a` whose boxes meet that of `a` (grown by the clearance) and that the
+  // groups leave, ascending. Requires a < size(). Cost: O(log n) beyond what it finds.
+  void Candidates(uint32_t a, std::vector<uint32_t>& candidates) const;
+
+  // The answer of a candidate, and what else is wanted of it if it is found. CANCELLED: should_stop
+  // said so.
+  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b) const;
+  // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.
+  bool IsFound(const Answer& answer) const;
+
+ private:
+  SceneSearch(std::span<const PlacedHull> placements, const SceneOptions& options);
+
+  bool IsIgnored(uint32_t a, uint32_t b) const;
+  uint64_t CountPairs() const;
+
+  std::span<const PlacedHull> placements_;
+  const SceneOptions* options_;
+  // The relation, and whether it is within the clearance.
+  QueryOptions first_look_;
+  std::set<std::pair<uint32_t, uint32_t>> ignored_;
+  std::vector<Box> boxes_;
+  BoxTree tree_{std::span<const Box>()};
+  uint64_t pairs_ = 0;
+  uint32_t size_ = 0;
 };
 
 // Which of all pairs of placements collide: a tree of bounding boxes leaves the pairs whose boxes

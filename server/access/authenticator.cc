@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "server/contract/error_info.h"
+
 namespace hulld::server {
 namespace {
 
@@ -31,21 +33,27 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
   if (table == nullptr) return Caller();
   const auto [first, last] = metadata.equal_range(kKey);
   if (first == last) {
-    return absl::UnauthenticatedError(
-        "the call carries no token; send one as metadata \"authorization: Bearer TOKEN\"");
+    return WithReason(
+        absl::UnauthenticatedError(
+            "the call carries no token; send one as metadata \"authorization: Bearer TOKEN\""),
+        v1::ERROR_REASON_TOKEN_MISSING);
   }
   if (std::next(first) != last) {
-    return absl::UnauthenticatedError("the call carries \"authorization\" twice; send one");
+    return WithReason(
+        absl::UnauthenticatedError("the call carries \"authorization\" twice; send one"),
+        v1::ERROR_REASON_TOKEN_MISSING);
   }
   const std::string value(first->second.data(), first->second.size());
   if (!absl::StartsWithIgnoreCase(value, kScheme)) {
-    return absl::UnauthenticatedError(
-        "the metadata \"authorization\" is not \"Bearer TOKEN\"; write it so");
+    return WithReason(absl::UnauthenticatedError(
+                          "the metadata \"authorization\" is not \"Bearer TOKEN\"; write it so"),
+                      v1::ERROR_REASON_TOKEN_MISSING);
   }
   const std::optional<Caller> caller = table->Find(value.substr(sizeof kScheme - 1));
   if (!caller.has_value()) {
-    return absl::UnauthenticatedError(
-        "the call's token is unknown or no longer valid; ask whoever runs the server for another");
+    return WithReason(absl::UnauthenticatedError("the call's token is unknown or no longer valid; "
+                                                 "ask whoever runs the server for another"),
+                      v1::ERROR_REASON_TOKEN_UNKNOWN);
   }
   if (absl::Status s = CheckPermission(*caller, rpc); !s.ok()) return s;
   return *caller;

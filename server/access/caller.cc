@@ -3,6 +3,7 @@
 #include <absl/strings/escaping.h>
 #include <absl/strings/str_cat.h>
 
+#include "server/contract/error_info.h"
 #include "server/contract/hull_id.h"
 #include "server/contract/rpc.h"
 #include "server/settings/config.h"
@@ -12,10 +13,11 @@ namespace {
 
 absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
                            const std::string& value) {
-  return absl::PermissionDeniedError(
-      absl::StrCat(field, " \"", absl::CEscape(value), "\" is outside of \"", caller.prefix,
-                   "\", which token \"", caller.name,
-                   "\" is limited to; use an ID that starts with it, or another token"));
+  return WithReason(absl::PermissionDeniedError(absl::StrCat(
+                        field, " \"", absl::CEscape(value), "\" is outside of \"", caller.prefix,
+                        "\", which token \"", caller.name,
+                        "\" is limited to; use an ID that starts with it, or another token")),
+                    v1::ERROR_REASON_OUTSIDE_PREFIX, {{"prefix", caller.prefix}});
 }
 
 }  // namespace
@@ -48,7 +50,7 @@ Permission PermissionFor(Rpc rpc) {
     case Rpc::kDeleteHull:
     case Rpc::kReplaceHull:
       return Permission::kWrite;
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return Permission::kAdmin;
   }
   return Permission::kAdmin;
@@ -57,9 +59,11 @@ Permission PermissionFor(Rpc rpc) {
 absl::Status CheckPermission(const Caller& caller, Rpc rpc) {
   const Permission needed = PermissionFor(rpc);
   if (caller.permission >= needed) return absl::OkStatus();
-  return absl::PermissionDeniedError(
-      absl::StrCat("token \"", caller.name, "\" has the role ", RoleName(caller.permission),
-                   ", but this call needs ", RoleName(needed), "; use another token"));
+  return WithReason(absl::PermissionDeniedError(absl::StrCat(
+                        "token \"", caller.name, "\" has the role ", RoleName(caller.permission),
+                        ", but this call needs ", RoleName(needed), "; use another token")),
+                    v1::ERROR_REASON_ROLE_TOO_LOW,
+                    {{"role", RoleName(caller.permission)}, {"needed_role", RoleName(needed)}});
 }
 
 absl::Status CheckHullId(const Caller& caller, const std::string& id, const std::string& field) {

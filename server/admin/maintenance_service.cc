@@ -1,12 +1,12 @@
 #include "server/admin/maintenance_service.h"
 
-#include "server/admin/snapshot_stream.h"
+#include "server/admin/backup_stream.h"
 
 namespace hulld::server {
 
-grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* MaintenanceService::SaveSnapshot(
-    grpc::CallbackServerContext* context, const v1::SaveSnapshotRequest*) {
-  return SnapshotStream::Start(*context, admission_, store_, registry_, readers_);
+grpc::ServerWriteReactor<v1::SaveBackupResponse>* MaintenanceService::SaveBackup(
+    grpc::CallbackServerContext* context, const v1::SaveBackupRequest*) {
+  return BackupStream::Start(*context, admission_, store_, registry_, readers_);
 }
 
 }  // namespace hulld::server

@@ -14,13 +14,13 @@ namespace hulld::server {
 // hulld.v1.MaintenanceService: the contract in maintenance.proto.
 class MaintenanceService : public v1::MaintenanceService::CallbackService {
  public:
-  // Snapshots are read on `readers`. All must outlive this.
+  // Backups are read on `readers`. All must outlive this.
   MaintenanceService(Store& store, const Registry& registry, Admission& admission,
                      WorkerPool& readers)
       : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
 
-  grpc::ServerWriteReactor<v1::SaveSnapshotResponse>* SaveSnapshot(
-      grpc::CallbackServerContext* context, const v1::SaveSnapshotRequest* request) override;
+  grpc::ServerWriteReactor<v1::SaveBackupResponse>* SaveBackup(
+      grpc::CallbackServerContext* context, const v1::SaveBackupRequest* request) override;
 
  private:
   Store& store_;

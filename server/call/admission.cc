@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {
@@ -36,10 +38,10 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kAppendPoints:
     case Rpc::kReplaceHull:
     case Rpc::kStreamCollisions:
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return CallKind::kStream;
   }
-  return CallKind::kUnary;
+  HULLD_UNREACHABLE();
 }
 
 Admission::Ticket::Ticket(Ticket&& other) noexcept
@@ -62,6 +64,7 @@ Admission::Admission(const Limits& limits, Metrics& metrics) : limits_(limits), 
 }
 
 Admission::~Admission() {
+  HULLD_CHECK(running_ == 0);
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -99,7 +102,9 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(Rpc rpc,
   if (ticket.kind_ == CallKind::kStream) ticket.client_ = client();
   const std::lock_guard lock(mutex_);
   if (draining_) {
-    return absl::UnavailableError("hulld is draining and ends soon; retry when it is back");
+    return WithReason(
+        absl::UnavailableError("hulld is draining and ends soon; retry when it is back"),
+        v1::ERROR_REASON_DRAINING);
   }
   // What tells the operator how the server is must work when it is full, too.
   if (rpc != Rpc::kGetStatus) {
@@ -160,15 +165,19 @@ bool Admission::WaitIdle(std::chrono::steady_clock::time_point deadline) {
 void Admission::Leave(Ticket& ticket) {
   grpc_call* watched = nullptr;
   {
-    // Notified under the lock: whoever waits may destroy this as soon as it is released.
+    // Notified under the lock, as the thread that waits may destroy this once it is released.
     const std::lock_guard lock(mutex_);
     if (ticket.is_watched_) {
       watched = ticket.watched_->call;
       (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
     }
-    if (ticket.kind_ == CallKind::kBatch) --batches_;
+    if (ticket.kind_ == CallKind::kBatch) {
+      HULLD_CHECK(batches_ > 0);
+      --batches_;
+    }
     if (ticket.kind_ == CallKind::kStream) {
       const auto open = streams_.find(ticket.client_);
+      HULLD_CHECK(open != streams_.end());
       if (--open->second == 0) streams_.erase(open);
     }
     if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();

@@ -26,7 +26,7 @@ namespace hulld::server {
 enum class CallKind {
   // One request, one short answer.
   kUnary,
-  // Pairs by the thousand, for the executor: --max-concurrent-batches.
+  // Thousands of pairs, computed in slices: --max-concurrent-batches.
   kBatch,
   // One request, an answer of many messages.
   kDownload,
@@ -65,9 +65,9 @@ class Admission {
 
     Admission* admission_;
     CallKind kind_;
-    // Of streams alone.
+    // Empty unless the call is a stream.
     std::string client_;
-    // Of downloads and batches under --max-request-time.
+    // Set for downloads and batches, while --max-request-time limits them.
     std::list<Watched>::iterator watched_;
     bool is_watched_ = false;
   };
@@ -99,7 +99,7 @@ class Admission {
   size_t running() const { return running_.load(std::memory_order_relaxed); }
 
  private:
-  // Both require the mutex.
+  // Both require the mutex; unchecked, as a std::mutex cannot tell who holds it.
   absl::Status CheckRoom(CallKind kind, const std::string& client);
   void Watch(grpc_call* call, Ticket* ticket);
 

@@ -11,6 +11,7 @@
 #include <optional>
 #include <string>
 
+#include "core/base/check.h"
 #include "server/access/caller.h"
 #include "server/call/admission.h"
 #include "server/call/call_lifetime.h"
@@ -31,7 +32,10 @@ class Call {
 
   Rpc rpc() const { return rpc_; }
   // Who calls. Requires that Begin succeeded.
-  const Caller& caller() const { return caller_; }
+  const Caller& caller() const {
+    HULLD_CHECK(ticket_.has_value());
+    return caller_;
+  }
   // The client's (metadata x-request-id), or ours, made when it is first needed: most calls succeed
   // and have nothing said of them. All that is logged about the call carries it, and the reply of a
   // call that is logged or fails, or whose client gave one.
@@ -40,7 +44,7 @@ class Call {
 
   const CallLifetime& lifetime() const { return lifetime_; }
   bool ShouldStop() const { return lifetime_.ShouldStop(); }
-  // Requires ShouldStop().
+  // Requires ShouldStop(), as CallLifetime::StopStatus does.
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }
   void Cancel() { lifetime_.Cancel(); }
 

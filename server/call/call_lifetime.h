@@ -31,7 +31,8 @@ class CallLifetime {
 
   bool ShouldStop() const { return cancelled_.load(std::memory_order_relaxed) || Expired(); }
 
-  // Why the call stopped. Requires ShouldStop().
+  // Why the call stopped. Requires ShouldStop() a moment ago; unchecked, as the system clock may
+  // have been set back since.
   absl::Status StopStatus() const {
     if (Clock::now() >= deadline_) {
       return absl::DeadlineExceededError(

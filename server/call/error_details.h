@@ -11,10 +11,9 @@ namespace hulld::server {
 // google.rpc.Status (google/rpc/status.proto) with the details of google/rpc/error_details.proto
 // that apply:
 //   RequestInfo   always: request_id
+//   ErrorInfo     when the error has a reason: see v1/error.proto
 //   QuotaFailure  when a limit caused the error: subject is its flag
-//   RetryInfo     when the same request may soon do: retry_delay
-// Debian has no generated code for these files, and code of our own under their names would clash
-// with a program's that links it; hence the encoding by hand.
+//   RetryInfo     when the same request may soon succeed: retry_delay
 std::string EncodeErrorDetails(const absl::Status& status, const std::string& request_id);
 
 }  // namespace hulld::server

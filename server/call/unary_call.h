@@ -42,7 +42,8 @@ class UnaryCall : public grpc::ServerUnaryReactor {
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
   // Both reactions are trivial: gRPC need not wake a thread of its executor for each call's OnDone.
-  // Not part of gRPC's API; without it calls only take longer (tests/bench/service/remote_benchmark.cc).
+  // Not part of gRPC's API; without it calls only take longer
+  // (tests/bench/service/remote_benchmark.cc).
   bool InternalInlineable() override { return true; }
 
   Call call_;

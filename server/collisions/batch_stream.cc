@@ -1,100 +1,90 @@
 #include "server/collisions/batch_stream.h"
 
-#include <absl/status/status.h>
-
 #include <algorithm>
-#include <chrono>
+#include <memory>
 #include <utility>
 
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
-#include "server/wire/batch_columns.h"
 
 namespace hulld::server {
 namespace {
 
-// Slices grow and shrink so that each takes about this long: short enough for batches to take turns
-// and for answers to stream, long enough to hide the cost of opening a parallel region.
-constexpr std::chrono::milliseconds kSliceTime(40);
-constexpr size_t kFirstSlicePairs = 128;
-constexpr size_t kMostSlicePairs = 1 << 16;
-// Core hands out pairs to threads in pieces of 16.
-constexpr size_t kLeastSlicePairsPerThread = 16;
-// Projections of one slice under TEXTBOOK_SAT, whose cost can be foretold. A pair above it makes a
-// slice of its own, parallel over its axes.
-constexpr double kSliceProjections = 3e7;
+// The first pieces are small, as the cost of a pair is not known; the largest bounds what a wrong
+// guess of it can do.
+constexpr uint64_t kFirstPairs = 128;
+constexpr uint64_t kMostPairs = 1 << 14;
+// This many placements are decoded and placed in about a slice.
+constexpr int kMostShortPlacements = 4096;
+// Pairs between two looks at the clock.
+constexpr uint64_t kPairsPerLook = 64;
 
-double TextbookProjections(const Hull& a, const Hull& b) {
-  const double axes = static_cast<double>(a.edges().size()) * static_cast<double>(b.edges().size());
-  return axes * static_cast<double>(a.vertices().size() + b.vertices().size());
+// Adds the answers of the pairs that follow those of `message`.
+void Append(const v1::BatchCheckCollisionsResponse& next,
+            v1::BatchCheckCollisionsResponse* message) {
+  const uint64_t first_pair = message->first_pair();
+  message->MergeFrom(next);
+  message->set_first_pair(first_pair);
 }
 
 }  // namespace
 
 grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, Executor& executor, const v1::BatchCheckCollisionsRequest& request) {
-  const std::shared_ptr<BatchStream> stream(
-      new BatchStream(context, admission, registry, executor, request));
-  stream->self_ = stream;
-  const absl::Status begun = stream->call_.Begin();
-  if (begun.ok()) {
-    readers.Submit([stream] { stream->Open(); });
-  } else {
-    stream->Finish(stream->call_.End(begun));
-  }
-  return stream.get();
+    WorkerPool& readers, TaskPool& pool, Executor& executor,
+    const v1::BatchCheckCollisionsRequest& request) {
+  return Launch(std::shared_ptr<BatchStream>(
+      new BatchStream(context, admission, registry, readers, pool, executor, request)));
 }
+
+BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
+                         Registry& registry, WorkerPool& readers, TaskPool& pool,
+                         Executor& executor, const v1::BatchCheckCollisionsRequest& request)
+    : PiecedReplies(context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
+                    {kFirstPairs, kMostPairs,
+                     request.placements_size() + request.packed_placements().hulls_size() <=
+                         kMostShortPlacements}),
+      registry_(registry),
+      team_threads_(executor.threads()),
+      team_lane_(executor.opener()),
+      request_(request),
+      pair_count_(static_cast<uint64_t>(request.pairs_size()) / 2) {}
 
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(request_.method(), request_.wanted(), request_.tolerance(),
-                       registry_.limits(), call_.lifetime());
+                       registry_.limits(), call().lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
-  options_.should_stop = [this] {
-    Executor::GiveWay();
-    return call_.ShouldStop();
-  };
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request_.placements(), request_.packed_placements(), call_.caller(),
+      PlacementTable::Make(request_.placements(), request_.packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
-  call_.AddPairs(pair_count());
+  call().AddPairs(pair_count_);
   return ValidatePairs(request_.pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
                        "the batch");
 }
 
-void BatchStream::QueueHead() {
+absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
+  if (!may_wait) return table_.TryResolve(registry_);
+  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  return true;
+}
+
+uint64_t BatchStream::Begin() {
   table_.EncodeHeader(registry_.store(), head_.mutable_header());
+  has_head_ = true;
   size_t next = 0;
   while ((next = table_.EncodeHulls(next, head_.mutable_hulls(),
                                     head_.mutable_placement_problems())) < table_.table_rows()) {
-    ready_.push_back(std::exchange(head_, {}));
+    const size_t bytes = head_.ByteSizeLong();
+    Queue(std::exchange(head_, {}), bytes);
   }
+  return pair_count_;
 }
 
-void BatchStream::Open() {
-  absl::Status status = Validate();
-  if (status.ok()) status = table_.Resolve(registry_, options_.should_stop);
-  if (call_.ShouldStop()) status = call_.StopStatus();
-  const std::lock_guard lock(mutex_);
-  computing_ = false;
-  slice_pairs_ = kFirstSlicePairs;
-  if (!status.ok()) {
-    end_ = status;
-  } else {
-    QueueHead();
-    if (pair_count() == 0) {
-      ready_.push_back(std::move(head_));
-      end_ = absl::OkStatus();
-    }
-  }
-  Proceed();
-}
-
-PlacedPair BatchStream::PairAt(size_t i) const {
+PlacedPair BatchStream::PairAt(uint64_t i) const {
   return {request_.pairs(static_cast<int>(2 * i)), request_.pairs(static_cast<int>(2 * i + 1))};
 }
 
@@ -102,129 +92,86 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
   return table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
 }
 
-// Where the slice that starts at next_pair_ ends.
-size_t BatchStream::SliceEnd() const {
-  const size_t most = std::min(pair_count(), next_pair_ + slice_pairs_);
-  if (options_.method != Method::kTextbookSat) return most;
-  double projections = 0;
-  for (size_t i = next_pair_; i < most; ++i) {
-    const PlacedPair pair = PairAt(i);
-    projections +=
-        TextbookProjections(table_.placed()[pair.a].hull(), table_.placed()[pair.b].hull());
-    if (projections > kSliceProjections) return std::max(i, next_pair_ + 1);
-  }
-  return most;
+bool BatchStream::IsForTeam(const PlacedPair& pair) const {
+  return IsTextbookForTeam(options_, table_.placed()[pair.a].hull(),
+                           table_.placed()[pair.b].hull());
 }
 
-std::vector<absl::StatusOr<Answer>> BatchStream::AnswerPairs(
-    const std::vector<PlacedPair>& pairs) const {
-  if (pairs.size() != 1) {
-    return CheckCollisions(table_.placed(), pairs, options_, executor_.threads());
+// A pair for the team makes a piece of its own.
+uint64_t BatchStream::EndOfPiece(uint64_t begin, uint64_t end) const {
+  if (options_.method != Method::kTextbookSat) return end;
+  for (uint64_t i = begin; i < end; ++i) {
+    if (IsForTeam(PairAt(i))) return std::max(i, begin + 1);
   }
-  QueryOptions options = options_;
-  options.threads = executor_.threads();
-  std::vector<absl::StatusOr<Answer>> answers;
-  answers.push_back(
-      CheckCollision(table_.placed()[pairs[0].a], table_.placed()[pairs[0].b], options));
-  return answers;
+  return end;
 }
 
-absl::Status BatchStream::ComputeSlice() {
-  const size_t begin = next_pair_;
-  const size_t end = SliceEnd();
-  std::vector<PlacedPair> pairs;
-  pairs.reserve(end - begin);
-  for (size_t i = begin; i < end; ++i) {
-    if (IsAnswerable(PairAt(i))) pairs.push_back(PairAt(i));
-  }
-  const auto start = std::chrono::steady_clock::now();
-  const std::vector<absl::StatusOr<Answer>> answers = AnswerPairs(pairs);
-  if (call_.ShouldStop()) return call_.StopStatus();
-  AdaptSlice(end - begin, std::chrono::steady_clock::now() - start);
+void BatchStream::Submit(PairsPiece& piece) {
+  if (!IsForTeam(PairAt(piece.next))) return PiecedReplies::Submit(piece);
+  RunOn(team_lane_, [this, &piece] { RunSlice(piece); });
+}
 
-  BatchColumns columns(std::move(head_), request_.wanted(), begin);
-  head_.Clear();
-  size_t answered = 0;
-  RungCounts counts;
-  for (size_t i = begin; i < end; ++i) {
-    const PlacedPair pair = PairAt(i);
-    if (!IsAnswerable(pair)) {
-      columns.AddUnanswered();
-      continue;
-    }
-    const absl::StatusOr<Answer>& answer = answers[answered++];
-    const Hull& a = table_.placed()[pair.a].hull();
-    const Hull& b = table_.placed()[pair.b].hull();
-    if (answer.ok()) {
-      counts.Add(answer->rung);
-      columns.Add(answer, a, b);
-    } else {
-      const absl::Status status = NameQueryLimit(answer.status());
-      call_.CountLimit(status);
-      columns.Add(status, a, b);
-    }
-  }
-  call_.metrics().CountPairs(counts);
-  Send(columns, end);
+absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
+  BatchColumns columns({}, request_.wanted(), piece.next);
+  do {
+    const uint64_t until = std::min(piece.end, piece.next + kPairsPerLook);
+    if (absl::Status s = Answer(piece.next, until, &columns); !s.ok()) return s;
+    piece.next = until;
+  } while (piece.next < piece.end && Clock::now() < end);
+  piece.is_done = piece.next == piece.end;
+  for (v1::BatchCheckCollisionsResponse& reply : columns.Take()) piece.Add(std::move(reply));
   return absl::OkStatus();
 }
 
-// Queues what answers the pairs up to `end`.
-void BatchStream::Send(BatchColumns& columns, size_t end) {
-  next_pair_ = end;
-  const std::lock_guard lock(mutex_);
-  for (v1::BatchCheckCollisionsResponse& message : columns.Take()) {
-    ready_.push_back(std::move(message));
-  }
-}
-
-void BatchStream::AdaptSlice(size_t pairs, std::chrono::steady_clock::duration elapsed) {
-  const double factor = std::chrono::duration<double>(kSliceTime) / elapsed;
-  const double wished = static_cast<double>(pairs) * std::min(factor, 4.0);
-  const size_t least = kLeastSlicePairsPerThread * executor_.threads();
-  slice_pairs_ = std::max(least, static_cast<size_t>(std::min<double>(wished, kMostSlicePairs)));
-}
-
-void BatchStream::OnWriteDone(bool ok) {
-  const std::shared_ptr<BatchStream> self = shared_from_this();
-  const std::lock_guard lock(mutex_);
-  writing_ = false;
-  if (!ok) {
-    call_.Cancel();
-    ready_.clear();
-    if (!end_.has_value()) end_ = call_.StopStatus();
-  }
-  Proceed();
-}
-
-void BatchStream::Proceed() {
-  if (finished_) return;
-  if (!writing_ && !ready_.empty()) {
-    writing_ = true;
-    in_flight_ = std::move(ready_.front());
-    ready_.pop_front();
-    StartWrite(&in_flight_);
-  }
-  if (end_.has_value()) {
-    if (writing_ || computing_) return;
-    finished_ = true;
-    Finish(call_.End(*end_));
-    return;
-  }
-  if (computing_ || !ready_.empty()) return;
-  computing_ = true;
-  executor_.Submit([self = shared_from_this()] {
-    const absl::Status status =
-        self->call_.ShouldStop() ? self->call_.StopStatus() : self->ComputeSlice();
-    const std::lock_guard lock(self->mutex_);
-    self->computing_ = false;
-    if (self->end_.has_value()) {
-      // The client is gone.
-    } else if (!status.ok() || self->next_pair_ == self->pair_count()) {
-      self->end_ = status;
+absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* columns) {
+  RungCounts counts;
+  QueryOptions options = options_;
+  for (uint64_t i = begin; i < end; ++i) {
+    const PlacedPair pair = PairAt(i);
+    if (!IsAnswerable(pair)) {
+      columns->AddUnanswered();
+      continue;
     }
-    self->Proceed();
-  });
+    const PlacedHull& a = table_.placed()[pair.a];
+    const PlacedHull& b = table_.placed()[pair.b];
+    options.threads = IsForTeam(pair) ? team_threads_ : 1;
+    absl::StatusOr<hulld::Answer> answer = CheckCollision(a, b, options);
+    if (absl::IsCancelled(answer.status())) return answer.status();
+    if (answer.ok()) {
+      counts.Add(answer->rung);
+    } else {
+      answer = NameQueryLimit(answer.status());
+      call().CountLimit(answer.status());
+    }
+    columns->Add(answer, a.hull(), b.hull());
+  }
+  call().metrics().CountPairs(counts);
+  return absl::OkStatus();
+}
+
+void BatchStream::Deliver(PairsPiece& piece) {
+  if (has_head_ && !piece.replies.empty()) {
+    Append(piece.replies.front(), &head_);
+    piece.replies.front() = std::move(head_);
+    piece.reply_bytes.front() = piece.replies.front().ByteSizeLong();
+    has_head_ = false;
+  }
+  DeliverReplies(piece);
+}
+
+// A problem names its row, which would change.
+bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
+                       v1::BatchCheckCollisionsResponse* waiting) {
+  if (reply.columns().pair_problems_size() > 0) return false;
+  Append(reply, waiting);
+  return true;
+}
+
+// A batch without pairs is its head.
+void BatchStream::OnAllDelivered() {
+  if (!std::exchange(has_head_, false)) return;
+  const size_t bytes = head_.ByteSizeLong();
+  Queue(std::move(head_), bytes);
 }
 
 }  // namespace hulld::server

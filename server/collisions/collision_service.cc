@@ -7,7 +7,9 @@
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
+#include "core/base/check.h"
 #include "core/query/collision.h"
 #include "server/call/unary_call.h"
 #include "server/collisions/batch_stream.h"
@@ -20,15 +22,6 @@
 
 namespace hulld::server {
 namespace {
-
-// One pair, ready to be answered by any thread.
-struct PairQuery {
-  HullView a;
-  HullView b;
-  Pose X_WA;
-  Pose X_WB;
-  QueryOptions options;
-};
 
 absl::StatusOr<Pose> ReadPlacement(const Caller& caller, bool present,
                                    const v1::Placement& placement, const std::string& field) {
@@ -47,9 +40,52 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
   return {request.a().hull_id(), request.b().hull_id()};
 }
 
-// All of a query but its hulls.
-absl::StatusOr<PairQuery> ReadQuery(const Limits& limits, const Call& call,
-                                    const v1::CheckCollisionRequest& request) {
+// Whether nothing is left to make before these hulls can be queried.
+bool AreReady(const Resolved& resolved) {
+  for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
+    if (hull.ok() && !hull->served->has_query_hull()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+// One pair, ready to be answered by any thread.
+struct CollisionService::PairQuery {
+  // All but the hulls.
+  static absl::StatusOr<PairQuery> Read(const Limits& limits, const Call& call,
+                                        const v1::CheckCollisionRequest& request);
+
+  // Takes the hulls that were found for it, and gives the response their versions. May make what
+  // queries need of them.
+  absl::Status Place(const Registry& registry, absl::StatusOr<Resolved> resolved,
+                     v1::CheckCollisionResponse* response);
+
+  // Requires that Place succeeded.
+  bool IsQuick() const { return IsQuickToRelate(hull_a()) && IsQuickToRelate(hull_b()); }
+  bool IsForTeam() const { return IsTextbookForTeam(options, hull_a(), hull_b()); }
+  absl::Status Answer(const v1::Wanted& wanted, Metrics& metrics,
+                      v1::CheckCollisionResponse* response) const;
+  const Hull& hull_a() const {
+    HULLD_CHECK(a.has_value());
+    return a->hull();
+  }
+  const Hull& hull_b() const {
+    HULLD_CHECK(b.has_value());
+    return b->hull();
+  }
+
+  Pose X_WA;
+  Pose X_WB;
+  QueryOptions options;
+  // Keep the hulls.
+  std::vector<absl::StatusOr<HullView>> views;
+  std::optional<PlacedHull> a;
+  std::optional<PlacedHull> b;
+};
+
+absl::StatusOr<CollisionService::PairQuery> CollisionService::PairQuery::Read(
+    const Limits& limits, const Call& call, const v1::CheckCollisionRequest& request) {
   PairQuery query;
   absl::StatusOr<QueryOptions> options = MakeQueryOptions(
       request.method(), request.wanted(), request.tolerance(), limits, call.lifetime());
@@ -64,102 +100,98 @@ absl::StatusOr<PairQuery> ReadQuery(const Limits& limits, const Call& call,
   return query;
 }
 
-// Gives the query the hulls that were found for it, and the response their versions.
-absl::Status TakeHulls(const Registry& registry, absl::StatusOr<Resolved> resolved,
-                       PairQuery* query, v1::CheckCollisionResponse* response) {
+absl::Status CollisionService::PairQuery::Place(const Registry& registry,
+                                                absl::StatusOr<Resolved> resolved,
+                                                v1::CheckCollisionResponse* response) {
   if (!resolved.ok()) return resolved.status();
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
     if (!hull.ok()) return hull.status();
   }
-  query->a = *std::move(resolved->hulls[0]);
-  query->b = *std::move(resolved->hulls[1]);
+  views = std::move(resolved->hulls);
+  a = PlacedHull(views[0]->served->query_hull(), X_WA);
+  b = PlacedHull(views[1]->served->query_hull(), X_WB);
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
-  EncodeVersion(query->a.record, response->mutable_hull_a());
-  EncodeVersion(query->b.record, response->mutable_hull_b());
+  EncodeVersion(registry.store().id(), views[0]->record, response->mutable_hull_a());
+  EncodeVersion(registry.store().id(), views[1]->record, response->mutable_hull_b());
   return absl::OkStatus();
 }
 
-// Whether a relation, of these hulls, may be found on gRPC's thread: they are of moderate size, and
-// nothing is left to make.
-bool IsQuick(const Resolved& resolved) {
-  for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
-    if (!hull.ok()) continue;
-    const Snapshot& snapshot = *hull->snapshot;
-    if (!snapshot.has_query_hull() || !IsQuickToRelate(snapshot.hull())) return false;
-  }
-  return true;
-}
-
-absl::Status Answer(const PairQuery& query, const v1::Wanted& wanted, Metrics& metrics,
-                    v1::CheckCollisionResponse* response) {
-  const PlacedHull placed_a(query.a.snapshot->query_hull(), query.X_WA);
-  const PlacedHull placed_b(query.b.snapshot->query_hull(), query.X_WB);
-  const Hull& a = placed_a.hull();
-  const Hull& b = placed_b.hull();
-  const auto answer = hulld::CheckCollision(placed_a, placed_b, query.options);
+absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metrics& metrics,
+                                                 v1::CheckCollisionResponse* response) const {
+  const Hull& of_a = hull_a();
+  const Hull& of_b = hull_b();
+  const auto answer = hulld::CheckCollision(*a, *b, options);
   if (!answer.ok()) return NameQueryLimit(answer.status());
   RungCounts counts;
   counts.Add(answer->rung);
   metrics.CountPairs(counts);
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
-  if (answer->analysis) EncodeAnalysis(*answer->analysis, a, b, response->mutable_analysis());
+  if (answer->analysis) {
+    EncodeAnalysis(*answer->analysis, of_a, of_b, response->mutable_analysis());
+  }
   if (answer->certificate) {
-    EncodeCertificate(*answer->certificate, a, b, response->mutable_certificate());
+    EncodeCertificate(*answer->certificate, of_a, of_b, response->mutable_certificate());
   }
   if (answer->separation) EncodeSeparation(*answer->separation, response->mutable_separation());
   if (answer->witness) EncodeWitness(*answer->witness, response->mutable_witness());
   if (answer->within_clearance) response->set_within_clearance(*answer->within_clearance);
   if (!wanted.axis() || !answer->axis.has_value()) return absl::OkStatus();
-  return EncodeAxis(*answer->axis, a, b, response->mutable_axis());
+  return EncodeAxis(*answer->axis, of_a, of_b, response->mutable_axis());
 }
-
-}  // namespace
 
 grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
                                                            const v1::CheckCollisionRequest* request,
                                                            v1::CheckCollisionResponse* response) {
   return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
-    absl::StatusOr<PairQuery> query = ReadQuery(registry_.limits(), call->call(), *request);
+    pool_.NoteSingleCall();
+    absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), *request);
     if (!query.ok()) return call->End(query.status());
-    if (query->options.WantsRelationOnly()) {
-      std::optional<Resolved> resolved = registry_.TryResolve(HullIds(*request));
-      if (resolved.has_value() && IsQuick(*resolved)) {
-        const absl::Status taken = TakeHulls(registry_, *std::move(resolved), &*query, response);
-        return call->End(taken.ok()
-                             ? Answer(*query, request->wanted(), call->call().metrics(), response)
-                             : taken);
-      }
+    std::optional<Resolved> ready = registry_.TryResolve(HullIds(*request));
+    if (ready.has_value() && AreReady(*ready)) {
+      const absl::Status placed = query->Place(registry_, *std::move(ready), response);
+      if (!placed.ok()) return call->End(placed);
+      return Compute(*std::move(query), request->wanted(), call, response);
     }
+    // Waits for the store, for a writer, or for what queries need to be made.
     readers_.Submit([this, call, request, response, query = *std::move(query)]() mutable {
-      const absl::Status taken =
-          TakeHulls(registry_, registry_.Resolve(HullIds(*request), query.options.should_stop),
-                    &query, response);
-      if (!taken.ok()) return call->End(taken);
-      if (query.options.method != Method::kTextbookSat) {
-        return call->End(Answer(query, request->wanted(), call->call().metrics(), response));
-      }
-      query.options.threads = executor_.threads();
-      executor_.Submit([call, request, response, query = std::move(query)] {
-        call->End(Answer(query, request->wanted(), call->call().metrics(), response));
-      });
+      const absl::Status placed = query.Place(
+          registry_, registry_.Resolve(HullIds(*request), query.options.should_stop), response);
+      if (!placed.ok()) return call->End(placed);
+      Compute(std::move(query), request->wanted(), call, response);
     });
+  });
+}
+
+void CollisionService::Compute(PairQuery query, const v1::Wanted& wanted, UnaryCall* call,
+                               v1::CheckCollisionResponse* response) {
+  Metrics& metrics = call->call().metrics();
+  if (query.options.WantsRelationOnly() && query.IsQuick()) {
+    return call->End(query.Answer(wanted, metrics, response));
+  }
+  const bool is_for_team = query.IsForTeam();
+  if (is_for_team) query.options.threads = executor_.threads();
+  TaskPool& pool = is_for_team ? executor_.opener() : pool_;
+  // The request, hence `wanted`, lives until the call ends.
+  pool.Submit([call, response, &wanted, &metrics, query = std::move(query)] {
+    call->End(query.Answer(wanted, metrics, response));
   });
 }
 
 grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* CollisionService::BatchCheckCollisions(
     grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest* request) {
-  return BatchStream::Start(*context, admission_, registry_, long_readers_, executor_, *request);
+  return BatchStream::Start(*context, admission_, registry_, long_readers_, pool_, executor_,
+                            *request);
 }
 
 grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
 CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_);
+  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
 }
 
 grpc::ServerWriteReactor<v1::FindCollisionsResponse>* CollisionService::FindCollisions(
     grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) {
-  return SceneStream::Start(*context, admission_, registry_, long_readers_, executor_, *request);
+  return SceneStream::Start(*context, admission_, registry_, long_readers_, pool_, *request);
 }
 
 }  // namespace hulld::server

@@ -5,7 +5,9 @@
 
 #include "hulld/v1/collision.grpc.pb.h"
 #include "server/call/admission.h"
+#include "server/call/unary_call.h"
 #include "server/process/executor.h"
+#include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 
@@ -13,18 +15,19 @@ namespace hulld::server {
 
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
 // answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
-// of moderate size and ready; else by one of the `readers`, so that it never waits for a batch, and
-// so are the few pairs of a stream's step; steps that take longer, and the placements of batches
-// and scenes, are the work of `long_readers`; TEXTBOOK_SAT, whose loop over axes is parallel,
-// batches and scenes that of the executor.
+// of moderate size and ready. Everything else is computed by `pool`: single pairs and the steps of
+// streams ahead of slices of batches, scenes and long steps. What may wait for the store or a
+// writer runs on `readers`, hulls of one pair, or `long_readers`, hulls of many. Pairs for
+// TEXTBOOK_SAT whose loop over axes is worth a team of threads go to the executor.
 class CollisionService : public v1::CollisionService::CallbackService {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
-                   WorkerPool& long_readers, Executor& executor)
+                   WorkerPool& long_readers, TaskPool& pool, Executor& executor)
       : registry_(registry),
         admission_(admission),
         readers_(readers),
         long_readers_(long_readers),
+        pool_(pool),
         executor_(executor) {}
 
   grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
@@ -39,10 +42,17 @@ class CollisionService : public v1::CollisionService::CallbackService {
       grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) override;
 
  private:
+  struct PairQuery;
+
+  // Answers the query on the thread that suits it.
+  void Compute(PairQuery query, const v1::Wanted& wanted, UnaryCall* call,
+               v1::CheckCollisionResponse* response);
+
   Registry& registry_;
   Admission& admission_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;
+  TaskPool& pool_;
   Executor& executor_;
 };
 

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <utility>
 
-#include "server/call/stream_message.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"
@@ -17,13 +16,11 @@
 namespace hulld::server {
 namespace {
 
-// A step that takes longer than this moves to the threads for long tasks, where other calls get
-// their turn after each slice.
-constexpr std::chrono::milliseconds kFirstSliceTime(2);
-constexpr std::chrono::milliseconds kSliceTime(20);
-// The clock is read once for so many pairs.
-constexpr size_t kPairsPerLook = 64;
-// Of an update that is answered where it arrives.
+// Pairs between two looks at the clock.
+constexpr size_t kPairsPerLook = 16;
+// Decoding the poses of an update up to this size takes less than a slice.
+constexpr int kMostShortUpdate = 4096;
+// An update that concerns no more pairs is answered where it arrives.
 constexpr int kMostQuickPairs = 8;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
@@ -32,51 +29,39 @@ constexpr size_t kIndexBytes = 5;
 
 grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
 CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                       Registry& registry, WorkerPool& readers, WorkerPool& long_readers) {
-  const std::shared_ptr<CollisionStream> stream(
-      new CollisionStream(context, admission, registry, readers, long_readers));
-  stream->self_ = stream;
-  const absl::Status begun = stream->call_.Begin();
-  if (begun.ok()) {
-    stream->ReadNext();
-  } else {
-    stream->Finish(stream->call_.End(begun));
+                       Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
+                       TaskPool& pool) {
+  return Launch(std::shared_ptr<CollisionStream>(
+      new CollisionStream(context, admission, registry, readers, long_readers, pool)));
+}
+
+void CollisionStream::OnMessage() {
+  call().BeginMessage();
+  if (IsQuick()) {
+    pool_.NoteSingleCall();
+    return Handle();
   }
-  return stream.get();
+  // What resolves hulls may wait for the store; the first message resolves all of them.
+  if (!open_) return RunOn(long_readers_, [this] { Handle(); });
+  if (request().update().refresh_hulls()) return RunOn(readers_, [this] { Handle(); });
+  // Only the first slice of a step goes ahead of batches.
+  const bool is_short = request().update().placements_size() <= kMostShortUpdate;
+  if (is_short) return RunOn(pool_, [this] { Handle(); });
+  RunOn(lane_, [this] { Handle(); });
 }
 
-void CollisionStream::ReadNext() {
-  PrepareToRead(&request_);
-  StartRead(&request_);
-}
-
-void CollisionStream::OnReadDone(bool ok) {
-  // Without a message the client has said all, or is gone, or speaks another language.
-  if (!ok) return End(WhyNotRead(request_));
-  call_.BeginMessage();
-  if (IsQuick()) return Handle();
-  // The first message resolves hulls, and answers all pairs with cold caches.
-  WorkerPool& pool = open_ ? readers_ : long_readers_;
-  pool.Submit([self = shared_from_this()] { self->Handle(); });
-}
-
-void CollisionStream::OnWriteDone(bool ok) {
-  if (!ok) return End(absl::CancelledError("the client is gone"));
-  const bool answered = response_.last();
-  response_.Clear();
-  response_bytes_ = 0;
-  if (answered) return ReadNext();
-  long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
-}
-
-void CollisionStream::End(const absl::Status& status) {
-  Finish(call_.End(call_.ShouldStop() ? call_.StopStatus() : status));
+void CollisionStream::OnSent() {
+  const bool answered = reply().last();
+  reply().Clear();
+  reply_bytes_ = 0;
+  if (answered) return Read();
+  RunOn(lane_, [this] { AnswerSlice(); });
 }
 
 // Whether the message can be answered here and now, on gRPC's thread.
 bool CollisionStream::IsQuick() const {
-  if (!open_ || !request_.has_update() || !options_.WantsRelationOnly()) return false;
-  const v1::CollisionStreamUpdate& update = request_.update();
+  if (!open_ || !request().has_update() || !options_.WantsRelationOnly()) return false;
+  const v1::CollisionStreamUpdate& update = request().update();
   if (update.refresh_hulls() || update.placements_size() > kMostQuickPairs) return false;
   int pairs = 0;
   for (const uint32_t placement : update.placements()) {
@@ -96,18 +81,18 @@ void CollisionStream::Handle() {
   asked_.clear();
   next_asked_ = 0;
   const absl::Status status = HandleMessage();
-  if (!status.ok()) return End(status);
-  request_.Clear();
+  if (!status.ok()) return FinishCall(OrStopped(status));
+  request().Clear();
   std::sort(asked_.begin(), asked_.end());
   for (const uint32_t pair : asked_) is_asked_[pair] = false;
-  table_.EncodeHeader(registry_.store(), response_.mutable_header());
-  response_bytes_ = response_.ByteSizeLong();
-  call_.AddPairs(asked_.size());
-  AnswerSlice(kFirstSliceTime);
+  table_.EncodeHeader(registry_.store(), reply().mutable_header());
+  reply_bytes_ = reply().ByteSizeLong();
+  call().AddPairs(asked_.size());
+  AnswerSlice();
 }
 
 absl::Status CollisionStream::HandleMessage() {
-  switch (request_.message_case()) {
+  switch (request().message_case()) {
     case v1::StreamCollisionsRequest::kOpen:
       if (open_) {
         return absl::InvalidArgumentError(
@@ -117,7 +102,7 @@ absl::Status CollisionStream::HandleMessage() {
     case v1::StreamCollisionsRequest::kUpdate:
       if (!open_) return absl::InvalidArgumentError("the first message must be open, not update");
       ++messages_;
-      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request_.update()));
+      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
     case v1::StreamCollisionsRequest::MESSAGE_NOT_SET:
       break;
   }
@@ -125,13 +110,13 @@ absl::Status CollisionStream::HandleMessage() {
 }
 
 absl::Status CollisionStream::HandleOpen() {
-  const v1::CollisionStreamOpen& open = request_.open();
+  const v1::CollisionStreamOpen& open = request().open();
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
-                       call_.lifetime());
+                       call().lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(open.placements(), open.packed_placements(), call_.caller(),
+      PlacementTable::Make(open.placements(), open.packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the stream");
   if (!table.ok()) return Prefixed("open: ", table.status());
   const absl::Status valid = ValidatePairs(open.pairs(), table->size(),
@@ -250,46 +235,45 @@ void CollisionStream::AddAnswer(uint32_t index) {
   const bool changed = relation != pair.relation;
   pair.relation = relation;
   if (only_changes_ && messages_ > 0 && !changed) return;
-  v1::AnswerColumns* const columns = response_.mutable_columns();
-  const auto position = static_cast<uint64_t>(response_.pairs_size());
-  response_.add_pairs(index);
-  response_bytes_ += kIndexBytes;
+  v1::AnswerColumns* const columns = reply().mutable_columns();
+  reply().add_pairs(index);
+  reply_bytes_ += kIndexBytes;
   if (!answerable) {
-    response_bytes_ += AddUnanswered(wanted_, columns);
+    reply_bytes_ += AddUnanswered(wanted_, columns);
     return;
   }
-  response_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
-                                       table_.placed()[pair.b].hull(), wanted_, position, columns);
+  reply_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
+                                    table_.placed()[pair.b].hull(), wanted_, columns);
 }
 
-void CollisionStream::Send(bool last) {
-  response_.set_update(messages_);
-  response_.set_last(last);
-  StartWrite(&response_);
+void CollisionStream::SendPart(bool last) {
+  reply().set_update(messages_);
+  reply().set_last(last);
+  Send();
 }
 
 // Computes until the answer is complete, a message is full, or it is the turn of others.
-void CollisionStream::AnswerSlice(std::chrono::milliseconds time) {
+void CollisionStream::AnswerSlice() {
   if (next_row_ < table_.table_rows()) {
-    next_row_ = table_.EncodeHulls(next_row_, response_.mutable_hulls(),
-                                   response_.mutable_placement_problems());
-    if (next_row_ < table_.table_rows()) return Send(false);
-    response_bytes_ = response_.ByteSizeLong();
+    next_row_ = table_.EncodeHulls(next_row_, reply().mutable_hulls(),
+                                   reply().mutable_placement_problems());
+    if (next_row_ < table_.table_rows()) return SendPart(false);
+    reply_bytes_ = reply().ByteSizeLong();
   }
-  const auto end = std::chrono::steady_clock::now() + time;
+  const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (next_asked_ < asked_.size()) {
-    if (response_bytes_ >= Config::kReplyMessageBytes) break;
+    if (reply_bytes_ >= Config::kReplyMessageBytes) break;
     AddAnswer(asked_[next_asked_++]);
     if (next_asked_ % kPairsPerLook != 0) continue;
-    if (call_.ShouldStop()) break;
+    if (call().ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
-      return long_readers_.Submit([self = shared_from_this()] { self->AnswerSlice(kSliceTime); });
+      return RunOn(lane_, [this] { AnswerSlice(); });
     }
   }
-  call_.metrics().CountPairs(std::exchange(rungs_, {}));
-  if (call_.ShouldStop()) return End(call_.StopStatus());
-  if (next_asked_ == asked_.size()) call_.EndMessage();
-  Send(next_asked_ == asked_.size());
+  call().metrics().CountPairs(std::exchange(rungs_, {}));
+  if (call().ShouldStop()) return FinishCall(call().StopStatus());
+  if (next_asked_ == asked_.size()) call().EndMessage();
+  SendPart(next_asked_ == asked_.size());
 }
 
 }  // namespace hulld::server

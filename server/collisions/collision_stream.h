@@ -13,27 +13,28 @@
 
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/call/call.h"
+#include "server/call/pulled_stream.h"
 #include "server/collisions/placement_table.h"
+#include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// One StreamCollisions call: reads a message, answers it on a reader thread (or where it arrives,
-// if that takes no time), sends the answer, and only then reads the next, so that a fast client
-// fills gRPC's window and not our memory. Long answers are computed in slices, between which other
-// calls get their turn, and sent in pieces.
-//
-// At any time one of a read, a task and a write is under way, and nothing else touches the state;
-// so it needs no mutex.
+// One StreamCollisions call: reads a message, answers it, sends the answer, and only then reads the
+// next, so that a fast client fills gRPC's window and not our memory. A message that takes no time
+// is answered where it arrives, one that resolves hulls on a reader thread, and others on the pool.
+// Long answers are computed in slices, between which other calls get their turn, and sent in
+// pieces.
 class CollisionStream
-    : public grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>,
-      public std::enable_shared_from_this<CollisionStream> {
+    : public ReadingStream<PulledStream<grpc::ServerBidiReactor<v1::StreamCollisionsRequest,
+                                                                v1::StreamCollisionsResponse>,
+                                        v1::StreamCollisionsResponse>,
+                           v1::StreamCollisionsRequest> {
  public:
   static grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, WorkerPool& long_readers);
+      WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool);
 
  private:
   // What is kept of a pair from one answer to the next.
@@ -46,20 +47,20 @@ class CollisionStream
   };
 
   CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                  WorkerPool& readers, WorkerPool& long_readers)
-      : registry_(registry),
+                  WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
+      : ReadingStream(context, admission, Rpc::kStreamCollisions),
+        registry_(registry),
         readers_(readers),
         long_readers_(long_readers),
-        call_(context, admission, Rpc::kStreamCollisions),
-        charge_(registry) {}
+        pool_(pool),
+        lane_(pool),
+        charge_(registry.memory()) {}
 
-  void OnReadDone(bool ok) override;
-  void OnWriteDone(bool ok) override;
-  void OnCancel() override { call_.Cancel(); }
-  void OnDone() override { self_.reset(); }
+  void Open() override { Read(); }
+  void OnMessage() override;
+  void OnNoMessage(const absl::Status& why) override { FinishCall(OrStopped(why)); }
+  void OnSent() override;
 
-  void ReadNext();
-  void End(const absl::Status& status);
   bool IsQuick() const;
   void Handle();
   absl::Status HandleMessage();
@@ -71,21 +72,20 @@ class CollisionStream
   void AskAboutPairsOf(size_t placement);
   absl::StatusOr<Answer> AnswerPair(PairState& pair) const;
   void AddAnswer(uint32_t index);
-  void AnswerSlice(std::chrono::milliseconds time);
-  void Send(bool last);
+  void AnswerSlice();
+  void SendPart(bool last);
 
   Registry& registry_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;
-  Call call_;
-  // Of placements and pairs. Goes before the call, which keeps the server alive.
+  TaskPool& pool_;
+  // The slices of long answers.
+  TaskPool::Lane lane_;
+  // Covers placements and pairs.
   MemoryCharge charge_;
-  // Keeps this alive until gRPC is done with it; a queued task holds another reference.
-  std::shared_ptr<CollisionStream> self_;
 
-  v1::StreamCollisionsRequest request_;
-  v1::StreamCollisionsResponse response_;
-  size_t response_bytes_ = 0;
+  // The size of the reply, estimated.
+  size_t reply_bytes_ = 0;
   uint64_t messages_ = 0;
 
   // From `open`.
@@ -101,7 +101,7 @@ class CollisionStream
   std::vector<uint32_t> pairs_of_;
   std::vector<size_t> pairs_begin_;
 
-  // Of the message that is being answered: the pairs to answer, ascending, and the next of them.
+  // The pairs that the current message asks about, ascending, and the next of them to answer.
   std::vector<uint32_t> asked_;
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;

@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"
@@ -140,21 +141,36 @@ size_t PlacementTable::MemoryBytes() const {
 absl::Status PlacementTable::Resolve(Registry& registry, const std::function<bool()>& should_stop) {
   absl::StatusOr<Resolved> resolved = registry.Resolve(ids_, should_stop);
   if (!resolved.ok()) return resolved.status();
+  Take(registry, *std::move(resolved));
+  return absl::OkStatus();
+}
+
+bool PlacementTable::TryResolve(Registry& registry) {
+  std::optional<Resolved> resolved = registry.TryResolve(ids_);
+  if (!resolved.has_value()) return false;
+  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
+    if (hull.ok() && !hull->served->has_query_hull()) return false;
+  }
+  Take(registry, *std::move(resolved));
+  return true;
+}
+
+void PlacementTable::Take(const Registry& registry, Resolved resolved) {
   changed_.assign(ids_.size(), true);
-  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved->hulls[i]);
+  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
-  hulls_ = std::move(resolved->hulls);
-  store_revision_ = resolved->store_revision;
+  hulls_ = std::move(resolved.hulls);
+  store_id_ = registry.store().id();
+  store_revision_ = resolved.store_revision;
   placed_.clear();
   placed_.reserve(entries_.size());
   for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
-  return absl::OkStatus();
 }
 
 PlacedHull PlacementTable::Place(size_t i) const {
   if (!is_answerable(i)) return PlacedHull(NoHull(), Pose());
   const Entry& entry = entries_[i];
-  return PlacedHull(hulls_[*entry.hull]->snapshot->query_hull(), entry.pose);
+  return PlacedHull(hulls_[*entry.hull]->served->query_hull(), entry.pose);
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {
@@ -191,7 +207,7 @@ size_t PlacementTable::EncodeHulls(
       v1::HullVersion* const version = hulls->Add();
       const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
       const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
-      if (known) EncodeVersion(hulls_[*hull]->record, version);
+      if (known) EncodeVersion(store_id_, hulls_[*hull]->record, version);
       bytes += version->ByteSizeLong();
     }
     if (is_name || problem(i).ok()) continue;
@@ -199,6 +215,7 @@ size_t PlacementTable::EncodeHulls(
     encoded->set_placement(static_cast<uint32_t>(i));
     encoded->set_code(ToGrpc(problem(i).code()));
     encoded->set_message(std::string(problem(i).message()));
+    encoded->set_reason(ReasonOf(problem(i)));
     bytes += kEntryBytes + encoded->ByteSizeLong();
   }
   return row;

@@ -26,7 +26,7 @@ namespace hulld::server {
 class PlacementTable {
  public:
   PlacementTable() = default;
-  // Of a request that has one of the two forms. Notes what is malformed and what is not the
+  // Reads a request that has one of the two forms. Notes what is malformed and what is not the
   // caller's; no hull is known before Resolve. INVALID_ARGUMENT: both forms, or packed ones whose
   // lists do not fit each other. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
   // `what` holds them, as in "the batch".
@@ -39,6 +39,10 @@ class PlacementTable {
   // CANCELLED: should_stop said so.
   absl::Status Resolve(Registry& registry, const std::function<bool()>& should_stop);
 
+  // The same, but false, at once, where it would have to wait or to make what queries need of a
+  // hull.
+  bool TryResolve(Registry& registry);
+
   size_t size() const { return entries_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
@@ -47,7 +51,7 @@ class PlacementTable {
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
 
-  // Requires a valid pose.
+  // Requires a valid pose, which is checked where the hull is placed.
   void Move(size_t i, const Pose& X_WH);
 
   // The store's revision of the last Resolve.
@@ -63,7 +67,7 @@ class PlacementTable {
   struct Entry {
     // Index into hulls_; none when the ID is malformed or not the caller's.
     std::optional<size_t> hull;
-    // Of the ID or the pose.
+    // What is wrong with the ID or the pose.
     absl::Status malformed;
     Pose pose;
   };
@@ -72,11 +76,12 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
+  void Take(const Registry& registry, Resolved resolved);
   const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 
   std::vector<Entry> entries_;
-  // Of packed placements: each that was named, as an index into ids_; none when it is malformed or
+  // Each hull that packed placements name, as an index into ids_; none when it is malformed or
   // not the caller's.
   bool is_packed_ = false;
   std::vector<std::optional<size_t>> named_;
@@ -84,6 +89,8 @@ class PlacementTable {
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
   std::vector<char> changed_;
+  // Of the last Resolve.
+  std::string store_id_;
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
 };

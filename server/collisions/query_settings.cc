@@ -52,6 +52,15 @@ bool IsQuickToRelate(const Hull& hull) {
   return hull.vertices().size() <= kMostVertices;
 }
 
+bool IsTextbookForTeam(const QueryOptions& options, const Hull& a, const Hull& b) {
+  if (options.method != Method::kTextbookSat) return false;
+  // Some 10 ms of one thread: far more than a team waits for its slowest thread, and not so much
+  // that it matters to other calls when one thread of the pool is busy with it.
+  constexpr double kTeamProjections = 1e7;
+  const double axes = static_cast<double>(a.edges().size()) * static_cast<double>(b.edges().size());
+  return axes * static_cast<double>(a.vertices().size() + b.vertices().size()) > kTeamProjections;
+}
+
 absl::Status NameQueryLimit(const absl::Status& status) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   return AtLimit(status, "max-textbook-axes");

@@ -21,6 +21,10 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
 // question and of the answer does, so that one of gRPC's threads may find it.
 bool IsQuickToRelate(const Hull& hull);
 
+// Whether the textbook's axes of this pair are worth a team of threads (Executor); always false for
+// other methods. Cost: a few operations, whatever the size of the hulls.
+bool IsTextbookForTeam(const QueryOptions& options, const Hull& a, const Hull& b);
+
 // An error of core's query in the words of the server: RESOURCE_EXHAUSTED names the limit's flag.
 absl::Status NameQueryLimit(const absl::Status& status);
 

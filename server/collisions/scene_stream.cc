@@ -2,24 +2,25 @@
 
 #include <absl/strings/str_cat.h>
 
-#include <algorithm>
-#include <chrono>
+#include <memory>
 #include <set>
 #include <utility>
 
 #include "server/collisions/query_settings.h"
-#include "server/contract/status_map.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 
 namespace hulld::server {
 namespace {
 
-// How many messages may wait for the client, and how long for the next of them to leave.
-constexpr size_t kMostWaiting = 32;
-constexpr std::chrono::seconds kMostPatience(5);
-// How long a search may wait for its client in all: meanwhile it holds the executor.
-constexpr std::chrono::seconds kMostPatienceInAll(20);
+// The first pieces are small, as the number of candidates is not known; the largest bounds what a
+// wrong guess of it can do.
+constexpr uint64_t kFirstPlacements = 4;
+constexpr uint64_t kMostPlacements = 1024;
+// The tree of this many placements is built in about a slice.
+constexpr int kMostShortPlacements = 512;
+// Candidates or placements between two looks at the clock.
+constexpr uint64_t kStepsPerLook = 16;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
@@ -60,35 +61,56 @@ std::vector<GroupPair> IgnoredGroups(const v1::FindCollisionsRequest& request) {
   return ignored;
 }
 
+void Count(v1::Relation relation, v1::SceneTotals* totals) {
+  switch (relation) {
+    case v1::RELATION_SEPARATED:
+      return totals->set_separated(totals->separated() + 1);
+    case v1::RELATION_TOUCHING:
+      return totals->set_touching(totals->touching() + 1);
+    case v1::RELATION_OVERLAPPING:
+      return totals->set_overlapping(totals->overlapping() + 1);
+    case v1::RELATION_WITHIN_TOLERANCE:
+      return totals->set_within_tolerance(totals->within_tolerance() + 1);
+    default:
+      return totals->set_failed(totals->failed() + 1);
+  }
+}
+
+void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
+  sums->set_candidates(sums->candidates() + totals.candidates());
+  sums->set_separated(sums->separated() + totals.separated());
+  sums->set_touching(sums->touching() + totals.touching());
+  sums->set_overlapping(sums->overlapping() + totals.overlapping());
+  sums->set_within_tolerance(sums->within_tolerance() + totals.within_tolerance());
+  sums->set_failed(sums->failed() + totals.failed());
+}
+
 }  // namespace
 
 grpc::ServerWriteReactor<v1::FindCollisionsResponse>* SceneStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, Executor& executor, const v1::FindCollisionsRequest& request) {
-  const std::shared_ptr<SceneStream> stream(
-      new SceneStream(context, admission, registry, executor, request));
-  stream->self_ = stream;
-  const absl::Status begun = stream->call_.Begin();
-  if (!begun.ok()) {
-    stream->Finish(stream->call_.End(begun));
-    return stream.get();
-  }
-  readers.Submit([stream] {
-    const absl::Status opened = stream->Open();
-    if (!opened.ok()) return stream->End(opened);
-    stream->executor_.Submit([stream] { stream->End(stream->Search()); });
-  });
-  return stream.get();
+    WorkerPool& readers, TaskPool& pool, const v1::FindCollisionsRequest& request) {
+  return Launch(std::shared_ptr<SceneStream>(
+      new SceneStream(context, admission, registry, readers, pool, request)));
 }
 
-// Validates the request and resolves its hulls.
-absl::Status SceneStream::Open() {
+SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
+                         Registry& registry, WorkerPool& readers, TaskPool& pool,
+                         const v1::FindCollisionsRequest& request)
+    : PiecedReplies(context, admission, Rpc::kFindCollisions, {readers, pool},
+                    {kFirstPlacements, kMostPlacements,
+                     request.placements_size() + request.packed_placements().hulls_size() <=
+                         kMostShortPlacements}),
+      registry_(registry),
+      request_(request) {}
+
+absl::Status SceneStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request_.wanted(), request_.tolerance(),
-                       registry_.limits(), call_.lifetime());
+                       registry_.limits(), call().lifetime());
   if (!options.ok()) return options.status();
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request_.placements(), request_.packed_placements(), call_.caller(),
+      PlacementTable::Make(request_.placements(), request_.packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
@@ -97,143 +119,100 @@ absl::Status SceneStream::Open() {
   options_.ignored_groups = ignored_groups_;
   options_.groups = {request_.groups().data(), static_cast<size_t>(request_.groups_size())};
   if (request_.has_movers()) options_.movers = request_.movers();
-  patience_left_ = kMostPatienceInAll;
   options_.query = *std::move(options);
-  options_.query.should_stop = [this] {
-    Executor::GiveWay();
-    return call_.ShouldStop() || too_slow_;
-  };
-  options_.threads = executor_.threads();
-  if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
-  QueueHead();
   return absl::OkStatus();
 }
 
-// Without waiting for the client: this is a reader's thread.
+absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
+  if (!may_wait) return table_.TryResolve(registry_);
+  if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
+  return true;
+}
+
+absl::Status SceneStream::Prepare() {
+  // What is known goes out while the tree is built.
+  Locked([this] { QueueHead(); });
+  absl::StatusOr<SceneSearch> search = SceneSearch::Make(table_.placed(), options_);
+  if (!search.ok()) return search.status();
+  search_ = *std::move(search);
+  call().AddPairs(search_->pairs());
+  return absl::OkStatus();
+}
+
 void SceneStream::QueueHead() {
-  const std::lock_guard lock(mutex_);
-  table_.EncodeHeader(registry_.store(), filling_.mutable_header());
+  v1::FindCollisionsResponse head;
+  table_.EncodeHeader(registry_.store(), head.mutable_header());
   size_t next = 0;
   do {
-    next =
-        table_.EncodeHulls(next, filling_.mutable_hulls(), filling_.mutable_placement_problems());
-    ready_.push_back(std::exchange(filling_, {}));
+    next = table_.EncodeHulls(next, head.mutable_hulls(), head.mutable_placement_problems());
+    const size_t bytes = head.ByteSizeLong();
+    Queue(std::exchange(head, {}), bytes);
   } while (next < table_.table_rows());
-  Proceed();
 }
 
-absl::Status SceneStream::Search() {
-  if (call_.ShouldStop()) return call_.StopStatus();
-  const absl::StatusOr<SceneTotals> searched = hulld::FindCollisions(
-      table_.placed(), options_, [this](std::span<const SceneAnswer> answers) { Take(answers); });
-  if (too_slow_) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "the client reads too slowly: the search waited for it for ", kMostPatience.count(),
-        " s at once or ", kMostPatienceInAll.count(), " s in all while ", kMostWaiting,
-        " MiB were ready; read faster or ask for less"));
+absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
+  v1::FindCollisionsResponse reply;
+  size_t reply_bytes = 0;
+  for (uint64_t step = 1; step % kStepsPerLook != 0 || Clock::now() < end; ++step) {
+    if (piece.next == piece.end) break;
+    const auto a = static_cast<uint32_t>(piece.next);
+    if (!piece.has_candidates) {
+      search_->Candidates(a, piece.candidates);
+      piece.next_candidate = 0;
+      piece.has_candidates = true;
+    }
+    if (piece.next_candidate == piece.candidates.size()) {
+      piece.has_candidates = false;
+      ++piece.next;
+      continue;
+    }
+    const uint32_t b = piece.candidates[piece.next_candidate++];
+    const absl::StatusOr<Answer> answer = search_->Ask(a, b);
+    if (absl::IsCancelled(answer.status())) return answer.status();
+    piece.totals.set_candidates(piece.totals.candidates() + 1);
+    if (answer.ok()) piece.rungs.Add(answer->rung);
+    if (answer.ok() && !search_->IsFound(*answer)) continue;
+    reply_bytes += AddFound(a, b, answer, piece, &reply);
+    if (reply_bytes < Config::kReplyMessageBytes) continue;
+    piece.Add(std::exchange(reply, {}));
+    reply_bytes = 0;
   }
-  if (!searched.ok()) return searched.status();
-  call_.AddPairs(searched->pairs);
-  call_.metrics().CountPairs({searched->by_rung});
-  totals_.set_pairs(searched->pairs);
-  totals_.set_candidates(searched->candidates);
-  *filling_.mutable_totals() = totals_;
-  Send();
+  if (reply.pairs_size() > 0) piece.Add(std::move(reply));
+  piece.is_done = piece.next == piece.end;
   return absl::OkStatus();
 }
 
-void SceneStream::Take(std::span<const SceneAnswer> answers) {
-  for (const SceneAnswer& found : answers) {
-    if (filling_bytes_ >= Config::kReplyMessageBytes) Send();
-    if (too_slow_) return;
-    const auto& [a, b] = found.pair;
-    const auto position = static_cast<uint64_t>(filling_.pairs_size()) / 2;
-    filling_.add_pairs(a);
-    filling_.add_pairs(b);
-    filling_bytes_ +=
-        kPairBytes + AddAnswer(found.answer, table_.placed()[a].hull(), table_.placed()[b].hull(),
-                               request_.wanted(), position, filling_.mutable_columns());
-    Count(filling_.columns().relations(static_cast<int>(position)));
-  }
-  // What was found goes out as soon as nothing is before it.
-  if (IsIdle() && filling_.pairs_size() > 0) Send();
+size_t SceneStream::AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer,
+                             ScenePiece& piece, v1::FindCollisionsResponse* reply) {
+  const int position = reply->pairs_size() / 2;
+  reply->add_pairs(a);
+  reply->add_pairs(b);
+  const size_t bytes = AddAnswer(answer, table_.placed()[a].hull(), table_.placed()[b].hull(),
+                                 request_.wanted(), reply->mutable_columns());
+  Count(reply->columns().relations(position), &piece.totals);
+  return kPairBytes + bytes;
 }
 
-void SceneStream::Count(v1::Relation relation) {
-  switch (relation) {
-    case v1::RELATION_SEPARATED:
-      return totals_.set_separated(totals_.separated() + 1);
-    case v1::RELATION_TOUCHING:
-      return totals_.set_touching(totals_.touching() + 1);
-    case v1::RELATION_OVERLAPPING:
-      return totals_.set_overlapping(totals_.overlapping() + 1);
-    case v1::RELATION_WITHIN_TOLERANCE:
-      return totals_.set_within_tolerance(totals_.within_tolerance() + 1);
-    default:
-      return totals_.set_failed(totals_.failed() + 1);
-  }
+void SceneStream::Deliver(ScenePiece& piece) {
+  AddTo(&totals_, std::exchange(piece.totals, {}));
+  call().metrics().CountPairs(std::exchange(piece.rungs, {}));
+  DeliverReplies(piece);
 }
 
-bool SceneStream::IsIdle() {
-  const std::lock_guard lock(mutex_);
-  return !writing_;
+// The messages of the head hold no answers. A problem is named by its place among the columns,
+// which would change.
+bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
+                       v1::FindCollisionsResponse* waiting) {
+  if (waiting->pairs_size() == 0 || reply.columns().pair_problems_size() > 0) return false;
+  waiting->MergeFrom(reply);
+  return true;
 }
 
-// Queues what was filled; waits while too much is queued.
-void SceneStream::Send() {
-  std::unique_lock lock(mutex_);
-  const auto start = std::chrono::steady_clock::now();
-  const auto patience =
-      std::min<std::chrono::steady_clock::duration>(kMostPatience, patience_left_);
-  const bool room = sent_.wait_for(lock, patience, [this] {
-    return ready_.size() < kMostWaiting || end_.has_value() || call_.ShouldStop();
-  });
-  patience_left_ -= std::chrono::steady_clock::now() - start;
-  if (!room) too_slow_ = true;
-  ready_.push_back(std::exchange(filling_, {}));
-  filling_bytes_ = 0;
-  Proceed();
-}
-
-void SceneStream::End(const absl::Status& status) {
-  const std::lock_guard lock(mutex_);
-  searching_ = false;
-  if (!end_.has_value()) end_ = call_.ShouldStop() ? call_.StopStatus() : status;
-  // After an error nobody waits for the rest.
-  if (!end_->ok()) ready_.clear();
-  Proceed();
-}
-
-void SceneStream::OnWriteDone(bool ok) {
-  const std::shared_ptr<SceneStream> self = shared_from_this();
-  const std::lock_guard lock(mutex_);
-  writing_ = false;
-  if (!ok) {
-    call_.Cancel();
-    ready_.clear();
-    if (!end_.has_value()) end_ = call_.StopStatus();
-  }
-  sent_.notify_all();
-  Proceed();
-}
-
-void SceneStream::OnCancel() {
-  const std::lock_guard lock(mutex_);
-  call_.Cancel();
-  sent_.notify_all();
-}
-
-void SceneStream::Proceed() {
-  if (finished_) return;
-  if (!writing_ && !ready_.empty()) {
-    writing_ = true;
-    in_flight_ = std::move(ready_.front());
-    ready_.pop_front();
-    StartWrite(&in_flight_);
-  }
-  if (!end_.has_value() || writing_ || searching_) return;
-  finished_ = true;
-  Finish(call_.End(*end_));
+void SceneStream::OnAllDelivered() {
+  v1::FindCollisionsResponse last;
+  totals_.set_pairs(search_->pairs());
+  *last.mutable_totals() = totals_;
+  QueueOrJoin(std::move(last), totals_.ByteSizeLong());
 }
 
 }  // namespace hulld::server

@@ -4,25 +4,29 @@
 #include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 
+#include "server/contract/error_info.h"
+
 namespace hulld::server {
 namespace {
 
-// Payloads of a status, read again where the call ends.
-constexpr char kLimitPayload[] = "hulld/limit";
+// Keys of the metadata, as error.proto names them.
+constexpr char kFlag[] = "flag";
+constexpr char kLimit[] = "limit";
+// A payload of the status, read again where the call ends.
 constexpr char kRetryPayload[] = "hulld/retry-ms";
 
 }  // namespace
 
 absl::Status AtLimit(const absl::Status& status, const std::string& flag) {
-  absl::Status named =
-      absl::ResourceExhaustedError(absl::StrCat(status.message(), " (--", flag, ")"));
-  named.SetPayload(kLimitPayload, absl::Cord(flag));
-  return named;
+  return WithReason(absl::ResourceExhaustedError(absl::StrCat(status.message(), " (--", flag, ")")),
+                    v1::ERROR_REASON_LIMIT_EXCEEDED, {{kFlag, flag}});
 }
 
 absl::Status LimitExceeded(const std::string& what, const std::string& limit,
                            const std::string& flag) {
-  return AtLimit(absl::ResourceExhaustedError(absl::StrCat(what, "; the limit is ", limit)), flag);
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(what, "; the limit is ", limit, " (--", flag, ")")),
+      v1::ERROR_REASON_LIMIT_EXCEEDED, {{kFlag, flag}, {kLimit, limit}});
 }
 
 absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag) {
@@ -31,15 +35,14 @@ absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::s
 
 absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
                         std::chrono::milliseconds retry) {
-  absl::Status status = LimitExceeded(what, limit, flag);
+  absl::Status status = WithReason(LimitExceeded(what, limit, flag), v1::ERROR_REASON_OVERLOADED,
+                                   {{kFlag, flag}, {kLimit, limit}});
   status.SetPayload(kRetryPayload, absl::Cord(std::to_string(retry.count())));
   return status;
 }
 
 std::optional<std::string> ExceededLimit(const absl::Status& status) {
-  const absl::optional<absl::Cord> flag = status.GetPayload(kLimitPayload);
-  if (!flag.has_value()) return std::nullopt;
-  return std::string(*flag);
+  return MetadataOf(status, kFlag);
 }
 
 std::optional<std::chrono::milliseconds> RetryAfter(const absl::Status& status) {

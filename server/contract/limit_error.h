@@ -9,18 +9,18 @@
 
 namespace hulld::server {
 
-// RESOURCE_EXHAUSTED because of the limit of a flag: "<what>; the limit is <limit> (--<flag>)".
-// flag: without dashes, as in "max-hulls".
+// RESOURCE_EXHAUSTED because of the limit of a flag: "<what>; the limit is <limit> (--<flag>)",
+// with the reason LIMIT_EXCEEDED. flag: without dashes, as in "max-hulls".
 absl::Status LimitExceeded(const std::string& what, const std::string& limit,
                            const std::string& flag);
 absl::Status LimitExceeded(const std::string& what, uint64_t limit, const std::string& flag);
 
-// LimitExceeded for a limit that others use up at the moment: the same request may do after
-// `retry`.
+// The same, with the reason OVERLOADED, for a limit that others use up at the moment: the same
+// request may succeed after `retry`.
 absl::Status Overloaded(const std::string& what, uint64_t limit, const std::string& flag,
                         std::chrono::milliseconds retry);
 
-// The error of a limit that core was given: its words, with the flag.
+// LimitExceeded for a limit that core was given: core's words, followed by the flag.
 absl::Status AtLimit(const absl::Status& status, const std::string& flag);
 
 // The flag whose limit caused this error, if one did.

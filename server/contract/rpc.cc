@@ -1,5 +1,7 @@
 #include "server/contract/rpc.h"
 
+#include "core/base/check.h"
+
 namespace hulld::server {
 
 const char* RpcName(Rpc rpc) {
@@ -28,10 +30,10 @@ const char* RpcName(Rpc rpc) {
       return "GetStatus";
     case Rpc::kReplaceHull:
       return "ReplaceHull";
-    case Rpc::kSaveSnapshot:
-      return "SaveSnapshot";
+    case Rpc::kSaveBackup:
+      return "SaveBackup";
   }
-  return "unknown";
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace hulld::server

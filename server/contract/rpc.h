@@ -19,10 +19,10 @@ enum class Rpc {
   kFindCollisions,
   kGetStatus,
   kReplaceHull,
-  kSaveSnapshot,
+  kSaveBackup,
 };
 
-inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kSaveSnapshot) + 1;
+inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kSaveBackup) + 1;
 
 // As in the contract: "CheckCollision".
 const char* RpcName(Rpc rpc);

@@ -3,6 +3,8 @@
 #include <absl/strings/cord.h>
 #include <absl/strings/str_cat.h>
 
+#include "core/base/check.h"
+
 namespace hulld::server {
 
 grpc::StatusCode ToGrpc(absl::StatusCode code) {
@@ -43,7 +45,7 @@ grpc::StatusCode ToGrpc(absl::StatusCode code) {
     case absl::StatusCode::kDoNotUseReservedForFutureExpansionUseDefaultInSwitchInstead_:
       return grpc::StatusCode::UNKNOWN;
   }
-  return grpc::StatusCode::UNKNOWN;
+  HULLD_UNREACHABLE();  // a status of absl has one of these codes, whatever it was made of
 }
 
 grpc::Status ToGrpc(const absl::Status& status) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/call/stream_message.h"
+#include "core/base/check.h"
 #include "server/contract/status_map.h"
 #include "server/process/random_id.h"
 #include "server/wire/decode.h"
@@ -36,148 +36,115 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 
 grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Registry& registry) {
-  const std::shared_ptr<AppendStream> stream(new AppendStream(context, admission, registry));
-  stream->self_ = stream;
-  const absl::Status begun = stream->call_.Begin();
-  const std::lock_guard lock(stream->mutex_);
-  if (!begun.ok()) stream->End(begun);
-  stream->Proceed();
-  return stream.get();
+  return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, registry)));
 }
 
-void AppendStream::OnReadDone(bool ok) {
-  const std::shared_ptr<AppendStream> self = shared_from_this();
-  const std::lock_guard lock(mutex_);
-  reading_ = false;
-  if (!end_.has_value()) {
-    if (ok) {
-      HandleMessage();
-    } else {
-      // The client has said all, or is gone, or speaks another language.
-      End(call_.ShouldStop() ? call_.StopStatus() : WhyNotRead(request_));
-    }
-  }
-  Proceed();
-}
-
-void AppendStream::OnWriteDone(bool ok) {
-  const std::shared_ptr<AppendStream> self = shared_from_this();
-  const std::lock_guard lock(mutex_);
-  writing_ = false;
-  if (!ok) {
-    next_reply_.reset();
-    End(absl::CancelledError("the client is gone"));
-  }
-  Proceed();
-}
-
-void AppendStream::OnCancel() {
-  const std::shared_ptr<AppendStream> self = shared_from_this();
-  call_.Cancel();
-  const std::lock_guard lock(mutex_);
-  next_reply_.reset();
-  End(call_.StopStatus());
-  Proceed();
+void AppendStream::Open() {
+  Locked([] {});
 }
 
 void AppendStream::OnDone() {
-  const std::shared_ptr<AppendStream> last = std::move(self_);
-  const std::lock_guard lock(mutex_);
-  if (session_.has_value()) registry_.CloseAppend(*session_);
+  const auto self = shared_from_this();
+  ReadingStream::OnDone();
+  Locked([this] {
+    if (session_.has_value()) registry_.CloseAppend(*session_);
+  });
 }
 
-void AppendStream::HandleMessage() {
-  switch (request_.message_case()) {
+void AppendStream::StartWork() {
+  if (!reading() && !opening_ && unbuilt_ < kMaxUnbuilt && uncommitted_ < kMaxUncommitted) Read();
+}
+
+void AppendStream::OnMessage() {
+  if (end().has_value()) return;
+  switch (request().message_case()) {
     case v1::AppendPointsRequest::kOpen:
-      return HandleOpen(request_.open());
+      return HandleOpen(request().open());
     case v1::AppendPointsRequest::kChunk:
-      return HandleChunk(request_.chunk());
+      return HandleChunk(request().chunk());
     case v1::AppendPointsRequest::MESSAGE_NOT_SET:
-      return End(absl::InvalidArgumentError("the message is empty; set open or chunk"));
+      return Fail(absl::InvalidArgumentError("the message is empty; set open or chunk"));
   }
 }
+
+void AppendStream::OnNoMessage(const absl::Status& why) { Fail(OrStopped(why)); }
 
 void AppendStream::HandleOpen(const v1::AppendOpen& open) {
   if (session_.has_value()) {
-    return End(absl::InvalidArgumentError(
+    return Fail(absl::InvalidArgumentError(
         "open came twice; one stream appends to one hull, so start another stream"));
   }
-  if (absl::Status s = CheckHullId(call_.caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
-    return End(s);
+  if (absl::Status s = CheckHullId(call().caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
+    return Fail(s);
   }
-  if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return End(s);
+  if (absl::Status s = ValidateWriterId(open.writer_id()); !s.ok()) return Fail(s);
   writer_id_ = open.writer_id().empty() ? RandomId() : open.writer_id();
   opening_ = true;
-  const std::weak_ptr<AppendStream> weak = weak_from_this();
-  const auto on_gone = [weak](const absl::Status& reason) {
-    const std::shared_ptr<AppendStream> stream = weak.lock();
+  const auto on_gone = [weak = weak_from_this()](const absl::Status& reason) {
+    const auto stream = weak.lock();
     if (stream == nullptr) return;
-    const std::lock_guard lock(stream->mutex_);
-    stream->End(reason);
-    stream->Proceed();
+    auto& self = static_cast<AppendStream&>(*stream);
+    self.Locked([&] { self.Fail(reason); });
   };
   registry_.OpenAppend(open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
-                       [self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
-                         const std::lock_guard lock(self->mutex_);
-                         self->opening_ = false;
-                         self->HandleOpened(opened);
-                         self->Proceed();
+                       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
+                         Locked([&] {
+                           opening_ = false;
+                           HandleOpened(opened);
+                         });
                        });
 }
 
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
-  if (!opened.ok()) return End(opened.status());
+  if (!opened.ok()) return Fail(opened.status());
   session_ = opened->session;
   if (session_->created_hull) {
-    call_.Log(LogLevel::kInfo, "hull created", {{"hull", opened->hull.hull_id}});
+    call().Log(LogLevel::kInfo, "hull created", {{"hull", opened->hull.hull_id}});
   }
-  if (end_.has_value()) return;
-  v1::AppendOpened* reply = next_reply_.emplace().mutable_opened();
+  if (end().has_value()) return;
+  v1::AppendPointsResponse opened_reply;
+  v1::AppendOpened* reply = opened_reply.mutable_opened();
   EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
   reply->set_writer_id(writer_id_);
   reply->set_last_sequence(opened->last_sequence);
+  Queue(std::move(opened_reply));
 }
 
 void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!session_.has_value()) {
-    return End(absl::InvalidArgumentError("the first message must be open, not a chunk"));
+    return Fail(absl::InvalidArgumentError("the first message must be open, not a chunk"));
   }
   absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
-  if (!chunk.ok()) return End(chunk.status());
-  request_.Clear();
+  if (!chunk.ok()) return Fail(chunk.status());
+  request().Clear();
   ++unbuilt_;
   ++uncommitted_;
-  call_.AddPoints(chunk->points.size());
-  const std::shared_ptr<AppendStream> self = shared_from_this();
+  call().AddPoints(chunk->points.size());
+  const auto self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
   const auto arrival = std::chrono::steady_clock::now();
   registry_.Append(
-      *session_, *std::move(chunk), [self] { return self->call_.ShouldStop(); },
-      [self] {
-        const std::lock_guard lock(self->mutex_);
-        --self->unbuilt_;
-        self->Proceed();
-      },
-      [self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
-        const std::lock_guard lock(self->mutex_);
-        --self->uncommitted_;
-        if (result.ok()) self->call_.EndMessage(arrival);
-        self->HandleResult(sequence, result);
-        self->Proceed();
+      *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
+      [this, self] { Locked([this] { --unbuilt_; }); },
+      [this, self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
+        Locked([&] {
+          --uncommitted_;
+          if (result.ok()) call().EndMessage(arrival);
+          HandleResult(sequence, result);
+        });
       });
 }
 
 void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result) {
-  if (!result.ok()) {
-    const bool stopped = call_.ShouldStop();
-    return EndAt(sequence, stopped ? call_.StopStatus() : result.status());
-  }
-  call_.metrics().CountPoints(result->counts);
-  if (finished_) return;
-  if (!next_reply_.has_value()) next_reply_.emplace();
+  HULLD_DCHECK(unbuilt_ >= 0 && uncommitted_ >= 0);
+  if (!result.ok()) return FailAt(sequence, OrStopped(result.status()));
+  call().metrics().CountPoints(result->counts);
+  if (call().ShouldStop()) return;  // the client is gone
   // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
-  v1::AppendAck* ack = next_reply_->mutable_ack();
+  if (LastWaiting() == nullptr) Queue({});
+  HULLD_CHECK(!LastWaiting()->has_opened());
+  v1::AppendAck* ack = LastWaiting()->mutable_ack();
   EncodeHeader(registry_.store(), result->store_revision, ack->mutable_header());
   ack->set_sequence(std::max(ack->sequence(), sequence));
   if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {
@@ -190,41 +157,21 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
   AddTo(ack->mutable_counts(), result->counts);
 }
 
-void AppendStream::End(const absl::Status& status) {
-  if (end_.has_value()) return;
-  end_ = status;
-  if (!status.ok() && session_.has_value()) {
-    call_.Log(LogLevel::kDebug, "append ended early", {{"writer", session_->writer_id}});
-  }
-}
-
-void AppendStream::EndAt(uint64_t sequence, const absl::Status& status) {
-  // The client may have said all before the chunk was refused.
-  if (end_.has_value() && (end_->ok() || end_sequence_ > sequence)) end_.reset();
-  if (!end_.has_value()) end_sequence_ = sequence;
+void AppendStream::Fail(const absl::Status& status) {
+  if (end().has_value()) return;
   End(status);
+  if (!status.ok() && session_.has_value()) {
+    call().Log(LogLevel::kDebug, "append ended early", {{"writer", session_->writer_id}});
+  }
 }
 
-// Starts whatever may start now. Reading does not wait for writing, so that a client which sends
-// everything before it reads an ack is served too.
-void AppendStream::Proceed() {
-  if (finished_) return;
-  if (!writing_ && next_reply_.has_value()) {
-    writing_ = true;
-    reply_in_flight_ = *std::move(next_reply_);
-    next_reply_.reset();
-    StartWrite(&reply_in_flight_);
-  } else if (!writing_ && end_.has_value() && !opening_ && unbuilt_ == 0 && uncommitted_ == 0) {
-    finished_ = true;
-    Finish(call_.End(*end_));
-    return;
+void AppendStream::FailAt(uint64_t sequence, const absl::Status& status) {
+  if (!end().has_value()) {
+    end_sequence_ = sequence;
+    return Fail(status);
   }
-  if (!end_.has_value() && !reading_ && !opening_ && unbuilt_ < kMaxUnbuilt &&
-      uncommitted_ < kMaxUncommitted) {
-    reading_ = true;
-    PrepareToRead(&request_);
-    StartRead(&request_);
-  }
+  // The client may have said all before the chunk was refused.
+  if (end()->ok() || end_sequence_ > sequence) EndInsteadWith(status);
 }
 
 }  // namespace hulld::server

@@ -3,6 +3,7 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/hull/audit.h"
@@ -106,12 +107,12 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   const auto& [revision, view] = *resolved;
   EncodeHeader(registry_.store(), revision, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
-  response->set_edge_count(view.snapshot->hull().edges().size());
-  response->set_facet_count(view.snapshot->hull().facet_count());
-  EncodeBox(view.snapshot->hull(), response);
+  response->set_edge_count(view.served->hull().edges().size());
+  response->set_facet_count(view.served->hull().facet_count());
+  EncodeBox(view.served->hull(), response);
   if (request.audit()) {
     const absl::Status finding =
-        AuditHull(view.snapshot->hull(), [&call] { return call.ShouldStop(); });
+        AuditHull(view.served->hull(), [&call] { return call.ShouldStop(); });
     if (absl::IsCancelled(finding)) return finding;
     response->mutable_audit()->set_ok(finding.ok());
     if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
@@ -121,16 +122,12 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
 
 absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& call,
                                v1::ListHullsResponse* response) {
-  if (request.page_size() > Config::kMaxPageSize) {
-    return absl::InvalidArgumentError(absl::StrCat("page_size is ", request.page_size(),
-                                                   "; the limit is ", Config::kMaxPageSize));
-  }
   const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
   if (!prefix.ok()) return prefix.status();
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
-  const HullPage page = registry_.List(
-      *prefix, *after, request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size());
+  const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
+  const HullPage page = registry_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize));
   EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
   for (const ListedHull& hull : page.hulls) {
     v1::HullInfo* info = response->add_hulls();

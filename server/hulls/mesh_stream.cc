@@ -22,42 +22,43 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 grpc::ServerWriteReactor<v1::GetHullMeshResponse>* MeshStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
     WorkerPool& readers, const v1::GetHullMeshRequest& request) {
-  auto* stream = new MeshStream(context, admission);
-  const absl::Status begun = stream->call_.Begin();
-  if (begun.ok()) {
-    // gRPC keeps the request until the call is done.
-    readers.Submit([stream, &registry, &request] { stream->Open(registry, request); });
-  } else {
-    stream->Finish(stream->call_.End(begun));
-  }
-  return stream;
+  return Launch(
+      std::shared_ptr<MeshStream>(new MeshStream(context, admission, registry, readers, request)));
 }
 
-void MeshStream::Open(Registry& registry, const v1::GetHullMeshRequest& request) {
-  absl::Status valid = CheckHullId(call_.caller(), request.hull_id(), "hull_id");
-  if (!valid.ok()) return Finish(call_.End(valid));
-  auto resolved = registry.Resolve(request.hull_id(), [this] { return call_.ShouldStop(); });
-  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
-  if (!resolved.ok()) return Finish(call_.End(resolved.status()));
+void MeshStream::Open() {
+  RunOn(readers_, [this] {
+    const absl::Status made = MakeHeader();
+    if (call().ShouldStop()) return FinishCall(call().StopStatus());
+    if (!made.ok()) return FinishCall(made);
+    Send();
+  });
+}
+
+absl::Status MeshStream::MakeHeader() {
+  absl::Status valid = CheckHullId(call().caller(), request_.hull_id(), "hull_id");
+  if (!valid.ok()) return valid;
+  auto resolved = registry_.Resolve(request_.hull_id(), [this] { return call().ShouldStop(); });
+  if (!resolved.ok()) return resolved.status();
   mesh_ =
-      std::shared_ptr<const Hull>(resolved->second.snapshot, &resolved->second.snapshot->hull());
-  v1::MeshHeader* header = message_.mutable_header();
-  if (request.has_simplification()) {
-    const absl::Status simplified = Simplify(request.simplification(), header);
-    if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
-    if (!simplified.ok()) return Finish(call_.End(Prefixed("simplification: ", simplified)));
+      std::shared_ptr<const Hull>(resolved->second.served, &resolved->second.served->hull());
+  v1::MeshHeader* header = reply().mutable_header();
+  if (request_.has_simplification()) {
+    const absl::Status simplified = Simplify(request_.simplification(), header);
+    if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
-  EncodeHeader(registry.store(), resolved->first, header->mutable_header());
+  EncodeHeader(registry_.store(), resolved->first, header->mutable_header());
   EncodeRecord(resolved->second.record, header->mutable_hull());
   header->set_facet_count(mesh_->facet_count());
   header->set_vertex_count(mesh_->vertices().size());
-  StartWrite(&message_);
+  return absl::OkStatus();
 }
 
 absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
                                   v1::MeshHeader* header) {
   const SimplifyTarget target = {static_cast<size_t>(simplification.max_vertices()),
-                                 simplification.max_error(), [this] { return call_.ShouldStop(); }};
+                                 simplification.max_error(),
+                                 [this] { return call().ShouldStop(); }};
   absl::StatusOr<SimplifiedHull> simplified;
   switch (simplification.side()) {
     case v1::SIMPLIFICATION_SIDE_INSIDE:
@@ -75,21 +76,19 @@ absl::Status MeshStream::Simplify(const v1::Simplification& simplification,
   return absl::OkStatus();
 }
 
-void MeshStream::OnWriteDone(bool ok) {
-  if (call_.ShouldStop()) return Finish(call_.End(call_.StopStatus()));
-  if (!ok) return Finish(call_.End(absl::CancelledError("the client is gone")));
-  if (!NextMessage()) return Finish(call_.End(absl::OkStatus()));
-  StartWrite(&message_);
+void MeshStream::OnSent() {
+  if (!NextMessage()) return FinishCall(absl::OkStatus());
+  Send();
 }
 
 bool MeshStream::NextMessage() {
-  message_.Clear();
+  reply().Clear();
   if (next_vertex_ < mesh_->vertices().size()) {
-    FillVertices(message_.mutable_vertices());
+    FillVertices(reply().mutable_vertices());
     return true;
   }
   if (next_facet_ < mesh_->facet_count()) {
-    FillFacets(message_.mutable_facets());
+    FillFacets(reply().mutable_facets());
     return true;
   }
   return false;

@@ -4,45 +4,51 @@
 #include <grpcpp/grpcpp.h>
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "hulld/v1/hull.pb.h"
-#include "server/call/call.h"
+#include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
 
-// One GetHullMesh call: one message after the other from one snapshot, the next one made when the
-// one before is sent. It owns itself until gRPC is done with it.
-class MeshStream : public grpc::ServerWriteReactor<v1::GetHullMeshResponse> {
+// One GetHullMesh call: a header, then pieces of one snapshot of the hull.
+class MeshStream : public PulledStream<grpc::ServerWriteReactor<v1::GetHullMeshResponse>,
+                                       v1::GetHullMeshResponse> {
  public:
+  // `request` must outlive the call, as gRPC's requests do.
   static grpc::ServerWriteReactor<v1::GetHullMeshResponse>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
       WorkerPool& readers, const v1::GetHullMeshRequest& request);
 
  private:
-  MeshStream(grpc::CallbackServerContext& context, Admission& admission)
-      : call_(context, admission, Rpc::kGetHullMesh) {}
+  MeshStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+             WorkerPool& readers, const v1::GetHullMeshRequest& request)
+      : PulledStream(context, admission, Rpc::kGetHullMesh),
+        registry_(registry),
+        readers_(readers),
+        request_(request) {}
 
-  void OnWriteDone(bool ok) override;
-  void OnCancel() override { call_.Cancel(); }
-  void OnDone() override { delete this; }
+  void Open() override;
+  void OnSent() override;
 
-  void Open(Registry& registry, const v1::GetHullMeshRequest& request);
+  absl::Status MakeHeader();
   absl::Status Simplify(const v1::Simplification& simplification, v1::MeshHeader* header);
-  // Fills message_ with the next piece; false when all are sent.
+  // Fills the reply with the next piece; false when all are sent.
   bool NextMessage();
   void FillVertices(v1::MeshVertices* message);
   void FillFacets(v1::MeshFacets* message);
 
-  Call call_;
+  Registry& registry_;
+  WorkerPool& readers_;
+  const v1::GetHullMeshRequest& request_;
   // What is sent: the hull itself, or what stands for it.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;
   size_t next_facet_ = 0;
-  v1::GetHullMeshResponse message_;
 };
 
 }  // namespace hulld::server

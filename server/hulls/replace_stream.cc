@@ -5,7 +5,6 @@
 #include <chrono>
 #include <utility>
 
-#include "server/call/stream_message.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 #include "server/wire/decode.h"
@@ -16,65 +15,56 @@ namespace hulld::server {
 grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceStream::Start(
     grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
     WorkerPool& writers, v1::ReplaceHullResponse* response) {
-  auto* stream = new ReplaceStream(context, admission, registry, writers, response);
-  const absl::Status begun = stream->call_.Begin();
-  if (begun.ok()) {
-    stream->Read();
-  } else {
-    stream->End(begun);
-  }
-  return stream;
+  return Launch(std::shared_ptr<ReplaceStream>(
+      new ReplaceStream(context, admission, registry, writers, response)));
 }
 
-void ReplaceStream::Read() {
-  PrepareToRead(&request_);
-  StartRead(&request_);
-}
-
-void ReplaceStream::OnReadDone(bool ok) {
-  if (call_.ShouldStop()) return End(call_.StopStatus());
+void ReplaceStream::OnNoMessage(const absl::Status& why) {
+  if (call().ShouldStop()) return FinishCall(call().StopStatus());
+  if (!why.ok()) return FinishCall(why);
   const bool opened = replacement_.builder != nullptr;
-  if (!ok) {
-    if (absl::Status s = WhyNotRead(request_); !s.ok()) return End(s);
-    // Only the empty block tells a client that has said all from one that is gone.
-    if (opened && complete_) return writers_.Submit([this] { Commit(); });
-    if (opened) {
-      return End(absl::InvalidArgumentError(
-          "the stream ended without an empty block of points, which says that nothing is missing; "
-          "the hull is as it was"));
-    }
-    return End(absl::InvalidArgumentError("the stream ended before its first message, open"));
-  }
+  // Only the empty block tells a client that has said all from one that is gone.
+  if (opened && complete_) return RunOn(writers_, [this] { Commit(); });
+  FinishCall(absl::InvalidArgumentError(
+      opened ? "the stream ended without an empty block of points, which says that nothing is "
+               "missing; the hull is as it was"
+             : "the stream ended before its first message, open"));
+}
+
+void ReplaceStream::OnMessage() {
+  if (call().ShouldStop()) return FinishCall(call().StopStatus());
   ++messages_;
-  switch (request_.message_case()) {
-    case v1::ReplaceHullRequest::kOpen: {
-      const absl::Status status =
-          opened ? absl::InvalidArgumentError("open came twice; start another stream")
-                 : HandleOpen(request_.open());
-      if (!status.ok()) return End(status);
-      Read();
-      return;
-    }
+  if (absl::Status s = HandleMessage(); !s.ok()) return FinishCall(s);
+  if (!request().has_points() || complete_) return Read();
+  RunOn(writers_, [this, arrival = std::chrono::steady_clock::now()] {
+    const absl::Status built = Build();
+    if (!built.ok()) return FinishCall(OrStopped(built));
+    call().EndMessage(arrival);
+    Read();
+  });
+}
+
+// All but the building.
+absl::Status ReplaceStream::HandleMessage() {
+  const bool opened = replacement_.builder != nullptr;
+  switch (request().message_case()) {
+    case v1::ReplaceHullRequest::kOpen:
+      if (!opened) return HandleOpen(request().open());
+      return absl::InvalidArgumentError("open came twice; start another stream");
     case v1::ReplaceHullRequest::kPoints:
       if (!opened) {
-        return End(absl::InvalidArgumentError("the first message must be open, not points"));
+        return absl::InvalidArgumentError("the first message must be open, not points");
       }
-      complete_ = request_.points().xyz().empty() && request_.points().xyz_float().empty();
-      if (complete_) return Read();
-      writers_.Submit([this, arrival = std::chrono::steady_clock::now()] {
-        const absl::Status built = Build();
-        if (!built.ok()) return End(call_.ShouldStop() ? call_.StopStatus() : built);
-        call_.EndMessage(arrival);
-        Read();
-      });
-      return;
+      complete_ = request().points().xyz().empty() && request().points().xyz_float().empty();
+      return absl::OkStatus();
     case v1::ReplaceHullRequest::MESSAGE_NOT_SET:
-      return End(absl::InvalidArgumentError("the message is empty; set open or points"));
+      break;
   }
+  return absl::InvalidArgumentError("the message is empty; set open or points");
 }
 
 absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
-  if (absl::Status s = CheckHullId(call_.caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
+  if (absl::Status s = CheckHullId(call().caller(), open.hull_id(), "open.hull_id"); !s.ok()) {
     return s;
   }
   replacement_.hull_id = open.hull_id();
@@ -88,9 +78,9 @@ absl::Status ReplaceStream::Build() {
   const std::string name = absl::StrCat("message ", messages_, ": ");
   const Limits& limits = registry_.limits();
   const absl::StatusOr<std::vector<Vector>> points =
-      DecodePoints(request_.points(), limits.max_points_per_chunk);
+      DecodePoints(request().points(), limits.max_points_per_chunk);
   if (!points.ok()) return Prefixed(name, points.status());
-  call_.AddPoints(points->size());
+  call().AddPoints(points->size());
   const uint64_t received = replacement_.counts.received + points->size();
   if (received > limits.max_points_per_hull) {
     return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
@@ -99,7 +89,7 @@ absl::Status ReplaceStream::Build() {
   if (absl::Status s = registry_.CheckMemory(); !s.ok()) return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
-      {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call_.ShouldStop(); }});
+      {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call().ShouldStop(); }});
   if (absl::IsResourceExhausted(added.status())) {
     return LimitExceeded(name + "the hull would hold too many vertices",
                          limits.max_vertices_per_hull, "max-vertices-per-hull");
@@ -111,21 +101,20 @@ absl::Status ReplaceStream::Build() {
 }
 
 void ReplaceStream::Commit() {
+  // The registry answers on another thread, when the change is committed.
   registry_.Replace(std::move(replacement_), [this](const absl::StatusOr<ReplaceResult>& result) {
     // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
     charge_.Set(0);
-    if (!result.ok()) return End(result.status());
-    call_.Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
-              {{"hull", result->hull.hull_id}});
-    call_.metrics().CountPoints(result->hull.counts);
+    if (!result.ok()) return FinishCall(result.status());
+    call().Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
+               {{"hull", result->hull.hull_id}});
+    call().metrics().CountPoints(result->hull.counts);
     EncodeHeader(registry_.store(), result->store_revision, response_->mutable_header());
     EncodeRecord(result->hull, response_->mutable_hull());
     response_->set_created(result->created);
     response_->set_durability(EncodeDurability(registry_.store().durability()));
-    End(absl::OkStatus());
+    FinishCall(absl::OkStatus());
   });
 }
-
-void ReplaceStream::End(const absl::Status& status) { Finish(call_.End(status)); }
 
 }  // namespace hulld::server

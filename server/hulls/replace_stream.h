@@ -9,17 +9,18 @@
 
 #include "core/hull/growth/hull_builder.h"
 #include "hulld/v1/hull.pb.h"
-#include "server/call/call.h"
+#include "server/call/call_stream.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
 
 // One ReplaceHull call: builds a hull apart, message by message on a thread of the writers, and
-// hands it to the registry when the client has said all. One step follows the other, so that
-// nothing needs a lock: a read, or the building of what was read. It owns itself until gRPC is done
-// with it.
-class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
+// hands it to the registry when the client has said all. One thing at a time is under way, a read
+// or the building of what was read, so the state needs no mutex.
+class ReplaceStream
+    : public ReadingStream<CallStream<grpc::ServerReadReactor<v1::ReplaceHullRequest>>,
+                           v1::ReplaceHullRequest> {
  public:
   static grpc::ServerReadReactor<v1::ReplaceHullRequest>* Start(
       grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
@@ -28,29 +29,26 @@ class ReplaceStream : public grpc::ServerReadReactor<v1::ReplaceHullRequest> {
  private:
   ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
                 WorkerPool& writers, v1::ReplaceHullResponse* response)
-      : registry_(registry),
+      : ReadingStream(context, admission, Rpc::kReplaceHull),
+        registry_(registry),
         writers_(writers),
         response_(response),
-        call_(context, admission, Rpc::kReplaceHull),
-        charge_(registry) {}
+        charge_(registry.memory()) {}
 
-  void OnReadDone(bool ok) override;
-  void OnCancel() override { call_.Cancel(); }
-  void OnDone() override { delete this; }
+  void Open() override { Read(); }
+  void OnMessage() override;
+  void OnNoMessage(const absl::Status& why) override;
 
-  void Read();
+  absl::Status HandleMessage();
   absl::Status HandleOpen(const v1::ReplaceOpen& open);
   absl::Status Build();
   void Commit();
-  void End(const absl::Status& status);
 
   Registry& registry_;
   WorkerPool& writers_;
   v1::ReplaceHullResponse* response_;
-  Call call_;
-  // Of the builder, until the registry has it. Goes before the call, which keeps the server alive.
+  // Covers the builder until the registry has it.
   MemoryCharge charge_;
-  v1::ReplaceHullRequest request_;
   Replacement replacement_;
   uint64_t messages_ = 0;
   // The last message was an empty block.

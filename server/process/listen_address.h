@@ -32,7 +32,8 @@ absl::StatusOr<ListenAddress> ParseListenAddress(const std::string& text,
 // does not allow that.
 absl::Status CheckExposure(const ListenAddress& address, bool has_tls, bool insecure);
 
-// OK when nobody listens on this unix socket (gRPC would take it over without a word), and for TCP.
+// OK when no server listens on this unix socket (gRPC would take it over without a word), and for
+// TCP.
 absl::Status CheckSocketFree(const ListenAddress& address);
 
 // Why the address could not be bound, by trying again: UNAVAILABLE with what to do.

@@ -12,11 +12,13 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace hulld::server {
 namespace {
 
-// Of the event that this thread is logging: spdlog's messages hold text alone, and its sinks run
-// where LogEvent is called.
+// The fields of the event that this thread is logging: spdlog's messages hold text alone, and its
+// sinks run where LogEvent is called.
 thread_local const LogFields* current_fields = nullptr;
 bool is_json = false;
 
@@ -52,7 +54,7 @@ spdlog::level::level_enum ToSpdlog(LogLevel level) {
     case LogLevel::kError:
       return spdlog::level::err;
   }
-  return spdlog::level::err;
+  HULLD_UNREACHABLE();
 }
 
 class JsonFormatter : public spdlog::formatter {

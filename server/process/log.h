@@ -49,7 +49,7 @@ struct LogField {
   LogField(const char* field, std::string text) : name(field), value(std::move(text)) {}
   LogField(const char* field, uint64_t number)
       : name(field), value(std::to_string(number)), is_number(true) {}
-  // Of milliseconds: to the microsecond.
+  // number: milliseconds, printed to the microsecond.
   LogField(const char* field, double number);
 
   const char* name;

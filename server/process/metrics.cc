@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/base/check.h"
 #include "server/contract/status_map.h"
 
 namespace hulld::server {
@@ -15,7 +16,7 @@ namespace {
 using prometheus::Family;
 using Buckets = prometheus::Histogram::BucketBoundaries;
 
-// Of rungs, in the order of the enum.
+// The names of rungs, in the order of the enum.
 constexpr std::array<const char*, kRungCount> kRungNames = {"bounds", "cached", "floating_point",
                                                             "exact"};
 constexpr std::array<Rpc, 3> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
@@ -68,10 +69,11 @@ StoreMetrics AddStore(prometheus::Registry& registry) {
       lookups.Add({{"result", "miss"}}),
       AddCounters(registry, "hulld_cache_evictions_total", "Hulls that made room for others.")
           .Add({}),
-      AddGauges(registry, "hulld_cache_bytes", "Bytes that the hulls in memory take, estimated.")
+      AddGauges(registry, "hulld_cache_bytes",
+                "Bytes that count against the limit, estimated: hulls in memory, points on their "
+                "way to them, streams.")
           .Add({}),
-      AddGauges(registry, "hulld_cache_limit_bytes",
-                "Bytes that the hulls in memory may take (--memory-limit); 0: no limit.")
+      AddGauges(registry, "hulld_cache_limit_bytes", "Bytes that may count (--memory-limit).")
           .Add({}),
   };
 }
@@ -176,7 +178,8 @@ void Metrics::CountCall(Rpc rpc, absl::StatusCode code,
 
 void Metrics::CountMessage(Rpc rpc, std::chrono::steady_clock::duration duration) {
   prometheus::Histogram* const seconds = message_seconds_[static_cast<size_t>(rpc)];
-  if (seconds != nullptr) seconds->Observe(Seconds(duration));
+  HULLD_CHECK(seconds != nullptr);
+  seconds->Observe(Seconds(duration));
 }
 
 void Metrics::CountLimit(const std::string& limit) {

@@ -42,7 +42,7 @@ struct StoreMetrics {
   prometheus::Counter& cache_hits;
   prometheus::Counter& cache_misses;
   prometheus::Counter& cache_evictions;
-  // hulld_cache_bytes: what the hulls in memory take; hulld_cache_limit_bytes: --memory-limit.
+  // hulld_cache_bytes: what counts against the limit; hulld_cache_limit_bytes: --memory-limit.
   prometheus::Gauge& cache_bytes;
   prometheus::Gauge& cache_limit_bytes;
 };
@@ -66,7 +66,8 @@ class Metrics : public prometheus::Collectable {
   // hulld_requests_total{rpc,code}, hulld_request_duration_seconds{rpc}.
   void CountCall(Rpc rpc, absl::StatusCode code, std::chrono::steady_clock::duration duration);
   // hulld_message_duration_seconds{rpc}: one message of a stream that lasts as long as its client
-  // likes, from its arrival until its answer is ready. AppendPoints, ReplaceHull, StreamCollisions.
+  // likes, from its arrival until its answer is ready. rpc: AppendPoints, ReplaceHull or
+  // StreamCollisions.
   void CountMessage(Rpc rpc, std::chrono::steady_clock::duration duration);
   // hulld_limits_hit_total: the limit is named like its flag, as in "max-hulls".
   void CountLimit(const std::string& limit);

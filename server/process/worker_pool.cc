@@ -2,14 +2,14 @@
 
 #include <utility>
 
-#include "server/process/thread_priority.h"
+#include "core/base/check.h"
 
 namespace hulld::server {
 
-WorkerPool::WorkerPool(int threads, std::optional<PoolMetrics> metrics, int niceness)
-    : metrics_(metrics) {
+WorkerPool::WorkerPool(int threads, std::optional<PoolMetrics> metrics) : metrics_(metrics) {
+  HULLD_CHECK(threads > 0);
   threads_.reserve(threads);
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this, niceness] { Work(niceness); });
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Work(); });
 }
 
 WorkerPool::~WorkerPool() {
@@ -35,8 +35,7 @@ void WorkerPool::NoteWaiting() {
   if (metrics_.has_value()) metrics_->waiting.Set(static_cast<double>(tasks_.size()));
 }
 
-void WorkerPool::Work(int niceness) {
-  if (niceness > 0) LowerPriority(niceness);
+void WorkerPool::Work() {
   std::unique_lock lock(mutex_);
   while (true) {
     ready_.wait(lock, [this] { return ending_ || !tasks_.empty(); });

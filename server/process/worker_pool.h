@@ -16,15 +16,13 @@
 
 namespace hulld::server {
 
-// A few threads that run tasks in the order in which they came. gRPC calls back on as few as two
-// threads, which must stay free to move bytes; whatever may take longer than that runs here.
+// A few threads that run tasks in the order in which they came, at the priority of the process.
+// gRPC calls back on as few as two threads, which must stay free to move bytes. Work that may wait
+// for the store, for a writer or for a file runs here; work that only computes, on a TaskPool.
 class WorkerPool {
  public:
-  // metrics: where to report what waits. niceness: added to that of the process, so that the system
-  // runs other threads first when there is too much to do; inherited by the threads that these
-  // start.
-  explicit WorkerPool(int threads, std::optional<PoolMetrics> metrics = std::nullopt,
-                      int niceness = 0);
+  // metrics: where to report what waits. Requires threads > 0.
+  explicit WorkerPool(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
   // Runs what is queued, then ends.
@@ -41,7 +39,7 @@ class WorkerPool {
     std::chrono::steady_clock::time_point submitted;
   };
 
-  void Work(int niceness);
+  void Work();
   // Requires the mutex.
   void NoteWaiting();
 

@@ -2,137 +2,103 @@
 #define HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <condition_variable>
+#include <cstdint>
 #include <functional>
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
-#include "server/registry/registry.h"
+#include "core/hull/growth/hull_builder.h"
+#include "server/registry/hull_state.h"
+#include "server/registry/locked.h"
+#include "server/registry/memory_budget.h"
+#include "server/registry/registry_types.h"
+#include "server/registry/served_hull.h"
+#include "server/store/hull_record.h"
 
 namespace hulld::server {
 
-// The registry's mutex, held, and what is to be done once it is not: callbacks, and the end of
-// large objects.
-class Registry::Locked {
- public:
-  explicit Locked(std::mutex& mutex) : lock_(mutex) {}
-  Locked(const Locked&) = delete;
-  Locked& operator=(const Locked&) = delete;
-  ~Locked() {
-    if (lock_.owns_lock()) Unlock();
-  }
-
-  void Unlock() {
-    std::vector<std::function<void()>> afterwards = std::move(afterwards_);
-    afterwards_.clear();
-    lock_.unlock();
-    for (const auto& task : afterwards) task();
-  }
-  void Lock() { lock_.lock(); }
-  std::unique_lock<std::mutex>& lock() { return lock_; }
-
-  void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
-  template <typename T>
-  void Discard(std::unique_ptr<T> object) {
-    if (object != nullptr) Discard(std::shared_ptr<T>(std::move(object)));
-  }
-  template <typename T>
-  void Discard(std::shared_ptr<T> object) {
-    if (object != nullptr) afterwards_.push_back([kept = std::move(object)] {});
-  }
-
- private:
-  std::unique_lock<std::mutex> lock_;
-  std::vector<std::function<void()>> afterwards_;
-};
-
-struct Registry::PendingChunk {
+// A chunk that waits to be built.
+struct PendingChunk {
   AppendSession session;
   Chunk chunk;
   std::function<bool()> should_stop;
   std::function<void()> on_built;
   Reply<ChunkResult> done;
-  // What the cache counts for its points.
-  uint64_t charged_bytes = 0;
+  // Counts its points.
+  MemoryCharge charge;
 };
 
-// A change on its way to the store.
-struct Registry::PendingCommit {
-  Change change;
-  HullPointer hull;
-  Finish finish;
-  // What the cache counts for its vertices.
-  uint64_t charged_bytes = 0;
-};
-
-struct Registry::OpenRequest {
-  std::string hull_id;
-  std::string writer_id;
-  bool create_if_absent = false;
-  bool created_hull = false;
-  std::function<void(const absl::Status&)> on_gone;
-  Reply<OpenResult> done;
-};
-
+// One incarnation of a hull, guarded by the registry's mutex; the builder alone is used without it,
+// by the thread that HullState makes its owner.
 struct RegisteredHull {
-  enum class State { kCreating, kPresent, kGone };
   // The last sequence of a writer.
   struct Sequences {
     uint64_t committed = 0;
-    // With the chunks on their way.
+    // With the chunks in flight.
     uint64_t head = 0;
   };
 
-  State state = State::kPresent;
+  // readable: whether the store gives back what it keeps of the hull.
+  RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
+                 MemoryBudget& budget);
+
+  // Counts what the hull holds now, and that it was used just now.
+  void NoteUse() { account.Set(MemoryBytes()); }
+  // Drops the builder, unless a thread owns it.
+  void DiscardBuilder(Locked& locked);
+  // The last sequence of a writer, chunks in flight included; 0 for a writer not in `writers`.
+  uint64_t HeadSequence(const std::string& writer_id) const;
+
+  HullState state;
+  const bool readable_from_store;
   StoredHull committed;
-  // With the changes on their way.
+  // With the changes in flight.
   StoredHull head;
-  // Of committed.record.revision; null when nobody has asked since the last change.
-  std::shared_ptr<const Snapshot> snapshot;
-  // Not OK when the store cannot give the hull back.
-  absl::Status damage;
+  // The hull at committed.record.revision; null until the first reader after a change asks.
+  std::shared_ptr<const ServedHull> served;
   // Those in use; the store has the others.
   std::unordered_map<std::string, Sequences> writers;
+  // Threads that read a writer's sequence from the store, without the mutex. What is committed
+  // meanwhile is newer than what they read, so `writers` keeps it for them.
+  int sequence_readers = 0;
   // One per open session.
   std::map<uint64_t, std::function<void(const absl::Status&)>> watches;
 
-  // Whoever set `busy` owns the builder, without the registry's mutex.
-  bool busy = false;
-  // The hull with the changes on their way; null when it is to be read from the store.
+  // The hull with the changes in flight; null when it is to be read from the store, or when a
+  // thread owns it.
   std::unique_ptr<HullBuilder> builder;
-  // Changes on their way, and whether they are a creation, a deletion or a replacement.
-  int in_flight = 0;
-  bool ending = false;
-  // How often changes on their way were refused and the hull went back to `committed`.
-  uint64_t reverts = 0;
-  // Readers that need the builder; the next chunk waits for them.
-  int pins = 0;
+  // What it holds, also while a thread owns it.
+  uint64_t builder_bytes = 0;
+  // Told of each step of `state`.
   std::condition_variable released;
-  std::list<Registry::PendingChunk> chunks;
-  // What waits until the hull is neither busy nor a change of it on its way; goes before chunks.
-  std::list<std::function<void(Registry::Locked&)>> exclusive;
+  std::list<PendingChunk> chunks;
+  // What waits until the hull is quiet; goes before chunks.
+  std::list<std::function<void(Locked&)>> exclusive;
 
-  // What the registry's cache counts for it.
-  size_t charged_bytes = 0;
-  size_t builder_bytes = 0;
-  bool in_used_list = false;
-  std::list<RegisteredHull*>::iterator used_place;
+  // Last, so that it is closed before anything that it counts ends.
+  MemoryBudget::Account account;
 
-  bool quiet() const { return !busy && in_flight == 0; }
+ private:
+  // What the hull holds and can make again.
+  uint64_t MemoryBytes() const;
+  // Drops what is not in use, if it can be made again.
+  uint64_t DropUnused(Locked& locked);
 };
 
-// The error, or a result that is still to be filled in.
+// What is served of a hull without vertices; one for all, and not counted.
+const std::shared_ptr<const ServedHull>& EmptyServedHull();
+
+// Answers once the mutex is not held.
 template <typename T>
-absl::StatusOr<T> ErrorOrEmpty(const absl::Status& status) {
-  if (!status.ok()) return status;
-  return T();
+void Answer(Locked& locked, const Reply<T>& done, absl::StatusOr<T> result) {
+  locked.Afterwards([done, result = std::move(result)] { done(result); });
 }
 
 std::string QuotedHull(const std::string& id);

@@ -1,3 +1,4 @@
+// IDs: which hulls there are, and how they begin and end.
 #include "server/registry/registry.h"
 
 #include <absl/status/status.h>
@@ -6,25 +7,13 @@
 
 #include <utility>
 
+#include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
-#include "server/contract/status_map.h"
 #include "server/registry/registered_hull.h"
 #include "server/settings/memory_limit.h"
 
 namespace hulld::server {
-
-std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
-
-absl::Status HullNotFound(const std::string& id) {
-  return absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first"));
-}
-
-absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {
-  return absl::AbortedError(absl::StrCat(QuotedHull(record.hull_id), " is at revision ",
-                                         record.revision, ", not ", if_revision,
-                                         " (if_revision); read it again, then retry"));
-}
-
 namespace {
 
 Limits WithMemoryLimit(Limits limits) {
@@ -33,46 +22,47 @@ Limits WithMemoryLimit(Limits limits) {
 }
 
 absl::Status Gone(const std::string& id, const char* how) {
-  return absl::FailedPreconditionError(
-      absl::StrCat(QuotedHull(id), " was ", how,
-                   " while points were streamed into it; open the stream again and start anew"));
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(id), " was ", how,
+          " while points were streamed into it; open the stream again and start anew")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
 }
 
 }  // namespace
 
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers)
-    : store_(store), limits_(WithMemoryLimit(limits)), writers_(writers) {
-  cache_.limit_bytes = limits_.memory_limit;
-  committer_ = std::thread([this] { CommitQueued(); });
-}
+    : store_(store),
+      limits_(WithMemoryLimit(limits)),
+      writers_(writers),
+      memory_(limits_.memory_limit, mutex_),
+      committer_(store, mutex_) {}
 
 Registry::~Registry() {
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  commit_ready_.notify_all();
-  committer_.join();
+  // Closed sessions may hold hulls for longer.
+  const std::lock_guard lock(mutex_);
+  for (const auto& [id, hull] : hulls_) hull->account.Close();
 }
 
 absl::Status Registry::Load() {
-  Locked locked(mutex_);
+  const std::lock_guard lock(mutex_);
+  HULLD_CHECK(hulls_.empty() && assigned_revision_ == 0);
   revision_ = assigned_revision_ = store_.revision();
-  uint64_t damaged = 0;
   const absl::Status status =
       store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
         if (stored.ok()) {
-          Insert(*stored);
+          Insert(*stored, HullState::Present());
+          vertex_count_ += stored->record.vertex_count;
           return;
         }
-        ++damaged;
         spdlog::error("{}", std::string(stored.status().message()));
         StoredHull nothing;
         nothing.record.hull_id = id;
-        Insert(nothing)->damage = stored.status();
-        ++cache_.damaged;
+        MarkDamaged(*Insert(nothing, HullState::Present()), stored.status());
       });
-  if (damaged > 0) spdlog::error("{} of {} hulls are damaged", damaged, hulls_.size());
+  if (cache_.damaged > 0) {
+    spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
+  }
   return status;
 }
 
@@ -83,33 +73,40 @@ Registry::HullPointer Registry::Find(const std::string& id) const {
 
 Registry::HullPointer Registry::FindVisible(const std::string& id) const {
   HullPointer hull = Find(id);
-  return hull != nullptr && hull->state == RegisteredHull::State::kPresent ? hull : nullptr;
+  return hull != nullptr && hull->state.visible() ? hull : nullptr;
 }
 
-Registry::HullPointer Registry::Insert(const StoredHull& stored) {
-  auto hull = std::make_shared<RegisteredHull>();
-  hull->committed = hull->head = stored;
-  if (stored.record.vertex_count == 0) hull->snapshot = empty_snapshot_;
-  vertex_count_ += stored.record.vertex_count;
-  hulls_[stored.record.hull_id] = hull;
+Registry::HullPointer Registry::Insert(const StoredHull& stored, const HullState& state) {
+  auto hull = std::make_shared<RegisteredHull>(stored, state, store_.keeps_hulls(), memory_);
+  const bool is_new = hulls_.emplace(stored.record.hull_id, hull).second;
+  HULLD_CHECK(is_new);
   return hull;
 }
 
-// Takes a hull out of sight.
+// Takes a hull that is gone out of sight and out of memory, and tells its sessions why.
 void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason) {
-  hull->state = RegisteredHull::State::kGone;
-  vertex_count_ -= hull->committed.record.vertex_count;
-  hull->released.notify_all();
+  HULLD_CHECK(hull->state.gone());
   const auto found = hulls_.find(hull->committed.record.hull_id);
-  if (found != hulls_.end() && found->second == hull) hulls_.erase(found);
+  HULLD_CHECK(found != hulls_.end() && found->second == hull);
+  hulls_.erase(found);
   for (auto& [number, on_gone] : hull->watches) {
     locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
   }
   hull->watches.clear();
-  if (!hull->busy) locked.Discard(std::move(hull->builder));
-  locked.Discard(std::move(hull->snapshot));
-  hull->snapshot = nullptr;
-  Charge(locked, *hull);
+  hull->DiscardBuilder(locked);
+  locked.Discard(std::exchange(hull->served, nullptr));
+  hull->account.Close();
+}
+
+absl::Status Registry::CheckHullCount() const {
+  if (hulls_.size() < limits_.max_hulls) return absl::OkStatus();
+  return LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"), limits_.max_hulls,
+                       "max-hulls");
+}
+
+void Registry::Publish(uint64_t revision) {
+  HULLD_CHECK(revision > revision_ && revision <= assigned_revision_);
+  revision_ = revision;
 }
 
 void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
@@ -120,56 +117,50 @@ void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult>
 void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                             const Reply<CreateResult>& done) {
   const HullPointer existing = Find(id);
-  if (existing != nullptr && existing->ending) {
+  if (existing == nullptr) {
+    return CreateNew(locked, id,
+                     [this, done](Locked& later, const absl::StatusOr<HullPointer>& hull) {
+                       if (!hull.ok()) return Answer<CreateResult>(later, done, hull.status());
+                       Answer<CreateResult>(
+                           later, done, CreateResult{revision_, (*hull)->committed.record, true});
+                     });
+  }
+  if (existing->state.changing_life()) {
     existing->exclusive.push_back(
         [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
-    return;
+  } else if (!if_absent) {
+    Answer<CreateResult>(
+        locked, done,
+        WithReason(absl::AlreadyExistsError(absl::StrCat(
+                       QuotedHull(id), " exists; delete it first, or set if_absent to use it")),
+                   v1::ERROR_REASON_HULL_EXISTS, {{"hull_id", id}}));
+  } else if (existing->state.damaged()) {
+    Answer<CreateResult>(locked, done, existing->state.damage());
+  } else {
+    Answer<CreateResult>(locked, done, CreateResult{revision_, existing->committed.record, false});
   }
-  if (existing != nullptr) {
-    absl::StatusOr<CreateResult> result =
-        CreateResult{revision_, existing->committed.record, false};
-    if (!if_absent) {
-      result = absl::AlreadyExistsError(
-          absl::StrCat(QuotedHull(id), " exists; delete it first, or set if_absent to use it"));
-    } else if (!existing->damage.ok()) {
-      result = existing->damage;
-    }
-    locked.Afterwards([done, result] { done(result); });
-    return;
-  }
-  CreateNew(locked, id, [this, id, done](Locked& later, const absl::Status& status) {
-    absl::StatusOr<CreateResult> result = ErrorOrEmpty<CreateResult>(status);
-    if (status.ok()) result = CreateResult{revision_, Find(id)->committed.record, true};
-    later.Afterwards([done, result] { done(result); });
-  });
 }
 
-// Requires that there is no such hull.
+// There must be no such hull, which Insert checks.
 void Registry::CreateNew(Locked& locked, const std::string& id,
-                         const std::function<void(Locked&, const absl::Status&)>& done) {
-  if (hulls_.size() >= limits_.max_hulls) {
-    return done(locked, LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
-                                      limits_.max_hulls, "max-hulls"));
-  }
+                         const std::function<void(Locked&, absl::StatusOr<HullPointer>)>& done) {
+  if (absl::Status s = CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
   change.revision = ++assigned_revision_;
   change.hull.record.hull_id = id;
   change.hull.record.create_revision = change.hull.record.revision = change.revision;
-  const HullPointer hull = Insert(change.hull);
-  hull->state = RegisteredHull::State::kCreating;
-  hull->ending = true;
+  const HullPointer hull = Insert(change.hull, HullState::Creating());
   ++creating_;
-  Submit(hull, std::move(change), [this, hull, done](Locked& later, const absl::Status& status) {
-    --creating_;
-    hull->ending = false;
-    if (status.ok()) {
-      hull->state = RegisteredHull::State::kPresent;
-      revision_ = hull->committed.record.revision;
-    } else {
-      Forget(later, hull, status);
-    }
-    done(later, status);
-  });
+  Submit(locked, hull, std::move(change),
+         [this, hull, done](Locked& later, const absl::Status& status) {
+           --creating_;
+           if (!status.ok()) {
+             Forget(later, hull, status);
+             return done(later, status);
+           }
+           Publish(hull->committed.record.revision);
+           done(later, hull);
+         });
 }
 
 void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
@@ -181,40 +172,35 @@ void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
   const HullPointer hull = Find(id);
-  absl::Status refusal;
-  if (hull == nullptr) {
-    refusal = HullNotFound(id);
-  } else if (!hull->quiet()) {
+  if (hull == nullptr) return Answer<uint64_t>(locked, done, HullNotFound(id));
+  if (!hull->state.quiet()) {
     hull->exclusive.push_back(
         [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
     return;
-  } else if (if_revision.has_value() && *if_revision != hull->committed.record.revision) {
-    refusal = RevisionMismatch(hull->committed.record, *if_revision);
   }
-  if (!refusal.ok()) {
-    locked.Afterwards([done, refusal] { done(refusal); });
-    return;
+  const StoredHull& committed = hull->committed;
+  if (if_revision.has_value() && *if_revision != committed.record.revision) {
+    return Answer<uint64_t>(locked, done, RevisionMismatch(committed.record, *if_revision));
   }
   Change change;
-  change.hull = hull->committed;
+  change.hull = committed;
   change.revision = ++assigned_revision_;
   change.deleted = true;
-  change.former_layout = hull->committed.layout;
-  hull->ending = true;
+  change.former_layout = committed.layout;
+  hull->state.StartEnding();
   Submit(
-      hull, std::move(change),
+      locked, hull, std::move(change),
       [this, hull, done, revision = assigned_revision_](Locked& later, const absl::Status& status) {
-        hull->ending = false;
-        absl::StatusOr<uint64_t> result = ErrorOrEmpty<uint64_t>(status);
-        if (status.ok()) {
-          result = revision_ = revision;
-          Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
-        }
-        later.Afterwards([done, result] { done(result); });
+        if (!status.ok()) return Answer<uint64_t>(later, done, status);
+        Publish(revision);
+        vertex_count_ -= hull->committed.record.vertex_count;
+        Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
+        Answer<uint64_t>(later, done, revision);
       });
 }
 
 void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
+  HULLD_CHECK(replacement.builder != nullptr);
   if (store_.keeps_hulls()) replacement.vertices = replacement.builder->Vertices();
   const auto shared = std::make_shared<Replacement>(std::move(replacement));
   Locked locked(mutex_);
@@ -223,37 +209,42 @@ void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
 
 void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                              const Reply<ReplaceResult>& done) {
-  const std::string& id = replacement->hull_id;
-  const std::optional<uint64_t>& if_revision = replacement->if_revision;
-  const HullPointer former = Find(id);
-  absl::Status refusal;
-  if (former == nullptr) {
-    if (if_revision.value_or(0) != 0) {
-      refusal = absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
-                                                "revision ", *if_revision, " (if_revision)"));
-    } else if (!replacement->create_if_absent) {
-      refusal = HullNotFound(id);
-    } else if (hulls_.size() >= limits_.max_hulls) {
-      refusal = LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"),
-                              limits_.max_hulls, "max-hulls");
-    }
-  } else if (!former->quiet()) {
+  const HullPointer former = Find(replacement->hull_id);
+  if (former != nullptr && !former->state.quiet()) {
     former->exclusive.push_back(
         [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
     return;
-  } else if (if_revision.has_value() && *if_revision != former->committed.record.revision) {
-    refusal = RevisionMismatch(former->committed.record, *if_revision);
   }
-  if (!refusal.ok()) {
-    locked.Afterwards([done, refusal] { done(refusal); });
-    return;
+  if (absl::Status s = CheckReplacement(former.get(), *replacement); !s.ok()) {
+    return Answer<ReplaceResult>(locked, done, s);
   }
-  CommitReplacement(former, *replacement, done);
+  CommitReplacement(locked, former, *replacement, done);
 }
 
-// Requires that the mutex is held. former: null when there is none.
-void Registry::CommitReplacement(const HullPointer& former, Replacement& replacement,
-                                 const Reply<ReplaceResult>& done) {
+// Whether the rules allow it. former: null when there is none.
+absl::Status Registry::CheckReplacement(const RegisteredHull* former,
+                                        const Replacement& replacement) const {
+  const std::string& id = replacement.hull_id;
+  const std::optional<uint64_t>& if_revision = replacement.if_revision;
+  if (former != nullptr) {
+    if (!if_revision.has_value() || *if_revision == former->committed.record.revision) {
+      return absl::OkStatus();
+    }
+    return RevisionMismatch(former->committed.record, *if_revision);
+  }
+  if (if_revision.value_or(0) != 0) {
+    return WithReason(
+        absl::AbortedError(absl::StrCat(QuotedHull(id), " does not exist, so it is not at ",
+                                        "revision ", *if_revision, " (if_revision)")),
+        v1::ERROR_REASON_REVISION_MISMATCH,
+        {{"hull_id", id}, {"if_revision", *if_revision}, {"current_revision", uint64_t{0}}});
+  }
+  if (!replacement.create_if_absent) return HullNotFound(id);
+  return CheckHullCount();
+}
+
+// former: null when there is none. Takes the replacement's vertices.
+Change Registry::MakeChange(const RegisteredHull* former, Replacement& replacement) {
   Change change;
   change.revision = ++assigned_revision_;
   HullRecord& record = change.hull.record;
@@ -268,47 +259,102 @@ void Registry::CommitReplacement(const HullPointer& former, Replacement& replace
     change.vertices = std::move(replacement.vertices);
     change.hull.layout = {record.revision, record.vertex_count, 0, 0};
   }
-  // The new incarnation is unknown to others until it takes the place of the former.
-  auto hull = std::make_shared<RegisteredHull>();
-  hull->committed = hull->head = change.hull;
-  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
-  hull->builder_bytes = hull->builder->MemoryBytes();
-  if (record.vertex_count == 0) hull->snapshot = empty_snapshot_;
+  return change;
+}
+
+// former: null when there is none, else quiet. Takes the replacement's builder.
+void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
+                                 Replacement& replacement, const Reply<ReplaceResult>& done) {
+  Change change = MakeChange(former.get(), replacement);
+  HullPointer hull;
   if (former == nullptr) {
-    hull->state = RegisteredHull::State::kCreating;
-    hull->ending = true;
-    hulls_[record.hull_id] = hull;
+    hull = Insert(change.hull, HullState::Creating());
     ++creating_;
   } else {
-    former->ending = true;
+    // Unknown to others until it takes the place of the former.
+    hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
+                                            store_.keeps_hulls(), memory_);
+    former->state.StartEnding();
   }
-  Submit(former == nullptr ? hull : former, std::move(change),
+  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
+  hull->builder_bytes = hull->builder->MemoryBytes();
+  Submit(locked, former == nullptr ? hull : former, std::move(change),
          [this, hull, former, done](Locked& later, const absl::Status& status) {
-           FinishReplacement(later, former, hull, status, done);
+           Answer(later, done, FinishReplacement(later, former, hull, status));
          });
 }
 
 // hull: what takes the place of `former`, or of none, if the status allows.
-void Registry::FinishReplacement(Locked& locked, const HullPointer& former, const HullPointer& hull,
-                                 const absl::Status& status, const Reply<ReplaceResult>& done) {
-  absl::StatusOr<ReplaceResult> result = ErrorOrEmpty<ReplaceResult>(status);
-  const std::string id = hull->committed.record.hull_id;
-  if (former == nullptr) --creating_;
-  (former == nullptr ? hull : former)->ending = false;
-  if (status.ok()) {
-    if (former != nullptr) Forget(locked, former, Gone(id, "replaced"));
-    hull->state = RegisteredHull::State::kPresent;
-    hulls_[id] = hull;
-    vertex_count_ += hull->committed.record.vertex_count;
-    revision_ = hull->committed.record.revision;
-    Charge(locked, *hull);
-    Evict(locked);
-    result = ReplaceResult{revision_, hull->committed.record, former == nullptr};
-  } else if (former == nullptr) {
-    vertex_count_ += hull->committed.record.vertex_count;
-    Forget(locked, hull, status);
+absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const HullPointer& former,
+                                                          const HullPointer& hull,
+                                                          const absl::Status& status) {
+  const HullRecord& record = hull->committed.record;
+  if (former == nullptr) {
+    --creating_;
+    if (!status.ok()) Forget(locked, hull, status);
+  } else if (status.ok()) {
+    hull->state.Commit();
+    vertex_count_ -= former->committed.record.vertex_count;
+    Forget(locked, former, Gone(record.hull_id, "replaced"));
+    hulls_[record.hull_id] = hull;
   }
-  locked.Afterwards([done, result] { done(result); });
+  if (!status.ok()) return status;
+  vertex_count_ += record.vertex_count;
+  Publish(record.revision);
+  hull->NoteUse();
+  memory_.Evict(locked);
+  return ReplaceResult{revision_, record, former == nullptr};
+}
+
+// Submits a change that follows all changes of its hull submitted before; `hull` is in the state
+// that says so. finish: called after the step of the state, before what waits for the hull goes on.
+void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
+                      Committer::Completion finish) {
+  HULLD_CHECK(hull->state.in_flight() > 0);
+  const auto charge =
+      std::make_shared<MemoryCharge>(memory_, change.vertices.capacity() * sizeof(Vector));
+  committer_.Submit(
+      locked, std::move(change),
+      [this, hull, charge, finish = std::move(finish)](Locked& later, const absl::Status& status) {
+        charge->Set(0);
+        if (status.ok()) {
+          hull->state.Commit();
+        } else {
+          hull->state.Refuse();
+        }
+        finish(later, status);
+        // One that has come to rest may be dropped.
+        if (hull->state.quiet()) memory_.Evict(later);
+        Advance(later, hull);
+      });
+}
+
+// Lets whatever waits for the hull go on. Called after each step of its state.
+void Registry::Advance(Locked& locked, const HullPointer& hull) {
+  hull->released.notify_all();
+  while (hull->state.quiet() && !hull->exclusive.empty()) {
+    const auto next = std::move(hull->exclusive.front());
+    hull->exclusive.pop_front();
+    next(locked);
+  }
+  if (hull->chunks.empty()) return;
+  if (hull->state.gone() || hull->state.damaged()) {
+    // Replies come on other threads than the one that asks.
+    writers_.Submit([this, hull] { RefuseChunks(hull); });
+    return;
+  }
+  if (!hull->state.can_schedule() || !hull->exclusive.empty()) return;
+  const PendingChunk& next = hull->chunks.front();
+  const bool repeated = next.chunk.sequence <= hull->HeadSequence(next.session.writer_id);
+  // What such a chunk finds must be committed.
+  if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
+  hull->state.Schedule();
+  writers_.Submit([this, hull] { RunNextChunk(hull); });
+}
+
+void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
+  hull.state.Damage(damage);
+  ++cache_.damaged;
 }
 
 HullPage Registry::List(const std::string& prefix, const std::string& after,
@@ -319,12 +365,12 @@ HullPage Registry::List(const std::string& prefix, const std::string& after,
   auto next = after.empty() ? hulls_.lower_bound(prefix) : hulls_.upper_bound(after);
   for (; next != hulls_.end() && next->first.starts_with(prefix); ++next) {
     const RegisteredHull& hull = *next->second;
-    if (hull.state != RegisteredHull::State::kPresent) continue;
+    if (!hull.state.visible()) continue;
     if (page.hulls.size() == page_size) {
       page.more = true;
       break;
     }
-    page.hulls.push_back({hull.committed.record, !hull.damage.ok()});
+    page.hulls.push_back({hull.committed.record, hull.state.damaged()});
   }
   return page;
 }
@@ -335,15 +381,18 @@ RegistrySizes Registry::Sizes() const {
 }
 
 CacheStatistics Registry::Cache() const {
+  const MemoryStatistics memory = memory_.Statistics();
   const std::lock_guard lock(mutex_);
-  return cache_;
+  CacheStatistics cache = cache_;
+  cache.bytes = memory.bytes;
+  cache.limit_bytes = memory.limit_bytes;
+  cache.evictions = memory.evictions;
+  return cache;
 }
 
-CommitStatistics Registry::Commits() const {
-  const std::lock_guard lock(mutex_);
-  CommitStatistics commits = commits_;
-  commits.failing = store_failed_;
-  return commits;
+absl::Status Registry::CheckMemory() {
+  Locked locked(mutex_);
+  return memory_.Check(locked);
 }
 
 }  // namespace hulld::server

@@ -1,21 +1,45 @@
-// Sessions and their chunks: the first half of each change that an append makes.
+// Sessions and their chunks: how hulls grow.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
 #include <utility>
 
+#include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
+#include "server/registry/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
+
+struct Registry::OpenRequest {
+  std::string hull_id;
+  std::string writer_id;
+  bool create_if_absent = false;
+  bool created_hull = false;
+  std::function<void(const absl::Status&)> on_gone;
+  Reply<OpenResult> done;
+};
+
+// What the rules say of a chunk that they allow.
+enum class Registry::Verdict { kNew, kAlreadyApplied };
+
+// A chunk that is in the builder, and the change that makes it durable.
+struct Registry::BuiltChunk {
+  Change change;
+  PointCounts counts;
+};
+
 namespace {
 
 absl::Status GoneWhileStreaming(const HullRecord& record) {
-  return absl::FailedPreconditionError(absl::StrCat(
-      QuotedHull(record.hull_id),
-      " was deleted or replaced while points were streamed into it; open the stream again"));
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(record.hull_id),
+          " was deleted or replaced while points were streamed into it; open the stream again")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", record.hull_id}});
 }
 
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
@@ -46,6 +70,12 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
   return RevisionMismatch(record, *chunk.if_revision);
 }
 
+void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequence,
+                 absl::StatusOr<ChunkResult> result) {
+  if (!result.ok()) result = Prefixed(absl::StrCat("chunk ", sequence, ": "), result.status());
+  Answer(locked, done, std::move(result));
+}
+
 }  // namespace
 
 void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
@@ -60,70 +90,71 @@ void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
   });
 }
 
+// On a thread of `writers_`. May release the mutex to ask the store.
 void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request) {
-  const auto retry = [this, request](Locked&, const absl::Status& status) {
-    if (!status.ok()) return request->done(status);
-    writers_.Submit([this, request] {
-      Locked later(mutex_);
-      OpenLocked(later, request);
-    });
-  };
-  const auto refuse = [&locked, &request](const absl::Status& status) {
-    locked.Afterwards([request, status] { request->done(status); });
+  const auto refuse = [request](Locked& later, const absl::Status& status) {
+    Answer<OpenResult>(later, request->done, status);
   };
   const HullPointer hull = Find(request->hull_id);
   if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(HullNotFound(request->hull_id));
+    if (!request->create_if_absent) return refuse(locked, HullNotFound(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
-    return CreateNew(locked, request->hull_id,
-                     [this, request](Locked& later, const absl::Status& status) {
-                       if (!status.ok()) {
-                         return later.Afterwards([request, status] { request->done(status); });
-                       }
-                       request->created_hull = true;
-                       OpenSession(later, Find(request->hull_id), request, 0);
-                     });
+    return CreateNew(
+        locked, request->hull_id,
+        [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
+          if (!created.ok()) return refuse(later, created.status());
+          request->created_hull = true;
+          OpenSession(later, *created, request, 0);
+        });
   }
-  if (hull->ending) {
-    hull->exclusive.push_back([retry](Locked& later) { retry(later, absl::OkStatus()); });
+  if (hull->state.changing_life()) {
+    hull->exclusive.push_back([this, request](Locked&) {
+      writers_.Submit([this, request] {
+        Locked later(mutex_);
+        OpenLocked(later, request);
+      });
+    });
     return;
   }
-  if (!hull->damage.ok()) return refuse(hull->damage);
+  if (hull->state.damaged()) return refuse(locked, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
-  if (!last.ok()) return refuse(last.status());
-  if (hull->state == RegisteredHull::State::kGone) return OpenLocked(locked, request);
+  if (!last.ok()) return refuse(locked, last.status());
+  if (hull->state.gone()) return OpenLocked(locked, request);
   if (*last == 0 && hull->head.writer_count >= limits_.max_writers_per_hull) {
-    return refuse(TooManyWriters(hull->head, limits_.max_writers_per_hull));
+    return refuse(locked, TooManyWriters(hull->head, limits_.max_writers_per_hull));
   }
   OpenSession(locked, hull, request, *last);
 }
 
 void Registry::OpenSession(Locked& locked, const HullPointer& hull,
                            const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence) {
+  HULLD_CHECK(hull->state.visible());
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
   result.store_revision = revision_;
   result.hull = hull->committed.record;
   result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_};
-  locked.Afterwards([request, result] { request->done(result); });
+  Answer<OpenResult>(locked, request->done, std::move(result));
 }
 
-// May release the mutex to ask the store.
+// The last committed sequence of a writer. May release the mutex to ask the store.
 absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredHull& hull,
                                                      const std::string& writer_id) {
   auto writer = hull.writers.find(writer_id);
   if (writer != hull.writers.end()) return writer->second.committed;
   if (!store_.keeps_hulls() || hull.committed.writer_count == 0) return 0;
   const HullRecord record = hull.committed.record;
+  ++hull.sequence_readers;
   locked.Unlock();
   const absl::StatusOr<uint64_t> sequence = store_.LoadSequence(record, writer_id);
   locked.Lock();
+  --hull.sequence_readers;
   if (!sequence.ok()) return sequence.status();
-  // What others committed meanwhile is newer.
+  // What was committed meanwhile is newer, and still there.
   writer = hull.writers.find(writer_id);
   if (writer != hull.writers.end()) return writer->second.committed;
-  // Who has not written yet leaves nothing behind.
+  // A writer that has not written yet leaves nothing behind.
   if (*sequence > 0) {
     hull.writers.emplace(writer_id, RegisteredHull::Sequences{*sequence, *sequence});
   }
@@ -134,7 +165,8 @@ void Registry::CloseAppend(const AppendSession& session) {
   const std::lock_guard lock(mutex_);
   RegisteredHull& hull = *session.hull;
   hull.watches.erase(session.watch);
-  const bool unused = hull.watches.empty() && hull.quiet() && hull.chunks.empty();
+  const bool unused = hull.watches.empty() && hull.state.quiet() && hull.chunks.empty() &&
+                      hull.sequence_readers == 0;
   if (unused && store_.keeps_hulls()) hull.writers.clear();
 }
 
@@ -142,64 +174,118 @@ void Registry::Append(const AppendSession& session, Chunk chunk, std::function<b
                       std::function<void()> on_built, Reply<ChunkResult> done) {
   Locked locked(mutex_);
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
-  cache_.bytes += bytes;
   session.hull->chunks.push_back({session, std::move(chunk), std::move(should_stop),
-                                  std::move(on_built), std::move(done), bytes});
+                                  std::move(on_built), std::move(done),
+                                  MemoryCharge(memory_, bytes)});
   Advance(locked, session.hull);
 }
 
 void Registry::RunNextChunk(const HullPointer& hull) {
   Locked locked(mutex_);
+  HULLD_CHECK(hull->state.work() == HullState::Work::kScheduled && !hull->chunks.empty());
   PendingChunk pending = std::move(hull->chunks.front());
   hull->chunks.pop_front();
-  std::optional<ChunkResult> already;
-  PointCounts counts;
-  absl::StatusOr<Change> change = Build(locked, hull, pending, &already, &counts);
+  ApplyChunk(locked, hull, pending);
   pending.chunk.points = {};
-  cache_.bytes -= pending.charged_bytes;
-  if (pending.on_built) locked.Afterwards(pending.on_built);
-  if (change.ok()) {
-    SubmitChunk(hull, pending, *std::move(change), counts);
-  } else {
-    absl::StatusOr<ChunkResult> result = change.status();
-    if (already.has_value()) result = *already;
-    locked.Afterwards([done = pending.done, result] { done(result); });
-  }
-  hull->busy = false;
-  Charge(locked, *hull);
-  Evict(locked);
+  pending.charge.Set(0);
+  if (pending.on_built) locked.Afterwards(std::move(pending.on_built));
+  hull->state.EndWork();
+  hull->NoteUse();
+  memory_.Evict(locked);
   Advance(locked, hull);
 }
 
-// What is to be known before building; sets `already` when the chunk is committed.
-absl::Status Registry::CheckChunk(Locked& locked, RegisteredHull& hull, const PendingChunk& pending,
-                                  std::optional<ChunkResult>* already) {
-  if (hull.state == RegisteredHull::State::kGone) return GoneWhileStreaming(hull.committed.record);
-  if (!hull.damage.ok()) return hull.damage;
-  const Chunk& chunk = pending.chunk;
-  const absl::StatusOr<uint64_t> committed =
-      CommittedSequence(locked, hull, pending.session.writer_id);
-  if (!committed.ok()) return committed.status();
-  const auto writer = hull.writers.find(pending.session.writer_id);
-  const uint64_t last = writer == hull.writers.end() ? 0 : writer->second.head;
-  if (chunk.sequence <= *committed) {
-    const HullRecord& record = hull.committed.record;
-    *already = ChunkResult{revision_, true, record.revision, record.vertex_count, {}};
-    return absl::AlreadyExistsError("the chunk is committed");
+// Refuses the chunks of a hull that cannot grow any more.
+void Registry::RefuseChunks(const HullPointer& hull) {
+  Locked locked(mutex_);
+  HULLD_CHECK(hull->state.gone() || hull->state.damaged());
+  const absl::Status reason =
+      hull->state.gone() ? GoneWhileStreaming(hull->committed.record) : hull->state.damage();
+  for (PendingChunk& pending : std::exchange(hull->chunks, {})) {
+    AnswerChunk(locked, pending.done, pending.chunk.sequence, reason);
+    if (pending.on_built) locked.Afterwards(std::move(pending.on_built));
   }
+}
+
+// Answers a chunk, or submits the change that it makes, whose end answers it. Releases the mutex
+// meanwhile.
+void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
+  const uint64_t sequence = pending.chunk.sequence;
+  const absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
+  if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
+  if (*verdict == Verdict::kAlreadyApplied) {
+    const HullRecord& record = hull->committed.record;
+    return AnswerChunk(locked, pending.done, sequence,
+                       ChunkResult{revision_, true, record.revision, record.vertex_count, {}});
+  }
+  absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
+  if (!built.ok()) return AnswerChunk(locked, pending.done, sequence, built.status());
+  SubmitChunk(locked, hull, pending, *std::move(built));
+}
+
+// What the rules say before anything is built. May release the mutex to ask the store.
+absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, RegisteredHull& hull,
+                                                       const PendingChunk& pending) {
+  const Chunk& chunk = pending.chunk;
+  const std::string& writer_id = pending.session.writer_id;
+  const absl::StatusOr<uint64_t> committed = CommittedSequence(locked, hull, writer_id);
+  if (!committed.ok()) return committed.status();
+  if (chunk.sequence <= *committed) return Verdict::kAlreadyApplied;
+  const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("the expected sequence is ", last + 1,
-                     "; open the stream again and continue after its last_sequence"));
+    return WithReason(absl::FailedPreconditionError(absl::StrCat(
+                          "the expected sequence is ", last + 1,
+                          "; open the stream again and continue after its last_sequence")),
+                      v1::ERROR_REASON_SEQUENCE_GAP,
+                      {{"hull_id", hull.committed.record.hull_id},
+                       {"sequence", chunk.sequence},
+                       {"expected_sequence", last + 1}});
   }
   if (last == 0 && hull.head.writer_count >= limits_.max_writers_per_hull) {
     return TooManyWriters(hull.head, limits_.max_writers_per_hull);
   }
-  if (absl::Status s = CheckChunkRevision(pending.session, hull.head.record, chunk); !s.ok()) {
-    return s;
+  const HullRecord& record = hull.head.record;
+  if (absl::Status s = CheckChunkRevision(pending.session, record, chunk); !s.ok()) return s;
+  if (absl::Status s = CheckPointCount(record, chunk, limits_); !s.ok()) return s;
+  if (absl::Status s = memory_.Check(locked); !s.ok()) return s;
+  return Verdict::kNew;
+}
+
+// Adds a chunk to its hull's builder, without the mutex. On success `head` and the writer's
+// sequence include it.
+absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredHull& hull,
+                                                     PendingChunk& pending) {
+  hull.state.StartBuilding();
+  BuiltChunk built;
+  Change& change = built.change;
+  change.hull = hull.head;
+  change.former_layout = hull.head.layout;
+  std::unique_ptr<HullBuilder> builder = std::move(hull.builder);
+  const bool load = builder == nullptr;
+
+  locked.Unlock();
+  const absl::StatusOr<PointCounts> added = AddPoints(pending, change, builder);
+  pending.chunk.points = {};
+  const uint64_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
+  locked.Lock();
+
+  if (load && builder != nullptr) ++cache_.loads;
+  hull.builder = std::move(builder);
+  hull.builder_bytes = builder_bytes;
+  if (hull.state.work() == HullState::Work::kReverting) {
+    hull.DiscardBuilder(locked);
+    return absl::UnavailableError("a change before it could not be stored");
   }
-  if (absl::Status s = CheckPointCount(hull.head.record, pending.chunk, limits_); !s.ok()) return s;
-  return CheckMemoryLocked(locked);
+  if (!added.ok()) return WhyNotBuilt(hull, added.status());
+
+  built.counts = *added;
+  FillChange(hull, *added, change);
+  RegisteredHull::Sequences& sequences = hull.writers[pending.session.writer_id];
+  if (sequences.head == 0) ++change.hull.writer_count;
+  sequences.head = pending.chunk.sequence;
+  change.writer = WriterSequence{pending.session.writer_id, pending.chunk.sequence};
+  hull.head = change.hull;
+  return built;
 }
 
 // The points of a chunk go into its hull's builder, which is read from the store where there is
@@ -208,16 +294,17 @@ absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending, Change& c
                                                 std::unique_ptr<HullBuilder>& builder) {
   if (builder == nullptr) {
     absl::StatusOr<std::unique_ptr<HullBuilder>> loaded =
-        LoadBuilder(change.hull, pending.should_stop);
+        LoadBuilder(store_, change.hull, pending.should_stop);
     if (!loaded.ok()) return loaded.status();
     builder = *std::move(loaded);
   }
   if (pending.should_stop && pending.should_stop()) {
     return absl::CancelledError("the call was cancelled");
   }
-  absl::StatusOr<PointCounts> added =
-      builder->Add(pending.chunk.points,
-                   {static_cast<size_t>(limits_.max_vertices_per_hull), pending.should_stop});
+  AddLimits limits;
+  limits.max_vertices = static_cast<size_t>(limits_.max_vertices_per_hull);
+  limits.should_stop = pending.should_stop;
+  absl::StatusOr<PointCounts> added = builder->Add(pending.chunk.points, limits);
   if (added.ok() && added->outside > 0 && store_.keeps_hulls()) {
     const bool base = Store::WantsBase(change.hull.layout, added->outside);
     change.vertex_change = base ? VertexChange::kReplaced : VertexChange::kAdded;
@@ -228,10 +315,7 @@ absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending, Change& c
 
 // What a writer is told when AddPoints failed.
 absl::Status Registry::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
-  if (absl::IsDataLoss(cause)) {
-    hull.damage = cause;
-    ++cache_.damaged;
-  }
+  if (absl::IsDataLoss(cause)) MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
       absl::StrCat(QuotedHull(hull.head.record.hull_id), " would hold too many vertices"),
@@ -256,70 +340,48 @@ void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, 
   }
 }
 
-// Entered and left with the mutex held; requires that the hull is busy for the caller. On success
-// `head` and the writer's sequence include the change.
-absl::StatusOr<Change> Registry::Build(Locked& locked, const HullPointer& hull,
-                                       PendingChunk& pending, std::optional<ChunkResult>* already,
-                                       PointCounts* counts) {
-  const std::string name = absl::StrCat("chunk ", pending.chunk.sequence, ": ");
-  absl::Status allowed = CheckChunk(locked, *hull, pending, already);
-  if (!allowed.ok()) return Prefixed(name, allowed);
-  const uint64_t reverts = hull->reverts;
-  Change change;
-  change.hull = hull->head;
-  change.former_layout = hull->head.layout;
-  std::unique_ptr<HullBuilder> builder = std::move(hull->builder);
-  const bool load = builder == nullptr;
-
-  locked.Unlock();
-  const absl::StatusOr<PointCounts> added = AddPoints(pending, change, builder);
-  pending.chunk.points = {};
-  const size_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
-  locked.Lock();
-
-  if (load && builder != nullptr) ++cache_.loads;
-  if (hull->reverts != reverts) {
-    locked.Discard(std::move(builder));
-    hull->builder_bytes = 0;
-    return Prefixed(name, absl::UnavailableError("a change before it could not be stored"));
-  }
-  hull->builder = std::move(builder);
-  hull->builder_bytes = builder_bytes;
-  if (!added.ok()) return Prefixed(name, WhyNotBuilt(*hull, added.status()));
-
-  *counts = *added;
-  FillChange(*hull, *added, change);
-  RegisteredHull::Sequences& sequences = hull->writers[pending.session.writer_id];
-  if (sequences.head == 0) ++change.hull.writer_count;
-  sequences.head = pending.chunk.sequence;
-  change.writer = WriterSequence{pending.session.writer_id, pending.chunk.sequence};
-  hull->head = change.hull;
-  return change;
+void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
+                           BuiltChunk built) {
+  const auto finish = [this, hull, after = built.change.hull, counts = built.counts,
+                       done = pending.done, writer_id = pending.session.writer_id,
+                       sequence = pending.chunk.sequence](Locked& later,
+                                                          const absl::Status& status) {
+    if (!status.ok()) {
+      Revert(later, *hull);
+      return AnswerChunk(later, done, sequence, status);
+    }
+    CommitChunk(later, *hull, after, writer_id, sequence);
+    const HullRecord& record = after.record;
+    AnswerChunk(later, done, sequence,
+                ChunkResult{revision_, false, record.revision, record.vertex_count, counts});
+  };
+  hull->state.Submit();
+  Submit(locked, hull, std::move(built.change), finish);
 }
 
-void Registry::SubmitChunk(const HullPointer& hull, const PendingChunk& pending, Change change,
-                           const PointCounts& counts) {
-  const StoredHull after = change.hull;
-  const auto finish = [this, hull, after, counts, done = pending.done,
-                       writer_id = pending.session.writer_id, sequence = pending.chunk.sequence](
-                          Locked& locked, const absl::Status& status) {
-    absl::StatusOr<ChunkResult> result =
-        ErrorOrEmpty<ChunkResult>(Prefixed(absl::StrCat("chunk ", sequence, ": "), status));
-    if (status.ok()) {
-      const HullRecord& record = after.record;
-      if (record.revision != hull->committed.record.revision) {
-        revision_ = record.revision;
-        vertex_count_ += record.vertex_count - hull->committed.record.vertex_count;
-        locked.Discard(std::exchange(hull->snapshot, nullptr));
-      }
-      hull->committed = after;
-      hull->writers[writer_id].committed = sequence;
-      Charge(locked, *hull);
-      result = ChunkResult{revision_, false, record.revision, record.vertex_count, counts};
-    }
-    locked.Afterwards([done, result] { done(result); });
-  };
-  Submit(hull, std::move(change), finish);
+// after: the hull with this chunk.
+void Registry::CommitChunk(Locked& locked, RegisteredHull& hull, const StoredHull& after,
+                           const std::string& writer_id, uint64_t sequence) {
+  if (after.record.revision != hull.committed.record.revision) {
+    Publish(after.record.revision);
+    vertex_count_ += after.record.vertex_count - hull.committed.record.vertex_count;
+    locked.Discard(std::exchange(hull.served, nullptr));
+  }
+  hull.committed = after;
+  RegisteredHull::Sequences& sequences = hull.writers[writer_id];
+  HULLD_CHECK(sequence == sequences.committed + 1 && sequence <= sequences.head);
+  sequences.committed = sequence;
+  hull.NoteUse();
+}
+
+// A chunk in flight was refused, and with it all that follow: the hull returns to what is
+// committed. The first of them does it, the others find it done. A thread that is building on them
+// drops the builder itself, as its state says.
+void Registry::Revert(Locked& locked, RegisteredHull& hull) {
+  hull.head = hull.committed;
+  for (auto& [writer_id, sequences] : hull.writers) sequences.head = sequences.committed;
+  hull.DiscardBuilder(locked);
+  hull.NoteUse();
 }
 
 }  // namespace hulld::server

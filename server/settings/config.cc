@@ -63,6 +63,12 @@ class Parser {
     return arguments;
   }
 
+  // Lets Parse use its arguments alone. CLI11 would read the variables of all options that they
+  // leave unset.
+  void ForgetEnvironment() {
+    for (CLI::Option* option : app_.get_options()) option->envname("");
+  }
+
   // OK with print set for --help and --version; INVALID_ARGUMENT with the parser's words.
   absl::Status Parse(std::vector<std::string> arguments, CommandLine* result) {
     std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
@@ -112,8 +118,8 @@ class Parser {
     Add("listen", config_.listen,
         "Where to listen: host:port, [v6]:port or unix:path; port 0 picks a free port");
     app_.add_flag("--insecure", config_.insecure,
-                  "Allow --listen on addresses that other machines can reach without TLS: whoever "
-                  "is between can read and change what passes, tokens included")
+                  "Allow --listen on addresses that other machines can reach without TLS: anyone "
+                  "in between can read and change what passes, tokens included")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
@@ -150,7 +156,7 @@ class Parser {
         ->envname(EnvironmentName("metrics-insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
     Add("slow-request", slow_request_seconds_,
-        "Log requests that take longer than so many seconds; 0: none")
+        "Log requests that take longer than this many seconds; 0: none")
         ->check(CLI::Validator(CheckSeconds, ""));
   }
 
@@ -263,7 +269,9 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   // Each variable alone first, so that an error can say where the value came from.
   for (const std::string& variable : variables) {
     if (variable.starts_with("--config=")) continue;
-    const absl::Status status = Parser().Parse({variable}, &result);
+    Parser parser;
+    parser.ForgetEnvironment();
+    const absl::Status status = parser.Parse({variable}, &result);
     if (!status.ok()) {
       const std::string flag = variable.substr(2, variable.find('=') - 2);
       return WithAdvice(status, absl::StrCat(EnvironmentName(flag), ": ").c_str());

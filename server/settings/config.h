@@ -28,23 +28,23 @@ struct Limits {
   uint64_t max_vertices_per_hull = 1'000'000;
   uint64_t max_hulls = 100'000;
   uint64_t max_pairs_per_batch = 1'000'000;
-  // Of one batch, scene or stream; each takes about 500 bytes while it runs.
+  // Placements of one batch, scene or stream; each takes about 500 bytes while it runs.
   uint64_t max_placements = 200'000;
   uint64_t max_textbook_axes = 10'000'000;
   uint64_t max_writers_per_hull = 100'000;
-  // Bytes that builders and snapshots may hold, those of replacements under way too, and points
-  // that wait to be built or stored; beside messages of calls and the store's own buffers. 0: half
-  // of what the machine or the control group of the process has.
+  // Bytes that hulls in memory may hold, replacements under way too, points that wait to be built
+  // or stored, and the placements and pairs of streams; beside messages of calls and the store's
+  // own buffers. 0: half of what the machine or the control group of the process has.
   uint64_t memory_limit = 0;
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveSnapshot. A client is a token or,
+  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveBackup. A client is a token or,
   // without tokens, a peer address.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns.
   uint64_t max_concurrent_batches = 32;
-  // Of one request, or one message of a stream of StreamCollisions; zero: unlimited.
+  // The longest time of one request, or one message of StreamCollisions; zero: unlimited.
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
   std::chrono::milliseconds slow_request{1000};
@@ -61,7 +61,7 @@ struct Config {
   std::string tls_cert;
   std::string tls_key;
   std::string tls_client_ca;
-  // Who may call (server/access/token_table.h); empty: everyone who can connect.
+  // The tokens that may call (server/access/token_table.h); empty: everyone who can connect.
   std::string tokens_file;
   // Threads of parallel queries; 0: one per core.
   int threads = 0;
@@ -73,7 +73,7 @@ struct Config {
   // What an acknowledged change survives: "sync" (on disk) or "relaxed" (written; synced within
   // kRelaxedSyncInterval).
   std::string durability = "sync";
-  // Of a durable store; null: the operating system's. For tests.
+  // The file system of a durable store; null: the operating system's. For tests.
   rocksdb::Env* store_env = nullptr;
   // How long running calls may take after SIGTERM before they are cancelled.
   std::chrono::milliseconds drain_timeout{10'000};

@@ -14,8 +14,8 @@
 namespace hulld::server {
 
 // A file system that knows how much of RocksDB's write-ahead logs is committed, so that what a
-// failed write left at their end can be cut off: a change that was refused must not come to light
-// when the log is read again.
+// failed write left at their end can be cut off: a change that was refused must not appear when
+// the log is read again.
 //
 // It also hides how much room the disk has, on which RocksDB would resume by itself after an error
 // and write to a log that failed.
@@ -31,7 +31,8 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   // Syncs of files and directories that failed so far: RocksDB also refuses to write after one in
   // the background.
   uint64_t failed_syncs() const { return failed_syncs_.load(std::memory_order_relaxed); }
-  // Cuts off what is not. Requires that no database has the logs open.
+  // Cuts off what is not. Requires that no database has the logs open (unchecked: only RocksDB
+  // knows; RocksDbStore::Reopen, the one caller, has just closed it).
   rocksdb::IOStatus CutUncommitted();
 
   rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "server/contract/error_info.h"
 #include "server/process/random_id.h"
 #include "server/store/store.h"
 
@@ -27,8 +28,9 @@ class MemoryStore : public Store {
   absl::Status Commit(std::span<const Change* const>) override { return absl::OkStatus(); }
   absl::Status Recover() override { return absl::OkStatus(); }
   absl::StatusOr<std::string> MakeCopy() override {
-    return absl::FailedPreconditionError(
-        "the store is memory (--store=memory), of which no snapshot can be saved");
+    return WithReason(absl::FailedPreconditionError(
+                          "the store is memory (--store=memory), of which no backup can be saved"),
+                      v1::ERROR_REASON_STORE_IN_MEMORY);
   }
 
  private:

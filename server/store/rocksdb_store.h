@@ -9,12 +9,15 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -94,8 +97,9 @@ class RocksDbStore : public Store {
   absl::Status BeginRun();
   absl::Status EndRelaxedRun();
   absl::Status WriteMeta(rocksdb::WriteBatch* batch);
-  absl::StatusOr<std::string> Read(const std::string& key);
-  absl::StatusOr<uint64_t> ReadNumber(const std::string& key);
+  // The value of a key, without its checksum; nullopt: there is none. DATA_LOSS, UNAVAILABLE.
+  absl::StatusOr<std::optional<std::string>> Read(const std::string& key);
+  absl::StatusOr<std::optional<uint64_t>> ReadNumber(const std::string& key);
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
@@ -115,11 +119,11 @@ class RocksDbStore : public Store {
   // Whether kRelaxedKey is there, and ours to remove.
   bool relaxed_run_ = false;
 
-  // Held shared by whoever uses db_, alone by Reopen.
+  // Shared while db_ is used, exclusive in Reopen.
   mutable std::shared_mutex db_mutex_;
   std::unique_ptr<rocksdb::DB> db_;
 
-  // Held by whoever writes the log or syncs it.
+  // Held while the log is written or synced.
   std::mutex log_mutex_;
   // Once writing the log failed it must not be touched again: only reading goes on, until Recover
   // opens the database anew.

@@ -48,7 +48,7 @@ struct Change {
   VertexLayout former_layout;
   VertexChange vertex_change = VertexChange::kNone;
   std::vector<Vector> vertices;
-  // Of a chunk: who wrote it.
+  // Who wrote the chunk, if the change is one.
   std::optional<WriterSequence> writer;
   // The incarnation that this one takes the place of, if there is one.
   std::optional<StoredHull> replaced;
@@ -67,7 +67,7 @@ struct StoreFailures {
   uint64_t read = 0;
 };
 
-// Where changes are kept, beside the registry that serves them. Reading is for any thread.
+// Where changes are kept, beside the registry that serves them. Any thread may read.
 class Store {
  public:
   virtual ~Store() = default;
@@ -100,7 +100,7 @@ class Store {
   virtual StoreFailures failures() const { return {}; }
 
   // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
-  // directory: whoever asked removes that. FAILED_PRECONDITION: nothing is kept.
+  // directory, which the caller removes. FAILED_PRECONDITION: nothing is kept.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
 
   // Whether the next change is to bring a new base instead of a delta of `new_vertices`: once the

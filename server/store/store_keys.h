@@ -25,7 +25,7 @@ namespace hulld::server {
 //   d<incarnation><revision>             vertices of a delta
 //
 // An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that a
-// value that was damaged, or that belongs to another key, is found out where it is used.
+// value that was damaged, or that belongs to another key, is recognized where it is used.
 
 inline constexpr uint64_t kStoreFormat = 1;
 inline constexpr char kFormatKey[] = "m/format";

@@ -5,37 +5,37 @@
 #include <limits>
 #include <string>
 
+#include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
 namespace {
 
-// What an element of a repeated message field takes beside its own bytes: a tag and its length.
+// Bytes of an element of a repeated message field beside its own: a tag and a length.
 constexpr size_t kElementOverhead = 5;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kWitnessNumbers = 6;
 
-template <typename Columns>
-size_t AddProblem(const absl::Status& status, uint64_t pair, Columns* columns) {
+// Why the last row has no answer.
+size_t AddProblem(const absl::Status& status, v1::AnswerColumns* columns) {
   v1::PairProblem* const problem = columns->add_pair_problems();
-  problem->set_pair(pair);
+  problem->set_row(static_cast<uint64_t>(columns->relations_size()) - 1);
   problem->set_code(ToGrpc(status.code()));
   problem->set_message(std::string(status.message()));
+  problem->set_reason(ReasonOf(status));
   return problem->ByteSizeLong() + kElementOverhead;
 }
 
-template <typename Columns>
-void AddWitness(const Witness& witness, Columns* columns) {
+void AddWitness(const Witness& witness, v1::AnswerColumns* columns) {
   for (const Vector& point : {witness.p_WA, witness.p_WB}) {
     for (int i = 0; i < 3; ++i) columns->add_witness_xyz(point[i]);
   }
   columns->add_witness_errors(witness.error);
 }
 
-// The columns of fixed size.
-template <typename Columns>
-size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, Columns* columns) {
+// Fills the columns of fixed size.
+size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   size_t bytes = 0;
   if (wanted.separation()) {
     const bool known = answer != nullptr && answer->separation.has_value();
@@ -56,20 +56,19 @@ size_t AddNumbers(const Answer* answer, const v1::Wanted& wanted, Columns* colum
   return bytes;
 }
 
-// EncodeAxis, but a feature that is too large leaves the pair without answer.
-template <typename Columns>
-size_t AddAxis(const SeparatingAxis& found, const Hull& a, const Hull& b, uint64_t pair,
-               Columns* columns) {
+// As EncodeAxis, but a feature that is too large leaves the pair without an answer.
+size_t AddAxis(const SeparatingAxis& found, const Hull& a, const Hull& b,
+               v1::AnswerColumns* columns) {
   v1::Axis* const axis = columns->mutable_axes(columns->axes_size() - 1);
   const absl::Status encoded = EncodeAxis(found, a, b, axis);
   if (encoded.ok()) return axis->ByteSizeLong();
   axis->Clear();
   columns->set_relations(columns->relations_size() - 1, v1::RELATION_UNSPECIFIED);
-  return AddProblem(encoded, pair, columns);
+  return AddProblem(encoded, columns);
 }
 
-template <typename Columns>
-size_t AddRow(v1::Relation relation, v1::Rung rung, const v1::Wanted& wanted, Columns* columns) {
+size_t AddRow(v1::Relation relation, v1::Rung rung, const v1::Wanted& wanted,
+              v1::AnswerColumns* columns) {
   columns->add_relations(relation);
   columns->add_rungs(rung);
   if (wanted.axis()) columns->add_axes();
@@ -81,18 +80,16 @@ size_t AddRow(v1::Relation relation, v1::Rung rung, const v1::Wanted& wanted, Co
 
 }  // namespace
 
-template <typename Columns>
-size_t AddUnanswered(const v1::Wanted& wanted, Columns* columns) {
+size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   const size_t bytes = AddRow(v1::RELATION_UNSPECIFIED, v1::RUNG_UNSPECIFIED, wanted, columns);
   return bytes + AddNumbers(nullptr, wanted, columns);
 }
 
-template <typename Columns>
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b,
-                 const v1::Wanted& wanted, uint64_t pair, Columns* columns) {
+                 const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   if (!answer.ok()) {
     const size_t bytes = AddUnanswered(wanted, columns);
-    return bytes + AddProblem(answer.status(), pair, columns);
+    return bytes + AddProblem(answer.status(), columns);
   }
   size_t bytes =
       AddRow(EncodeRelation(answer->relation), EncodeRung(answer->rung), wanted, columns);
@@ -109,17 +106,9 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull
     bytes += certificate->ByteSizeLong();
   }
   if (wanted.axis() && answer->axis.has_value()) {
-    bytes += AddAxis(*answer->axis, a, b, pair, columns);
+    bytes += AddAxis(*answer->axis, a, b, columns);
   }
   return bytes;
 }
-
-#define HULLD_ANSWER_COLUMNS(Columns)                                                         \
-  template size_t AddAnswer<Columns>(const absl::StatusOr<Answer>&, const Hull&, const Hull&, \
-                                     const v1::Wanted&, uint64_t, Columns*);                  \
-  template size_t AddUnanswered<Columns>(const v1::Wanted&, Columns*);
-HULLD_ANSWER_COLUMNS(v1::AnswerColumns)
-HULLD_ANSWER_COLUMNS(v1::BatchCheckCollisionsResponse)
-#undef HULLD_ANSWER_COLUMNS
 
 }  // namespace hulld::server

@@ -4,7 +4,6 @@
 #include <absl/status/statusor.h>
 
 #include <cstddef>
-#include <cstdint>
 
 #include "core/hull/hull.h"
 #include "core/query/collision.h"
@@ -12,18 +11,15 @@
 
 namespace hulld::server {
 
-// Answers as columns. Columns: v1::AnswerColumns, or v1::BatchCheckCollisionsResponse, whose fields
-// are named alike. Both functions add one entry to each column that is wanted and return the bytes
-// that it adds to the message, estimated from above, framing counted.
+// Both functions add one row: an entry to each column that is wanted. They return the bytes that
+// the row adds to the message, estimated from above, framing counted.
 
-// The answer of hulls a and b, or why there is none. pair: how a problem names it.
-template <typename Columns>
+// The answer for hulls a and b, or why there is none.
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b,
-                 const v1::Wanted& wanted, uint64_t pair, Columns* columns);
+                 const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
-// No answer, for a reason that stands elsewhere.
-template <typename Columns>
-size_t AddUnanswered(const v1::Wanted& wanted, Columns* columns);
+// No answer; the reply gives the cause elsewhere, with the placement.
+size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
 }  // namespace hulld::server
 

@@ -6,6 +6,7 @@
 #include "server/wire/answer_columns.h"
 
 namespace hulld::server {
+
 BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                            uint64_t first_pair)
     : wanted_(wanted), next_pair_(first_pair), bytes_(head.ByteSizeLong()) {
@@ -13,21 +14,21 @@ BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Want
   messages_.push_back(std::move(head));
 }
 
-v1::BatchCheckCollisionsResponse* BatchColumns::MessageForNext() {
+v1::AnswerColumns* BatchColumns::ColumnsForNext() {
   if (bytes_ >= Config::kReplyMessageBytes) {
     messages_.emplace_back().set_first_pair(next_pair_);
     bytes_ = 0;
   }
-  return &messages_.back();
+  return messages_.back().mutable_columns();
 }
 
 void BatchColumns::AddUnanswered() {
-  bytes_ += server::AddUnanswered(wanted_, MessageForNext());
+  bytes_ += server::AddUnanswered(wanted_, ColumnsForNext());
   ++next_pair_;
 }
 
 void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b) {
-  bytes_ += AddAnswer(answer, a, b, wanted_, next_pair_, MessageForNext());
+  bytes_ += AddAnswer(answer, a, b, wanted_, ColumnsForNext());
   ++next_pair_;
 }
 

@@ -20,21 +20,21 @@ class BatchColumns {
   BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                uint64_t first_pair);
 
-  // The answer of the next pair, of hulls a and b, or why there is none.
+  // The answer for the next pair, of hulls a and b, or why there is none.
   void Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b);
-  // The next pair has no answer, for a reason that stands elsewhere.
+  // The next pair has no answer; its placements give the cause.
   void AddUnanswered();
 
   std::vector<v1::BatchCheckCollisionsResponse> Take();
 
  private:
-  // The message that takes the next row.
-  v1::BatchCheckCollisionsResponse* MessageForNext();
+  // The columns of the message that takes the next row.
+  v1::AnswerColumns* ColumnsForNext();
 
   const v1::Wanted wanted_;
   uint64_t next_pair_;
   std::vector<v1::BatchCheckCollisionsResponse> messages_;
-  // Of the last message, estimated.
+  // Size of the last message, estimated.
   size_t bytes_;
 };
 

@@ -31,12 +31,12 @@ absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_p
 // A pose; absent parts mean identity. INVALID_ARGUMENT names the coordinate, as in "rotation.w".
 absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
 
-// Of poses in a row: seven numbers each, quaternion w x y z and translation x y z.
+// Poses in a row have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;
-// The i-th of them. INVALID_ARGUMENT as DecodePose.
+// The i-th of such poses. INVALID_ARGUMENT as DecodePose.
 absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i);
 
-// INVALID_ARGUMENT: a number that stands for no method.
+// INVALID_ARGUMENT: a number that means no method.
 absl::StatusOr<Method> DecodeMethod(v1::Method method);
 
 }  // namespace hulld::server

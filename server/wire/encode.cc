@@ -4,6 +4,7 @@
 
 #include <variant>
 
+#include "server/contract/error_info.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -11,9 +12,11 @@ namespace {
 
 absl::Status EncodeFeature(const Feature& feature, const Hull& hull, v1::Feature* message) {
   if (feature.vertices.size() > Config::kMaxFeatureVertices) {
-    return absl::ResourceExhaustedError(absl::StrCat(
-        "the axis touches a feature of ", feature.vertices.size(), " vertices; a reply holds ",
-        Config::kMaxFeatureVertices, " at most; ask again without the axis"));
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(
+            "the axis touches a feature of ", feature.vertices.size(), " vertices; a reply holds ",
+            Config::kMaxFeatureVertices, " at most; ask again without the axis")),
+        v1::ERROR_REASON_FEATURE_TOO_LARGE, {{"limit", uint64_t{Config::kMaxFeatureVertices}}});
   }
   for (const uint32_t index : feature.vertices) {
     message->add_vertex_indices(index);
@@ -76,10 +79,12 @@ void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
   EncodeCounts(record.counts, message->mutable_counts());
 }
 
-void EncodeVersion(const HullRecord& record, v1::HullVersion* message) {
+void EncodeVersion(const std::string& store_id, const HullRecord& record,
+                   v1::HullVersion* message) {
   message->set_hull_id(record.hull_id);
   message->set_create_revision(record.create_revision);
   message->set_revision(record.revision);
+  message->set_store_id(store_id);
 }
 
 void EncodeDuration(std::chrono::nanoseconds duration, google::protobuf::Duration* message) {

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "hulld/rpc/error_details.pb.h"
+
 namespace hulld {
 namespace {
 
@@ -22,10 +24,26 @@ void FillInfo(const std::string& hull_id, const FakeHull& hull, v1::HullInfo* in
 }
 
 grpc::Status NoSuchHull(const std::string& hull_id) {
-  return {grpc::StatusCode::NOT_FOUND, "hull \"" + hull_id + "\" not found"};
+  return HulldError(grpc::StatusCode::NOT_FOUND, "hull \"" + hull_id + "\" not found",
+                    v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", hull_id}});
 }
 
 }  // namespace
+
+grpc::Status HulldError(grpc::StatusCode code, const std::string& message, v1::ErrorReason reason,
+                        const std::map<std::string, std::string>& metadata) {
+  rpc::ErrorInfo info;
+  info.set_reason(v1::ErrorReason_Name(reason).substr(std::string("ERROR_REASON_").size()));
+  info.set_domain("hulld");
+  info.mutable_metadata()->insert(metadata.begin(), metadata.end());
+  rpc::Status status;
+  status.set_code(code);
+  status.set_message(message);
+  google::protobuf::Any* const detail = status.add_details();
+  detail->set_type_url("type.googleapis.com/google.rpc.ErrorInfo");
+  detail->set_value(info.SerializeAsString());
+  return {code, message, status.SerializeAsString()};
+}
 
 class FakeHulld::Hulls final : public v1::HullService::Service {
  public:
@@ -195,7 +213,9 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
               "sequence " + std::to_string(chunk.sequence()) + ": points[0].x is NaN"};
     }
     if (chunk.sequence() > last + 1) {
-      return {grpc::StatusCode::FAILED_PRECONDITION, "a gap; expected " + std::to_string(last + 1)};
+      return HulldError(grpc::StatusCode::FAILED_PRECONDITION, "a chunk is missing",
+                        v1::ERROR_REASON_SEQUENCE_GAP,
+                        {{"expected_sequence", std::to_string(last + 1)}});
     }
     v1::AppendAck& ack = *response->mutable_ack();
     ack.set_sequence(chunk.sequence());
@@ -258,12 +278,13 @@ class FakeHulld::Collisions final : public v1::CollisionService::Service {
     // As where the table of hulls is long: the answers begin in another message.
     writer->Write(response);
     response.Clear();
+    v1::AnswerColumns& columns = *response.mutable_columns();
     for (int i = 0; i < request->pairs_size(); i += 2) {
       const bool failed = bad[request->pairs(i)] || bad[request->pairs(i + 1)];
-      response.add_relations(failed ? v1::RELATION_UNSPECIFIED : v1::RELATION_TOUCHING);
-      response.add_rungs(v1::RUNG_EXACT);
-      if (request->wanted().axis()) response.add_axes()->set_kind(v1::AXIS_KIND_EDGE_EDGE);
-      if (request->wanted().analysis()) response.add_analyses()->set_axes_tested(7);
+      columns.add_relations(failed ? v1::RELATION_UNSPECIFIED : v1::RELATION_TOUCHING);
+      columns.add_rungs(v1::RUNG_EXACT);
+      if (request->wanted().axis()) columns.add_axes()->set_kind(v1::AXIS_KIND_EDGE_EDGE);
+      if (request->wanted().analysis()) columns.add_analyses()->set_axes_tested(7);
     }
     writer->Write(response);
     return grpc::Status::OK;

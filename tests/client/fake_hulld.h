@@ -15,10 +15,15 @@
 #include <vector>
 
 #include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/error.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
 
 namespace hulld {
+
+// An error as hulld gives it: with a reason and metadata in its details.
+grpc::Status HulldError(grpc::StatusCode code, const std::string& message, v1::ErrorReason reason,
+                        const std::map<std::string, std::string>& metadata = {});
 
 // What the fake server holds of a hull: every point, as if each were a vertex.
 struct FakeHull {

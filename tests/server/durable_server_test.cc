@@ -1,4 +1,4 @@
-// A server on a durable store, over the contract: restarts, replacement, snapshots, the doctor.
+// A server on a durable store, over the contract: restarts, replacement, backups, the doctor.
 
 #include <gmock/gmock.h>
 #include <prometheus/text_serializer.h>
@@ -9,8 +9,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "client/backup_file.h"
 #include "client/client.h"
-#include "client/snapshot_file.h"
 #include "server/admin/doctor.h"
 #include "tests/server/harness/faulty_file_system.h"
 #include "tests/server/harness/test_server.h"
@@ -52,11 +52,11 @@ class DurableServer : public ServerTest {
     });
   }
 
-  void SaveSnapshot(const std::string& file) {
-    SnapshotWriter writer(file);
+  void SaveBackup(const std::string& file) {
+    BackupWriter writer(file);
     ASSERT_TRUE(writer.Open().ok());
-    const absl::Status saved = MakeClient().SaveSnapshot(
-        [&](const v1::SaveSnapshotResponse& part) { return writer.Write(part); });
+    const absl::Status saved = MakeClient().SaveBackup(
+        [&](const v1::SaveBackupResponse& part) { return writer.Write(part); });
     ASSERT_TRUE(saved.ok()) << saved;
     ASSERT_TRUE(writer.Finish().ok());
   }
@@ -192,12 +192,12 @@ TEST_F(DurableServer, ReplacingAndSavingHaveADeadlineOnlyWhereOneIsGiven) {
   v1::ReplaceOpen open;
   open.set_hull_id("h");
   const auto feed = [](const Client::PointSink&) { return absl::OkStatus(); };
-  const auto receive = [](const v1::SaveSnapshotResponse&) { return absl::OkStatus(); };
+  const auto receive = [](const v1::SaveBackupResponse&) { return absl::OkStatus(); };
   EXPECT_TRUE(absl::IsDeadlineExceeded(client.GetStatus().status()));
   EXPECT_TRUE(absl::IsDeadlineExceeded(client.ReplaceHull(open, feed, kPassed).status()));
-  EXPECT_TRUE(absl::IsDeadlineExceeded(client.SaveSnapshot(receive, kPassed)));
+  EXPECT_TRUE(absl::IsDeadlineExceeded(client.SaveBackup(receive, kPassed)));
   EXPECT_TRUE(client.ReplaceHull(open, feed).ok());
-  EXPECT_TRUE(client.SaveSnapshot(receive).ok());
+  EXPECT_TRUE(client.SaveBackup(receive).ok());
 }
 
 TEST_F(DurableServer, ReplacingEndsTheStreamsThatAppend) {
@@ -214,16 +214,16 @@ TEST_F(DurableServer, ReplacingEndsTheStreamsThatAppend) {
   EXPECT_EQ(again.opened().last_sequence(), 0);
 }
 
-TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
+TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
   Put("sphere", Sphere(300));
   const v1::GetHullResponse before = Get("sphere");
-  const std::string file = directory_ + "/snapshot";
-  SaveSnapshot(file);
-  // The server goes on, and what comes later is not in the snapshot.
+  const std::string file = directory_ + "/backup";
+  SaveBackup(file);
+  // The server goes on, and what comes later is not in the backup.
   ASSERT_TRUE(Delete("sphere").ok());
-  const auto restored = RestoreSnapshot(file, directory_ + "/restored");
+  const auto restored = RestoreBackup(file, directory_ + "/restored");
   ASSERT_TRUE(restored.ok()) << restored.status();
-  EXPECT_EQ(RestoreSnapshot(file, directory_ + "/restored").status().code(),
+  EXPECT_EQ(RestoreBackup(file, directory_ + "/restored").status().code(),
             absl::StatusCode::kFailedPrecondition);
   Restart(DurableConfig("restored"));
   const v1::GetHullResponse after = Get("sphere");
@@ -235,10 +235,10 @@ TEST_F(DurableServer, ASnapshotIsAStoreOfItsOwn) {
   EXPECT_EQ(Get("sphere").header().store_id(), after.header().store_id());
 }
 
-TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
+TEST_F(DurableServer, ADamagedOrCutBackupIsRefused) {
   Put("sphere", Sphere(300));
-  const std::string file = directory_ + "/snapshot";
-  SaveSnapshot(file);
+  const std::string file = directory_ + "/backup";
+  SaveBackup(file);
   const auto size = std::filesystem::file_size(file);
   const std::string copy = directory_ + "/copy";
   for (const uintmax_t at : {uintmax_t{20}, size / 3, size / 2, size - 3}) {
@@ -249,18 +249,18 @@ TEST_F(DurableServer, ADamagedOrCutSnapshotIsRefused) {
     bytes.seekp(static_cast<std::streamoff>(at));
     bytes.put(flipped);
     bytes.close();
-    EXPECT_FALSE(RestoreSnapshot(copy, directory_ + "/restored").ok()) << at;
+    EXPECT_FALSE(RestoreBackup(copy, directory_ + "/restored").ok()) << at;
     std::filesystem::resize_file(copy, at);
-    EXPECT_FALSE(RestoreSnapshot(copy, directory_ + "/restored").ok()) << at;
+    EXPECT_FALSE(RestoreBackup(copy, directory_ + "/restored").ok()) << at;
     EXPECT_FALSE(std::filesystem::exists(directory_ + "/restored"));
   }
 }
 
-TEST_F(DurableServer, ASnapshotIsRestoredWithinADirectoryThatIsThere) {
+TEST_F(DurableServer, ABackupIsRestoredWithinADirectoryThatIsThere) {
   Put("sphere", Sphere(300));
   const v1::GetHullResponse before = Get("sphere");
-  const std::string file = directory_ + "/snapshot";
-  SaveSnapshot(file);
+  const std::string file = directory_ + "/backup";
+  SaveBackup(file);
   // A mount point cannot be replaced, and nothing can be made beside it by who owns no more than
   // itself.
   const std::string target = directory_ + "/mounted";
@@ -277,7 +277,7 @@ TEST_F(DurableServer, ASnapshotIsRestoredWithinADirectoryThatIsThere) {
     return status.st_ino;
   };
   const ino_t inode_before = inode();
-  const auto restored = RestoreSnapshot(file, target);
+  const auto restored = RestoreBackup(file, target);
   ASSERT_TRUE(restored.ok()) << restored.status();
   EXPECT_EQ(inode(), inode_before);
   EXPECT_TRUE(std::filesystem::exists(target + ".restoring/mine"));
@@ -289,12 +289,12 @@ TEST_F(DurableServer, ASnapshotIsRestoredWithinADirectoryThatIsThere) {
 
 TEST_F(DurableServer, ARestoringThatFailsLeavesTheDirectoryEmpty) {
   Put("sphere", Sphere(300));
-  const std::string file = directory_ + "/snapshot";
-  SaveSnapshot(file);
+  const std::string file = directory_ + "/backup";
+  SaveBackup(file);
   std::filesystem::resize_file(file, std::filesystem::file_size(file) - 3);
   const std::string target = directory_ + "/mounted";
   std::filesystem::create_directory(target);
-  EXPECT_FALSE(RestoreSnapshot(file, target).ok());
+  EXPECT_FALSE(RestoreBackup(file, target).ok());
   EXPECT_TRUE(std::filesystem::is_empty(target));
 }
 
@@ -308,11 +308,11 @@ TEST_F(DurableServer, TheDoctorLooksAtAStoreThatNobodyHasOpen) {
   EXPECT_EQ(RunDoctor({}), 2);
 }
 
-TEST_F(ServerTest, AStoreInMemoryHasNoSnapshot) {
+TEST_F(ServerTest, AStoreInMemoryHasNoBackup) {
   grpc::ClientContext context;
   const auto stub = v1::MaintenanceService::NewStub(channel_);
-  const auto reader = stub->SaveSnapshot(&context, v1::SaveSnapshotRequest());
-  v1::SaveSnapshotResponse part;
+  const auto reader = stub->SaveBackup(&context, v1::SaveBackupRequest());
+  v1::SaveBackupResponse part;
   EXPECT_FALSE(reader->Read(&part));
   const grpc::Status status = reader->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);

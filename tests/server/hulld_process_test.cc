@@ -7,8 +7,14 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
 #include <string>
+#include <vector>
 
+#include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
 
@@ -39,6 +45,44 @@ TEST_P(HulldProcess, ServesOnTheLoggedAddressAndEndsCleanlyOnASignal) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, HulldProcess, ::testing::Values(SIGTERM, SIGINT));
+
+// The fields of a line of /proc/PID/stat after the name, which may hold anything.
+std::vector<std::string> StatFields(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::string text;
+  std::getline(file, text);
+  std::istringstream rest(text.substr(text.rfind(')') + 1));
+  return {std::istream_iterator<std::string>(rest), {}};
+}
+
+// A thread of lower priority gets next to nothing beside another busy program, and all that wait
+// for it with it.
+TEST(HulldProgram, EveryThreadHasThePriorityOfTheProcess) {
+  constexpr size_t kNice = 16;
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0"});
+  const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
+  const auto stub = v1::CollisionService::NewStub(
+      grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+  // After a batch, as threads may be started when they are needed.
+  grpc::ClientContext context;
+  v1::BatchCheckCollisionsRequest request;
+  request.add_placements()->set_hull_id("none");
+  for (int i = 0; i < 20'000; ++i) request.add_pairs(0);
+  const auto answers = stub->BatchCheckCollisions(&context, request);
+  v1::BatchCheckCollisionsResponse part;
+  while (answers->Read(&part)) {
+  }
+  ASSERT_TRUE(answers->Finish().ok());
+  const std::filesystem::path process = "/proc/" + std::to_string(hulld.pid());
+  size_t threads = 0;
+  for (const auto& thread : std::filesystem::directory_iterator(process / "task")) {
+    const std::vector<std::string> fields = StatFields(thread.path() / "stat");
+    ASSERT_GT(fields.size(), kNice);
+    EXPECT_EQ(fields[kNice], StatFields("/proc/self/stat").at(kNice)) << thread.path();
+    ++threads;
+  }
+  EXPECT_GT(threads, 4u);
+}
 
 TEST(HulldProgram, ATakenPortAndAWrongFlagEndItWithAnError) {
   Process first({"--store", "memory", "--listen", "127.0.0.1:0"});

@@ -118,7 +118,7 @@ class BatchParser {
   BatchScene scene_;
   std::unordered_map<std::string, uint32_t> index_;
   std::vector<NamedPair> pairs_;
-  // Of `all`; 0 when there is none.
+  // The line of `all`; 0 when there is none.
   uint64_t all_line_ = 0;
 };
 

@@ -3,14 +3,13 @@
 
 #include <absl/status/status.h>
 
-#include <CLI/App.hpp>
-
+#include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
 
 namespace hulld {
 
 // Declares --tls and what goes with it, and --token-file; they fill invocation->security.
-void AddConnectionOptions(CLI::App* app, Invocation* invocation);
+void AddConnectionOptions(Command command, Invocation* invocation);
 
 // After parsing: takes the token of the environment when no file gives one. INVALID_ARGUMENT: the
 // options do not go together.

@@ -12,7 +12,7 @@ enum class ExitCode {
   kUsage = 2,
   // No answer: the server is not there, is draining, or did not answer in time.
   kUnreachable = 3,
-  // Of many items, some have no answer; the others have.
+  // Some of many items have no answer; the others have.
   kSomeFailed = 4,
   // A certificate does not prove its answer.
   kInvalidCertificate = 5,

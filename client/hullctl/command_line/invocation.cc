@@ -8,19 +8,6 @@
 namespace hulld {
 namespace {
 
-bool Contains(const std::string& text, const char* part) {
-  return text.find(part) != std::string::npos;
-}
-
-// gRPC uses one code for "nobody there" and for a server that says so itself.
-bool IsConnectionFailure(const std::string& message) {
-  for (const char* part :
-       {"connect", "Connect", "resolution", "resolve", "Socket closed", "reset"}) {
-    if (Contains(message, part)) return true;
-  }
-  return false;
-}
-
 std::string WithHint(const std::string& message, const std::string& hint) {
   return absl::StrCat(message, " (", hint, ")");
 }
@@ -38,9 +25,12 @@ std::string ExplainConnectionFailure(const std::string& message, const std::stri
 std::string Explain(const absl::Status& status, const std::string& server,
                     std::chrono::milliseconds timeout, const ConnectionSecurity& security) {
   const std::string message(status.message().data(), status.message().size());
+  // Errors without a reason are gRPC's own.
+  const v1::ErrorReason reason = ReasonOf(status);
+  const bool is_hulld = reason != v1::ERROR_REASON_UNSPECIFIED;
   switch (status.code()) {
     case absl::StatusCode::kUnavailable:
-      if (IsConnectionFailure(message)) return ExplainConnectionFailure(message, server, security);
+      if (!is_hulld) return ExplainConnectionFailure(message, server, security);
       return absl::StrCat("hulld at ", server, " is not available: ", message, "; try again later");
     case absl::StatusCode::kDeadlineExceeded:
       return absl::StrCat("no answer from hulld at ", server, " within ", timeout.count(),
@@ -65,11 +55,12 @@ std::string Explain(const absl::Status& status, const std::string& server,
                           id.empty() ? "" : " for request ", id);
     }
     case absl::StatusCode::kResourceExhausted:
-      // gRPC refuses these before the server can name its limit.
-      if (Contains(message, "Received message larger than max")) {
-        return WithHint(message, "the server's --max-message-bytes; send less at once");
-      }
-      return message;
+      // gRPC refuses messages that are too large before the server can name its limit.
+      if (is_hulld) return message;
+      return WithHint(message, "the server's --max-message-bytes; send less at once");
+    case absl::StatusCode::kFailedPrecondition:
+      if (reason != v1::ERROR_REASON_SEQUENCE_GAP) return message;
+      return WithHint(message, "does another program append under the same --writer?");
     default:
       return message;
   }

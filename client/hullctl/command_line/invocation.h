@@ -25,7 +25,7 @@ struct Invocation {
 
   std::string server = kDefaultServer;
   std::chrono::milliseconds timeout{30000};
-  // What --timeout said, if anything: a bound of what takes as long as the data is large.
+  // The value of --timeout, if given. It bounds calls that take time in proportion to the data.
   std::optional<std::chrono::milliseconds> given_timeout;
   bool json = false;
   ConnectionSecurity security;
@@ -35,11 +35,11 @@ struct Invocation {
 
   Client MakeClient() const;
 
-  // Says what failed and what to do about it; returns the exit code that fits the status of a call.
+  // Says what failed and what to do about it; returns the exit code for the status of a call.
   ExitCode Fail(const absl::Status& status) const;
   // The same for input and output files and arguments.
   ExitCode FailUsage(const absl::Status& status) const;
-  // Says why unless valid; returns the exit code that fits the verdict on a certificate.
+  // Says why a certificate is not valid; returns the exit code for the verdict.
   ExitCode Judge(const Verification& verification) const;
 };
 

@@ -2,25 +2,22 @@
 
 #include <sys/stat.h>
 
-#include <CLI/CLI.hpp>
 #include <utility>
-
-#include "client/hullctl/command_line/number_option.h"
 
 namespace hulld {
 
-void AddPointInput(CLI::App* command, PointInput* input) {
-  command->add_option("FILE", input->files, "Files of points; - is standard input")->required();
-  command->add_flag("--skip-nonfinite", input->skip_nonfinite,
-                    "Leave out and count points with a coordinate that is NaN or infinite");
+void AddPointInput(Command command, PointInput* input) {
+  command.AddTexts("FILE", &input->files, "Files of points; - is standard input").Required();
+  command.AddFlag("--skip-nonfinite", &input->skip_nonfinite,
+                  "Leave out and count points with a coordinate that is NaN or infinite");
   command
-      ->add_option("--format", input->format,
-                   "Format of the files (default: by extension; standard input: xyz)")
-      ->check(CLI::IsMember(PointFormatNames()))
-      ->type_name("FORMAT");
-  AddNumberOption(command, "--chunk-points", 1, uint64_t{100} << 20,
-                  "Points per message (default: about 1 MiB)",
-                  [input](uint64_t number) { input->chunk_points = number; });
+      .AddText("--format", &input->format,
+               "Format of the files (default: by extension; standard input: xyz)")
+      .OneOf(PointFormatNames())
+      .ValueName("FORMAT");
+  command.AddNumber("--chunk-points", 1, uint64_t{100} << 20,
+                    "Points per message (default: about 1 MiB)",
+                    [input](uint64_t number) { input->chunk_points = number; });
 }
 
 v1::PointBlock ToProto(const PointBlock& block) {

@@ -3,12 +3,12 @@
 
 #include <absl/status/statusor.h>
 
-#include <CLI/App.hpp>
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include "client/formats/point_file.h"
+#include "client/hullctl/command_line/command.h"
 #include "hulld/v1/geometry.pb.h"
 
 namespace hulld {
@@ -25,10 +25,10 @@ struct PointInput {
 
 // Declares FILE..., --skip-nonfinite, --format and --chunk-points. `input` must outlive the
 // command.
-void AddPointInput(CLI::App* command, PointInput* input);
+void AddPointInput(Command command, PointInput* input);
 
-// What is to be read, in order, checked before anything is sent, so that a mistyped name changes
-// nothing. total_bytes: of all files, 0 when that is not known.
+// The files to read, in order. Checks that they can be read before anything is sent, so that a
+// mistyped name changes nothing. total_bytes: the size of all files, 0 when that is not known.
 absl::StatusOr<std::vector<ReadRequest>> PlanReads(const PointInput& input, uint64_t* total_bytes);
 
 v1::PointBlock ToProto(const PointBlock& block);

@@ -1,10 +1,7 @@
 #ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_QUERY_OPTIONS_H_
 #define HULLD_CLIENT_HULLCTL_COMMAND_LINE_QUERY_OPTIONS_H_
 
-#include <CLI/App.hpp>
-#include <functional>
-#include <string>
-
+#include "client/hullctl/command_line/command.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -20,11 +17,7 @@ struct QueryWishes {
 
 // Declares --textbook, --axis, --report, --certificate, --separation, --max-error, --witness,
 // --clearance, --tolerance and --verify. `wishes` must outlive the parsing.
-void AddQueryOptions(CLI::App* command, QueryWishes* wishes);
-
-// An option that takes a finite length of at least 0.
-CLI::Option* AddLengthOption(CLI::App* command, const std::string& name, const std::string& help,
-                             std::function<void(double)> take);
+void AddQueryOptions(Command command, QueryWishes* wishes);
 
 }  // namespace hulld
 

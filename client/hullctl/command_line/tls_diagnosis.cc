@@ -52,7 +52,7 @@ Owned<SSL_CTX> MakeContext(const ConnectionSecurity& security) {
   return context;
 }
 
-// Null when there is nobody.
+// Null when nothing answers.
 Owned<BIO> Connect(const std::string& server) {
   Owned<BIO> bio(BIO_new_connect(server.c_str()));
   if (bio == nullptr || BIO_do_connect_retry(bio.get(), kPatienceSeconds, 50) != 1) return nullptr;

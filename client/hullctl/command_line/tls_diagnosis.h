@@ -7,10 +7,10 @@
 
 namespace hulld {
 
-// Why a connection to `server` (host:port) with this security fails, where TLS is the reason, and
-// what to try; empty when it is not. gRPC tells certificates that have expired from those of
-// strangers no more than servers that speak no TLS from dead ones, so this shakes hands with the
-// server once more by itself. Takes a few seconds at most.
+// Why a connection to `server` (host:port) with this security fails, and what to try; empty when
+// TLS is not the reason. gRPC does not distinguish an expired certificate from an unknown
+// authority, or a server without TLS from a dead one, so this performs a handshake of its own.
+// Takes a few seconds at most.
 std::string DiagnoseTls(const std::string& server, const ConnectionSecurity& security);
 
 }  // namespace hulld

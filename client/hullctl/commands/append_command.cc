@@ -1,6 +1,5 @@
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 
@@ -125,7 +124,7 @@ void Print(const Invocation& run, const std::string& hull_id, const Appender& ap
   table.Print(run.out);
 }
 
-// Before an error is reported: what stands in spite of it.
+// Says, before an error is reported, which points stand in spite of it.
 void PrintAppendedBefore(const Invocation& run, const Appender& appender) {
   const uint64_t points = appender.totals().points_acknowledged;
   if (points == 0) return;
@@ -153,7 +152,7 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
   for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
     outcome = files.Read(std::move(*request));
   }
-  // What was read before a file's error is sent already: wait for it, so that the summary is true.
+  // Points read before a file's error are sent already: wait for them, so that the summary is true.
   if (outcome.stream.ok()) outcome.stream = files.Finish();
   files.Clear();
   if (!outcome.stream.ok()) {
@@ -170,24 +169,24 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
 
 }  // namespace
 
-void AddAppendCommand(CLI::App* app, Invocation* invocation) {
+void AddAppendCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<AppendArguments>();
-  CLI::App* command = app->add_subcommand("append", "Add the points of files to a hull");
-  command->add_option("ID", arguments->hull_id, "Name of the hull")->required();
+  Command command = program.AddCommand("append", "Add the points of files to a hull");
+  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
   AddPointInput(command, &arguments->input);
-  command->add_flag("--create", arguments->create, "Create the hull when it does not exist");
-  CLI::Option* writer =
-      command->add_option("--writer", arguments->writer, "Name to write under (default: random)")
-          ->type_name("NAME");
+  command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
+  const Option writer =
+      command.AddText("--writer", &arguments->writer, "Name to write under (default: random)")
+          .ValueName("NAME");
   command
-      ->add_flag("--resume", arguments->resume,
-                 "The same command was interrupted: leave out the chunks that this writer has "
-                 "committed")
-      ->needs(writer);
-  command->footer(
+      .AddFlag("--resume", &arguments->resume,
+               "The same command was interrupted: leave out the chunks that this writer has "
+               "committed")
+      .Needs(writer);
+  command.SetFooter(
       "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf.\n"
       "--resume needs the same files, options and writer as before.");
-  command->callback([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <unordered_map>
@@ -25,6 +24,7 @@ struct BatchArguments {
 struct Problem {
   int code = 0;
   std::string message;
+  v1::ErrorReason reason = v1::ERROR_REASON_UNSPECIFIED;
 };
 
 // Asks in calls of bounded size, each with only the placements that its pairs need, and prints
@@ -49,7 +49,7 @@ class BatchRun {
   }
 
   uint64_t failed() const { return failed_; }
-  // Whose certificates do not prove them, and whose could not be checked.
+  // Pairs whose certificates do not prove them, and pairs that could not be checked.
   uint64_t invalid() const { return invalid_; }
   uint64_t unchecked() const { return unchecked_; }
 
@@ -90,19 +90,22 @@ class BatchRun {
     if (part.has_header()) *head_.mutable_header() = part.header();
     head_.mutable_hulls()->MergeFrom(part.hulls());
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
-      placement_problems_[problem.placement()] = {problem.code(), problem.message()};
+      placement_problems_[problem.placement()] = {problem.code(), problem.message(),
+                                                  problem.reason()};
     }
     std::unordered_map<uint64_t, Problem> pair_problems;
-    for (const v1::PairProblem& problem : part.pair_problems()) {
-      pair_problems[problem.pair()] = {problem.code(), problem.message()};
+    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
+      pair_problems[part.first_pair() + problem.row()] = {problem.code(), problem.message(),
+                                                          problem.reason()};
     }
-    const size_t count = static_cast<size_t>(part.relations_size());
+    const size_t count = static_cast<size_t>(part.columns().relations_size());
     if (count == 0) return absl::OkStatus();
-    if (begin + part.first_pair() != *next || count > end - *next || !AreParallel(part, count)) {
+    if (begin + part.first_pair() != *next || count > end - *next ||
+        !AreParallel(part.columns(), count)) {
       return absl::InternalError("the answers do not follow one another");
     }
     for (size_t i = 0; i < count; ++i, ++*next) {
-      const AnswerRow row = RowAt(part, static_cast<int>(i));
+      const AnswerRow row = RowAt(part.columns(), static_cast<int>(i));
       const Problem* problem = nullptr;
       std::optional<Verification> verification;
       if (row.relation == v1::RELATION_UNSPECIFIED) {
@@ -120,7 +123,8 @@ class BatchRun {
 
   const Problem* FindProblem(const std::unordered_map<uint64_t, Problem>& pair_problems,
                              size_t pair) const {
-    static const Problem* const kUnknown = new Problem{0, "the server gave no cause"};
+    static const Problem* const kUnknown =
+        new Problem{0, "the server gave no cause", v1::ERROR_REASON_UNSPECIFIED};
     if (const auto found = pair_problems.find(pair); found != pair_problems.end()) {
       return &found->second;
     }
@@ -138,10 +142,10 @@ class BatchRun {
     if (a >= hulls || b >= hulls || row.certificate == nullptr) {
       return absl::InternalError("the answers lack the hulls or the certificates they are about");
     }
-    auto verification = checker_.Check(
-        {request_->placements(static_cast<int>(a)), request_->placements(static_cast<int>(b)),
-         row.relation, *row.certificate, head_.header().store_id(),
-         head_.hulls(static_cast<int>(a)), head_.hulls(static_cast<int>(b))});
+    auto verification =
+        checker_.Check({request_->placements(static_cast<int>(a)),
+                        request_->placements(static_cast<int>(b)), row.relation, *row.certificate,
+                        head_.hulls(static_cast<int>(a)), head_.hulls(static_cast<int>(b))});
     if (!verification.ok()) return verification;
     if (verification->verdict == Verdict::kInvalid) {
       ++invalid_;
@@ -182,6 +186,7 @@ class BatchRun {
       object.AddJson("problem", JsonObject()
                                     .AddJson("code", std::to_string(problem->code))
                                     .Add("message", problem->message)
+                                    .Add("reason", v1::ErrorReason_Name(problem->reason))
                                     .Close());
     }
     return object.Close();
@@ -261,15 +266,14 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
 
 }  // namespace
 
-void AddBatchCommand(CLI::App* app, Invocation* invocation) {
+void AddBatchCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BatchArguments>();
-  CLI::App* command = app->add_subcommand("batch", "Ask about many pairs from a file");
-  command->add_option("FILE", arguments->file, "Placements and pairs; - is standard input")
-      ->required();
+  Command command = program.AddCommand("batch", "Ask about many pairs from a file");
+  command.AddText("FILE", &arguments->file, "Placements and pairs; - is standard input").Required();
   AddQueryOptions(command, &arguments->wishes);
-  command->add_flag("--colliding", arguments->colliding, "Leave out the pairs that are separated");
-  command->footer(kBatchFileHelp);
-  command->callback([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
+  command.AddFlag("--colliding", &arguments->colliding, "Leave out the pairs that are separated");
+  command.SetFooter(kBatchFileHelp);
+  command.OnGiven([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -4,7 +4,6 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,7 +13,6 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
-#include "client/hullctl/command_line/number_option.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/load/load.h"
 #include "client/hullctl/load/load_subjects.h"
@@ -117,7 +115,7 @@ void PrintHistogram(const LatencyHistogram& latencies, std::ostream& out) {
   uint64_t most = 1;
   for (const LatencyHistogram::Row& row : rows) most = std::max(most, row.count);
   for (const LatencyHistogram::Row& row : rows) {
-    // Whatever is there is seen.
+    // A bar is at least one character long.
     const size_t length = (row.count * kWidth + most - 1) / most;
     out << absl::StrFormat("  %7s - %-7s %10u  %s\n", TimeText(row.from), TimeText(row.to),
                            row.count, std::string(length, '#'));
@@ -228,7 +226,7 @@ LoadResult Drive(const Invocation& run, const LoadArguments& arguments, LoadSubj
                  });
 }
 
-// What ends a load whose requests failed.
+// The exit code for a load.
 ExitCode CodeOf(const LoadResult& result) {
   if (result.failures.empty()) return ExitCode::kDone;
   if (result.latencies.count() > 0) return ExitCode::kSomeFailed;
@@ -270,82 +268,84 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
   return CodeOf(result);
 }
 
-void AddPlanOptions(CLI::App* command, LoadPlan* plan) {
+void AddPlanOptions(Command command, LoadPlan* plan) {
   command
-      ->add_option_function<std::string>(
+      .AddParsed(
           "--duration",
           [plan](const std::string& text) {
             const auto duration = ParseDuration(text);
-            if (!duration.ok()) {
-              throw CLI::ValidationError("--duration", std::string(duration.status().message()));
-            }
-            plan->duration = *duration;
+            if (duration.ok()) plan->duration = *duration;
+            return duration.status();
           },
           "How long, such as 30s (default 10s, unless --requests is given)")
-      ->type_name("TIME");
-  AddNumberOption(command, "--requests", 1, uint64_t{1} << 40,
-                  "How many requests, of all clients together",
-                  [plan](uint64_t number) { plan->requests = number; });
+      .ValueName("TIME");
+  command.AddNumber("--requests", 1, uint64_t{1} << 40,
+                    "How many requests, of all clients together",
+                    [plan](uint64_t number) { plan->requests = number; });
   command
-      ->add_option_function<std::string>(
+      .AddParsed(
           "--rate",
           [plan](const std::string& text) {
             double rate = 0;
             if (ParseDouble(text, &rate) != NumberText::kNumber || !(rate >= 0.01 && rate <= 1e7)) {
-              throw CLI::ValidationError(
-                  "--rate", Quoted(text) + " is not a number of requests a second, 0.01 to 1e7");
+              return absl::InvalidArgumentError(
+                  Quoted(text) + " is not a number of requests a second, 0.01 to 1e7");
             }
             plan->rate = rate;
+            return absl::OkStatus();
           },
           "Requests a second, of all clients together (default: as fast as they are answered)")
-      ->type_name("R");
+      .ValueName("R");
 }
 
-void AddSettingOptions(CLI::App* command, LoadSettings* settings) {
+void AddSettingOptions(Command command, LoadSettings* settings) {
   std::vector<std::string> names;
   for (const auto& [name, mode] : ModeNames()) names.push_back(name);
   command
-      ->add_option_function<std::string>(
-          "--mode", [settings](const std::string& name) { settings->mode = ModeNames().at(name); },
+      .AddParsed(
+          "--mode",
+          [settings](const std::string& name) {
+            settings->mode = ModeNames().at(name);
+            return absl::OkStatus();
+          },
           "check (default), batch, append, or mixed: of ten requests eight, one and one")
-      ->check(CLI::IsMember(names))
-      ->type_name("MODE");
-  AddNumberOption(command, "--clients", 1, 1000, "Clients, each with a connection (default 1)",
-                  [settings](uint64_t number) { settings->clients = static_cast<int>(number); });
-  AddNumberOption(command, "--hulls", 1, 10000, "Hulls to ask about (default 16)",
-                  [settings](uint64_t number) { settings->hulls = number; });
-  AddNumberOption(command, "--vertices", 1, 100000, "Vertices of each, on a sphere (default 64)",
-                  [settings](uint64_t number) { settings->vertices = number; });
-  AddNumberOption(command, "--pairs", 1, 1000000, "Pairs of a batch (default 10000)",
-                  [settings](uint64_t number) { settings->pairs = number; });
-  AddNumberOption(command, "--points", 1, 160000, "Points of an append, in a ball (default 10000)",
-                  [settings](uint64_t number) { settings->points = number; });
+      .OneOf(names)
+      .ValueName("MODE");
+  command.AddNumber("--clients", 1, 1000, "Clients, each with a connection (default 1)",
+                    [settings](uint64_t number) { settings->clients = static_cast<int>(number); });
+  command.AddNumber("--hulls", 1, 10000, "Hulls to ask about (default 16)",
+                    [settings](uint64_t number) { settings->hulls = number; });
+  command.AddNumber("--vertices", 1, 100000, "Vertices of each, on a sphere (default 64)",
+                    [settings](uint64_t number) { settings->vertices = number; });
+  command.AddNumber("--pairs", 1, 1000000, "Pairs of a batch (default 10000)",
+                    [settings](uint64_t number) { settings->pairs = number; });
+  command.AddNumber("--points", 1, 160000, "Points of an append, in a ball (default 10000)",
+                    [settings](uint64_t number) { settings->points = number; });
   command
-      ->add_option("--prefix", settings->prefix,
-                   "Of the hulls it creates and deletes (default bench-load/RANDOM/)")
-      ->type_name("PREFIX");
+      .AddText("--prefix", &settings->prefix,
+               "Of the hulls it creates and deletes (default bench-load/RANDOM/)")
+      .ValueName("PREFIX");
 }
 
 }  // namespace
 
-void AddBenchCommand(CLI::App* app, Invocation* invocation) {
-  CLI::App* bench = app->add_subcommand("bench", "Measure a running server");
-  bench->require_subcommand(1);
+void AddBenchCommand(Command program, Invocation* invocation) {
+  Command bench = program.AddCommand("bench", "Measure a running server");
+  bench.RequireCommand();
   auto arguments = std::make_shared<LoadArguments>();
-  CLI::App* load = bench->add_subcommand(
-      "load", "Ask as many clients would; show throughput, latencies and errors");
-  load->fallthrough();
+  Command load =
+      bench.AddCommand("load", "Ask as many clients would; show throughput, latencies and errors");
   AddSettingOptions(load, &arguments->settings);
   AddPlanOptions(load, &arguments->plan);
-  load->add_flag_callback(
+  load.AddFlag(
       "--json", [invocation] { invocation->json = true; }, "The same as --output json");
-  load->footer(
+  load.SetFooter(
       "Creates hulls of its own and deletes them at the end, also after Ctrl-C.\n"
       "Without --rate each client asks again when it is answered. With --rate requests are due at\n"
       "fixed times and latencies count from then, so that waiting behind a slow one is not "
       "hidden.\n"
       "Nothing is retried; latencies are those of requests that succeeded.");
-  load->callback([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
+  load.OnGiven([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

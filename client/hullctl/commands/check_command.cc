@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "client/formats/text_number.h"
@@ -95,7 +94,7 @@ void PrintTable(const v1::CheckCollisionRequest& request,
   table.Print(out);
 }
 
-// A certificate comes with the question, so that `hullctl verify` has all it needs.
+// An answer with a certificate includes the question, so that `hullctl verify` has all it needs.
 std::string ResponseJson(const v1::CheckCollisionRequest& request,
                          const v1::CheckCollisionResponse& response,
                          const Verification* verification) {
@@ -133,41 +132,38 @@ ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
   return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
 }
 
-void AddPoseOption(CLI::App* command, const std::string& name, v1::Placement* placement) {
+void AddPoseOption(Command command, const std::string& name, v1::Placement* placement) {
   command
-      ->add_option_function<std::string>(
+      .AddParsed(
           name,
-          [name, placement](const std::string& text) {
+          [placement](const std::string& text) {
             const auto pose = ParsePose(text);
-            if (!pose.ok()) {
-              throw CLI::ValidationError(name, std::string(pose.status().message().data(),
-                                                           pose.status().message().size()));
-            }
-            *placement->mutable_pose() = *pose;
+            if (pose.ok()) *placement->mutable_pose() = *pose;
+            return pose.status();
           },
           "Where it stands: quaternion and translation, or translation alone (default: as built)")
-      ->type_name("[w,x,y,z,]tx,ty,tz");
+      .ValueName("[w,x,y,z,]tx,ty,tz");
 }
 
 }  // namespace
 
-void AddCheckCommand(CLI::App* app, Invocation* invocation) {
+void AddCheckCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CheckArguments>();
   v1::CheckCollisionRequest* const request = &arguments->request;
-  CLI::App* command = app->add_subcommand("check", "Ask whether two hulls collide");
-  command->add_option("A", *request->mutable_a()->mutable_hull_id(), "Name of a hull")->required();
-  command->add_option("B", *request->mutable_b()->mutable_hull_id(), "Name of a hull")->required();
+  Command command = program.AddCommand("check", "Ask whether two hulls collide");
+  command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull").Required();
+  command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull").Required();
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
   AddQueryOptions(command, &arguments->wishes);
-  command->footer(
+  command.SetFooter(
       "Lengths are in the unit of the points. For example:\n"
       "  hullctl check arm box --pose-b 0.2,0,0 --separation --witness\n"
       "  hullctl check arm box --clearance 0.01\n"
       "  hullctl check arm box --verify\n"
       "  hullctl check arm box --certificate --output json > answer.json; hullctl verify "
       "answer.json");
-  command->callback([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

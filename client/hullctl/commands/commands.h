@@ -1,32 +1,31 @@
 #ifndef HULLD_CLIENT_HULLCTL_COMMANDS_COMMANDS_H_
 #define HULLD_CLIENT_HULLCTL_COMMANDS_COMMANDS_H_
 
-#include <CLI/App.hpp>
-
+#include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
 
 namespace hulld {
 
-// Each declares one command; when it is the one named, parsing sets invocation->action. Both
-// arguments must outlive the action.
-void AddCreateCommand(CLI::App* app, Invocation* invocation);
-void AddAppendCommand(CLI::App* app, Invocation* invocation);
-void AddReplaceCommand(CLI::App* app, Invocation* invocation);
-void AddSnapshotCommand(CLI::App* app, Invocation* invocation);
-void AddGetCommand(CLI::App* app, Invocation* invocation);
-void AddListCommand(CLI::App* app, Invocation* invocation);
-void AddDeleteCommand(CLI::App* app, Invocation* invocation);
-void AddMeshCommand(CLI::App* app, Invocation* invocation);
-void AddCheckCommand(CLI::App* app, Invocation* invocation);
-void AddBatchCommand(CLI::App* app, Invocation* invocation);
-void AddSceneCommand(CLI::App* app, Invocation* invocation);
-void AddStreamCommand(CLI::App* app, Invocation* invocation);
-void AddVerifyCommand(CLI::App* app, Invocation* invocation);
-void AddGenerateCommand(CLI::App* app, Invocation* invocation);
-void AddStatusCommand(CLI::App* app, Invocation* invocation);
-void AddBenchCommand(CLI::App* app, Invocation* invocation);
-void AddPictureCommand(CLI::App* app, Invocation* invocation);
-void AddTokenCommand(CLI::App* app, Invocation* invocation);
+// Each declares one command of `program`; when it is given, parsing sets invocation->action.
+// `invocation` must outlive the action.
+void AddCreateCommand(Command program, Invocation* invocation);
+void AddAppendCommand(Command program, Invocation* invocation);
+void AddReplaceCommand(Command program, Invocation* invocation);
+void AddGetCommand(Command program, Invocation* invocation);
+void AddListCommand(Command program, Invocation* invocation);
+void AddDeleteCommand(Command program, Invocation* invocation);
+void AddMeshCommand(Command program, Invocation* invocation);
+void AddCheckCommand(Command program, Invocation* invocation);
+void AddBatchCommand(Command program, Invocation* invocation);
+void AddSceneCommand(Command program, Invocation* invocation);
+void AddStreamCommand(Command program, Invocation* invocation);
+void AddVerifyCommand(Command program, Invocation* invocation);
+void AddGenerateCommand(Command program, Invocation* invocation);
+void AddStatusCommand(Command program, Invocation* invocation);
+void AddBackupCommand(Command program, Invocation* invocation);
+void AddBenchCommand(Command program, Invocation* invocation);
+void AddPictureCommand(Command program, Invocation* invocation);
+void AddTokenCommand(Command program, Invocation* invocation);
 
 }  // namespace hulld
 

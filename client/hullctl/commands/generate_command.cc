@@ -1,13 +1,11 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <map>
 #include <memory>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
-#include "client/hullctl/command_line/number_option.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/load/point_generator.h"
@@ -58,59 +56,43 @@ ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
   return written.ok() ? ExitCode::kDone : run.FailUsage(written);
 }
 
-void AddLengthOption(CLI::App* command, const char* name, double* length, const char* help) {
-  command
-      ->add_option_function<std::string>(
-          name,
-          [name, length](const std::string& text) {
-            if (ParseDouble(text, length) != NumberText::kNumber || !(*length >= 0) ||
-                !std::isfinite(*length)) {
-              throw CLI::ValidationError(name, Quoted(text) + " is not a length");
-            }
-          },
-          help)
-      ->type_name("LENGTH");
-}
-
 }  // namespace
 
-void AddGenerateCommand(CLI::App* app, Invocation* invocation) {
+void AddGenerateCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<GenerateArguments>();
   CloudOptions* const cloud = &arguments->cloud;
-  CLI::App* command = app->add_subcommand("generate", "Write points as XYZ text; needs no server");
+  Command command = program.AddCommand("generate", "Write points as XYZ text; needs no server");
   std::vector<std::string> names;
   for (const auto& [name, shape] : ShapeNames()) names.push_back(name);
-  command->add_option("SHAPE", arguments->shape, "ball, sphere, cube or lattice")
-      ->required()
-      ->check(CLI::IsMember(names));
-  AddNumberOption(command, "N", 0, uint64_t{1} << 40, "How many points", [cloud](uint64_t number) {
-    cloud->count = number;
-  })->required();
-  AddNumberOption(command, "--seed", 0, kAnyNumber, "Another seed, other points (default 1)",
-                  [cloud](uint64_t number) { cloud->seed = number; });
-  AddLengthOption(command, "--radius", &cloud->radius, "Of ball and sphere (default 1)");
-  AddLengthOption(command, "--size", &cloud->size,
-                  "Edge of the cube, or step of the lattice (default 1)");
+  command.AddText("SHAPE", &arguments->shape, "ball, sphere, cube or lattice")
+      .Required()
+      .OneOf(names);
   command
-      ->add_option_function<std::string>(
+      .AddNumber("N", 0, uint64_t{1} << 40, "How many points",
+                 [cloud](uint64_t number) { cloud->count = number; })
+      .Required();
+  command.AddNumber("--seed", 0, kAnyNumber, "Another seed, other points (default 1)",
+                    [cloud](uint64_t number) { cloud->seed = number; });
+  command.AddLength("--radius", "Of ball and sphere (default 1)",
+                    [cloud](double length) { cloud->radius = length; });
+  command.AddLength("--size", "Edge of the cube, or step of the lattice (default 1)",
+                    [cloud](double length) { cloud->size = length; });
+  command
+      .AddParsed(
           "--center",
           [cloud](const std::string& text) {
             const auto center = ParseTriple(text);
-            if (!center.ok()) {
-              throw CLI::ValidationError("--center", std::string(center.status().message().data(),
-                                                                 center.status().message().size()));
-            }
-            cloud->center = *center;
+            if (center.ok()) cloud->center = *center;
+            return center.status();
           },
           "Centre; of the lattice its first point (default 0,0,0)")
-      ->type_name("x,y,z");
-  command->add_option("-o,--out", arguments->file, "File to write (default: standard output)")
-      ->type_name("FILE");
-  command->footer(
+      .ValueName("x,y,z");
+  command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
+      .ValueName("FILE");
+  command.SetFooter(
       "The same options give the same bytes on every machine. A lattice of N points is the first\n"
       "N of the smallest cube of k*k*k points; take N = k*k*k for a whole one.");
-  command->callback(
-      [=] { invocation->action = [=] { return Generate(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Generate(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

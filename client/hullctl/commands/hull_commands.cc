@@ -1,10 +1,8 @@
 // create, get, list and delete: one hull, or the list of all.
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/number_option.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -113,45 +111,45 @@ struct HullOptions {
 
 }  // namespace
 
-void AddCreateCommand(CLI::App* app, Invocation* invocation) {
+void AddCreateCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
-  CLI::App* command = app->add_subcommand("create", "Register an empty hull");
-  command->add_option("ID", options->hull_id, "Name of the hull, such as arm/3")->required();
-  command->add_flag("--if-absent", options->flag, "Accept a hull that exists already");
-  command->callback([=] {
+  Command command = program.AddCommand("create", "Register an empty hull");
+  command.AddText("ID", &options->hull_id, "Name of the hull, such as arm/3").Required();
+  command.AddFlag("--if-absent", &options->flag, "Accept a hull that exists already");
+  command.OnGiven([=] {
     invocation->action = [=] { return Create(*invocation, options->hull_id, options->flag); };
   });
 }
 
-void AddGetCommand(CLI::App* app, Invocation* invocation) {
+void AddGetCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
-  CLI::App* command = app->add_subcommand("get", "Show size, counts and box of a hull");
-  command->add_option("ID", options->hull_id, "Name of the hull")->required();
-  command->add_flag("--audit", options->flag,
-                    "Also let the server check the hull by other means than it was built by");
-  command->callback([=] {
+  Command command = program.AddCommand("get", "Show size, counts and box of a hull");
+  command.AddText("ID", &options->hull_id, "Name of the hull").Required();
+  command.AddFlag("--audit", &options->flag,
+                  "Also let the server check the hull by other means than it was built by");
+  command.OnGiven([=] {
     invocation->action = [=] { return Get(*invocation, options->hull_id, options->flag); };
   });
 }
 
-void AddListCommand(CLI::App* app, Invocation* invocation) {
+void AddListCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
-  CLI::App* command = app->add_subcommand("list", "List the hulls by name");
-  command->add_option("PREFIX", options->hull_id, "Only names that start with it");
-  AddNumberOption(command, "--limit", 1, kAnyNumber, "Stop after so many (default: all)",
-                  [options](uint64_t number) { options->limit = number; });
-  command->callback([=] {
+  Command command = program.AddCommand("list", "List the hulls by name");
+  command.AddText("PREFIX", &options->hull_id, "Only names that start with it");
+  command.AddNumber("--limit", 1, kAnyNumber, "Stop after N hulls (default: all)",
+                    [options](uint64_t number) { options->limit = number; });
+  command.OnGiven([=] {
     invocation->action = [=] { return List(*invocation, options->hull_id, options->limit); };
   });
 }
 
-void AddDeleteCommand(CLI::App* app, Invocation* invocation) {
+void AddDeleteCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
-  CLI::App* command = app->add_subcommand("delete", "Remove a hull");
-  command->add_option("ID", options->hull_id, "Name of the hull")->required();
-  AddNumberOption(command, "--if-revision", 0, kAnyNumber, "Only if its revision is this one",
-                  [options](uint64_t number) { options->if_revision = number; });
-  command->callback([=] {
+  Command command = program.AddCommand("delete", "Remove a hull");
+  command.AddText("ID", &options->hull_id, "Name of the hull").Required();
+  command.AddNumber("--if-revision", 0, kAnyNumber, "Only if its revision is this one",
+                    [options](uint64_t number) { options->if_revision = number; });
+  command.OnGiven([=] {
     invocation->action = [=] {
       return Delete(*invocation, options->hull_id, options->if_revision);
     };

@@ -1,8 +1,7 @@
-#include <CLI/CLI.hpp>
+#include <cmath>
 #include <memory>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/number_option.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/mesh_obj.h"
@@ -50,24 +49,30 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
 
 }  // namespace
 
-void AddMeshCommand(CLI::App* app, Invocation* invocation) {
+void AddMeshCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<MeshArguments>();
-  CLI::App* command = app->add_subcommand("mesh", "Write a hull as OBJ");
-  command->add_option("ID", arguments->hull_id, "Name of the hull")->required();
-  command->add_option("-o,--out", arguments->file, "File to write (default: standard output)")
-      ->type_name("FILE");
-  AddNumberOption(command, "--max-vertices", 1, kAnyNumber, "Simplify to at most so many vertices",
-                  [arguments](uint64_t number) { arguments->max_vertices = number; });
+  Command command = program.AddCommand("mesh", "Write a hull as OBJ");
+  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
+  command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
+      .ValueName("FILE");
+  command.AddNumber("--max-vertices", 1, kAnyNumber, "Simplify to at most N vertices",
+                    [arguments](uint64_t number) { arguments->max_vertices = number; });
+  const auto take_max_error = [arguments](const std::string& text) {
+    double& length = arguments->max_error;
+    const bool is_number = ParseDouble(text, &length) == NumberText::kNumber;
+    if (is_number && std::isfinite(length) && length > 0) return absl::OkStatus();
+    return absl::InvalidArgumentError(Quoted(text) + " is not a length above 0");
+  };
   command
-      ->add_option("--max-error", arguments->max_error,
-                   "Simplify while the proven distance to the hull stays within this length")
-      ->check(CLI::PositiveNumber);
-  command->add_flag("--outside", arguments->outside,
-                    "Simplify to a hull that encloses this one, instead of one inside it");
-  command->footer(
+      .AddParsed("--max-error", take_max_error,
+                 "Simplify while the proven distance to the hull stays within this length")
+      .ValueName("LENGTH");
+  command.AddFlag("--outside", &arguments->outside,
+                  "Simplify to a hull that encloses this one, instead of one inside it");
+  command.SetFooter(
       "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
       "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.");
-  command->callback([=] { invocation->action = [=] { return Mesh(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Mesh(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "client/formats/mesh_file.h"
@@ -123,24 +122,24 @@ ExitCode Picture(const Invocation& run, const PictureArguments& arguments) {
 
 }  // namespace
 
-void AddPictureCommand(CLI::App* app, Invocation* invocation) {
+void AddPictureCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<PictureArguments>();
-  CLI::App* command =
-      app->add_subcommand("picture", "Draw points, a mesh and a hull side by side as SVG");
-  command->add_option("--points", arguments->points, "File of points to draw as dots")
-      ->type_name("FILE");
-  command->add_option("--mesh", arguments->mesh, "Mesh to draw with shading: obj, off, stl or gltf")
-      ->type_name("FILE");
-  command->add_option("--hull", arguments->hull_id, "Hull of the server to draw")->type_name("ID");
-  command->add_option("-o,--out", arguments->file, "File to write (default: standard output)")
-      ->type_name("FILE");
-  command->add_option("--up", arguments->up, "The axis that points up (default y)")
-      ->type_name("x|y|z")
-      ->check(CLI::IsMember({"x", "y", "z"}));
-  command->footer(
+  Command command =
+      program.AddCommand("picture", "Draw points, a mesh and a hull side by side as SVG");
+  command.AddText("--points", &arguments->points, "File of points to draw as dots")
+      .ValueName("FILE");
+  command.AddText("--mesh", &arguments->mesh, "Mesh to draw with shading: obj, off, stl or gltf")
+      .ValueName("FILE");
+  command.AddText("--hull", &arguments->hull_id, "Hull of the server to draw").ValueName("ID");
+  command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
+      .ValueName("FILE");
+  command.AddText("--up", &arguments->up, "The axis that points up (default y)")
+      .ValueName("x|y|z")
+      .OneOf({"x", "y", "z"});
+  command.SetFooter(
       "All panels show one view at one scale. Many points or triangles are thinned out;\n"
       "the captions count all of them.");
-  command->callback([=] { invocation->action = [=] { return Picture(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Picture(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

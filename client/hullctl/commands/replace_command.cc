@@ -1,10 +1,8 @@
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 
-#include "client/hullctl/command_line/number_option.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
@@ -77,21 +75,21 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
 
 }  // namespace
 
-void AddReplaceCommand(CLI::App* app, Invocation* invocation) {
+void AddReplaceCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ReplaceArguments>();
-  CLI::App* command = app->add_subcommand(
+  Command command = program.AddCommand(
       "replace", "Put a hull of the points of files in the place of another, all at once");
-  command->add_option("ID", arguments->hull_id, "Name of the hull")->required();
+  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
   AddPointInput(command, &arguments->input);
-  command->add_flag("--create", arguments->create, "Create the hull when it does not exist");
-  AddNumberOption(command, "--if-revision", 0, std::numeric_limits<uint64_t>::max(),
-                  "Only if the hull is at this revision; 0: only if it does not exist",
-                  [arguments](uint64_t number) { arguments->if_revision = number; });
-  command->footer(
+  command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
+  command.AddNumber("--if-revision", 0, std::numeric_limits<uint64_t>::max(),
+                    "Only if the hull is at this revision; 0: only if it does not exist",
+                    [arguments](uint64_t number) { arguments->if_revision = number; });
+  command.SetFooter(
       "However long that takes, unless --timeout is given, which then bounds all of it. A call "
       "that\n"
       "ends early leaves the hull as it was, or, when all points were sent, may have replaced it.");
-  command->callback([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

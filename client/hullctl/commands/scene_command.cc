@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <unordered_map>
 
@@ -40,7 +39,7 @@ class SceneRun {
     }
     std::unordered_map<uint64_t, std::string> problems;
     for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      problems[problem.pair()] = problem.message();
+      problems[problem.row()] = problem.message();
     }
     const int count = part.pairs_size() / 2;
     if (part.pairs_size() % 2 != 0 || !AreParallel(part.columns(), static_cast<size_t>(count))) {
@@ -114,14 +113,10 @@ class SceneRun {
 };
 
 ExitCode Scene(const Invocation& run, const std::string& path) {
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return run.FailUsage(source.status());
-  std::string text;
-  std::string_view line;
-  while ((*source)->ReadLine(&line)) (text += line) += "\n";
-  if (!(*source)->status().ok()) return run.FailUsage((*source)->status());
+  const absl::StatusOr<std::string> text = ReadText(path);
+  if (!text.ok()) return run.FailUsage(text.status());
   v1::FindCollisionsRequest request;
-  const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &request);
+  const absl::Status parsed = ParseJson(*text, UnknownFields::kRefuse, &request);
   if (!parsed.ok()) {
     return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(path, ": ", parsed.message())));
   }
@@ -134,14 +129,14 @@ ExitCode Scene(const Invocation& run, const std::string& path) {
 
 }  // namespace
 
-void AddSceneCommand(CLI::App* app, Invocation* invocation) {
+void AddSceneCommand(Command program, Invocation* invocation) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = app->add_subcommand("scene", "Find all pairs of a scene that collide");
-  command->add_option("FILE", *path, "The scene as JSON; - is standard input")->required();
-  command->footer(
+  Command command = program.AddCommand("scene", "Find all pairs of a scene that collide");
+  command.AddText("FILE", path.get(), "The scene as JSON; - is standard input").Required();
+  command.SetFooter(
       "FILE is a FindCollisionsRequest of the contract as JSON. Placements are named by their\n"
-      "index. Optional: a group for each placement, and which groups never collide; movers, to\n"
-      "ask only about pairs with one of the first so many; tolerance; and what is wanted, such\n"
+      "index. Optional: a group for each placement, and which groups never collide; movers N, to\n"
+      "ask only about pairs with one of the first N; tolerance; and what is wanted, such\n"
       "as a clearance, within which pairs are found although they are separated. For example:\n"
       "  {\"placements\":[{\"hullId\":\"arm\"},\n"
       "                 {\"hullId\":\"box\",\"pose\":{\"translation\":{\"x\":2}}},\n"
@@ -151,7 +146,7 @@ void AddSceneCommand(CLI::App* app, Invocation* invocation) {
       "each placement's hull, and its pose in seven numbers, w x y z and x y z:\n"
       "  {\"packedPlacements\":{\"hullIds\":[\"arm\",\"box\"], \"hulls\":[0,1],\n"
       "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]}}");
-  command->callback([=] { invocation->action = [=] { return Scene(*invocation, *path); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Scene(*invocation, *path); }; });
 }
 
 }  // namespace hulld

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_text.h"
@@ -62,16 +61,16 @@ ExitCode Health(const Invocation& run) {
 
 }  // namespace
 
-void AddStatusCommand(CLI::App* app, Invocation* invocation) {
-  CLI::App* command =
-      app->add_subcommand("status", "Show what the server is and whether it is serving");
-  command->footer("Exits with 0 only when the server answers and is serving.");
-  command->callback([=] { invocation->action = [=] { return Status(*invocation); }; });
+void AddStatusCommand(Command program, Invocation* invocation) {
+  Command command =
+      program.AddCommand("status", "Show what the server is and whether it is serving");
+  command.SetFooter("Exits with 0 only when the server answers and is serving.");
+  command.OnGiven([=] { invocation->action = [=] { return Status(*invocation); }; });
 
-  CLI::App* health =
-      app->add_subcommand("health", "Ask whether the server is serving; needs no token");
-  health->footer("Exits with 0 only when it is.");
-  health->callback([=] { invocation->action = [=] { return Health(*invocation); }; });
+  Command health =
+      program.AddCommand("health", "Ask whether the server is serving; needs no token");
+  health.SetFooter("Exits with 0 only when it is.");
+  health.OnGiven([=] { invocation->action = [=] { return Health(*invocation); }; });
 }
 
 }  // namespace hulld

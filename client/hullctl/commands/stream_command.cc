@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <unordered_map>
 
@@ -17,6 +16,7 @@ std::string ProblemJson(const v1::PairProblem& problem) {
   return JsonObject()
       .AddJson("code", std::to_string(problem.code()))
       .Add("message", problem.message())
+      .Add("reason", v1::ErrorReason_Name(problem.reason()))
       .Close();
 }
 
@@ -27,8 +27,7 @@ absl::StatusOr<std::string> AnswerJson(const v1::StreamCollisionsResponse& answe
     return absl::InternalError("the answer's columns and pairs disagree");
   }
   std::unordered_map<uint64_t, const v1::PairProblem*> problems;
-  for (const v1::PairProblem& problem : columns.pair_problems())
-    problems[problem.pair()] = &problem;
+  for (const v1::PairProblem& problem : columns.pair_problems()) problems[problem.row()] = &problem;
   std::string rows;
   for (int i = 0; i < answer.pairs_size(); ++i) {
     JsonObject row;
@@ -97,11 +96,11 @@ ExitCode Stream(const Invocation& run, const std::string& path) {
 
 }  // namespace
 
-void AddStreamCommand(CLI::App* app, Invocation* invocation) {
+void AddStreamCommand(Command program, Invocation* invocation) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = app->add_subcommand("stream", "Ask again and again while poses change");
-  command->add_option("FILE", *path, "JSON, one object per line; - is standard input")->required();
-  command->footer(
+  Command command = program.AddCommand("stream", "Ask again and again while poses change");
+  command.AddText("FILE", path.get(), "JSON, one object per line; - is standard input").Required();
+  command.SetFooter(
       "The first line is a CollisionStreamOpen of the contract, each other line a\n"
       "CollisionStreamUpdate; each is answered by one line of JSON before the next is read.\n"
       "Poses are seven numbers for each placement named: quaternion w x y z, translation x y z.\n"
@@ -110,7 +109,7 @@ void AddStreamCommand(CLI::App* app, Invocation* invocation) {
       "  {\"placements\":[{\"hullId\":\"arm\"},{\"hullId\":\"box\"}],\"pairs\":[0,1]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.5,0,0]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.6,0,0],\"refreshHulls\":true}");
-  command->callback([=] { invocation->action = [=] { return Stream(*invocation, *path); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Stream(*invocation, *path); }; });
 }
 
 }  // namespace hulld

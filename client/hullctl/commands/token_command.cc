@@ -5,7 +5,6 @@
 #include <sys/random.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -27,7 +26,7 @@ struct TokenArguments {
   std::string file;
 };
 
-// As hulld's file of tokens holds it.
+// The hash as hulld's file of tokens holds it.
 std::string HashText(const std::string& token) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> hash = {};
   SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash.data());
@@ -35,7 +34,7 @@ std::string HashText(const std::string& token) {
                                      reinterpret_cast<const char*>(hash.data()), hash.size())));
 }
 
-// 256 random bits, so that a plain hash of them gives nothing away.
+// 256 random bits, so that a plain hash reveals nothing.
 absl::StatusOr<std::string> RandomToken() {
   std::array<char, 32> bytes = {};
   if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
@@ -87,44 +86,38 @@ ExitCode HashToken(const Invocation& run) {
 
 }  // namespace
 
-void AddTokenCommand(CLI::App* app, Invocation* invocation) {
-  CLI::App* const command =
-      app->add_subcommand("token", "Make a token and its line for hulld's --tokens-file");
-  command->require_subcommand(1);
+void AddTokenCommand(Command program, Invocation* invocation) {
+  Command command =
+      program.AddCommand("token", "Make a token and its line for hulld's --tokens-file");
+  command.RequireCommand();
   const auto arguments = std::make_shared<TokenArguments>();
-  CLI::App* const make = command->add_subcommand("new", "Make a random token");
-  make->add_option("name", arguments->name, "Whose it is; the server's messages say it")
-      ->required()
-      ->check(CLI::Validator(
-          [](const std::string& name) -> std::string {
-            const bool valid = name.size() <= 64 && !name.empty() && std::isalnum(name[0]) != 0 &&
-                               name.find_first_not_of(
-                                   "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
-                                   "0123456789._-") == std::string::npos;
-            return valid ? "" : "not up to 64 of [A-Za-z0-9._-] that start with a letter or digit";
-          },
-          "NAME"));
-  make->add_option("--role", arguments->role, "What it allows")
-      ->required()
-      ->check(CLI::IsMember({"read-only", "read-write", "admin"}));
-  make->add_option("--prefix", arguments->prefix,
-                   "What the IDs that it sees start with, ending in \"/\" (default: all)")
-      ->check(CLI::Validator(
-          [](const std::string& prefix) -> std::string {
-            const bool valid = prefix.size() > 1 && prefix.back() == '/' &&
-                               prefix.find_first_of(" \t") == std::string::npos;
-            return valid ? "" : "a prefix ends in \"/\", as in cell-1/";
-          },
-          "PREFIX"));
-  make->add_option("--token-out", arguments->file,
-                   "Write the token to this new file, which only you can read, and print only the "
-                   "line")
-      ->type_name("FILE");
-  make->callback([=] { invocation->action = [=] { return NewToken(*invocation, *arguments); }; });
-  CLI::App* const hash =
-      command->add_subcommand("hash", "Print the hash of a token read from standard input");
-  hash->callback([=] { invocation->action = [=] { return HashToken(*invocation); }; });
-  for (CLI::App* part : {make, hash}) part->fallthrough();
+  Command make = command.AddCommand("new", "Make a random token");
+  make.AddText("name", &arguments->name, "Whose it is; the server's messages say it")
+      .Required()
+      .Check("NAME", [](const std::string& name) -> std::string {
+        const bool valid = name.size() <= 64 && !name.empty() && std::isalnum(name[0]) != 0 &&
+                           name.find_first_not_of(
+                               "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+                               "0123456789._-") == std::string::npos;
+        return valid ? "" : "not up to 64 of [A-Za-z0-9._-] that start with a letter or digit";
+      });
+  make.AddText("--role", &arguments->role, "What it allows")
+      .Required()
+      .OneOf({"read-only", "read-write", "admin"});
+  make.AddText("--prefix", &arguments->prefix,
+               "What the IDs that it sees start with, ending in \"/\" (default: all)")
+      .Check("PREFIX", [](const std::string& prefix) -> std::string {
+        const bool valid = prefix.size() > 1 && prefix.back() == '/' &&
+                           prefix.find_first_of(" \t") == std::string::npos;
+        return valid ? "" : "a prefix ends in \"/\", as in cell-1/";
+      });
+  make.AddText("--token-out", &arguments->file,
+               "Write the token to this new file, which only you can read, and print only the "
+               "line")
+      .ValueName("FILE");
+  make.OnGiven([=] { invocation->action = [=] { return NewToken(*invocation, *arguments); }; });
+  Command hash = command.AddCommand("hash", "Print the hash of a token read from standard input");
+  hash.OnGiven([=] { invocation->action = [=] { return HashToken(*invocation); }; });
 }
 
 }  // namespace hulld

@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 
-#include <CLI/CLI.hpp>
 #include <memory>
 
 #include "client/formats/byte_source.h"
@@ -18,19 +17,8 @@ struct RecordedAnswer {
   v1::CheckCollisionResponse response;
 };
 
-absl::StatusOr<std::string> ReadAll(const std::string& path) {
-  const auto source = ByteSource::Open(path);
-  if (!source.ok()) return source.status();
-  std::string text;
-  std::string_view line;
-  while ((*source)->ReadLine(&line))
-    absl::StrAppend(&text, absl::string_view(line.data(), line.size()), "\n");
-  if (!(*source)->status().ok()) return (*source)->status();
-  return text;
-}
-
 absl::StatusOr<RecordedAnswer> ReadAnswer(const std::string& path) {
-  const auto text = ReadAll(path);
+  const auto text = ReadText(path);
   if (!text.ok()) return text.status();
   RecordedAnswer answer;
   const absl::Status request = ParseMember(*text, "request", &answer.request);
@@ -50,9 +38,9 @@ ExitCode Verify(const Invocation& run, const std::string& path) {
   const Client client = run.MakeClient();
   AnswerChecker checker(client);
   const v1::CheckCollisionResponse& response = answer->response;
-  const auto verification = checker.Check(
-      {answer->request.a(), answer->request.b(), response.relation(), response.certificate(),
-       response.header().store_id(), response.hull_a(), response.hull_b()});
+  const auto verification =
+      checker.Check({answer->request.a(), answer->request.b(), response.relation(),
+                     response.certificate(), response.hull_a(), response.hull_b()});
   if (!verification.ok()) return run.Fail(verification.status());
   if (run.json) {
     run.out << VerificationJson(*verification) << "\n";
@@ -64,18 +52,18 @@ ExitCode Verify(const Invocation& run, const std::string& path) {
 
 }  // namespace
 
-void AddVerifyCommand(CLI::App* app, Invocation* invocation) {
+void AddVerifyCommand(Command program, Invocation* invocation) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command =
-      app->add_subcommand("verify", "Check that a recorded answer's certificate proves it");
-  command->add_option("FILE", *path, "The answer; - is standard input")->required();
-  command->footer(
+  Command command =
+      program.AddCommand("verify", "Check that a recorded answer's certificate proves it");
+  command.AddText("FILE", path.get(), "The answer; - is standard input").Required();
+  command.SetFooter(
       "FILE is what `hullctl check A B --certificate --output json` prints. The vertices are\n"
       "fetched from the server, the arithmetic is exact and shares no code with it. An answer\n"
       "about a hull that has changed since cannot be checked, which is not the same as wrong:\n"
       "ask again, or let `hullctl check --verify` do both at once. For example:\n"
       "  hullctl check arm box --certificate --output json | hullctl verify -");
-  command->callback([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });
+  command.OnGiven([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });
 }
 
 }  // namespace hulld

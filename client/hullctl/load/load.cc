@@ -20,7 +20,7 @@ class LoadRun {
   LoadRun(const LoadPlan& plan, const std::atomic<bool>& stop)
       : plan_(plan), stop_(stop), start_(Clock::now()) {}
 
-  // Asks again and again until the plan is done.
+  // Sends requests until the plan is done.
   LoadResult Ask(const LoadRequest& request) {
     LoadResult result;
     for (;;) {

@@ -24,28 +24,28 @@ struct LoadPlan {
   // Requests a second, of all clients together. Absent: each client asks again when it is answered
   // (closed loop).
   //
-  // With a rate (open loop), request i is due at i / rate and its latency counts from then, however
-  // late a client comes to it: a server that stalls cannot hide that by not being asked (what Tene
-  // calls coordinated omission).
+  // With a rate (open loop), request i is due at i / rate and its latency counts from then, even if
+  // a client sends it late. So a server that stalls cannot hide it (Tene calls that coordinated
+  // omission).
   std::optional<double> rate;
 };
 
 // Requests that failed with one code.
 struct LoadFailures {
   uint64_t count = 0;
-  // Of the first of them.
+  // The message of the first of them.
   std::string message;
 };
 
 struct LoadResult {
   std::chrono::nanoseconds elapsed{0};
-  // Of requests that succeeded.
+  // The latencies of requests that succeeded.
   LatencyHistogram latencies;
-  // What these did in all, such as pairs or points.
+  // How many items these did in all, such as pairs or points.
   uint64_t items = 0;
   std::map<absl::StatusCode, LoadFailures> failures;
-  // Requests that were due while the run lasted but that no client came to: the rate was not kept,
-  // and their latencies would have been the longest.
+  // Requests that were due while the run lasted but were never sent: the rate was not kept, and
+  // their latencies would have been the longest.
   uint64_t missed = 0;
 
   uint64_t failed() const;

@@ -85,7 +85,7 @@ class LoadSubjects::LoadClient {
       case LoadMode::kMixed:
         break;
     }
-    // Of ten requests eight check, one is a batch and one appends.
+    // Eight of ten requests check, one is a batch and one appends.
     if (i % 10 == 4) return Batch();
     if (i % 10 == 9) return Append();
     return Check(i);
@@ -106,7 +106,7 @@ class LoadSubjects::LoadClient {
     uint64_t answered = 0;
     const absl::Status status = client_.BatchCheckCollisions(
         batch_, [&answered](const v1::BatchCheckCollisionsResponse& part) {
-          answered += static_cast<uint64_t>(part.relations_size());
+          answered += static_cast<uint64_t>(part.columns().relations_size());
           return absl::OkStatus();
         });
     if (!status.ok()) return status;

@@ -23,11 +23,11 @@ struct LoadSettings {
   // Hulls that are asked about, and points on a sphere that each is made of.
   uint64_t hulls = 16;
   uint64_t vertices = 64;
-  // Of one batch.
+  // Pairs of one batch.
   uint64_t pairs = 10000;
-  // Of one chunk of an append.
+  // Points of one chunk of an append.
   uint64_t points = 10000;
-  // Of the IDs of all hulls of the load; ends in "/".
+  // The prefix of the IDs of all hulls of the load; ends in "/".
   std::string prefix;
 };
 
@@ -44,8 +44,8 @@ class LoadSubjects {
   // One per client, each of which belongs to one thread.
   std::vector<LoadRequest> MakeClients();
 
-  // Deletes every hull of the prefix, in spite of errors, the first of which it returns. Nothing
-  // where Create refused.
+  // Deletes every hull of the prefix, in spite of errors, and returns the first error. Deletes
+  // nothing when Create refused.
   absl::Status Delete();
 
  private:

@@ -28,7 +28,7 @@ struct CloudOptions {
   Shape shape = Shape::kBall;
   uint64_t count = 0;
   uint64_t seed = 1;
-  // Of ball and sphere.
+  // Radius of ball and sphere.
   double radius = 1;
   // Edge of the cube; distance between neighbours of the lattice.
   double size = 1;

@@ -32,9 +32,10 @@ struct ScenePanel {
 enum class UpAxis { kX, kY, kZ };
 
 // An SVG image: the panels from left to right in one orthographic view and one scale, nearer things
-// drawn over farther ones. Requires finite vertices, of any magnitude. Coordinates are rounded to 2
-// decimals of a pixel; more than some thousand vertices or polygons of a panel are thinned out, so
-// that the image stays near 1 MB at most.
+// drawn over farther ones. Requires finite vertices, of any
+// magnitude; unchecked, as the readers of files and the server refuse others. Coordinates are
+// rounded to 2 decimals of a pixel; more than some thousand vertices or polygons of a panel are
+// thinned out, so that the image stays near 1 MB at most.
 std::string RenderSceneSvg(const std::vector<ScenePanel>& panels, UpAxis up);
 
 // "1234567" as "1,234,567".

@@ -22,8 +22,7 @@ v1::Vector3 VectorOf(const double* xyz) {
 
 }  // namespace
 
-template <typename Columns>
-bool AreParallel(const Columns& columns, size_t count) {
+bool AreParallel(const v1::AnswerColumns& columns, size_t count) {
   const auto fits = [count](int size, size_t each = 1) {
     return size == 0 || static_cast<size_t>(size) == each * count;
   };
@@ -36,8 +35,7 @@ bool AreParallel(const Columns& columns, size_t count) {
          fits(columns.within_clearance_size());
 }
 
-template <typename Columns>
-AnswerRow RowAt(const Columns& columns, int i) {
+AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
   AnswerRow row;
   row.relation = columns.relations(i);
   if (columns.rungs_size() > 0) row.rung = columns.rungs(i);
@@ -59,11 +57,6 @@ AnswerRow RowAt(const Columns& columns, int i) {
   if (columns.within_clearance_size() > 0) row.within_clearance = columns.within_clearance(i);
   return row;
 }
-
-template bool AreParallel(const v1::AnswerColumns&, size_t);
-template bool AreParallel(const v1::BatchCheckCollisionsResponse&, size_t);
-template AnswerRow RowAt(const v1::AnswerColumns&, int);
-template AnswerRow RowAt(const v1::BatchCheckCollisionsResponse&, int);
 
 std::string RowText(const AnswerRow& row) {
   std::vector<std::string> cells = {RelationText(row.relation)};

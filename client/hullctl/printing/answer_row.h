@@ -22,15 +22,12 @@ struct AnswerRow {
   std::optional<bool> within_clearance;
 };
 
-// Columns: v1::AnswerColumns, or v1::BatchCheckCollisionsResponse, whose fields are named alike.
-
 // Whether each column is empty or holds `count` entries.
-template <typename Columns>
-bool AreParallel(const Columns& columns, size_t count);
+bool AreParallel(const v1::AnswerColumns& columns, size_t count);
 
-// Requires parallel columns and i below their number of entries.
-template <typename Columns>
-AnswerRow RowAt(const Columns& columns, int i);
+// Row i of the columns. Requires AreParallel(columns, count) and i < count; unchecked, as callers
+// ask AreParallel once for all rows.
+AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 
 // For people, separated by tabs, the relation first.
 std::string RowText(const AnswerRow& row);

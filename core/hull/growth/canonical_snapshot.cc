@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/numeric/orientation.h"
 
 namespace hulld {
@@ -72,18 +73,21 @@ std::vector<Boundary> CollectFacet(const Surface& surface, const Ranking& rankin
   return boundary;
 }
 
-// The boundary's loop from its lowest vertex.
+// The boundary's loop from its lowest vertex. Requires edges that form one loop.
 std::vector<uint32_t> LoopOf(std::vector<Boundary> boundary) {
   std::sort(boundary.begin(), boundary.end(),
             [](const Boundary& a, const Boundary& b) { return a.tail < b.tail; });
+  HULLD_CHECK(!boundary.empty());
   std::vector<uint32_t> loop;
   loop.reserve(boundary.size());
   uint32_t at = boundary.front().tail;
   do {
     loop.push_back(at);
-    at = std::lower_bound(boundary.begin(), boundary.end(), at,
-                          [](const Boundary& b, uint32_t tail) { return b.tail < tail; })
-             ->head;
+    const auto edge =
+        std::lower_bound(boundary.begin(), boundary.end(), at,
+                         [](const Boundary& b, uint32_t tail) { return b.tail < tail; });
+    HULLD_CHECK(edge != boundary.end() && edge->tail == at && loop.size() <= boundary.size());
+    at = edge->head;
   } while (at != boundary.front().tail);
   return loop;
 }
@@ -98,7 +102,8 @@ std::vector<char> FlatEdges(const VertexTable& vertices, const Surface& surface,
       if (other < id) continue;
       const SurfaceTriangle& o = surface.triangle(other);
       int j = 0;
-      while (o.corners[j] != t.corners[(i + 1) % 3]) ++j;
+      while (j < 3 && o.corners[j] != t.corners[(i + 1) % 3]) ++j;
+      HULLD_CHECK(j < 3);
       const Vector& opposite = vertices[o.corners[(j + 2) % 3]];
       if (Orient3d(vertices[t.corners[0]], vertices[t.corners[1]], vertices[t.corners[2]],
                    opposite) == 0) {
@@ -113,6 +118,7 @@ std::vector<char> FlatEdges(const VertexTable& vertices, const Surface& surface,
 }  // namespace
 
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends) {
+  HULLD_CHECK(ends.size() <= 2);
   std::vector<Vector> points;
   for (const VertexId id : ends) points.push_back(vertices[id]);
   std::vector<Edge> edges;
@@ -122,6 +128,7 @@ Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends)
 }
 
 Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop) {
+  HULLD_CHECK(loop.size() >= 3);
   Ranking ranking = Rank(vertices, {loop.begin(), loop.end()});
   const auto n = static_cast<uint32_t>(loop.size());
   std::vector<uint32_t> facet;

@@ -15,9 +15,10 @@ namespace hulld {
 // exactly, facets and edges sorted. Cost: O(V log V), and one exact sign for each edge of a
 // surface; that of a surface is stopped by the poll, and nullopt then.
 
-// At most two vertices, in lexicographic order.
+// Requires at most two vertices, in lexicographic order (unchecked: AuditHull sees it).
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);
-// A strictly convex polygon, its vertices in order, either way round.
+// Requires at least three vertices of a strictly convex polygon, in order, either way round
+// (unchecked: AuditHull sees it).
 Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop);
 std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface, StopPoll& poll);
 

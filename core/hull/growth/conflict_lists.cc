@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace hulld {
 namespace {
 
-// Insertions between two polls of should_stop.
-constexpr size_t kInsertionsPerPoll = 64;
+// Steps of the poll for one insertion: it moves the points of the lists that it changes, too.
+constexpr uint64_t kStepsPerInsertion = 4;
 // Insertions after which it is clear whether most points are inside.
 constexpr size_t kTrialInsertions = 24;
 // Moves of a point, on average, from which on another order of insertion is better. Observed: at
@@ -34,6 +36,7 @@ void ConflictLists::Take(std::span<const Vector> points) {
 }
 
 void ConflictLists::Take(std::span<const Vector> points, std::span<const TriangleId> seen) {
+  HULLD_CHECK(points.size() == seen.size());
   CountTaken(points);
   is_trial_ = false;
   std::vector<TriangleId> targets;
@@ -58,20 +61,20 @@ void ConflictLists::Take(std::span<const Vector> points, std::span<const Triangl
 }
 
 void ConflictLists::CountTaken(std::span<const Vector> points) {
+  HULLD_CHECK(waiting_ == 0);
   for (const Vector& p : points) size_ = std::max(size_, p.cwiseAbs().maxCoeff());
   taken_ += points.size();
   waiting_ += points.size();
   lists_.resize(surface_.id_bound());
 }
 
-ConflictLists::Outcome ConflictLists::InsertAll(const std::function<bool()>& should_stop) {
+ConflictLists::Outcome ConflictLists::InsertAll(StopPoll& poll) {
   size_t insertions = 0;
   for (; next_in_queue_ < queue_.size(); ++next_in_queue_) {
     const TriangleId id = queue_[next_in_queue_];
     if (lists_[id].count == 0) continue;
-    if (insertions++ % kInsertionsPerPoll == 0 && should_stop && should_stop()) {
-      return Outcome::kStopped;
-    }
+    if (poll.Step(kStepsPerInsertion)) return Outcome::kStopped;
+    ++insertions;
     InsertFrom(id);
     if (moved_ > kMostMoves * taken_ || IsMostlyOutside(insertions)) return Outcome::kGaveUp;
   }
@@ -106,8 +109,10 @@ void ConflictLists::InsertFrom(TriangleId id) {
   if (!sources_.empty()) Distribute(targets);
 }
 
+// Requires a list that is not empty.
 Vector ConflictLists::RemoveFarthest(TriangleId id) {
   List& list = lists_[id];
+  HULLD_CHECK(list.count > 0);
   const size_t i = FarthestAlong(BlocksOf(list), list.count, surface_.triangle(id).normal);
   const Vector farthest = PointOf(list, i);
   const Vector last = PointOf(list, list.count - 1);
@@ -199,12 +204,14 @@ void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
     const uint32_t count = counts_[k + 1];
     cursors_[k + 1] = end_ * PointBlock::kSize;
     if (count == 0) continue;
+    HULLD_CHECK(end_ + BlocksFor(count) <= capacity_);
     lists_[targets[k]] = {static_cast<uint32_t>(end_), count};
     queue_.push_back(targets[k]);
     end_ += BlocksFor(count);
     // The last may be partly filled.
     blocks_[end_ - 1] = {};
   }
+  HULLD_CHECK(end_ < capacity_);
   cursors_[0] = end_ * PointBlock::kSize;
 }
 
@@ -215,6 +222,8 @@ void ConflictLists::Reserve(size_t blocks) {
   for (const List& list : lists_) kept += BlocksFor(list.count);
   for (const List& list : sources_) kept += BlocksFor(list.count);
   capacity_ = 2 * (kept + blocks);
+  // Lists hold the numbers of blocks in 32 bits.
+  HULLD_CHECK(capacity_ <= UINT32_MAX);
   auto packed = std::make_unique_for_overwrite<PointBlock[]>(capacity_);
   end_ = 0;
   const auto move = [&](List& list) {

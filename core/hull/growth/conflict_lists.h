@@ -3,11 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/hull/growth/point_blocks.h"
 #include "core/hull/growth/surface.h"
 #include "core/hull/growth/vertex_table.h"
@@ -26,7 +26,7 @@ class ConflictLists {
  public:
   enum class Outcome {
     kDone,
-    // should_stop said so.
+    // The poll said stop.
     kStopped,
     // The points are moved so often that another order of insertion does better: see TakeRest.
     kGaveUp
@@ -34,15 +34,14 @@ class ConflictLists {
 
   ConflictLists(Surface& surface, VertexTable& vertices) : surface_(surface), vertices_(vertices) {}
 
-  // Both require that no point is waiting.
-  // Takes points that may lie anywhere; those inside are counted and forgotten. Cost: as many tests
-  // a point as the surface has triangles.
+  // Takes points that may lie anywhere; those inside are counted and forgotten. Requires that no
+  // point is waiting. Cost: as many tests a point as the surface has triangles.
   void Take(std::span<const Vector> points);
-  // Takes points that see seen[i] strictly.
+  // Takes points that see seen[i] strictly. Requires that no point is waiting.
   void Take(std::span<const Vector> points, std::span<const TriangleId> seen);
 
-  // Adds all points that were taken. should_stop may be empty.
-  Outcome InsertAll(const std::function<bool()>& should_stop);
+  // Adds all points that were taken. The poll's steps are single insertions.
+  Outcome InsertAll(StopPoll& poll);
   // The points not yet added.
   std::vector<Vector> TakeRest();
 

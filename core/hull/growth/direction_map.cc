@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/simd_path.h"
@@ -26,11 +27,13 @@ DirectionMap::DirectionMap(const Vector& center, int resolution)
 }
 
 void DirectionMap::AppendCell(double reach, uint32_t hint) {
+  HULLD_DCHECK(radii_.size() < cell_count());
   radii_.push_back((1 - kDirectionMapMargin) * reach);
   hints_.push_back(hint);
 }
 
 Vector DirectionMap::CornerDirection(int face, int i, int j) const {
+  HULLD_DCHECK(0 <= face && face < 6 && 0 <= i && i <= n_ && 0 <= j && j <= n_);
   return CubeDirection(static_cast<uint32_t>(face), (i - half_) / half_, (j - half_) / half_);
 }
 
@@ -41,6 +44,7 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
 // (kappa + ratio)) u0, with ratio = largest / least reach and kappa = |c| / least reach; half of
 // kDirectionMapMargin bounds it. Proven.
 void DirectionMap::Finish(double least_reach, double largest_reach) {
+  HULLD_CHECK(radii_.size() == cell_count());
   if (!(least_reach > 0)) return;
   const double ratio = largest_reach / least_reach;
   const double kappa = center_.cwiseAbs().maxCoeff() / least_reach;

@@ -38,9 +38,9 @@ class DirectionMap {
   // distance m such that the double nearest to center + m * direction, component by component, is
   // in the set. Cost: O(1).
   void AppendCell(double reach, uint32_t hint);
-  // Says, when all cells are there, what the least and the largest reach of all corners are. Where
-  // the shape is too slender for the rounding of this map to be negligible, nothing is certainly
-  // inside.
+  // Says what the least and the largest reach of all corners are. Requires that all cells are
+  // there. Where the shape is too slender for the rounding of this map to be negligible, nothing is
+  // certainly inside.
   void Finish(double least_reach, double largest_reach);
 
   const Vector& center() const { return center_; }

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/block_insertion.h"
 #include "core/hull/growth/canonical_snapshot.h"
@@ -25,12 +26,10 @@ namespace {
 // A block of at most this many points is not worth a copy of the builder for the sake of stopping
 // within it.
 constexpr size_t kUninterruptedPoints = 1024;
-// Points between two polls of should_stop.
-constexpr size_t kPointsPerPoll = 256;
+// Insertions between two polls of should_stop.
+constexpr size_t kInsertionsPerPoll = 256;
 // Points looked at for some that are extreme along the axes, at most twice.
 constexpr size_t kExtremesSample = 4096;
-// From this many points on, threads save more than they cost.
-constexpr size_t kWorthThreads = 65536;
 // From this many points on, the order of insertion is worth choosing.
 constexpr size_t kWorthOrdering = 128;
 
@@ -43,6 +42,7 @@ bool AreFinite(std::span<const Vector> points) {
   return bad == 0;
 }
 
+// Requires a coordinate that is not finite.
 absl::Status DescribeNotFinite(std::span<const Vector> points) {
   constexpr const char* kNames[] = {"x", "y", "z"};
   for (size_t i = 0; i < points.size(); ++i) {
@@ -52,23 +52,7 @@ absl::Status DescribeNotFinite(std::span<const Vector> points) {
           "points[", i, "].", kNames[k], " is ", std::isnan(points[i][k]) ? "NaN" : "infinite"));
     }
   }
-  return absl::OkStatus();
-}
-
-absl::Status CheckFinite(std::span<const Vector> points, int threads) {
-  // A parallel region costs more than a small block, even with one thread.
-  if (threads <= 1 || points.size() < kWorthThreads) {
-    return AreFinite(points) ? absl::OkStatus() : DescribeNotFinite(points);
-  }
-  const auto parts = static_cast<size_t>(threads);
-  int64_t bad = 0;
-#pragma omp parallel for num_threads(parts) schedule(static, 1) reduction(| : bad)
-  for (size_t k = 0; k < parts; ++k) {
-    const size_t first = points.size() * k / parts;
-    const size_t end = points.size() * (k + 1) / parts;
-    bad |= AreFinite(points.subspan(first, end - first)) ? 0 : 1;
-  }
-  return bad == 0 ? absl::OkStatus() : DescribeNotFinite(points);
+  HULLD_UNREACHABLE();
 }
 
 // Where the lowest and the highest coordinates are, along each axis, among some points spread over
@@ -108,14 +92,14 @@ class HullBuilder::State {
         return GrowToSegment(point);
       case 1:
         return InsertIntoSegment(point);
-      default:
+      case 2:
         return InsertIntoPolygon(point);
     }
+    HULLD_UNREACHABLE();
   }
 
-  // Inserts all points; false when should_stop, which may be empty, said so.
-  bool InsertAll(std::span<const Vector> points, int threads,
-                 const std::function<bool()>& should_stop) {
+  // Inserts all points. Returns false, with some of them inserted, when the poll said stop.
+  bool InsertAll(std::span<const Vector> points, StopPoll& poll) {
     if (points.size() < kWorthOrdering) {
       for (const Vector& point : points) Insert(point);
       return true;
@@ -127,10 +111,10 @@ class HullBuilder::State {
       if (surface_) {
         std::erase_if(done, [i](uint32_t index) { return index < i; });
         for (uint32_t& index : done) index -= static_cast<uint32_t>(i);
-        return InsertBlock(*surface_, vertices_, points.subspan(i), done, threads, should_stop);
+        return InsertBlock(*surface_, vertices_, points.subspan(i), done, poll);
       }
       if (std::find(done.begin(), done.end(), i) != done.end()) continue;
-      if (i % kPointsPerPoll == 0 && should_stop && should_stop()) return false;
+      if (poll.Step()) return false;
       Insert(points[i]);
     }
     return true;
@@ -218,15 +202,16 @@ HullBuilder::~HullBuilder() = default;
 
 absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
                                              const AddLimits& limits) {
-  if (absl::Status status = CheckFinite(points, limits.threads); !status.ok()) return status;
+  if (!AreFinite(points)) return DescribeNotFinite(points);
   const bool may_stop = limits.should_stop && points.size() > kUninterruptedPoints;
   const bool may_exceed = vertex_count() + points.size() > limits.max_vertices;
   std::unique_ptr<State> before;
   if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
 
   state_->BeginBlock();
-  static const std::function<bool()> kNeverStop;
-  if (!state_->InsertAll(points, limits.threads, may_stop ? limits.should_stop : kNeverStop)) {
+  const std::function<bool()> never;
+  StopPoll poll(may_stop ? limits.should_stop : never, kInsertionsPerPoll);
+  if (!state_->InsertAll(points, poll)) {
     state_ = std::move(before);
     return absl::CancelledError("stopped while adding points; the hull is as before");
   }
@@ -236,6 +221,7 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
     return absl::ResourceExhaustedError(absl::StrCat(
         "the hull would have ", reached, " vertices; the limit is ", limits.max_vertices));
   }
+  HULLD_CHECK(state_->vertices().outside() + state_->vertices().duplicate() <= points.size());
   PointCounts counts;
   counts.received = points.size();
   counts.outside = state_->vertices().outside();
@@ -257,9 +243,10 @@ size_t HullBuilder::MemoryBytes() const { return sizeof(*this) + state_->MemoryB
 uint64_t HullBuilder::housekeeping_steps() const { return state_->housekeeping_steps(); }
 
 Hull HullBuilder::Snapshot() const {
-  static const std::function<bool()> kNeverStop;
-  StopPoll poll(kNeverStop);
-  return *state_->Snapshot(poll);
+  StopPoll never;
+  std::optional<Hull> snapshot = state_->Snapshot(never);
+  HULLD_CHECK(snapshot.has_value());
+  return *std::move(snapshot);
 }
 
 absl::StatusOr<Hull> HullBuilder::Snapshot(const std::function<bool()>& should_stop) const {

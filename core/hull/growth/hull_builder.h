@@ -39,12 +39,9 @@ struct PointCounts {
 struct AddLimits {
   // The hull after the block may have at most this many vertices.
   size_t max_vertices = std::numeric_limits<size_t>::max();
-  // Polled every few thousand steps of a block of more than 1024 points; true ends the call with
-  // CANCELLED. May be empty.
+  // Polled every few hundred insertions of a block of more than 1024 points; true ends the call
+  // with CANCELLED. May be empty.
   std::function<bool()> should_stop;
-  // OpenMP threads that a large block may use, at least 1. The hull and the counts do not depend on
-  // it.
-  int threads = 1;
 };
 
 // Builds the convex hull of a growing point set, exactly.

@@ -1,5 +1,6 @@
 #include "core/hull/growth/point_blocks.h"
 
+#include "core/base/check.h"
 #include "core/numeric/simd_path.h"
 
 namespace hulld {
@@ -68,6 +69,7 @@ bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBo
 }
 
 size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction) {
+  HULLD_CHECK(count > 0 && BlocksFor(count) <= blocks.size());
   size_t farthest = 0;
   double most = -INFINITY;
   for (size_t i = 0; i < count; ++i) {

@@ -56,6 +56,7 @@ bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBo
                  int64_t* matches);
 
 // The index of the point, of the first `count`, with the largest component along the direction.
+// Requires that there is one.
 size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction);
 
 }  // namespace hulld

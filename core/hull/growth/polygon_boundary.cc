@@ -2,11 +2,14 @@
 
 #include <iterator>
 
+#include "core/base/check.h"
+
 namespace hulld {
 
 PolygonBoundary::PolygonBoundary(VertexTable& vertices, CoordinatePlane plane, VertexId a,
                                  VertexId b, VertexId c)
     : plane_(plane) {
+  HULLD_CHECK(Orient2d(vertices[a], vertices[b], vertices[c], plane) != 0);
   for (const VertexId id : {a, b, c}) InsertVertex(vertices, id);
 }
 
@@ -23,6 +26,7 @@ void PolygonBoundary::Insert(VertexTable& vertices, const Vector& point) {
 }
 
 std::vector<VertexId> PolygonBoundary::Loop() const {
+  HULLD_CHECK(lower_.size() >= 2 && upper_.size() >= 2);
   std::vector<VertexId> loop;
   loop.reserve(lower_.size() + upper_.size() - 2);
   for (const auto& [key, id] : lower_) loop.push_back(id);
@@ -33,8 +37,12 @@ std::vector<VertexId> PolygonBoundary::Loop() const {
 }
 
 void PolygonBoundary::InsertVertex(VertexTable& vertices, VertexId id) {
-  if (IsBeyond(vertices, lower_, +1, vertices[id])) Extend(vertices, lower_, +1, id);
-  if (IsBeyond(vertices, upper_, -1, vertices[id])) Extend(vertices, upper_, -1, id);
+  const bool is_below = IsBeyond(vertices, lower_, +1, vertices[id]);
+  if (is_below) Extend(vertices, lower_, +1, id);
+  const bool is_above = IsBeyond(vertices, upper_, -1, vertices[id]);
+  if (is_above) Extend(vertices, upper_, -1, id);
+  // Else the vertex would live on no chain.
+  HULLD_CHECK(is_below || is_above);
 }
 
 bool PolygonBoundary::IsBeyond(const VertexTable& vertices, const Chain& chain, int turn,

@@ -18,11 +18,12 @@ namespace hulld {
 // Preparata 1979, An Optimal Real-Time Algorithm for Planar Convex Hulls.
 class PolygonBoundary {
  public:
-  // Starts from three points that are not collinear, which become the vertices; `plane` is
-  // ProjectionOf of them.
+  // Starts from three points, which become the vertices. Requires that they are not collinear in
+  // `plane`, which ProjectionOf gives.
   PolygonBoundary(VertexTable& vertices, CoordinatePlane plane, VertexId a, VertexId b, VertexId c);
 
-  // Adds a point of the plane. Cost: O(log n) amortized.
+  // Adds a point of the plane. Unchecked: the caller has just decided that it lies in the plane.
+  // Cost: O(log n) amortized.
   void Insert(VertexTable& vertices, const Vector& point);
 
   // What it holds in memory: each node has three links, a color, a key and an ID. Cost: O(1).

@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "core/base/check.h"
+#include "core/hull/growth/surface_check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"
@@ -12,27 +14,6 @@
 
 namespace hulld {
 namespace {
-
-// Rounds of aiming at the surface, each at a plane nearer than the last; more is not worth it.
-constexpr int kMostRounds = 64;
-
-// A smaller surface is walked across faster than it is measured.
-constexpr size_t kWorthMeasuring = 64;
-
-// Corners of a map that one insertion measures: a map is done long before the surface has doubled.
-constexpr size_t kCornersPerInsertion = 8;
-
-// Simpler than Eigen's for three components, and as exact.
-double LargestComponent(const Vector& v) {
-  return std::max(std::abs(v.x()), std::max(std::abs(v.y()), std::abs(v.z())));
-}
-
-// Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
-// many points than where it only tells where to start walking.
-int ResolutionFor(size_t triangles, bool rejects) {
-  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 6 : 96));
-  return std::clamp(static_cast<int>(cells_a_side), 2, 256);
-}
 
 // Times the power of two that brings the largest component into [1/2, 1).
 Vector WithUnitSize(const Vector& v) {
@@ -44,33 +25,38 @@ Vector WithUnitSize(const Vector& v) {
 }  // namespace
 
 Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex) {
+  HULLD_CHECK(polygon.size() >= 3);
   std::vector<VertexId> loop(polygon.begin(), polygon.end());
+  const int side =
+      Orient3d(vertices[loop[0]], vertices[loop[1]], vertices[loop[2]], vertices[apex]);
+  HULLD_CHECK(side != 0);
   // Seen from outside, the apex is behind the base.
-  if (Orient3d(vertices[loop[0]], vertices[loop[1]], vertices[loop[2]], vertices[apex]) > 0) {
-    std::reverse(loop.begin(), loop.end());
-  }
+  if (side > 0) std::reverse(loop.begin(), loop.end());
   const size_t n = loop.size();
-  for (size_t i = 1; i + 1 < n; ++i)
-    SetTriangle(vertices, NewId(editor_), loop[0], loop[i], loop[i + 1]);
-  for (size_t i = 0; i < n; ++i)
-    SetTriangle(vertices, NewId(editor_), loop[(i + 1) % n], loop[i], apex);
+  for (size_t i = 1; i + 1 < n; ++i) {
+    SetTriangle(vertices, NewId(), loop[0], loop[i], loop[i + 1]);
+  }
+  for (size_t i = 0; i < n; ++i) {
+    SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
+  }
   alive_ = triangles_.size();
   LinkAll();
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   Update(vertices);
+  DcheckSurface(*this, vertices);
 }
 
 void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell) {
   const double size = SizeWith(vertices, point);
   std::optional<Location> location;
   if (directions_) {
-    location = Walk(vertices, point, size, Alive(directions_->hint(cell)), 0, work_);
+    location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
   }
   if (!location) {
     location = Scan(vertices, point, size);
     work_ += triangles_.size();
   }
-  editor_.last = location->triangle;
+  last_ = location->triangle;
   if (location->side == Side::kInside) {
     // A point equal to a vertex lies in the cones of that vertex's triangles alone.
     const std::optional<VertexId> corner = CornerAt(vertices, location->triangle, point);
@@ -79,26 +65,31 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
     RemoveVisible(vertices, point, location->triangle);
     JoinToBoundary(vertices, point);
   }
-  if (directions_) directions_->SetHint(cell, editor_.last);
-  if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
-  if (alive_ >= next_update_) Update(vertices);
+  if (directions_) directions_->SetHint(cell, last_);
+  if (measuring_ || alive_ >= next_update_) Measure(vertices);
 }
 
 std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const Vector& point,
                                                    TriangleId seen) {
-  CollectRegion(vertices, seen, point, SizeWith(vertices, point), editor_);
-  RemoveVertices(vertices, editor_);
-  return editor_.region;
+  HULLD_DCHECK(IsAlive(seen) && IsSeenFrom(vertices, seen, point));
+  CollectRegion(vertices, seen, point, SizeWith(vertices, point));
+  RemoveVertices(vertices);
+  return region_;
 }
 
 std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
-  JoinHorizon(vertices, vertices.Add(point), editor_);
+  // Empty unless RemoveVisible has come before.
+  HULLD_CHECK(horizon_.size() >= 3);
+  const VertexId apex = vertices.Add(point);
+  JoinHorizon(vertices, apex);
   // Here rather than when they are needed, so that no insertion does it for many.
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   if (directions_) {
     extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
   }
-  return std::span(editor_.region).first(editor_.horizon.size());
+  const std::span<const TriangleId> created = std::span(region_).first(horizon_.size());
+  DcheckStar(*this, vertices, created, apex);
+  return created;
 }
 
 size_t Surface::MemoryBytes() const {
@@ -108,15 +99,8 @@ size_t Surface::MemoryBytes() const {
     bytes += measuring_->map.MemoryBytes() + measuring_->reach.capacity() * sizeof(double) +
              measuring_->hint.capacity() * sizeof(TriangleId);
   }
-  return bytes + editor_.region.capacity() * sizeof(TriangleId) +
-         editor_.horizon.capacity() * sizeof(HorizonEdge) +
-         editor_.visits.capacity() * sizeof(Visit);
-}
-
-void Surface::FinishInsertions(const VertexTable& vertices) {
-  // A map that was made fine for a large block takes more memory than it saves time from here on.
-  if (directions_ && directions_->cell_count() > 4 * alive_) directions_->Coarsen();
-  if (alive_ >= next_update_) Update(vertices);
+  return bytes + region_.capacity() * sizeof(TriangleId) +
+         horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit);
 }
 
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
@@ -148,25 +132,14 @@ void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a
   t.mark = 0;
 }
 
-TriangleId Surface::NewId(Editor& editor) {
-  if (editor.zone != 0) {
-    if (editor.free.empty()) return editor.next++;
-    const TriangleId id = editor.free.back();
-    editor.free.pop_back();
-    return id;
+TriangleId Surface::NewId() {
+  if (free_.empty()) {
+    HULLD_CHECK(triangles_.size() < kDead);
+    return static_cast<TriangleId>(triangles_.Extend());
   }
-  if (free_.empty()) return static_cast<TriangleId>(triangles_.Extend());
   const TriangleId id = free_.back();
   free_.pop_back();
   return id;
-}
-
-void Surface::FreeId(Editor& editor, TriangleId id) {
-  if (editor.zone != 0) {
-    editor.free.push_back(id);
-  } else {
-    free_.push_back(id);
-  }
 }
 
 // Links neighbours by their common edges, for a surface whose triangles are all new.
@@ -179,77 +152,10 @@ void Surface::LinkAll() {
     }
   }
   for (const auto& [edge, place] : by_edge) {
-    triangles_[place.first].neighbours[place.second] = by_edge.at({edge.second, edge.first}).first;
+    const auto twin = by_edge.find({edge.second, edge.first});
+    HULLD_CHECK(twin != by_edge.end());
+    triangles_[place.first].neighbours[place.second] = twin->second.first;
   }
-}
-
-Surface::Ray Surface::RayTo(const Vector& point) const {
-  const Vector y = point - directions_->center();
-  const double d = std::max(extent_, LargestComponent(y));
-  const bool in_range = d >= kTripleProductMin && d <= kTripleProductMax;
-  return {y, in_range ? kTripleProductErrorFactor * d * d * d : INFINITY};
-}
-
-// Which side of the plane through the interior point and the edge a, b the point lies on: +1 on the
-// side of a triangle to the left of the edge.
-int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
-                    const Ray& ray) const {
-  const Vector& center = directions_->center();
-  const double value = Dot(ray.y, Cross(vertices[a] - center, vertices[b] - center));
-  if (value > ray.bound) return 1;
-  if (value < -ray.bound) return -1;
-  return Orient3d(center, vertices[a], vertices[b], point);
-}
-
-// Crosses any edge whose plane through the interior point has the point on its far side, starting
-// with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
-// walk is longer than the surface warrants, or leaves the zone, where one is given.
-std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
-                                               double size, TriangleId start, uint32_t zone,
-                                               uint64_t& steps) const {
-  const Ray ray = RayTo(point);
-  TriangleId at = start;
-  uint32_t random = 1;
-  TriangleId from = kDead;
-  const size_t longest = 4 * alive_ + 64;
-  for (size_t step = 0; step < longest; ++step) {
-    ++steps;
-    if (zone != 0 && (triangles_[at].mark & kZoneMask) != zone) return std::nullopt;
-    if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
-    random = random * 1664525u + 1013904223u;
-    const uint32_t first = (random >> 16) % 3;
-    const SurfaceTriangle& t = triangles_[at];
-    TriangleId next = kDead;
-    for (uint32_t k = 0; k < 3 && next == kDead; ++k) {
-      const uint32_t i = (first + k) % 3;
-      // The edge just crossed has the point on this side, as the sign was exact.
-      if (t.neighbours[i] == from) continue;
-      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point, ray) < 0) {
-        next = t.neighbours[i];
-      }
-    }
-    if (next == kDead) return Location{Side::kInside, at};
-    from = at;
-    at = next;
-  }
-  return std::nullopt;
-}
-
-Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point,
-                                double size) const {
-  Location location{Side::kInside, Alive(editor_.last)};
-  for (TriangleId id = 0; id < triangles_.size(); ++id) {
-    if (!IsAlive(id)) continue;
-    const int side = SideOf(vertices, id, point, size);
-    if (side > 0) return {Side::kOutside, id};
-    if (side < 0) continue;
-    const auto& corners = triangles_[id].corners;
-    if (std::any_of(corners.begin(), corners.end(),
-                    [&](VertexId v) { return vertices[v] == point; })) {
-      location.triangle = id;
-    }
-  }
-  return location;
 }
 
 std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleId id,
@@ -260,157 +166,27 @@ std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleI
   return std::nullopt;
 }
 
-// Looks for an interior point while none is known, and starts to measure the surface for its
-// present size. Called when the surface has doubled, so the cost of O(F) for an interior point is
-// amortized.
-void Surface::Update(const VertexTable& vertices) {
-  next_update_ = 2 * alive_;
-  if (!directions_) SetCenter(vertices);
-  if (IsWorthMeasuring() && !measuring_) {
-    StartMeasuring(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
-  };
-}
-
-// Puts the center strictly inside and forgets what was measured; does nothing where no double is
-// inside.
-void Surface::SetCenter(const VertexTable& vertices) {
-  work_ += 2 * triangles_.size();
-  const std::optional<Vector> interior = FindInterior(vertices);
-  if (!interior) return;
-  directions_.emplace(*interior);
-  extent_ = 0;
-  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-    for (const VertexId v : t.corners) {
-      extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
-    }
-  });
-}
-
-std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
-  // The mean of the corners; each divided first, so that no sum overflows.
-  Vector mean = Vector::Zero();
-  const double weight = 1.0 / static_cast<double>(3 * alive_);
-  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-    for (const VertexId v : t.corners) mean += vertices[v] * weight;
-  });
-  if (!mean.allFinite()) return std::nullopt;
-  const double size = SizeWith(vertices, mean);
-  bool inside = true;
-  ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) {
-    inside = inside && SideOf(vertices, id, mean, size) < 0;
-  });
-  return inside ? std::optional<Vector>(mean) : std::nullopt;
-}
-
-// At extreme scales every sign is decided by integers, and a map costs more than it saves.
-bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
-
-void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
-  if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
-  // A tenth as many walks as points, at most.
-  const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
-  const int wanted = std::min(affordable, 3 * ResolutionFor(alive_, true)) & ~1;
-  if (wanted < 4) return;
-  if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
-    StartMeasuring(vertices, wanted);
-    ContinueMeasuring(vertices, SIZE_MAX);
-  }
-}
-
-void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
-  // The first surface, from which the center comes, may have been a corner of what it is now.
-  if (directions_->resolution() == 1) SetCenter(vertices);
-  measured_at_ = alive_;
-  asked_ = 0;
-  rejected_ = 0;
-  const size_t row = static_cast<size_t>(resolution) + 1;
-  work_ += row;
-  measuring_ =
-      Measurement{DirectionMap(directions_->center(), resolution), std::vector<double>(row),
-                  std::vector<TriangleId>(row, Alive(editor_.last))};
-}
-
-void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
-  for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
-  if (measuring_->face < 6) return;
-  measuring_->map.Finish(measuring_->least, measuring_->largest);
-  directions_ = std::move(measuring_->map);
-  measuring_.reset();
-}
-
-// Measures one corner, and makes the cell whose last corner it is.
-void Surface::MeasureCorner(const VertexTable& vertices) {
-  Measurement& m = *measuring_;
-  const auto j = static_cast<size_t>(m.j);
-  const double reach_above = m.reach[j];
-  const TriangleId hint_above = m.hint[j];
-  // From the corner to the left, or from the one above.
-  TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
-  const double reach = Reach(vertices, m.map.CornerDirection(m.face, m.i, m.j), near);
-  m.reach[j] = reach;
-  m.hint[j] = near;
-  m.least = std::min(m.least, reach);
-  m.largest = std::max(m.largest, reach);
-  if (m.i > 0 && m.j > 0) {
-    m.map.AppendCell(
-        std::min(std::min(m.reach_before, reach_above), std::min(m.reach[j - 1], reach)),
-        m.hint_before);
-  }
-  m.reach_before = reach_above;
-  m.hint_before = hint_above;
-  ++work_;
-  if (++m.j <= m.map.resolution()) return;
-  m.j = 0;
-  if (++m.i <= m.map.resolution()) return;
-  m.i = 0;
-  ++m.face;
-}
-
-// A distance m, near the largest, such that the double nearest to center + m * direction is inside;
-// 0 when none was found. `near` is where to start walking, and becomes where the direction leaves
-// the surface.
-double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
-  const Vector center = directions_->center();
-  double m = extent_;
-  // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
-  // nearly coplanar, their rounded planes tell little, hence the growing steps.
-  for (int round = 0; round < kMostRounds; ++round) {
-    const SurfaceTriangle& t = triangles_[near];
-    const double climb = t.normal.dot(direction);
-    const double height = t.offset - t.normal.dot(center);
-    if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
-    m *= 1 - std::ldexp(0x1p-30, round / 2);
-    const Vector point = center + m * direction;
-    const std::optional<Location> location =
-        Walk(vertices, point, SizeWith(vertices, point), near, 0, work_);
-    if (!location) return 0;
-    near = location->triangle;
-    if (location->side == Side::kInside) return m;
-  }
-  return 0;
-}
-
 void Surface::ResetMarks() {
   for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
   for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_[id] = 0;
-  editor_.mark = 0;
+  mark_ = 0;
 }
 
-// Fills the editor's region with the connected triangles that the point sees or whose planes hold
-// it, and the horizon with their boundary, in order round it: depth first, the edges of each
-// triangle counter-clockwise from the one it was entered by. False when that leaves the zone.
-bool Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                            double size, Editor& editor) {
-  if (editor.mark > UINT32_MAX - 2 * (kZoneMask + 1)) ResetMarks();
-  const uint32_t mark = editor.mark += kZoneMask + 1;
-  editor.region.assign(1, first);
-  editor.horizon.clear();
+// Fills the region with the connected triangles that the point sees or whose planes hold it, and
+// the horizon with their boundary, in order round it: depth first, the edges of each triangle
+// counter-clockwise from the one it was entered by.
+void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                            double size) {
+  if (mark_ == UINT32_MAX) ResetMarks();
+  const uint32_t mark = ++mark_;
+  region_.assign(1, first);
+  horizon_.clear();
   triangles_[first].mark = mark;
-  editor.visits.assign(1, {first, 0, 3});
-  while (!editor.visits.empty()) {
-    Visit& visit = editor.visits.back();
+  visits_.assign(1, {first, 0, 3});
+  while (!visits_.empty()) {
+    Visit& visit = visits_.back();
     if (visit.left == 0) {
-      editor.visits.pop_back();
+      visits_.pop_back();
       continue;
     }
     const SurfaceTriangle& t = triangles_[visit.triangle];
@@ -421,60 +197,52 @@ bool Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
     const TriangleId next = t.neighbours[i];
     SurfaceTriangle& other = triangles_[next];
     if (other.mark == mark) continue;
-    if (editor.zone != 0 && (other.mark & kZoneMask) != editor.zone) return false;
     const uint32_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
+    HULLD_DCHECK(other.neighbours[back] == id);
     if (SideOf(vertices, next, point, size) >= 0) {
       other.mark = mark;
-      editor.region.push_back(next);
-      editor.visits.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
+      region_.push_back(next);
+      visits_.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
     } else {
-      editor.horizon.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
+      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
     }
   }
-  return true;
 }
 
 // Removes the vertices that only triangles of the region have: those not on the horizon. By Euler's
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
-void Surface::RemoveVertices(VertexTable& vertices, Editor& editor) {
-  if (editor.region.size() + 2 == editor.horizon.size()) return;
-  for (const HorizonEdge& edge : editor.horizon) vertex_mark_[edge.tail] = editor.mark;
-  for (const TriangleId id : editor.region) {
+void Surface::RemoveVertices(VertexTable& vertices) {
+  if (region_.size() + 2 == horizon_.size()) return;
+  for (const HorizonEdge& edge : horizon_) vertex_mark_[edge.tail] = mark_;
+  for (const TriangleId id : region_) {
     for (const VertexId v : triangles_[id].corners) {
-      if (vertex_mark_[v] == editor.mark) continue;
-      vertex_mark_[v] = editor.mark;
-      if (editor.zone != 0) {
-        vertices.Remove(v, editor.vertices);
-      } else {
-        vertices.Remove(v);
-      }
+      if (vertex_mark_[v] == mark_) continue;
+      vertex_mark_[v] = mark_;
+      vertices.Remove(v);
     }
   }
 }
 
 // Joins the apex to the horizon; the new triangles take the places of the region's first.
-void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor) {
-  std::vector<TriangleId>& region = editor.region;
-  const size_t old_count = region.size();
-  const size_t new_count = editor.horizon.size();
-  while (region.size() < new_count) region.push_back(NewId(editor));
+void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
+  const size_t old_count = region_.size();
+  const size_t new_count = horizon_.size();
+  while (region_.size() < new_count) region_.push_back(NewId());
   for (size_t k = 0; k < new_count; ++k) {
-    const HorizonEdge& edge = editor.horizon[k];
-    const TriangleId id = region[k];
+    const HorizonEdge& edge = horizon_[k];
+    const TriangleId id = region_[k];
     SetTriangle(vertices, id, edge.tail, edge.head, apex);
-    triangles_[id].mark = editor.zone;
-    triangles_[id].neighbours = {edge.beyond, region[k + 1 == new_count ? 0 : k + 1],
-                                 region[k == 0 ? new_count - 1 : k - 1]};
+    triangles_[id].neighbours = {edge.beyond, region_[k + 1 == new_count ? 0 : k + 1],
+                                 region_[k == 0 ? new_count - 1 : k - 1]};
     triangles_[edge.beyond].neighbours[edge.edge_beyond] = id;
   }
   for (size_t k = new_count; k < old_count; ++k) {
-    triangles_[region[k]].corners[0] = kDead;
-    triangles_[region[k]].neighbours[0] = region[0];
-    FreeId(editor, region[k]);
+    triangles_[region_[k]].corners[0] = kDead;
+    triangles_[region_[k]].neighbours[0] = region_[0];
+    free_.push_back(region_[k]);
   }
-  if (editor.zone == 0) alive_ = alive_ - old_count + new_count;
-  editor.alive += static_cast<int64_t>(new_count) - static_cast<int64_t>(old_count);
-  editor.last = region[0];
+  alive_ = alive_ - old_count + new_count;
+  last_ = region_[0];
 }
 
 }  // namespace hulld

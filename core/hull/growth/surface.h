@@ -4,15 +4,16 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/growth/chunked_vector.h"
 #include "core/hull/growth/direction_map.h"
 #include "core/hull/growth/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 
@@ -49,8 +50,8 @@ static_assert(sizeof(SurfaceTriangle) == 64);
 // for the incremental hull; Devillers, Pion and Teillaud 2002 for the walk.
 class Surface {
  public:
-  // The cone from `apex` over a polygon whose plane does not hold it. `polygon`: vertices in order,
-  // either way round.
+  // The cone from `apex` over a polygon. `polygon`: at least three vertices in order, either way
+  // round. Requires that the polygon's plane does not hold the apex.
   Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex);
 
   // Adds a point. Cost: the triangles removed and created, and a walk of a few exact signs; a scan
@@ -80,8 +81,9 @@ class Surface {
   // interior point is known; empty when the walk is longer than the surface warrants.
   std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
                                  TriangleId start) const {
+    HULLD_CHECK(directions_.has_value());
     uint64_t steps = 0;
-    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), 0, steps);
+    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), steps);
   }
   // True when the point lies strictly outside the triangle's plane, exactly.
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
@@ -90,7 +92,8 @@ class Surface {
   // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
   // returns the triangles that go, for the caller to move what it keeps by triangle; the second
   // joins the point to their boundary and returns the triangles that come, which take over IDs.
-  // The spans hold until the next insertion.
+  // The spans hold until the next insertion. In builds without NDEBUG the second checks the
+  // triangles that came (FindStarDefect).
   std::span<const TriangleId> RemoveVisible(VertexTable& vertices, const Vector& point,
                                             TriangleId seen);
   std::span<const TriangleId> JoinToBoundary(VertexTable& vertices, const Vector& point);
@@ -99,14 +102,6 @@ class Surface {
                                    const Vector& point) const;
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
-
-  // Adds points, in the order given, by threads that each have a zone of the surface: the triangles
-  // with all corners in one part of space. Returns those that would change anything else, few,
-  // which are not added. zones: 2 or 4. Requires that an interior point is known.
-  // Empty when should_stop, which may be empty, said so: then the surface is of no use any more.
-  std::optional<std::vector<Vector>> InsertInZones(VertexTable& vertices,
-                                                   std::span<const Vector> points, uint32_t zones,
-                                                   const std::function<bool()>& should_stop);
 
   // The map of directions, for choosing what to insert and in which order; null where no interior
   // point is known.
@@ -138,13 +133,23 @@ class Surface {
     }
   }
   const SurfaceTriangle& triangle(TriangleId id) const { return triangles_[id]; }
+  // False for an ID that waits to be used again. Requires id < id_bound().
+  bool IsAlive(TriangleId id) const {
+    HULLD_DCHECK(id < id_bound());
+    return triangles_[id].corners[0] != kDead;
+  }
   // IDs of triangles lie below this.
   size_t id_bound() const { return triangles_.size(); }
   // What a plane's slope is relative to; infinite where the bound would not hold.
   double SizeWith(const VertexTable& vertices, const Vector& point) const;
+  // Triangles that are alive, and IDs that wait to be used again.
   size_t triangle_count() const { return alive_; }
+  size_t free_count() const { return free_.size(); }
 
  private:
+  // Corrupts surfaces, to see that FindDefect notices.
+  friend class SurfaceTestPeer;
+
   // An edge of the horizon, its triangle beyond, and which edge it is there.
   struct HorizonEdge {
     VertexId tail;
@@ -163,25 +168,6 @@ class Surface {
     TriangleId triangle;
     uint8_t edge;
     uint8_t left;
-  };
-  // What one insertion works with. Marks hold a count of insertions and, in the lowest bits, a
-  // zone.
-  struct Editor {
-    std::vector<TriangleId> region;
-    std::vector<HorizonEdge> horizon;
-    std::vector<Visit> visits;
-    uint32_t mark = 0;
-    // Where the last insertion was.
-    TriangleId last = 0;
-    // 0 for the whole surface. Otherwise only triangles marked with this zone may be changed, and
-    // new IDs come from `free`, then from `next` on, up to `end`.
-    uint32_t zone = 0;
-    std::vector<TriangleId> free;
-    TriangleId next = 0;
-    TriangleId end = 0;
-    int64_t alive = 0;
-    VertexTable::Zone vertices;
-    uint64_t work = 0;
   };
   // A map of directions in the making. Its corners are measured some at a time, so that no
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
@@ -202,10 +188,9 @@ class Surface {
     double largest = 0;
   };
 
-  bool IsAlive(TriangleId id) const { return triangles_[id].corners[0] != kDead; }
   // A dead triangle's first neighbour is one that came in its place.
   TriangleId Alive(TriangleId id) const {
-    if (id >= triangles_.size()) return editor_.last;
+    if (id >= triangles_.size()) return last_;
     while (!IsAlive(id)) id = triangles_[id].neighbours[0];
     return id;
   }
@@ -220,16 +205,16 @@ class Surface {
   }
   int ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point) const;
   void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
-  TriangleId NewId(Editor& editor);
-  void FreeId(Editor& editor, TriangleId id);
+  TriangleId NewId();
   void LinkAll();
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
-                               TriangleId start, uint32_t zone, uint64_t& steps) const;
+                               TriangleId start, uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
   int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
              const Ray& ray) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
+  void Measure(const VertexTable& vertices);
   void Update(const VertexTable& vertices);
   bool IsWorthMeasuring() const;
   bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
@@ -240,19 +225,14 @@ class Surface {
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
-  bool CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                     double size, Editor& editor);
+  void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                     double size);
   void InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell);
-  void RemoveVertices(VertexTable& vertices, Editor& editor);
-  void JoinHorizon(const VertexTable& vertices, VertexId apex, Editor& editor);
+  void RemoveVertices(VertexTable& vertices);
+  void JoinHorizon(const VertexTable& vertices, VertexId apex);
   void ResetMarks();
 
-  void MarkZones(const VertexTable& vertices, std::span<Editor> zones);
-  bool InsertInZone(VertexTable& vertices, const Vector& point, double size, Editor& zone);
-  void LeaveZones(VertexTable& vertices, std::span<Editor> zones);
-
   static constexpr VertexId kDead = UINT32_MAX;
-  static constexpr uint32_t kZoneMask = 7;
 
   ChunkedVector<SurfaceTriangle> triangles_;
   ChunkedVector<TriangleId> free_;
@@ -275,7 +255,15 @@ class Surface {
   size_t measured_at_ = 0;
   uint64_t work_ = 0;
 
-  Editor editor_;
+  // What one insertion works with: the triangles that the point sees or whose planes hold it, their
+  // boundary, and the stack of the traversal.
+  std::vector<TriangleId> region_;
+  std::vector<HorizonEdge> horizon_;
+  std::vector<Visit> visits_;
+  // The number of the insertion.
+  uint32_t mark_ = 0;
+  // Where the last insertion was.
+  TriangleId last_ = 0;
 };
 
 }  // namespace hulld

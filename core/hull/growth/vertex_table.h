@@ -5,8 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/hull/growth/chunked_vector.h"
-#include "core/hull/hull.h"
+#include "core/numeric/vector.h"
 
 namespace hulld {
 
@@ -33,14 +34,15 @@ class VertexTable {
     const Vector point = given + Vector::Zero();
     VertexId id;
     if (free_.empty()) {
+      HULLD_CHECK(points_.size() < UINT32_MAX);
       id = static_cast<VertexId>(points_.size());
       points_.push_back(point);
-      counts_.push_back({block_, 0, true});
+      counts_.push_back({block_, 0, true, true});
     } else {
       id = free_.back();
       free_.pop_back();
       points_[id] = point;
-      counts_[id] = {block_, 0, true};
+      counts_[id] = {block_, 0, true, true};
     }
     max_abs_coordinate_ = std::max(max_abs_coordinate_, point.cwiseAbs().maxCoeff());
     ++outside_;
@@ -48,15 +50,20 @@ class VertexTable {
     return id;
   }
 
+  // Requires a vertex that lives.
   void CountDuplicate(VertexId id) {
+    HULLD_DCHECK(IsAlive(id));
     Counts& counts = counts_[id];
-    if (counts.block != block_) counts = {block_, 0, false};
+    if (counts.block != block_) counts = {block_, 0, false, true};
     ++counts.duplicates;
     ++duplicate_;
   }
 
+  // Requires a vertex that lives.
   void Remove(VertexId id) {
+    HULLD_DCHECK(IsAlive(id));
     Counts& counts = counts_[id];
+    counts.is_alive = false;
     if (counts.block == block_) {
       duplicate_ -= counts.duplicates;
       if (counts.is_new) --outside_;
@@ -65,69 +72,9 @@ class VertexTable {
     free_.push_back(id);
   }
 
-  // IDs for one thread to add and remove vertices by while others do so in theirs, and what became
-  // of points meanwhile. A thread may remove and count only vertices that no other one does.
-  struct Zone {
-    std::vector<VertexId> free;
-    std::vector<VertexId> added;
-    VertexId next = 0;
-    VertexId end = 0;
-    int64_t outside = 0;
-    int64_t duplicate = 0;
-  };
-  Zone AddZone(size_t points) {
-    Zone zone;
-    zone.next = static_cast<VertexId>(points_.size());
-    for (size_t k = 0; k < points; ++k) {
-      points_.Extend();
-      counts_.Extend();
-    }
-    zone.end = static_cast<VertexId>(points_.size());
-    return zone;
-  }
-  // Requires room, and that EnlargeMaxAbsCoordinate knows the point's coordinates.
-  VertexId Add(const Vector& given, Zone& zone) {
-    VertexId id = zone.next;
-    if (zone.free.empty()) {
-      ++zone.next;
-    } else {
-      id = zone.free.back();
-      zone.free.pop_back();
-    }
-    points_[id] = given + Vector::Zero();
-    counts_[id] = {block_, 0, true};
-    ++zone.outside;
-    zone.added.push_back(id);
-    return id;
-  }
-  void CountDuplicate(VertexId id, Zone& zone) {
-    Counts& counts = counts_[id];
-    if (counts.block != block_) counts = {block_, 0, false};
-    ++counts.duplicates;
-    ++zone.duplicate;
-  }
-  void Remove(VertexId id, Zone& zone) {
-    Counts& counts = counts_[id];
-    if (counts.block == block_) {
-      zone.duplicate -= counts.duplicates;
-      if (counts.is_new) --zone.outside;
-      counts.is_new = false;
-    }
-    zone.free.push_back(id);
-  }
-  // Takes back what a zone did not use, and its counts.
-  void RemoveZone(const Zone& zone) {
-    for (VertexId id = zone.next; id < zone.end; ++id) free_.push_back(id);
-    for (const VertexId id : zone.free) free_.push_back(id);
-    added_.insert(added_.end(), zone.added.begin(), zone.added.end());
-    outside_ = static_cast<uint64_t>(static_cast<int64_t>(outside_) + zone.outside);
-    duplicate_ = static_cast<uint64_t>(static_cast<int64_t>(duplicate_) + zone.duplicate);
-  }
-  void EnlargeMaxAbsCoordinate(double value) {
-    max_abs_coordinate_ = std::max(max_abs_coordinate_, value);
-  }
-
   const Vector& operator[](VertexId id) const { return points_[id]; }
+  // False for an ID that waits to be used again, and for one that was never given out.
+  bool IsAlive(VertexId id) const { return id < points_.size() && counts_[id].is_alive; }
   // The vertices that the current block added and that live.
   // Cost: O(points of the block that were vertices at any time).
   std::vector<Vector> NewVertices() const {
@@ -144,12 +91,10 @@ class VertexTable {
   }
   // All that live. Cost: O(id_bound()).
   std::vector<Vector> Vertices() const {
-    std::vector<bool> lives(id_bound(), true);
-    for (size_t i = 0; i < free_.size(); ++i) lives[free_[i]] = false;
     std::vector<Vector> vertices;
     vertices.reserve(size());
     for (VertexId id = 0; id < id_bound(); ++id) {
-      if (lives[id]) vertices.push_back(points_[id]);
+      if (IsAlive(id)) vertices.push_back(points_[id]);
     }
     return vertices;
   }
@@ -166,10 +111,11 @@ class VertexTable {
 
  private:
   struct Counts {
-    // The block that the others belong to.
+    // The block that the next two belong to.
     uint64_t block;
     uint32_t duplicates;
     bool is_new;
+    bool is_alive;
   };
 
   ChunkedVector<Vector> points_;

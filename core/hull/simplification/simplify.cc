@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/hull/audit.h"
 #include "core/hull/growth/hull_builder.h"
 #include "core/hull/simplification/triangle_distance.h"
@@ -43,8 +45,8 @@ absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {
 
 Hull HullOf(std::span<const Vector> points) {
   HullBuilder builder;
-  // Finite points without limits cannot be refused.
-  builder.Add(points).IgnoreError();
+  // Finite points without limits are never refused.
+  HULLD_CHECK(builder.Add(points).ok());
   return builder.Snapshot();
 }
 
@@ -59,11 +61,10 @@ absl::StatusOr<Choice> ChooseVertices(const Hull& hull, const SimplifyTarget& ta
   const size_t most = target.max_vertices == 0
                           ? hull.vertices().size()
                           : std::min(target.max_vertices, hull.vertices().size());
+  StopPoll poll(target.should_stop, 1);
   while (subset.chosen().size() < most) {
     if (target.max_error > 0 && subset.DistanceBound() <= target.max_error) break;
-    if (target.should_stop && target.should_stop()) {
-      return absl::CancelledError("stopped while simplifying");
-    }
+    if (poll.Step()) return absl::CancelledError("stopped while simplifying");
     subset.ChooseNext();
   }
   Choice choice;
@@ -117,7 +118,9 @@ std::vector<Vector> CornersOf(const std::vector<HalfSpace>& half_spaces) {
   return corners;
 }
 
+// Requires a point.
 std::vector<Vector> BoxOf(std::span<const Vector> points) {
+  HULLD_CHECK(!points.empty());
   Vector low = points[0];
   Vector high = points[0];
   for (const Vector& p : points) {

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/hull/simplification/triangle_distance.h"
 
 namespace hulld {
@@ -27,6 +28,7 @@ uint32_t Farthest(size_t count, Measure&& measure) {
 }  // namespace
 
 VertexSubset::VertexSubset(std::span<const Vector> points) : points_(points) {
+  HULLD_CHECK(!points.empty());
   Vector low = points[0];
   Vector high = points[0];
   for (const Vector& p : points) {
@@ -91,6 +93,7 @@ double VertexSubset::HeightOf(const Triangle& triangle, uint32_t point) const {
 
 // Gives the point to the triangle, of those from `first_triangle` on, that it is nearest to.
 void VertexSubset::Assign(uint32_t point, size_t first_triangle) {
+  HULLD_CHECK(first_triangle < triangles_.size());
   size_t best = first_triangle;
   double least = INFINITY;
   for (size_t k = first_triangle; k < triangles_.size(); ++k) {
@@ -108,11 +111,14 @@ void VertexSubset::Assign(uint32_t point, size_t first_triangle) {
 }
 
 void VertexSubset::ChooseNext() {
+  HULLD_CHECK(!is_complete());
   Triangle* worst = nullptr;
   for (Triangle& t : triangles_) {
     if (t.near.empty()) continue;
     if (worst == nullptr || t.distance > worst->distance) worst = &t;
   }
+  // Each point that is not chosen is near some triangle.
+  HULLD_CHECK(worst != nullptr);
   const uint32_t next = worst->farthest;
   chosen_.push_back(next);
   Forget(*worst, next);

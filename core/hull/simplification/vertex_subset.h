@@ -18,7 +18,8 @@ namespace hulld {
 // (Quickhull) for the order and for keeping each point with one triangle.
 class VertexSubset {
  public:
-  // `points` must outlive this. Starts with two to four points that span the set as well as any.
+  // `points` must outlive this. Starts with up to four points that span the set as well as any.
+  // Requires a point.
   explicit VertexSubset(std::span<const Vector> points);
 
   // Indices, in the order chosen.

@@ -23,6 +23,10 @@ struct RungCounts {
   std::array<uint64_t, kRungCount> by_rung = {};
 
   void Add(Rung rung) { ++by_rung[static_cast<size_t>(rung)]; }
+  RungCounts& operator+=(const RungCounts& other) {
+    for (size_t rung = 0; rung < kRungCount; ++rung) by_rung[rung] += other.by_rung[rung];
+    return *this;
+  }
 };
 
 }  // namespace hulld

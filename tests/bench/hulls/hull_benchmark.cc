@@ -5,8 +5,9 @@
 //   stream  points one at a time, each a call of its own: the total, and percentiles of the latency
 //   cost    build and stream against the number of points
 //
-// tests/bench/hulls/run_hull_benchmark.sh runs all and keeps the rows as CSV. `vertices_missing_or_extra`
-// is by how many vertices a library's hull differs from hulld's exact one, which is audited.
+// tests/bench/hulls/run_hull_benchmark.sh runs all and keeps the rows as CSV.
+// `vertices_missing_or_extra` is by how many vertices a library's hull differs from hulld's exact
+// one, which is audited.
 
 #include <benchmark/benchmark.h>
 
@@ -75,15 +76,12 @@ void Report(benchmark::State& state, Workload& workload, size_t vertices) {
   state.counters["vertices_missing_or_extra"] = difference < 0 ? -difference : difference;
 }
 
-template <int kThreads>
 void BuildByHulld(benchmark::State& state, Workload& workload) {
   if (!IsReady(state, workload)) return;
-  AddLimits limits;
-  limits.threads = kThreads;
   size_t vertices = 0;
   for (auto _ : state) {
     HullBuilder builder;
-    benchmark::DoNotOptimize(builder.Add(workload.points(), limits));
+    benchmark::DoNotOptimize(builder.Add(workload.points()));
     vertices = builder.vertex_count();
   }
   Report(state, workload, vertices);
@@ -184,8 +182,7 @@ void RegisterBuilds() {
         "sphere:100000", "sphere:1000000", "mesh:stanford-bunny.obj", "mesh:rocker-arm.obj",
         "mesh:spot.obj", "lattice:50"}) {
     const auto workload = std::make_shared<Workload>(name);
-    Add("build", "hulld", BuildByHulld<1>, workload);
-    Add("build", "hulld on two threads", BuildByHulld<2>, workload)->UseRealTime();
+    Add("build", "hulld", BuildByHulld, workload);
     // What takes many seconds is measured once.
     const int repetitions = workload->name() == "sphere:1000000" ? 1 : 3;
     Add("build", "qhull", BuildByQhull, workload)->Repetitions(repetitions);
@@ -211,7 +208,7 @@ void RegisterCosts() {
     for (const int n : {100, 300, 1000, 3000, 10000, 30000, 100000, 300000, 1000000}) {
       const auto workload =
           std::make_shared<Workload>(std::string(shape) + ":" + std::to_string(n));
-      Add("cost", "hulld", BuildByHulld<1>, workload);
+      Add("cost", "hulld", BuildByHulld, workload);
       Add("cost", "hulld one at a time", InsertOneByOne<HulldStream>, workload);
       Add("cost", "qhull", BuildByQhull, workload)->Repetitions(n > 100000 ? 1 : 3);
       Add("cost", "cgal", BuildByCgal, workload)->Repetitions(n > 100000 ? 1 : 3);

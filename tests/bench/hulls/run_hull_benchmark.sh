@@ -38,5 +38,5 @@ for suite in "${suites[@]}"; do
   esac
 done
 if [[ -f $results/hull_cost_$machine.csv ]]; then bash tests/bench/hulls/plot_hull_cost.sh "$machine"; fi
-# For the README.
-if [[ -f $results/hull_extremes_$machine.csv ]]; then bash tests/bench/hulls/extremes_table.sh "$machine"; fi
+# The tables of the pages show this machine.
+if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

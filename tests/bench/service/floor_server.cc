@@ -30,9 +30,13 @@ constexpr v1::Rung kRung = v1::RUNG_FLOATING_POINT;
 // A relation and a rung, each a byte.
 constexpr int kPairsPerMessage = server::Config::kReplyMessageBytes / 2;
 
+const std::string& StoreId() {
+  static const auto* const id = new std::string(server::RandomId());
+  return *id;
+}
+
 void FillHeader(v1::ResponseHeader* header) {
-  static const std::string store_id = server::RandomId();
-  header->set_store_id(store_id);
+  header->set_store_id(StoreId());
   header->set_revision(kRevision);
 }
 
@@ -40,6 +44,7 @@ void FillVersion(const std::string& hull_id, v1::HullVersion* version) {
   version->set_hull_id(hull_id);
   version->set_create_revision(kRevision);
   version->set_revision(kRevision);
+  version->set_store_id(StoreId());
 }
 
 template <typename Request, typename Response>
@@ -53,8 +58,7 @@ void FillHead(const Request& request, Response* response) {
   }
 }
 
-template <typename Columns>
-void FillColumns(int count, Columns* columns) {
+void FillColumns(int count, v1::AnswerColumns* columns) {
   columns->mutable_relations()->Resize(count, kRelation);
   columns->mutable_rungs()->Resize(count, kRung);
 }
@@ -185,7 +189,7 @@ class CollisionFloor : public v1::CollisionService::CallbackService {
     for (int begin = 0; begin < pairs; begin += kPairsPerMessage) {
       if (begin > 0) messages.emplace_back();
       messages.back().set_first_pair(begin);
-      FillColumns(std::min(kPairsPerMessage, pairs - begin), &messages.back());
+      FillColumns(std::min(kPairsPerMessage, pairs - begin), messages.back().mutable_columns());
     }
     return new Replies<v1::BatchCheckCollisionsResponse>(std::move(messages));
   }

@@ -77,7 +77,7 @@ class BatchClient {
     grpc::ClientContext context;
     const auto reader = stub.BatchCheckCollisions(&context, request);
     v1::BatchCheckCollisionsResponse part;
-    while (!ending_ && reader->Read(&part)) *pairs += part.relations_size();
+    while (!ending_ && reader->Read(&part)) *pairs += part.columns().relations_size();
     if (ending_) context.TryCancel();
     const grpc::Status status = reader->Finish();
     if (!ending_) Require(status, "BatchCheckCollisions");

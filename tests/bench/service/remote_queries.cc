@@ -140,7 +140,7 @@ Sample AnswerBatch(RemoteSubject& subject, const Batch& batch, double seconds) {
     grpc::ClientContext context;
     const auto reader = subject.stub(0).BatchCheckCollisions(&context, batch.request);
     for (v1::BatchCheckCollisionsResponse part; reader->Read(&part);) {
-      answered += part.relations_size();
+      answered += part.columns().relations_size();
     }
     CheckOk(reader->Finish(), "a batch");
     if (answered != batch.pairs.size()) CheckOk(absl::InternalError("too few"), "a batch");

@@ -23,3 +23,5 @@ cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
 cmake --build --preset release --target remote_benchmark
 build/release/bin/remote_benchmark --out "tests/bench/results/remote_$machine.csv" \
   --rounds "${ROUNDS:-9}" --seconds "${SECONDS_EACH:-1}" "${flags[@]}"
+# The tables of the pages show this machine.
+if [[ $machine == epyc_gcc12 ]]; then bash tests/bench/tables.sh --write "$machine"; fi

@@ -85,10 +85,22 @@ TEST_F(HullctlTest, ErrorsSayWhatToDo) {
   const Ran late = Ask({"get", "x", "--timeout", "50ms"});
   EXPECT_EQ(late.code, 3);
   EXPECT_THAT(late.err, HasSubstr("within 50 ms: raise --timeout"));
-  fake_.FailNext("CreateHull", {{grpc::StatusCode::UNAVAILABLE, "draining"}});
+  fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "draining",
+                                           v1::ERROR_REASON_DRAINING)});
   const Ran draining = Ask({"create", "x"});
   EXPECT_EQ(draining.code, 3);
   EXPECT_THAT(draining.err, HasSubstr("is not available: draining; try again later"));
+  // Words do not tell an error of gRPC from one of hulld.
+  fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::UNAVAILABLE, "cannot connect the disk",
+                                           v1::ERROR_REASON_STORE_UNAVAILABLE)});
+  EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("is not available: cannot connect the disk"));
+  fake_.FailNext("CreateHull", {{grpc::StatusCode::UNAVAILABLE, "no route"}});
+  EXPECT_THAT(Ask({"create", "x"}).err, StartsWith("hullctl: cannot reach hulld at "));
+  fake_.FailNext("CreateHull", {HulldError(grpc::StatusCode::RESOURCE_EXHAUSTED, "many hulls",
+                                           v1::ERROR_REASON_LIMIT_EXCEEDED)});
+  EXPECT_EQ(Ask({"create", "x"}).err, "hullctl: many hulls\n");
+  fake_.FailNext("CreateHull", {{grpc::StatusCode::RESOURCE_EXHAUSTED, "too large"}});
+  EXPECT_THAT(Ask({"create", "x"}).err, HasSubstr("--max-message-bytes"));
 }
 
 TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
@@ -119,6 +131,24 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
     EXPECT_NE(ran.err, "") << testing::PrintToString(arguments);
     EXPECT_EQ(ran.out, "");
   }
+}
+
+TEST_F(HullctlTest, AnUnknownCommandIsNamedWithTheNearestOne) {
+  const auto error = [](const std::vector<std::string>& arguments) {
+    const Ran ran = RunTool(arguments);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_EQ(ran.out, "");
+    return ran.err.substr(0, ran.err.find('\n'));
+  };
+  EXPECT_EQ(error({"chek", "a", "b"}), "Unknown command \"chek\". Did you mean \"check\"?");
+  EXPECT_EQ(error({"chekc", "a", "b"}), "Unknown command \"chekc\". Did you mean \"check\"?");
+  EXPECT_EQ(error({"--output", "json", "del", "a", "--verify"}),
+            "Unknown command \"del\". Did you mean \"delete\"?");
+  EXPECT_EQ(error({"backup", "sav", "f"}), "Unknown command \"sav\". Did you mean \"save\"?");
+  EXPECT_EQ(error({"fly"}), "Unknown command \"fly\".");
+  EXPECT_EQ(error({}), "A subcommand is required");
+  EXPECT_EQ(error({"backup"}), "A subcommand is required");
+  EXPECT_EQ(error({"check", "a"}), "B is required");
 }
 
 TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
@@ -295,17 +325,17 @@ TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
   const TempFile file("pairs", "place a box\nplace b box\npair a b\npair b a\n");
   v1::BatchCheckCollisionsResponse late;
   late.set_first_pair(1);
-  late.add_relations(v1::RELATION_TOUCHING);
+  late.mutable_columns()->add_relations(v1::RELATION_TOUCHING);
   v1::BatchCheckCollisionsResponse few;
-  few.add_relations(v1::RELATION_TOUCHING);
+  few.mutable_columns()->add_relations(v1::RELATION_TOUCHING);
   v1::BatchCheckCollisionsResponse many;
-  for (int i = 0; i < 3; ++i) many.add_relations(v1::RELATION_TOUCHING);
+  for (int i = 0; i < 3; ++i) many.mutable_columns()->add_relations(v1::RELATION_TOUCHING);
   v1::BatchCheckCollisionsResponse ragged;
-  for (int i = 0; i < 2; ++i) ragged.add_relations(v1::RELATION_TOUCHING);
-  ragged.add_axes();
+  for (int i = 0; i < 2; ++i) ragged.mutable_columns()->add_relations(v1::RELATION_TOUCHING);
+  ragged.mutable_columns()->add_axes();
   v1::BatchCheckCollisionsResponse half;
-  for (int i = 0; i < 2; ++i) half.add_relations(v1::RELATION_TOUCHING);
-  for (int i = 0; i < 2; ++i) half.add_separations(1);
+  for (int i = 0; i < 2; ++i) half.mutable_columns()->add_relations(v1::RELATION_TOUCHING);
+  for (int i = 0; i < 2; ++i) half.mutable_columns()->add_separations(1);
   for (const auto& answer : {late, few, many, ragged, half}) {
     fake_.batch_answers = {answer};
     EXPECT_EQ(Ask({"batch", file.path()}).code, 1);

@@ -33,6 +33,15 @@ TEST(Integer, ScaledDoublesStayWithinTheirBound) {
   EXPECT_EQ(ToScaledDoubles({0, 0, -1}), Vector(0, 0, -0x1p62));
 }
 
+TEST(IntegerDeathTest, RefusesWhatHasNoAnswer) {
+  EXPECT_DEATH(LowestBitExponent(0.0), "check failed: x != 0");
+  EXPECT_DEATH(ToInteger(0.75, 0), "check failed: shift > -53");
+  EXPECT_DEATH(ToInteger(std::numeric_limits<double>::infinity(), 0),
+               "check failed: std::isfinite");
+  EXPECT_DEATH(ToScaledDoubles({0, 0, 0}), "check failed: bits > 0");
+  EXPECT_DEATH(AnyPerpendicular({0, 0, 0}), "check failed: !IsZero");
+}
+
 TEST(Integer, PerpendicularIsAcrossAndNotZero) {
   for (const IntegerVector& d : {IntegerVector{5, 0, 0}, {0, -2, 0}, {0, 0, 1}, {1, 2, 3}}) {
     EXPECT_FALSE(IsZero(AnyPerpendicular(d)));

@@ -64,8 +64,7 @@ std::string CheckProblems(const Problems& problems, int placements, std::set<uin
 bool IsParallel(int size, bool wanted, int rows) { return size == (wanted ? rows : 0); }
 
 // Whether each column is as long as it must be.
-template <typename Columns>
-bool AreParallel(const v1::Wanted& wanted, const Columns& columns, int rows) {
+bool AreParallel(const v1::Wanted& wanted, const v1::AnswerColumns& columns, int rows) {
   return IsParallel(columns.relations_size(), true, rows) &&
          IsParallel(columns.rungs_size(), true, rows) &&
          IsParallel(columns.axes_size(), wanted.axis(), rows) &&
@@ -79,8 +78,8 @@ bool AreParallel(const v1::Wanted& wanted, const Columns& columns, int rows) {
 }
 
 // One row's numbers against its relation.
-template <typename Columns>
-std::string CheckRow(const v1::Wanted& wanted, double tolerance, const Columns& columns, int row) {
+std::string CheckRow(const v1::Wanted& wanted, double tolerance, const v1::AnswerColumns& columns,
+                     int row) {
   const v1::Relation relation = columns.relations(row);
   if (!v1::Relation_IsValid(relation) || !v1::Rung_IsValid(columns.rungs(row))) {
     return "an unknown relation or rung";
@@ -99,28 +98,28 @@ std::string CheckRow(const v1::Wanted& wanted, double tolerance, const Columns& 
   return finding;
 }
 
-// The rows of one message. `has_problem(row)`: whether a placement of the row's pair has one;
-// `name(row)`: how pair problems name the row.
-template <typename Columns, typename HasProblem, typename Name>
-std::string CheckColumns(const v1::Wanted& wanted, double tolerance, const Columns& columns,
-                         int rows, const HasProblem& has_problem, const Name& name) {
+// The rows of one message. `has_problem(row)`: whether a placement of the row's pair has one.
+template <typename HasProblem>
+std::string CheckColumns(const v1::Wanted& wanted, double tolerance,
+                         const v1::AnswerColumns& columns, int rows,
+                         const HasProblem& has_problem) {
   if (!AreParallel(wanted, columns, rows)) return "columns are not parallel";
   std::set<uint64_t> causes;
   for (const v1::PairProblem& problem : columns.pair_problems()) {
-    if (!causes.insert(problem.pair()).second || problem.message().empty() ||
+    if (!causes.insert(problem.row()).second || problem.message().empty() ||
         !IsProblemCode(problem.code())) {
       return "a malformed problem: " + problem.ShortDebugString();
     }
   }
   for (int row = 0; row < rows; ++row) {
-    const bool has_cause = has_problem(row) || causes.erase(name(row)) > 0;
+    const bool has_cause = has_problem(row) || causes.erase(static_cast<uint64_t>(row)) > 0;
     if (has_cause != (columns.relations(row) == v1::RELATION_UNSPECIFIED)) {
       return absl::StrCat("row ", row, " has an answer and a problem, or neither");
     }
     std::string finding = CheckRow(wanted, tolerance, columns, row);
     if (!finding.empty()) return finding;
   }
-  return causes.empty() ? "" : "a problem names a pair that the message does not answer";
+  return causes.empty() ? "" : "a problem names a row that the message does not have";
 }
 
 // Facets name vertices that there are.
@@ -189,7 +188,7 @@ std::string CheckHull(const v1::GetHullRequest& request, const v1::GetHullRespon
 }
 
 std::string CheckPage(const v1::ListHullsRequest& request, const v1::ListHullsResponse& response) {
-  const uint32_t most = request.page_size() == 0 ? 100 : request.page_size();
+  const uint32_t most = request.page_size() == 0 ? 100 : std::min(request.page_size(), 1000u);
   if (static_cast<uint32_t>(response.hulls_size()) > most) return "a page is longer than asked for";
   const std::string* before = nullptr;
   for (const v1::HullInfo& hull : response.hulls()) {
@@ -280,13 +279,14 @@ std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
       return problems.count(request.pairs(2 * pair)) + problems.count(request.pairs(2 * pair + 1)) >
              0;
     };
-    if (2 * pair_of(part.relations_size()) > static_cast<uint64_t>(request.pairs_size())) {
+    if (2 * pair_of(part.columns().relations_size()) >
+        static_cast<uint64_t>(request.pairs_size())) {
       return "more answers than pairs";
     }
-    finding = CheckColumns(request.wanted(), request.tolerance(), part, part.relations_size(),
-                           has_problem, pair_of);
+    finding = CheckColumns(request.wanted(), request.tolerance(), part.columns(),
+                           part.columns().relations_size(), has_problem);
     if (!finding.empty()) return finding;
-    next += static_cast<uint64_t>(part.relations_size());
+    next += static_cast<uint64_t>(part.columns().relations_size());
   }
   return 2 * next == static_cast<uint64_t>(request.pairs_size()) ? "" : "pairs without an answer";
 }
@@ -316,9 +316,8 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
     const auto has_problem = [&](int row) {
       return problems.count(part.pairs(2 * row)) + problems.count(part.pairs(2 * row + 1)) > 0;
     };
-    finding =
-        CheckColumns(request.wanted(), request.tolerance(), part.columns(), part.pairs_size() / 2,
-                     has_problem, [](int row) { return static_cast<uint64_t>(row); });
+    finding = CheckColumns(request.wanted(), request.tolerance(), part.columns(),
+                           part.pairs_size() / 2, has_problem);
     if (!finding.empty()) return finding;
     for (const int relation : part.columns().relations()) {
       Count(static_cast<v1::Relation>(relation), &counted);
@@ -330,7 +329,7 @@ std::string CheckScene(const v1::FindCollisionsRequest& request,
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts) {
   std::vector<v1::Relation> relations;
   for (const v1::BatchCheckCollisionsResponse& part : parts) {
-    for (const int relation : part.relations()) {
+    for (const int relation : part.columns().relations()) {
       relations.push_back(static_cast<v1::Relation>(relation));
     }
   }

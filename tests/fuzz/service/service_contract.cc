@@ -4,6 +4,8 @@
 
 #include <set>
 
+#include "client/grpc_status.h"
+
 namespace hulld::fuzz {
 namespace {
 
@@ -31,12 +33,20 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kCheckCollision:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
-    case Rpc::kSaveSnapshot:
+    case Rpc::kSaveBackup:
       return {grpc::FAILED_PRECONDITION};
     case Rpc::kGetStatus:
       return {};
   }
   return {};
+}
+
+// Every error of hulld gives its reason. gRPC refuses messages that are too large by itself.
+std::string CheckReason(Rpc rpc, const grpc::Status& status) {
+  if (ReasonOf(FromGrpcStatus(status)) != v1::ERROR_REASON_UNSPECIFIED) return {};
+  if (status.error_details().empty() && status.error_code() == grpc::RESOURCE_EXHAUSTED) return {};
+  return absl::StrCat(server::RpcName(rpc), " gave no reason for: \"", status.error_message(),
+                      "\"");
 }
 
 }  // namespace
@@ -50,7 +60,7 @@ std::string CheckStatus(Rpc rpc, const CallManner& manner, const grpc::Status& s
   if (manner.raw && code == grpc::UNIMPLEMENTED) return {};
   Codes codes = CodesOf(rpc);
   codes.insert(grpc::RESOURCE_EXHAUSTED);
-  if (codes.count(code) > 0 && !status.error_message().empty()) return {};
+  if (codes.count(code) > 0 && !status.error_message().empty()) return CheckReason(rpc, status);
   return absl::StrCat(server::RpcName(rpc), " ended ", CodeName(code), ": \"",
                       status.error_message(), "\"");
 }

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/snapshot_file.h"
+#include "client/backup_file.h"
 #include "tests/fuzz/service/service_program.h"
 
 namespace hulld::fuzz {
@@ -176,19 +176,19 @@ std::map<std::string, std::string> ServiceFuzz::Contents() {
 std::string ServiceFuzz::Reopen() {
   const std::map<std::string, std::string> before = Contents();
   std::string former;
-  // Every second time a snapshot takes the place of the store.
+  // Every second time a backup takes the place of the store.
   if (opened_ % 2 == 0) {
-    const std::string file = absl::StrCat(directory_, "/snapshot-", opened_);
-    SnapshotWriter writer(file);
+    const std::string file = absl::StrCat(directory_, "/backup-", opened_);
+    BackupWriter writer(file);
     absl::Status status = writer.Open();
     grpc::ClientContext context;
-    const auto reader = maintenance_->SaveSnapshot(&context, {});
-    v1::SaveSnapshotResponse part;
+    const auto reader = maintenance_->SaveBackup(&context, {});
+    v1::SaveBackupResponse part;
     while (reader->Read(&part) && status.ok()) status = writer.Write(part);
     if (status.ok()) status = writer.Finish();
     former = std::exchange(data_dir_, absl::StrCat(directory_, "/restored-", opened_));
-    if (status.ok()) status = RestoreSnapshot(file, data_dir_).status();
-    if (!status.ok()) return "a snapshot cannot be restored: " + status.ToString();
+    if (status.ok()) status = RestoreBackup(file, data_dir_).status();
+    if (!status.ok()) return "a backup cannot be restored: " + status.ToString();
     std::filesystem::remove(file);
   }
   Stop();
@@ -199,7 +199,7 @@ std::string ServiceFuzz::Reopen() {
     store_id_.clear();
   }
   if (Contents() != before) return "a store is not what it was before it was opened again";
-  ++reached_[former.empty() ? "store opened again" : "snapshot opened"];
+  ++reached_[former.empty() ? "store opened again" : "backup opened"];
   return {};
 }
 

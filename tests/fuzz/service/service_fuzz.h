@@ -34,7 +34,7 @@ class ServiceFuzz {
   // contract lists, replies are consistent (reply_check.h), certificates prove what they are for,
   // answers from a stream or a scene are those of a batch, hulls that the program cannot name stay
   // as they were, the others are as acknowledged, and no call outlives the program. After some
-  // programs a durable store is opened again, itself or a snapshot of it: every hull, its mesh and
+  // programs a durable store is opened again, itself or a backup of it: every hull, its mesh and
   // its writer's sequence are then as before.
   std::string Run(std::span<const uint8_t> program);
 

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "client/backup_file.h"
 #include "client/packed_placements.h"
-#include "client/snapshot_file.h"
 #include "client/verify/certificate_check.h"
 #include "tests/fuzz/service/raw_call.h"
 
@@ -63,7 +63,7 @@ bool IsCollision(v1::Relation relation) {
 const v1::ResponseHeader& HeaderOf(const v1::GetHullMeshResponse& part) {
   return part.header().header();
 }
-const v1::ResponseHeader& HeaderOf(const v1::SaveSnapshotResponse& part) {
+const v1::ResponseHeader& HeaderOf(const v1::SaveBackupResponse& part) {
   return part.begin().header();
 }
 template <typename Part>
@@ -112,7 +112,7 @@ void ServiceProgram::Step() {
     case 17:
       return ReplaceHull();
     case 18:
-      return in_.OneOf(4) ? SaveSnapshot() : ReplaceHull();
+      return in_.OneOf(4) ? SaveBackup() : ReplaceHull();
     default:
       return in_.OneOf(4) ? GetStatus() : AppendPoints();
   }
@@ -375,21 +375,21 @@ void ServiceProgram::ReplaceHull() {
   SeeHull(response.hull());
 }
 
-void ServiceProgram::SaveSnapshot() {
-  v1::SaveSnapshotRequest request;
-  std::vector<v1::SaveSnapshotResponse> parts;
+void ServiceProgram::SaveBackup() {
+  v1::SaveBackupRequest request;
+  std::vector<v1::SaveBackupResponse> parts;
   FillMessage(in_, Hints(), &request);
-  if (!ReadStream(Rpc::kSaveSnapshot, *service_.maintenance_,
-                  &v1::MaintenanceService::Stub::SaveSnapshot, request, &parts)) {
+  if (!ReadStream(Rpc::kSaveBackup, *service_.maintenance_,
+                  &v1::MaintenanceService::Stub::SaveBackup, request, &parts)) {
     return;
   }
-  SnapshotCheck check;
-  for (const v1::SaveSnapshotResponse& part : parts) {
+  BackupCheck check;
+  for (const v1::SaveBackupResponse& part : parts) {
     if (const absl::Status taken = check.Take(part); !taken.ok()) {
-      return Note("a snapshot: " + taken.ToString());
+      return Note("a backup: " + taken.ToString());
     }
   }
-  if (!check.complete()) Note("a snapshot ends OK and is not complete");
+  if (!check.complete()) Note("a backup ends OK and is not complete");
 }
 
 void ServiceProgram::AppendPoints() {

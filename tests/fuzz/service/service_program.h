@@ -53,7 +53,7 @@ class ServiceProgram {
   void StreamCollisions();
   void FindCollisions();
   void GetStatus();
-  void SaveSnapshot();
+  void SaveBackup();
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0}; }

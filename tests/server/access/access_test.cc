@@ -154,7 +154,7 @@ const std::map<std::string, CallRule>& Rules() {
       {"hulld.v1.StatusService.GetStatus",
        {Permission::kRead, [](const std::string&) { return std::vector{std::string()}; },
         CallRule::kNoHull}},
-      {"hulld.v1.MaintenanceService.SaveSnapshot",
+      {"hulld.v1.MaintenanceService.SaveBackup",
        {Permission::kAdmin, [](const std::string&) { return std::vector{std::string()}; },
         CallRule::kNoHull}},
   };
@@ -361,7 +361,7 @@ TEST_F(Access, ListsShowWhatIsTheCallersAlone) {
 
 TEST_F(Access, TheStoreAsAWholeIsNotForThoseWithAPrefix) {
   const grpc::Status status =
-      Do("hulld.v1.MaintenanceService.SaveSnapshot", "cell's secret", "").status;
+      Do("hulld.v1.MaintenanceService.SaveBackup", "cell's secret", "").status;
   EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED);
   EXPECT_THAT(status.error_message(), HasSubstr("\"cell-1/\""));
 }

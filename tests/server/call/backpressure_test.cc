@@ -14,7 +14,7 @@
 #include "tests/server/harness/test_server.h"
 
 #ifdef HULLD_SANITIZED
-// Of every sanitizer's runtime; GCC 12 comes without its header.
+// Every sanitizer's runtime has it; GCC 12 comes without its header.
 extern "C" size_t __sanitizer_get_current_allocated_bytes();
 #endif
 
@@ -89,7 +89,7 @@ TEST_F(Backpressure, MemoryStaysFlatWhilePointsStreamIn) {
   EXPECT_LT((most - before) / kMebibyte, 100) << "of " << kChunks * 1.2 << " MB sent";
 }
 
-// Both batches take turns on the executor, so the one that is read ends with the other far behind
+// Both batches take turns, so the one that is read ends with the other far behind
 // if that is held back, and at the end as well if it is not.
 TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
   constexpr int kPairs = 500'000;
@@ -111,6 +111,32 @@ TEST_F(Backpressure, ABatchThatNobodyReadsIsNotComputedAhead) {
   while (unread->Read(&part)) {
   }
   EXPECT_FALSE(unread->Finish().ok());
+}
+
+// Every pair is found, with a certificate of some hundred bytes. The unread scene holds up no other
+// call, so it need not be ended, and is complete when the client reads on.
+TEST_F(Backpressure, ASceneThatNobodyReadsIsNotSearchedAhead) {
+  constexpr int kPlacements = 600;
+  constexpr double kPairs = kPlacements * (kPlacements - 1) / 2.0;
+  Put("ball", Sphere(20));
+  v1::FindCollisionsRequest request;
+  for (int i = 0; i < kPlacements; ++i) *request.add_placements() = PlacementOf("ball", 1e-6 * i);
+  request.mutable_wanted()->set_certificate(true);
+  grpc::ClientContext unread_context;
+  const auto unread = collisions_->FindCollisions(&unread_context, request);
+  v1::FindCollisionsResponse part;
+  ASSERT_TRUE(unread->Read(&part));
+  grpc::ClientContext context;
+  const auto read = collisions_->FindCollisions(&context, request);
+  while (read->Read(&part)) {
+  }
+  ASSERT_TRUE(read->Finish().ok());
+  EXPECT_EQ(part.totals().overlapping(), kPairs);
+  EXPECT_LT(PairsAnswered() - kPairs, kPairs / 2);
+  double found = 0;
+  while (unread->Read(&part)) found += part.pairs_size() / 2.0;
+  EXPECT_TRUE(unread->Finish().ok());
+  EXPECT_EQ(found, kPairs);
 }
 
 // One step of a stream of poses answers all pairs; the client reads none of it.

@@ -406,8 +406,8 @@ TEST_F(LimitsTest, LimitsOfSinglePairsInABatchAreCountedToo) {
   const auto reader = collisions_->BatchCheckCollisions(&context, request);
   v1::BatchCheckCollisionsResponse part;
   ASSERT_TRUE(reader->Read(&part));
-  ASSERT_EQ(part.pair_problems_size(), 1);
-  EXPECT_THAT(part.pair_problems(0).message(), HasSubstr("(--max-textbook-axes)"));
+  ASSERT_EQ(part.columns().pair_problems_size(), 1);
+  EXPECT_THAT(part.columns().pair_problems(0).message(), HasSubstr("(--max-textbook-axes)"));
   EXPECT_TRUE(FinishBatch(*reader).ok());
   EXPECT_EQ(Hits("max-textbook-axes"), 1);
 }

@@ -44,25 +44,29 @@ class BatchCall : public ServerTest {
     while (stream->Read(&part)) {
       if (batch.messages++ == 0) batch.head = part;
       EXPECT_EQ(part.first_pair(), batch.relations.size());
-      EXPECT_EQ(part.relations_size(), part.rungs_size());
+      const v1::AnswerColumns& columns = part.columns();
+      EXPECT_EQ(columns.relations_size(), columns.rungs_size());
       batch.largest_message = std::max(batch.largest_message, part.ByteSizeLong());
-      for (const int r : part.relations()) batch.relations.push_back(static_cast<v1::Relation>(r));
-      for (const int r : part.rungs()) batch.rungs.push_back(static_cast<v1::Rung>(r));
-      batch.axes.insert(batch.axes.end(), part.axes().begin(), part.axes().end());
-      batch.analyses.insert(batch.analyses.end(), part.analyses().begin(), part.analyses().end());
-      batch.certificates.insert(batch.certificates.end(), part.certificates().begin(),
-                                part.certificates().end());
-      batch.separations.insert(batch.separations.end(), part.separations().begin(),
-                               part.separations().end());
+      for (const int r : columns.relations())
+        batch.relations.push_back(static_cast<v1::Relation>(r));
+      for (const int r : columns.rungs()) batch.rungs.push_back(static_cast<v1::Rung>(r));
+      batch.axes.insert(batch.axes.end(), columns.axes().begin(), columns.axes().end());
+      batch.analyses.insert(batch.analyses.end(), columns.analyses().begin(),
+                            columns.analyses().end());
+      batch.certificates.insert(batch.certificates.end(), columns.certificates().begin(),
+                                columns.certificates().end());
+      batch.separations.insert(batch.separations.end(), columns.separations().begin(),
+                               columns.separations().end());
       batch.separation_bounds.insert(batch.separation_bounds.end(),
-                                     part.separation_bounds().begin(),
-                                     part.separation_bounds().end());
-      batch.witness_xyz.insert(batch.witness_xyz.end(), part.witness_xyz().begin(),
-                               part.witness_xyz().end());
-      batch.within_clearance.insert(batch.within_clearance.end(), part.within_clearance().begin(),
-                                    part.within_clearance().end());
-      batch.problems.insert(batch.problems.end(), part.pair_problems().begin(),
-                            part.pair_problems().end());
+                                     columns.separation_bounds().begin(),
+                                     columns.separation_bounds().end());
+      batch.witness_xyz.insert(batch.witness_xyz.end(), columns.witness_xyz().begin(),
+                               columns.witness_xyz().end());
+      batch.within_clearance.insert(batch.within_clearance.end(),
+                                    columns.within_clearance().begin(),
+                                    columns.within_clearance().end());
+      batch.problems.insert(batch.problems.end(), columns.pair_problems().begin(),
+                            columns.pair_problems().end());
     }
     batch.status = stream->Finish();
     return batch;
@@ -159,7 +163,8 @@ TEST_F(LongTable, OfABatchComesInPieces) {
     std::vector<int> relations;
     while (stream->Read(&part)) {
       EXPECT_EQ(part.first_pair(), relations.size());
-      relations.insert(relations.end(), part.relations().begin(), part.relations().end());
+      relations.insert(relations.end(), part.columns().relations().begin(),
+                       part.columns().relations().end());
       parts.push_back(part);
     }
     const grpc::Status status = stream->Finish();
@@ -362,7 +367,7 @@ TEST_F(BatchCall, ProblemsOfAPairNameThePair) {
   EXPECT_THAT(batch.relations,
               ::testing::ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED));
   ASSERT_EQ(batch.problems.size(), 1);
-  EXPECT_EQ(batch.problems[0].pair(), 1);
+  EXPECT_EQ(batch.problems[0].row(), 1);
   EXPECT_EQ(batch.problems[0].code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_THAT(batch.problems[0].message(), HasSubstr("(--max-textbook-axes)"));
 }
@@ -464,7 +469,7 @@ TEST_F(BatchCall, CancellingEndsALongBatch) {
   auto stream = collisions_->BatchCheckCollisions(&context, request);
   v1::BatchCheckCollisionsResponse part;
   ASSERT_TRUE(stream->Read(&part));
-  EXPECT_GT(part.relations_size(), 0);
+  EXPECT_GT(part.columns().relations_size(), 0);
   context.TryCancel();
   while (stream->Read(&part)) {
   }
@@ -487,7 +492,7 @@ TEST_F(BatchCall, ADeadlineEndsALongBatch) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-TEST_F(BatchCall, BatchesTakeTurnsOnTheExecutor) {
+TEST_F(BatchCall, BatchesTakeTurns) {
   Put("cube", Cube());
   // One pair of these is over soon; all of them are not.
   Put("small", Sphere(100));

@@ -66,7 +66,8 @@ class Packed : public ServerTest {
   static std::vector<int> Relations(const std::vector<v1::BatchCheckCollisionsResponse>& parts) {
     std::vector<int> relations;
     for (const v1::BatchCheckCollisionsResponse& part : parts) {
-      relations.insert(relations.end(), part.relations().begin(), part.relations().end());
+      relations.insert(relations.end(), part.columns().relations().begin(),
+                       part.columns().relations().end());
     }
     return relations;
   }

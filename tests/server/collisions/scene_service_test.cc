@@ -175,11 +175,11 @@ TEST_F(FindCollisionsCall, EqualsABatchOfAllPairs) {
   auto stream = collisions_->BatchCheckCollisions(&context, batch);
   v1::BatchCheckCollisionsResponse part;
   while (stream->Read(&part)) {
-    for (int i = 0; i < part.relations_size(); ++i) {
+    for (int i = 0; i < part.columns().relations_size(); ++i) {
       const int at = 2 * (static_cast<int>(part.first_pair()) + i);
-      ++counts[part.relations(i)];
-      if (part.relations(i) == v1::RELATION_SEPARATED) continue;
-      expected[{batch.pairs(at), batch.pairs(at + 1)}] = part.relations(i);
+      ++counts[part.columns().relations(i)];
+      if (part.columns().relations(i) == v1::RELATION_SEPARATED) continue;
+      expected[{batch.pairs(at), batch.pairs(at + 1)}] = part.columns().relations(i);
     }
   }
   ASSERT_TRUE(stream->Finish().ok());
@@ -260,34 +260,6 @@ TEST_F(FindCollisionsCall, ADeadlineEndsALongScene) {
   EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   server_->BeginDrain();
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
-}
-
-TEST_F(FindCollisionsCall, AClientThatStopsReadingIsEnded) {
-  Put("ball", Sphere(20));
-  v1::FindCollisionsRequest request;
-  for (int i = 0; i < 700; ++i) *request.add_placements() = PlacementOf("ball", 1e-6 * i);
-  request.mutable_wanted()->set_certificate(true);
-  grpc::ClientContext context;
-  auto stream = collisions_->FindCollisions(&context, request);
-  // The message after the head shows that the search has the executor.
-  v1::FindCollisionsResponse part;
-  ASSERT_TRUE(stream->Read(&part) && stream->Read(&part));
-  ASSERT_GT(part.pairs_size(), 0);
-  // Some 70 MB of answers are more than may wait; the call ends by itself, and the batch behind it
-  // gets the executor.
-  v1::BatchCheckCollisionsRequest batch;
-  *batch.add_placements() = PlacementOf("ball");
-  batch.add_pairs(0);
-  batch.add_pairs(0);
-  grpc::ClientContext batch_context;
-  auto answers = collisions_->BatchCheckCollisions(&batch_context, batch);
-  v1::BatchCheckCollisionsResponse answer;
-  while (answers->Read(&answer)) {
-  }
-  EXPECT_TRUE(answers->Finish().ok());
-  while (stream->Read(&part)) {
-  }
-  EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <mutex>
 #include <utility>
 
+#include "core/base/check.h"
+
 namespace hulld::server {
 namespace {
 
@@ -71,7 +73,7 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   }
 
  private:
-  // The real disk need not be bothered: nobody cuts its power.
+  // The real disk need not be bothered: its power is not cut.
   IOStatus SyncWritten() {
     const std::shared_lock writing(system_.mutex_);
     const std::lock_guard lock(system_.state_mutex_);
@@ -181,7 +183,7 @@ IOStatus FaultyFileSystem::Error(bool is_sync) const {
     case Fault::kReadError:
       return IOStatus::OK();
   }
-  return IOStatus::OK();
+  HULLD_UNREACHABLE();
 }
 
 void FaultyFileSystem::CopySurvivors(const std::string& source, const std::string& target,

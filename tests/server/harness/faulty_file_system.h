@@ -45,9 +45,9 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   std::vector<std::string> directories() const;
   std::vector<std::string> unsynced_directories() const;
 
-  // Makes `target` what is left of `source` after the power went out at this very moment. Of bytes
-  // that were not synced a random part, from the front, is left, too. Both without a slash at the
-  // end; nothing that is written meanwhile is seen in part.
+  // Makes `target` what would be left of `source` if the power went out at this very moment. A
+  // random part, from the front, of the bytes that were not synced is left, too. Both names come
+  // without a slash at the end. Nothing that is written meanwhile is seen in part.
   void CopySurvivors(const std::string& source, const std::string& target, std::mt19937_64& random);
 
   rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,
@@ -83,7 +83,8 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
     std::optional<std::string> former;
   };
 
-  // What an operation fails with now. Requires mutex_.
+  // What an operation fails with now. Requires state_mutex_ (unchecked: a std::mutex does not
+  // tell).
   rocksdb::IOStatus Error(bool is_sync) const;
 
   // Held shared while something is written, alone while survivors are copied.

@@ -15,14 +15,13 @@
 
 namespace hulld::server {
 
-// The hull of one point at the origin, with which points of others are probed. Not part of any
-// history.
+// The hull of one point at the origin, which probes points of others. Not part of any history.
 inline constexpr const char* kProbeHull = "probe";
 
 // The cloud that histories are made of: 48 points, all extreme.
 const Coordinates& HistoryCloud();
 
-// A client that calls at random and records what it asked and was answered. One thread's.
+// A client that calls at random and records what it asked and was answered. For one thread.
 class HistoryClient {
  public:
   // name: its writer ID. The history must outlive this.
@@ -60,7 +59,7 @@ class HistoryClient {
   };
 
   Operation Begin(Operation::Kind kind);
-  // Records the operation with the status of its call; false when nobody answered.
+  // Records the operation with the status of its call; false when no answer came.
   bool End(const std::string& hull_id, Operation& operation, const grpc::Status& status);
   Stream* OpenStream(const std::string& hull_id, bool* answered);
   // `count` points of the cloud, with repetition; tells the operation of them.

@@ -3,239 +3,18 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <bit>
 #include <optional>
 #include <unordered_set>
 #include <utility>
+
+#include "core/base/check.h"
+#include "tests/server/harness/hull_specification.h"
 
 namespace hulld::server {
 namespace {
 
 using Kind = Operation::Kind;
 using Outcome = Operation::Outcome;
-
-// One hull as the specification has it.
-struct State {
-  bool exists = false;
-  uint64_t create_revision = 0;
-  // Of the last change, a deletion included. When not known: a change whose answer was lost gave
-  // it a greater one, which the next answer tells.
-  uint64_t revision = 0;
-  bool revision_known = true;
-  bool create_revision_known = true;
-  // Whether vertices came since its creation: until then both revisions are the same.
-  bool grown = false;
-  PointSet points = 0;
-  uint64_t received = 0;
-  uint64_t outside = 0;
-  uint64_t duplicate = 0;
-  std::map<std::string, uint64_t> writers;
-
-  uint64_t LastSequence(const std::string& writer) const {
-    const auto found = writers.find(writer);
-    return found == writers.end() ? 0 : found->second;
-  }
-
-  std::string Key() const {
-    std::string key = absl::StrCat(exists, ",", create_revision, ",", create_revision_known, ",",
-                                   revision, ",", revision_known, ",", grown, ",", points, ",",
-                                   received, ",", outside, ",", duplicate);
-    for (const auto& [writer, sequence] : writers)
-      absl::StrAppend(&key, ",", writer, ":", sequence);
-    return key;
-  }
-};
-
-bool AgreeOnIncarnation(State& state, uint64_t create_revision) {
-  if (!state.create_revision_known) {
-    state.create_revision = create_revision;
-    state.create_revision_known = true;
-  }
-  return state.create_revision == create_revision;
-}
-
-// Whether an answer may say that the hull is at this revision; from then on it is.
-bool Agree(State& state, uint64_t revision) {
-  if (state.revision_known) return state.revision == revision;
-  if (revision <= state.revision) return false;
-  if (!state.grown && !AgreeOnIncarnation(state, revision)) return false;
-  state.revision = revision;
-  state.revision_known = true;
-  return true;
-}
-
-// A change that was answered with this revision, or, when lost, had a later one than before.
-bool Advance(State& state, const Operation& operation, uint64_t revision) {
-  if (operation.outcome == Outcome::kUnknown) {
-    state.revision_known = false;
-    return true;
-  }
-  if (revision <= state.revision) return false;
-  state.revision = revision;
-  state.revision_known = true;
-  return true;
-}
-
-// A new incarnation, of no points, in the place of whatever there was.
-bool Create(State& state, const Operation& operation) {
-  const uint64_t revision = state.revision;
-  const bool known = state.revision_known;
-  state = State();
-  state.revision = revision;
-  state.revision_known = known;
-  if (!Advance(state, operation, operation.create_revision)) return false;
-  state.exists = true;
-  state.create_revision = state.revision;
-  state.create_revision_known = state.revision_known;
-  return true;
-}
-
-// Whether the condition may have failed. A lost answer leaves open which revision it is.
-bool Mismatch(const State& state, const Operation& operation) {
-  if (!operation.if_revision) return false;
-  return !state.revision_known || *operation.if_revision != state.revision;
-}
-
-// Whether the condition may have held.
-bool Match(const State& state, const Operation& operation) {
-  if (!operation.if_revision) return true;
-  return state.revision_known ? *operation.if_revision == state.revision
-                              : *operation.if_revision > state.revision;
-}
-
-bool SameCounts(const State& state, const Operation& operation) {
-  return operation.received == state.received && operation.outside == state.outside &&
-         operation.duplicate == state.duplicate &&
-         operation.vertex_count == static_cast<uint64_t>(std::popcount(state.points));
-}
-
-bool StepCreateOrOpen(State& state, const Operation& operation) {
-  const bool open = operation.kind == Kind::kOpen;
-  switch (operation.outcome) {
-    case Outcome::kNotFound:
-      return open && !operation.if_absent && !state.exists;
-    case Outcome::kAlreadyExists:
-      return !open && !operation.if_absent && state.exists;
-    case Outcome::kUnknown:
-      return !state.exists && (!open || operation.if_absent) && Create(state, operation);
-    case Outcome::kOk:
-      break;
-    default:
-      return false;
-  }
-  // The opening of a stream does not say whether it created the hull; that there was none does.
-  if (open ? operation.if_absent && !state.exists : operation.created) {
-    return !state.exists && Create(state, operation) && SameCounts(state, operation) &&
-           operation.revision == operation.create_revision && operation.last_sequence == 0;
-  }
-  if (!state.exists || (!open && !operation.if_absent)) return false;
-  if (!Agree(state, operation.revision)) return false;
-  if (!AgreeOnIncarnation(state, operation.create_revision)) return false;
-  if (!SameCounts(state, operation)) return false;
-  return !open || operation.last_sequence == state.LastSequence(operation.writer);
-}
-
-bool StepAppend(State& state, const Operation& operation) {
-  if (!state.exists || !AgreeOnIncarnation(state, operation.incarnation)) return false;
-  const uint64_t last = state.LastSequence(operation.writer);
-  if (operation.outcome == Outcome::kOk && operation.already_applied) {
-    return operation.sequence <= last && Agree(state, operation.revision);
-  }
-  if (operation.sequence != last + 1) return false;
-  if (operation.outcome == Outcome::kAborted) return Mismatch(state, operation);
-  if (!Match(state, operation)) return false;
-  const PointSet added = operation.points & ~state.points;
-  const uint64_t outside = static_cast<uint64_t>(std::popcount(added));
-  const bool lost = operation.outcome == Outcome::kUnknown;
-  if (!lost && operation.outcome != Outcome::kOk) return false;
-  if (added != 0) {
-    if (!Advance(state, operation, operation.revision)) return false;
-  } else if (!lost && !Agree(state, operation.revision)) {
-    return false;
-  }
-  state.points |= added;
-  state.grown = state.grown || added != 0;
-  state.received += operation.sent;
-  state.outside += outside;
-  state.duplicate += operation.sent - outside;
-  state.writers[operation.writer] = operation.sequence;
-  if (lost) return true;
-  return operation.received == operation.sent && operation.outside == outside &&
-         operation.duplicate == operation.sent - outside &&
-         operation.vertex_count == static_cast<uint64_t>(std::popcount(state.points));
-}
-
-// One change, in which the hull is never without the new points or with others.
-bool StepReplace(State& state, const Operation& operation) {
-  const bool absent_fits = operation.if_revision.value_or(0) == 0;
-  switch (operation.outcome) {
-    case Outcome::kNotFound:
-      return !state.exists && absent_fits && !operation.if_absent;
-    case Outcome::kAborted:
-      return state.exists ? Mismatch(state, operation) : !absent_fits;
-    case Outcome::kOk:
-    case Outcome::kUnknown:
-      break;
-    default:
-      return false;
-  }
-  const bool existed = state.exists;
-  if (existed ? !Match(state, operation) : !absent_fits || !operation.if_absent) return false;
-  if (!Create(state, operation)) return false;
-  state.points = operation.points;
-  state.received = operation.sent;
-  state.outside = static_cast<uint64_t>(std::popcount(operation.points));
-  state.duplicate = operation.sent - state.outside;
-  if (operation.outcome == Outcome::kUnknown) return true;
-  return operation.created == !existed && operation.revision == operation.create_revision &&
-         SameCounts(state, operation);
-}
-
-bool StepDelete(State& state, const Operation& operation) {
-  if (operation.outcome == Outcome::kNotFound) return !state.exists;
-  if (!state.exists) return false;
-  if (operation.outcome == Outcome::kAborted) return Mismatch(state, operation);
-  if (operation.outcome != Outcome::kOk && operation.outcome != Outcome::kUnknown) return false;
-  if (!Match(state, operation) || !Advance(state, operation, operation.store_revision)) {
-    return false;
-  }
-  state.exists = false;
-  return true;
-}
-
-bool StepRead(State& state, const Operation& operation) {
-  if (operation.outcome == Outcome::kNotFound) return !state.exists;
-  if (operation.outcome != Outcome::kOk || !state.exists) return false;
-  if (!Agree(state, operation.revision)) return false;
-  switch (operation.kind) {
-    case Kind::kGet:
-      return AgreeOnIncarnation(state, operation.create_revision) && SameCounts(state, operation);
-    case Kind::kMesh:
-      return operation.points == state.points;
-    default:
-      return operation.touching == ((state.points >> operation.probe & 1) != 0);
-  }
-}
-
-// Whether the hull may answer so; if so, `state` is what it is then.
-bool Step(State& state, const Operation& operation) {
-  switch (operation.kind) {
-    case Kind::kCreate:
-    case Kind::kOpen:
-      return StepCreateOrOpen(state, operation);
-    case Kind::kAppend:
-      return StepAppend(state, operation);
-    case Kind::kReplace:
-      return StepReplace(state, operation);
-    case Kind::kDelete:
-      return StepDelete(state, operation);
-    case Kind::kGet:
-    case Kind::kMesh:
-    case Kind::kProbe:
-      return StepRead(state, operation);
-  }
-  return false;
-}
 
 bool IsOptional(const Operation& operation) { return operation.outcome == Outcome::kUnknown; }
 
@@ -276,7 +55,7 @@ class OrderSearch {
   }
 
   bool Run() {
-    bool found = Enter(State(), 0, 0);
+    bool found = Enter(SpecifiedHull(), 0, 0);
     while (!found && !path_.empty()) found = TryNext();
     return found;
   }
@@ -300,7 +79,7 @@ class OrderSearch {
  private:
   // A state of the hull on the way to an order of all operations.
   struct Node {
-    State state;
+    SpecifiedHull state;
     // Operations so far that were answered.
     size_t count = 0;
     // When the latest operation so far was invoked.
@@ -342,7 +121,7 @@ class OrderSearch {
     return candidates;
   }
 
-  std::string Key(const State& state) const {
+  std::string Key(const SpecifiedHull& state) const {
     std::string key = absl::StrCat(state.Key(), ";", first_left_);
     // Beyond the first that is left, only what has been done matters.
     for (size_t i = first_left_; i < operations_.size() && i <= last_done_; ++i) {
@@ -352,7 +131,7 @@ class OrderSearch {
   }
 
   // Puts a state at the end of the path, with what may come next. Returns whether it explains all.
-  bool Enter(State state, size_t count, uint64_t latest) {
+  bool Enter(SpecifiedHull state, size_t count, uint64_t latest) {
     if (count == required_) return true;
     Node node{std::move(state), count, latest, {}, 0, std::nullopt, first_left_, last_done_};
     while (first_left_ < operations_.size() &&
@@ -387,7 +166,7 @@ class OrderSearch {
       return false;
     }
     const size_t i = last.candidates[last.next++];
-    State next = last.state;
+    SpecifiedHull next = last.state;
     if (!Step(next, operations_[i])) return false;
     done_[i] = true;
     last_done_ = std::max(last.last_before, i);
@@ -405,7 +184,7 @@ class OrderSearch {
   std::vector<Node> path_;
   std::unordered_set<std::string> seen_;
   size_t best_count_ = 0;
-  State best_state_;
+  SpecifiedHull best_state_;
   std::vector<size_t> best_candidates_;
   std::vector<bool> best_done_;
 };
@@ -457,6 +236,7 @@ std::string StoreRevisionFault(const HullHistory& history) {
 }  // namespace
 
 void HullHistory::Record(const std::string& hull_id, const Operation& operation) {
+  HULLD_CHECK(operation.invoked <= clock_ && operation.invoked < operation.returned);
   const std::lock_guard lock(mutex_);
   operations_[hull_id].push_back(operation);
 }

@@ -44,7 +44,7 @@ struct Operation {
   // What was asked.
   // Create, open: keeps a hull that exists. Open, replace: makes one that does not.
   bool if_absent = false;
-  // Of a replace 0: the hull must not exist.
+  // A replace with 0: the hull must not exist.
   std::optional<uint64_t> if_revision;
   std::string writer;
   uint64_t sequence = 0;
@@ -74,7 +74,8 @@ class HullHistory {
  public:
   // The current tick, later than all before.
   uint64_t Tick() { return ++clock_; }
-  // Requires that invoked and returned are ticks of this clock.
+  // Requires that invoked and returned are ticks of this clock, in this order, or that returned is
+  // UINT64_MAX.
   void Record(const std::string& hull_id, const Operation& operation);
 
   // Says that the server that was called so far is gone: what it has not answered took effect

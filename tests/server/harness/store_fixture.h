@@ -18,7 +18,7 @@
 
 namespace hulld::server {
 
-// A registry upon a durable store.
+// A registry over a durable store.
 class DurableRegistry {
  public:
   explicit DurableRegistry(std::unique_ptr<RocksDbStore> store, const Limits& limits = {})

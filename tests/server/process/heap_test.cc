@@ -11,7 +11,7 @@ namespace hulld::server {
 namespace {
 
 #ifdef HULLD_SANITIZED
-// Whose allocator keeps what was freed, to find out who uses it.
+// Sanitizers' allocators keep what was freed, to recognize its use.
 TEST(Heap, DISABLED_FreeMemoryGoesBackOnlyWhenThereIsMuch) {
 #else
 TEST(Heap, FreeMemoryGoesBackOnlyWhenThereIsMuch) {

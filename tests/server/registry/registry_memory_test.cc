@@ -61,7 +61,7 @@ TEST_F(RegistryMemory, WhatAReaderHoldsStays) {
     ASSERT_TRUE(hulls_->Put(std::to_string(i), SpherePoints(1000)).ok());
   }
   const uint64_t loads = hulls_->registry().Cache().loads;
-  EXPECT_EQ(hulls_->View("held")->snapshot, held.snapshot);
+  EXPECT_EQ(hulls_->View("held")->served, held.served);
   EXPECT_EQ(hulls_->registry().Cache().loads, loads);
 }
 
@@ -81,7 +81,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
           EXPECT_EQ(view.status().code(), absl::StatusCode::kNotFound) << view.status();
           continue;
         }
-        EXPECT_EQ(view->snapshot->hull().vertices().size(), view->record.vertex_count);
+        EXPECT_EQ(view->served->hull().vertices().size(), view->record.vertex_count);
       }
     });
   }
@@ -97,7 +97,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
   for (int h = 0; h < kHulls; ++h) {
     EXPECT_EQ(hulls_->View(std::to_string(h))->record.vertex_count, 1200);
   }
-  // Builders and snapshots of all of them together are beyond the limit.
+  // The builders of all of them and what is served are together beyond the limit.
   EXPECT_GT(hulls_->registry().Cache().evictions, 0);
 }
 
@@ -121,7 +121,7 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   const auto second = put("second");
   EXPECT_EQ(second.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("--memory-limit"));
-  EXPECT_EQ(registry.Resolve("first", {})->second.snapshot->hull().vertices().size(), 1000);
+  EXPECT_EQ(registry.Resolve("first", {})->second.served->hull().vertices().size(), 1000);
 }
 
 // Points that wait for their turn, and what they are once they are built.
@@ -190,7 +190,7 @@ TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
   limits.memory_limit = 100'000;
   Registry registry(store, limits, writers);
   {
-    MemoryCharge charge(registry);
+    MemoryCharge charge(registry.memory());
     charge.Set(100'000);
     EXPECT_TRUE(registry.CheckMemory().ok());
     charge.Set(100'001);
@@ -198,7 +198,7 @@ TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
     charge.Set(60'000);
     EXPECT_TRUE(registry.CheckMemory().ok());
     EXPECT_EQ(registry.Cache().bytes, 60'000);
-    MemoryCharge other(registry);
+    MemoryCharge other(registry.memory());
     other.Set(60'000);
     EXPECT_THAT(std::string(registry.CheckMemory().message()), HasSubstr("--memory-limit"));
   }

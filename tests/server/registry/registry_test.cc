@@ -60,22 +60,22 @@ class RegistryTest : public ::testing::Test {
   Registry registry_{store_, Limits(), writers_};
 };
 
-TEST_F(RegistryTest, ASnapshotIsMadeOnceAndSharedUntilTheNextChange) {
+TEST_F(RegistryTest, WhatIsServedIsMadeOnceAndSharedUntilTheNextChange) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}, {1, 0, 0}}).ok());
   const auto first = registry_.Resolve("h", {});
   ASSERT_TRUE(Append(session, 2, {{0.5, 0, 0}}).ok());
   const auto second = registry_.Resolve("h", {});
-  EXPECT_EQ(first->second.snapshot, second->second.snapshot);
+  EXPECT_EQ(first->second.served, second->second.served);
   EXPECT_EQ(second->second.record.counts.received, 3);
   ASSERT_TRUE(Append(session, 3, {{2, 0, 0}}).ok());
   const auto third = registry_.Resolve("h", {});
-  EXPECT_NE(first->second.snapshot, third->second.snapshot);
-  EXPECT_EQ(first->second.snapshot->hull().vertices()[1], Vector(1, 0, 0));
-  EXPECT_EQ(third->second.snapshot->hull().vertices()[1], Vector(2, 0, 0));
+  EXPECT_NE(first->second.served, third->second.served);
+  EXPECT_EQ(first->second.served->hull().vertices()[1], Vector(1, 0, 0));
+  EXPECT_EQ(third->second.served->hull().vertices()[1], Vector(2, 0, 0));
 }
 
-TEST_F(RegistryTest, TryResolveGivesUpWhereASnapshotIsMissing) {
+TEST_F(RegistryTest, TryResolveGivesUpWhereAHullIsNotReady) {
   const std::vector<std::string> ids = {"h", "none"};
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
@@ -85,14 +85,14 @@ TEST_F(RegistryTest, TryResolveGivesUpWhereASnapshotIsMissing) {
   ASSERT_TRUE(tried.has_value());
   EXPECT_EQ(tried->store_revision, waited->store_revision);
   ASSERT_EQ(tried->hulls.size(), 2);
-  EXPECT_EQ(tried->hulls[0]->snapshot, waited->hulls[0]->snapshot);
+  EXPECT_EQ(tried->hulls[0]->served, waited->hulls[0]->served);
   EXPECT_EQ(tried->hulls[0]->record.revision, waited->hulls[0]->record.revision);
   EXPECT_EQ(tried->hulls[1].status(), waited->hulls[1].status());
   ASSERT_TRUE(Append(session, 2, {{1, 0, 0}}).ok());
   EXPECT_FALSE(registry_.TryResolve(ids).has_value());
 }
 
-TEST_F(RegistryTest, ACurrentSnapshotIsReadWhileAChunkIsInProgress) {
+TEST_F(RegistryTest, WhatIsServedIsReadWhileAChunkIsInProgress) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
   ASSERT_TRUE(registry_.Resolve("h", {}).ok());
@@ -104,13 +104,13 @@ TEST_F(RegistryTest, ACurrentSnapshotIsReadWhileAChunkIsInProgress) {
     ++polls;
     const auto view = registry_.Resolve("h", {});
     EXPECT_TRUE(view.ok());
-    EXPECT_EQ(view->second.snapshot->hull().vertices().size(), 1);
+    EXPECT_EQ(view->second.served->hull().vertices().size(), 1);
     EXPECT_EQ(registry_.List("", "", 10).hulls.size(), 1);
     return false;
   });
   EXPECT_TRUE(result.ok());
   EXPECT_GT(polls, 1);
-  EXPECT_EQ(registry_.Resolve("h", {})->second.snapshot->hull().vertices().size(), 2);
+  EXPECT_EQ(registry_.Resolve("h", {})->second.served->hull().vertices().size(), 2);
 }
 
 TEST_F(RegistryTest, ACancelledChunkChangesNothingAndMayBeSentAgain) {
@@ -129,7 +129,7 @@ TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
   bool asked = false;
   ASSERT_TRUE(Append(session, 2, std::move(points), [&] {
-                // No snapshot is current and the builder is busy with this very chunk.
+                // Nothing is ready to be served, and the builder is busy with this very chunk.
                 if (!std::exchange(asked, true)) {
                   EXPECT_EQ(registry_.Resolve("h", [] { return true; }).status().code(),
                             absl::StatusCode::kCancelled);
@@ -139,7 +139,7 @@ TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
   EXPECT_TRUE(asked);
 }
 
-TEST_F(RegistryTest, AReaderThatMakesASnapshotCanBeCancelled) {
+TEST_F(RegistryTest, AReaderThatMakesWhatIsServedCanBeCancelled) {
   std::vector<Vector> points;
   for (int i = -50; i <= 50; ++i) {
     for (int j = -50; j <= 50; ++j) points.emplace_back(i, j, i * i + j * j);
@@ -155,7 +155,7 @@ TEST_F(RegistryTest, AReaderThatMakesASnapshotCanBeCancelled) {
   EXPECT_EQ(stopped, 3);
   const auto made = registry_.Resolve("h", {});
   ASSERT_TRUE(made.ok()) << made.status();
-  EXPECT_EQ(made->second.snapshot->hull().vertices().size(), points.size());
+  EXPECT_EQ(made->second.served->hull().vertices().size(), points.size());
 }
 
 TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
@@ -229,8 +229,8 @@ TEST_F(RegistryTest, ResolvesManyHullsAtOneRevision) {
   EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
   EXPECT_EQ(resolved->hulls[0]->record.hull_id, "b");
   EXPECT_EQ(resolved->hulls[1].status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(resolved->hulls[2]->snapshot->hull().vertices()[0], Vector(0, 0, 0));
-  EXPECT_EQ(resolved->hulls[0]->snapshot, resolved->hulls[3]->snapshot);
+  EXPECT_EQ(resolved->hulls[2]->served->hull().vertices()[0], Vector(0, 0, 0));
+  EXPECT_EQ(resolved->hulls[0]->served, resolved->hulls[3]->served);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <map>
 
@@ -165,6 +166,17 @@ TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--config", WriteFile("max-hull = 3\n")}, "max-hull");
   environment_["HULLD_MAX_HULLS"] = "many";
   ExpectRefused({"--max-hulls=3"}, "HULLD_MAX_HULLS: --max-hulls: \"many\"");
+}
+
+TEST_F(ConfigTest, TheWrongOneOfSeveralVariablesOfTheProcessIsNamed) {
+  // --listen is read before --max-hulls.
+  ASSERT_EQ(setenv("HULLD_LISTEN", "127.0.0.1:0", 1), 0);
+  ASSERT_EQ(setenv("HULLD_MAX_HULLS", "many", 1), 0);
+  const absl::StatusOr<CommandLine> parsed = ParseCommandLine({}, ProcessEnvironment);
+  unsetenv("HULLD_LISTEN");
+  unsetenv("HULLD_MAX_HULLS");
+  EXPECT_THAT(std::string(parsed.status().message()),
+              HasSubstr("HULLD_MAX_HULLS: --max-hulls: \"many\""));
 }
 
 TEST_F(ConfigTest, TheDataDirectoryIsWhereStateOfUsersBelongs) {

@@ -1,4 +1,4 @@
-// Bytes of a store that turned into others: found out, named, and never served.
+// Bytes of a store that turned into others: recognized, named, and never served.
 
 #include <absl/strings/str_cat.h>
 
@@ -115,7 +115,7 @@ TEST_F(StoreDamage, AReplacedHullWhoseRecordIsDamagedLeavesNothing) {
   for (const char* id : {"a", "b", "c"}) EXPECT_EQ(hulls_->View(id)->record.vertex_count, 8);
 }
 
-// Of two such hulls nobody knows which keys are whose.
+// With two such hulls, nothing says which keys belong to which.
 TEST_F(StoreDamage, KeysThatMayBeAnotherDamagedHullsAreKeptUntilThatIsDeletedToo) {
   FillThree();
   Flip(HullKey("a"));
@@ -191,7 +191,7 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
   for (int i = 0; i < 20; ++i) {
     ASSERT_TRUE(hulls_->Put(absl::StrCat("h", i), {sphere.begin() + i, sphere.end()}).ok());
   }
-  const Hull expected = hulls_->View("h7")->snapshot->hull();
+  const Hull expected = hulls_->View("h7")->served->hull();
   ASSERT_TRUE(hulls_->store().db().Flush({}).ok());
   ASSERT_TRUE(hulls_->Put("late", CubeCorners()).ok());
   hulls_ = nullptr;
@@ -240,7 +240,7 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
       }
       EXPECT_EQ(view->record.vertex_count, 300 - i);
       EXPECT_TRUE(
-          AuditContainment(view->snapshot->hull(), {sphere.data() + i, sphere.size() - i}).ok());
+          AuditContainment(view->served->hull(), {sphere.data() + i, sphere.size() - i}).ok());
     }
     ++(damage ? reported : harmless);
   }

@@ -90,11 +90,11 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   bare.separation = Separation{kInfinity, kInfinity};
   bare.within_clearance = false;
   v1::AnswerColumns columns;
-  size_t bytes = AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, wanted, 0, &columns);
+  size_t bytes = AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, wanted, &columns);
   bytes += AddUnanswered(wanted, &columns);
-  bytes += AddAnswer(absl::StatusOr<Answer>(bare), hull, hull, wanted, 2, &columns);
+  bytes += AddAnswer(absl::StatusOr<Answer>(bare), hull, hull, wanted, &columns);
   bytes += AddAnswer(absl::StatusOr<Answer>(absl::ResourceExhaustedError("why")), hull, hull,
-                     wanted, 3, &columns);
+                     wanted, &columns);
   EXPECT_GE(bytes, columns.ByteSizeLong() - 64);
   EXPECT_THAT(columns.relations(), ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED,
                                                v1::RELATION_SEPARATED, v1::RELATION_UNSPECIFIED));
@@ -117,16 +117,17 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   EXPECT_EQ(columns.witness_errors(0), 0.25);
   EXPECT_THAT(columns.within_clearance(), ElementsAre(true, false, false, false));
   ASSERT_EQ(columns.pair_problems_size(), 1);
-  EXPECT_EQ(columns.pair_problems(0).pair(), 3);
+  EXPECT_EQ(columns.pair_problems(0).row(), 3);
   EXPECT_EQ(columns.pair_problems(0).message(), "why");
+  EXPECT_EQ(columns.pair_problems(0).reason(), v1::ERROR_REASON_LIMIT_EXCEEDED);
 }
 
 TEST(AnswerColumns, WhatIsNotWantedIsNotSent) {
   const Hull hull = Tetrahedron();
-  v1::BatchCheckCollisionsResponse columns;
-  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, v1::Wanted(), 0, &columns);
+  v1::AnswerColumns columns;
+  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, v1::Wanted(), &columns);
   AddUnanswered(v1::Wanted(), &columns);
-  v1::BatchCheckCollisionsResponse expected;
+  v1::AnswerColumns expected;
   expected.add_relations(v1::RELATION_OVERLAPPING);
   expected.add_relations(v1::RELATION_UNSPECIFIED);
   expected.add_rungs(v1::RUNG_EXACT);

@@ -52,64 +52,6 @@ TEST(HullCost, NoSinglePointStalls) {
   }
 }
 
-// The same bits and the same counts, on any number of threads.
-TEST(HullCost, ThreadsLeaveNoTrace) {
-  const uint64_t seed = TestSeed(502);
-  Random random(seed);
-  std::vector<Vector> lattice = LatticeCube(48, 1);
-  Shuffle(random, lattice);
-  const std::vector<Vector> ball = RandomInBall(random, 150000, 1);
-  const std::vector<NamedPoints> clouds = {{"ball", ball},
-                                           {"ball twice", Concatenated(ball, Scaled(ball, 1.0))},
-                                           {"sphere", RandomOnSphere(random, 70000, 1)},
-                                           {"lattice", Concatenated(lattice, lattice)}};
-  const Hull small = BuildHull(RandomOnSphere(random, 300, 0.9));
-  for (const NamedPoints& cloud : clouds) {
-    std::vector<Hull> hulls;
-    std::vector<PointCounts> counts;
-    for (const int threads : {1, 2, 8}) {
-      HullBuilder builder;
-      AddLimits limits;
-      limits.threads = threads;
-      counts.push_back(builder.Add(cloud.points, limits).value());
-      hulls.push_back(builder.Snapshot());
-      // Into a live hull as well.
-      HullBuilder live;
-      ASSERT_TRUE(live.Add(small.vertices()).ok());
-      ASSERT_TRUE(live.Add(cloud.points, limits).ok());
-      ASSERT_TRUE(live.Add(small.vertices(), limits).ok());
-      hulls.push_back(live.Snapshot());
-    }
-    for (size_t k = 2; k < hulls.size(); ++k) {
-      EXPECT_TRUE(SameBits(hulls[k], hulls[k % 2])) << cloud.name << " seed " << seed;
-    }
-    EXPECT_EQ(counts[1], counts[0]) << cloud.name;
-    EXPECT_EQ(counts[2], counts[0]) << cloud.name;
-  }
-}
-
-TEST(HullCost, CancellationOnThreadsChangesNothing) {
-  const uint64_t seed = TestSeed(504);
-  Random random(seed);
-  const std::vector<Vector> first = RandomInBall(random, 500, 1);
-  const std::vector<Vector> block = RandomOnSphere(random, 30000, 2);
-  HullBuilder builder;
-  ASSERT_TRUE(builder.Add(first).ok());
-  const Hull before = builder.Snapshot();
-  int cancelled = 0;
-  // The last of the polls are those of the threads.
-  for (const int allowed : {0, 10, 40, 60, 80}) {
-    int polls = 0;
-    AddLimits limits;
-    limits.threads = 2;
-    limits.should_stop = [&] { return ++polls > allowed; };
-    if (builder.Add(block, limits).ok()) break;
-    ++cancelled;
-    ASSERT_TRUE(SameBits(builder.Snapshot(), before)) << "after " << allowed << " polls";
-  }
-  EXPECT_GE(cancelled, 4);
-}
-
 // Inside points are not kept, and what is kept is small.
 TEST(HullCost, MemoryIsBoundedByTheVertices) {
   const uint64_t seed = TestSeed(503);

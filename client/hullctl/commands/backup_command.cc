@@ -1,0 +1,83 @@
+#include <memory>
+#include <string>
+
+#include "client/backup_file.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+struct BackupArguments {
+  std::string file;
+  std::string data_dir;
+};
+
+void Print(const Invocation& run, const std::string& what, const BackupCheck& backup) {
+  const v1::ResponseHeader& header = backup.begin().header();
+  const v1::BackupEnd& totals = backup.totals();
+  if (run.json) {
+    run.out << JsonObject()
+                   .Add("storeId", header.store_id())
+                   .Add("revision", header.revision())
+                   .Add("files", totals.file_count())
+                   .Add("bytes", totals.byte_count())
+                   .Close()
+            << "\n";
+    return;
+  }
+  Table table;
+  table.Row({"backup", what})
+      .Row({"store", header.store_id()})
+      .Row({"revision", "at least " + std::to_string(header.revision())})
+      .Row({"bytes", std::to_string(totals.byte_count()) + " in " +
+                         std::to_string(totals.file_count()) + " files"});
+  table.Print(run.out);
+}
+
+ExitCode Save(const Invocation& run, const BackupArguments& arguments) {
+  BackupWriter writer(arguments.file);
+  if (absl::Status s = writer.Open(); !s.ok()) return run.FailUsage(s);
+  absl::Status file_error;
+  const absl::Status called = run.MakeClient().SaveBackup(
+      [&](const v1::SaveBackupResponse& part) {
+        file_error = writer.Write(part);
+        return file_error;
+      },
+      run.given_timeout);
+  if (!file_error.ok()) return run.FailUsage(file_error);
+  if (!called.ok()) return run.Fail(called);
+  if (absl::Status s = writer.Finish(); !s.ok()) return run.FailUsage(s);
+  Print(run, "saved to " + arguments.file, writer.check());
+  return ExitCode::kDone;
+}
+
+ExitCode Restore(const Invocation& run, const BackupArguments& arguments) {
+  const auto restored = RestoreBackup(arguments.file, arguments.data_dir);
+  if (!restored.ok()) return run.FailUsage(restored.status());
+  Print(run, "restored to " + arguments.data_dir, *restored);
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddBackupCommand(Command program, Invocation* invocation) {
+  auto arguments = std::make_shared<BackupArguments>();
+  Command command = program.AddCommand("backup", "Copies of a whole store in one file");
+  command.RequireCommand();
+  Command save = command.AddCommand("save", "Save a backup while hulld goes on serving");
+  save.AddText("FILE", &arguments->file, "File to make").Required();
+  save.SetFooter(
+      "However long that takes, unless --timeout is given, which then bounds all of it. What ends\n"
+      "early leaves no file.");
+  save.OnGiven([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
+  Command restore =
+      command.AddCommand("restore", "Make a data directory of a backup, for a new hulld");
+  restore.AddText("FILE", &arguments->file, "File that 'backup save' made").Required();
+  restore.AddText("--data-dir", &arguments->data_dir, "Directory to make; must be new or empty")
+      .Required();
+  restore.OnGiven([=] { invocation->action = [=] { return Restore(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

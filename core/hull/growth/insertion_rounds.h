@@ -1,0 +1,47 @@
+#ifndef HULLD_CORE_HULL_GROWTH_INSERTION_ROUNDS_H_
+#define HULLD_CORE_HULL_GROWTH_INSERTION_ROUNDS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/stop_poll.h"
+#include "core/hull/growth/surface.h"
+#include "core/hull/growth/vertex_table.h"
+
+namespace hulld {
+
+// The numbers 0 ... n-1 in rounds, each four times the one before, every round spread evenly and
+// irregularly over all of them: a biased randomized insertion order without a permutation in
+// memory. Source: Amenta, Choi and Rote 2003, Incremental Constructions con BRIO.
+class InsertionRounds {
+ public:
+  // Requires n < 2^32.
+  explicit InsertionRounds(size_t n);
+
+  int count() const { return count_; }
+  int RoundOf(uint32_t i) const;
+  // Appends the members of a round. Requires a round other than the last, whose members are most of
+  // the numbers: these are better recognized by RoundOf.
+  void AppendRound(int round, std::vector<uint32_t>& members) const;
+
+ private:
+  // A round is a range of ranks within each group of consecutive numbers.
+  static uint32_t FirstRank(int round) { return round == 0 ? 0 : 1u << (2 * (round - 1)); }
+
+  uint32_t n_;
+  int count_;
+  uint32_t group_mask_;
+};
+
+// Adds points to a surface in rounds of growing size, each reduced to those that the map of
+// directions cannot reject and sorted along the surface: the order for blocks most of which is
+// outside. Returns false, with some of the points added, when the poll, whose steps are insertions,
+// said stop.
+bool InsertInRounds(Surface& surface, VertexTable& vertices, std::span<const Vector> points,
+                    StopPoll& poll);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_GROWTH_INSERTION_ROUNDS_H_

@@ -1,0 +1,121 @@
+#include "core/hull/growth/surface_check.h"
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "core/numeric/orientation.h"
+
+namespace hulld {
+namespace {
+
+// Three vertices that live and span a plane.
+const char* FindCornerDefect(const VertexTable& vertices, const SurfaceTriangle& t) {
+  for (const VertexId v : t.corners) {
+    if (!vertices.IsAlive(v)) return "a corner is no vertex";
+  }
+  const auto& [a, b, c] = t.corners;
+  if (ProjectionOf(vertices[a], vertices[b], vertices[c]).first < 0) {
+    return "a triangle has no area";
+  }
+  return nullptr;
+}
+
+// The rounded plane holds the corners within its error, and the center lies below.
+const char* FindPlaneDefect(const Surface& surface, const VertexTable& vertices,
+                            const SurfaceTriangle& t) {
+  for (const VertexId v : t.corners) {
+    const double height = t.normal.dot(vertices[v]) - t.offset;
+    const double bound = static_cast<double>(t.slope) * surface.SizeWith(vertices, vertices[v]);
+    if (std::abs(height) > bound) return "a rounded plane misses a corner";
+  }
+  if (surface.directions() == nullptr) return nullptr;
+  const auto& [a, b, c] = t.corners;
+  if (Orient3d(vertices[a], vertices[b], vertices[c], surface.directions()->center()) >= 0) {
+    return "the center is not inside";
+  }
+  return nullptr;
+}
+
+// The edge of `other` that is edge i of t the other way round; 3 when there is none.
+size_t TwinOf(const SurfaceTriangle& t, size_t i, const SurfaceTriangle& other) {
+  size_t j = 0;
+  while (j < 3 && (other.corners[j] != t.corners[(i + 1) % 3] ||
+                   other.corners[(j + 1) % 3] != t.corners[i])) {
+    ++j;
+  }
+  return j;
+}
+
+// The sign of the dihedral angle at edge j of `other`, whose neighbour there is t: -1 where the
+// surface bends inwards, as it should, 0 where both lie in one plane.
+int BendAt(const VertexTable& vertices, const SurfaceTriangle& t, const SurfaceTriangle& other,
+           size_t j) {
+  const auto& [a, b, c] = t.corners;
+  return Orient3d(vertices[a], vertices[b], vertices[c], vertices[other.corners[(j + 2) % 3]]);
+}
+
+const char* FindLinkDefect(const Surface& surface, const VertexTable& vertices, TriangleId id) {
+  const SurfaceTriangle& t = surface.triangle(id);
+  for (size_t i = 0; i < 3; ++i) {
+    const TriangleId next = t.neighbours[i];
+    if (next >= surface.id_bound() || !surface.IsAlive(next)) return "a neighbour is not alive";
+    const SurfaceTriangle& other = surface.triangle(next);
+    const size_t j = TwinOf(t, i, other);
+    if (j == 3) return "a neighbour does not run along the common edge the other way";
+    if (other.neighbours[j] != id) return "a neighbour does not link back";
+    if (const char* defect = FindCornerDefect(vertices, other)) return defect;
+    if (BendAt(vertices, t, other, j) > 0) return "the surface is not convex at an edge";
+  }
+  return nullptr;
+}
+
+const char* FindTriangleDefect(const Surface& surface, const VertexTable& vertices, TriangleId id) {
+  if (id >= surface.id_bound() || !surface.IsAlive(id)) return "a triangle is not alive";
+  const SurfaceTriangle& t = surface.triangle(id);
+  if (const char* defect = FindCornerDefect(vertices, t)) return defect;
+  if (const char* defect = FindPlaneDefect(surface, vertices, t)) return defect;
+  return FindLinkDefect(surface, vertices, id);
+}
+
+}  // namespace
+
+const char* FindDefect(const Surface& surface, const VertexTable& vertices,
+                       std::span<const TriangleId> ids) {
+  if (surface.triangle_count() + surface.free_count() != surface.id_bound()) {
+    return "IDs are neither alive nor free";
+  }
+  if (surface.triangle_count() + 4 != 2 * vertices.size()) return "F is not 2 V - 4";
+  for (const TriangleId id : ids) {
+    if (const char* defect = FindTriangleDefect(surface, vertices, id)) return defect;
+  }
+  return nullptr;
+}
+
+const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
+                           std::span<const TriangleId> star, VertexId apex) {
+  if (const char* defect = FindDefect(surface, vertices, star)) return defect;
+  for (size_t k = 0; k < star.size(); ++k) {
+    const SurfaceTriangle& t = surface.triangle(star[k]);
+    if (t.corners[2] != apex) return "a new triangle does not end at the new vertex";
+    if (t.neighbours[1] != star[(k + 1) % star.size()]) return "the new triangles form no ring";
+    const SurfaceTriangle& beyond = surface.triangle(t.neighbours[0]);
+    if (BendAt(vertices, t, beyond, TwinOf(t, 0, beyond)) >= 0) return "the horizon does not bend";
+  }
+  return nullptr;
+}
+
+void DcheckSurface([[maybe_unused]] const Surface& surface,
+                   [[maybe_unused]] const VertexTable& vertices) {
+#ifndef NDEBUG
+  std::vector<TriangleId> all;
+  surface.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { all.push_back(id); });
+  if (all.size() != surface.triangle_count()) {
+    CheckFailed(__FILE__, __LINE__, "the count of triangles is wrong");
+  }
+  const char* const defect = FindDefect(surface, vertices, all);
+  if (defect != nullptr) CheckFailed(__FILE__, __LINE__, defect);
+#endif
+}
+
+}  // namespace hulld

@@ -1,0 +1,245 @@
+// How Surface finds where a point lies: the walk, the interior point that walks aim from, and the
+// map of directions round it, measured as the surface grows.
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/hull/growth/surface.h"
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+#include "core/numeric/orientation.h"
+#include "core/numeric/vector.h"
+
+namespace hulld {
+namespace {
+
+// Rounds of aiming at the surface, each at a plane nearer than the last; more is not worth it.
+constexpr int kMostRounds = 64;
+
+// A smaller surface is walked across faster than it is measured.
+constexpr size_t kWorthMeasuring = 64;
+
+// Corners of a map that one insertion measures: a map is done long before the surface has doubled.
+constexpr size_t kCornersPerInsertion = 8;
+
+// Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
+// many points than where it only tells where to start walking.
+int ResolutionFor(size_t triangles, bool rejects) {
+  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 6 : 96));
+  return std::clamp(static_cast<int>(cells_a_side), 2, 256);
+}
+
+}  // namespace
+
+Surface::Ray Surface::RayTo(const Vector& point) const {
+  HULLD_DCHECK(directions_.has_value());
+  const Vector y = point - directions_->center();
+  const double d = std::max(extent_, LargestComponent(y));
+  const bool in_range = d >= kTripleProductMin && d <= kTripleProductMax;
+  return {y, in_range ? kTripleProductErrorFactor * d * d * d : INFINITY};
+}
+
+// Which side of the plane through the interior point and the edge a, b the point lies on: +1 on the
+// side of a triangle to the left of the edge.
+int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
+                    const Ray& ray) const {
+  const Vector& center = directions_->center();
+  const double value = Dot(ray.y, Cross(vertices[a] - center, vertices[b] - center));
+  if (value > ray.bound) return 1;
+  if (value < -ray.bound) return -1;
+  return Orient3d(center, vertices[a], vertices[b], point);
+}
+
+// Crosses any edge whose plane through the interior point has the point on its far side, starting
+// with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
+// walk is longer than the surface warrants.
+std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
+                                               double size, TriangleId start,
+                                               uint64_t& steps) const {
+  const Ray ray = RayTo(point);
+  TriangleId at = start;
+  uint32_t random = 1;
+  TriangleId from = kDead;
+  const size_t longest = 4 * alive_ + 64;
+  for (size_t step = 0; step < longest; ++step) {
+    ++steps;
+    if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
+    random = random * 1664525u + 1013904223u;
+    const uint32_t first = (random >> 16) % 3;
+    const SurfaceTriangle& t = triangles_[at];
+    TriangleId next = kDead;
+    for (uint32_t k = 0; k < 3 && next == kDead; ++k) {
+      const uint32_t i = (first + k) % 3;
+      // The edge just crossed has the point on this side, as the sign was exact.
+      if (t.neighbours[i] == from) continue;
+      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point, ray) < 0) {
+        next = t.neighbours[i];
+      }
+    }
+    if (next == kDead) return Location{Side::kInside, at};
+    from = at;
+    at = next;
+  }
+  return std::nullopt;
+}
+
+Surface::Location Surface::Scan(const VertexTable& vertices, const Vector& point,
+                                double size) const {
+  Location location{Side::kInside, Alive(last_)};
+  for (TriangleId id = 0; id < triangles_.size(); ++id) {
+    if (!IsAlive(id)) continue;
+    const int side = SideOf(vertices, id, point, size);
+    if (side > 0) return {Side::kOutside, id};
+    if (side < 0) continue;
+    const auto& corners = triangles_[id].corners;
+    if (std::any_of(corners.begin(), corners.end(),
+                    [&](VertexId v) { return vertices[v] == point; })) {
+      location.triangle = id;
+    }
+  }
+  return location;
+}
+
+void Surface::Measure(const VertexTable& vertices) {
+  if (measuring_) ContinueMeasuring(vertices, kCornersPerInsertion);
+  if (alive_ >= next_update_) Update(vertices);
+}
+
+// Looks for an interior point while none is known, and starts to measure the surface for its
+// present size. Called when the surface has doubled, so the cost of O(F) for an interior point is
+// amortized.
+void Surface::Update(const VertexTable& vertices) {
+  next_update_ = 2 * alive_;
+  if (!directions_) SetCenter(vertices);
+  if (IsWorthMeasuring() && !measuring_) {
+    StartMeasuring(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
+  }
+}
+
+// Puts the center strictly inside and forgets what was measured; does nothing where no double is
+// inside.
+void Surface::SetCenter(const VertexTable& vertices) {
+  work_ += 2 * triangles_.size();
+  const std::optional<Vector> interior = FindInterior(vertices);
+  if (!interior) return;
+  directions_.emplace(*interior);
+  extent_ = 0;
+  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
+    for (const VertexId v : t.corners) {
+      extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
+    }
+  });
+}
+
+std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
+  // The mean of the corners; each divided first, so that no sum overflows.
+  Vector mean = Vector::Zero();
+  const double weight = 1.0 / static_cast<double>(3 * alive_);
+  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
+    for (const VertexId v : t.corners) mean += vertices[v] * weight;
+  });
+  if (!mean.allFinite()) return std::nullopt;
+  const double size = SizeWith(vertices, mean);
+  bool inside = true;
+  ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) {
+    inside = inside && SideOf(vertices, id, mean, size) < 0;
+  });
+  return inside ? std::optional<Vector>(mean) : std::nullopt;
+}
+
+// At extreme scales every sign is decided by integers, and a map costs more than it saves.
+bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
+
+void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
+  if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
+  // A tenth as many walks as points, at most.
+  const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
+  const int wanted = std::min(affordable, 3 * ResolutionFor(alive_, true)) & ~1;
+  if (wanted < 4) return;
+  if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
+    StartMeasuring(vertices, wanted);
+    ContinueMeasuring(vertices, SIZE_MAX);
+  }
+}
+
+void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
+  // The first surface, from which the center comes, may have been a corner of what it is now.
+  if (directions_->resolution() == 1) SetCenter(vertices);
+  measured_at_ = alive_;
+  asked_ = 0;
+  rejected_ = 0;
+  const size_t row = static_cast<size_t>(resolution) + 1;
+  work_ += row;
+  measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
+                           std::vector<double>(row), std::vector<TriangleId>(row, Alive(last_))};
+}
+
+void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
+  for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
+  if (measuring_->face < 6) return;
+  measuring_->map.Finish(measuring_->least, measuring_->largest);
+  directions_ = std::move(measuring_->map);
+  measuring_.reset();
+}
+
+// Measures one corner, and makes the cell whose last corner it is.
+void Surface::MeasureCorner(const VertexTable& vertices) {
+  Measurement& m = *measuring_;
+  const auto j = static_cast<size_t>(m.j);
+  const double reach_above = m.reach[j];
+  const TriangleId hint_above = m.hint[j];
+  // From the corner to the left, or from the one above.
+  TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
+  const double reach = Reach(vertices, m.map.CornerDirection(m.face, m.i, m.j), near);
+  m.reach[j] = reach;
+  m.hint[j] = near;
+  m.least = std::min(m.least, reach);
+  m.largest = std::max(m.largest, reach);
+  if (m.i > 0 && m.j > 0) {
+    m.map.AppendCell(
+        std::min(std::min(m.reach_before, reach_above), std::min(m.reach[j - 1], reach)),
+        m.hint_before);
+  }
+  m.reach_before = reach_above;
+  m.hint_before = hint_above;
+  ++work_;
+  if (++m.j <= m.map.resolution()) return;
+  m.j = 0;
+  if (++m.i <= m.map.resolution()) return;
+  m.i = 0;
+  ++m.face;
+}
+
+// A distance m, near the largest, such that the double nearest to center + m * direction is inside;
+// 0 when none was found. `near` is where to start walking, and becomes where the direction leaves
+// the surface.
+double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
+  const Vector center = directions_->center();
+  double m = extent_;
+  // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
+  // nearly coplanar, their rounded planes tell little, hence the growing steps.
+  for (int round = 0; round < kMostRounds; ++round) {
+    const SurfaceTriangle& t = triangles_[near];
+    const double climb = t.normal.dot(direction);
+    const double height = t.offset - t.normal.dot(center);
+    if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
+    m *= 1 - std::ldexp(0x1p-30, round / 2);
+    const Vector point = center + m * direction;
+    const std::optional<Location> location =
+        Walk(vertices, point, SizeWith(vertices, point), near, work_);
+    if (!location) return 0;
+    near = location->triangle;
+    if (location->side == Side::kInside) return m;
+  }
+  return 0;
+}
+
+void Surface::FinishInsertions(const VertexTable& vertices) {
+  // A map that was made fine for a large block takes more memory than it saves time from here on.
+  if (directions_ && directions_->cell_count() > 4 * alive_) directions_->Coarsen();
+  if (alive_ >= next_update_) Update(vertices);
+}
+
+}  // namespace hulld

@@ -1,0 +1,134 @@
+#ifndef HULLD_SERVER_CALL_CALL_STREAM_H_
+#define HULLD_SERVER_CALL_CALL_STREAM_H_
+
+#include <absl/status/status.h>
+#include <grpcpp/grpcpp.h>
+
+#include <memory>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/call/admission.h"
+#include "server/call/call.h"
+#include "server/call/stream_message.h"
+#include "server/contract/rpc.h"
+
+namespace hulld::server {
+
+// What every streaming call has: it owns itself until gRPC is done with it, is admitted before
+// anything else, and finishes exactly once. Reactor: gRPC's, for the kind of stream.
+//
+// PulledStream and QueuedStream build on this: replies made one at a time, or queued.
+template <typename Reactor>
+class CallStream : public Reactor, public std::enable_shared_from_this<CallStream<Reactor>> {
+ public:
+  // Admits the call of a new stream and opens it; a call that is not admitted ends at once.
+  static Reactor* Launch(const std::shared_ptr<CallStream>& stream) {
+    stream->self_ = stream;
+    const absl::Status begun = stream->call_.Begin();
+    if (begun.ok()) {
+      stream->Open();
+    } else {
+      stream->FinishCall(begun);
+    }
+    return stream.get();
+  }
+
+ protected:
+  CallStream(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
+      : call_(context, admission, rpc) {}
+  // Under way are neither a reaction nor a task: each holds a reference.
+  ~CallStream() override { HULLD_CHECK(finished_); }
+
+  Call& call() { return call_; }
+  const Call& call() const { return call_; }
+
+  // Starts the first step, on gRPC's thread: neither waits nor computes for long.
+  virtual void Open() = 0;
+
+  // Runs `step` on a pool or lane, which keeps this alive until then.
+  template <typename Pool, typename Step>
+  void RunOn(Pool& pool, Step step) {
+    pool.Submit([self = this->shared_from_this(), step = std::move(step)]() mutable { step(); });
+  }
+
+  // Runs a reaction of gRPC's, which keeps this alive until it returns.
+  template <typename Step>
+  void React(Step&& step) {
+    const auto self = this->shared_from_this();
+    step();
+  }
+
+  // Why the call stopped, if it did; else `status`.
+  absl::Status OrStopped(const absl::Status& status) const {
+    return call_.ShouldStop() ? call_.StopStatus() : status;
+  }
+
+  // Ends the call, exactly once. No other operation of gRPC's may be under way but a read.
+  void FinishCall(const absl::Status& status) {
+    HULLD_CHECK(!std::exchange(finished_, true));
+    // What stopped the work is better known here than where it was noticed.
+    this->Finish(call_.End(absl::IsCancelled(status) ? OrStopped(status) : status));
+  }
+  bool finished() const { return finished_; }
+
+  void OnCancel() override { call_.Cancel(); }
+  void OnDone() override { self_.reset(); }
+
+ private:
+  // Destroyed last: its ticket keeps the server alive.
+  Call call_;
+  bool finished_ = false;
+  // Keeps this alive until gRPC is done with it.
+  std::shared_ptr<CallStream> self_;
+};
+
+// Reads messages into one request, one at a time, and tells the end of the client's stream from a
+// message that is malformed. Stream: a CallStream whose reactor reads.
+template <typename Stream, typename Request>
+class ReadingStream : public Stream {
+ protected:
+  using Stream::Stream;
+
+  // Starts to read the next message. Requires that none is being read, and that the call has not
+  // finished.
+  void Read() {
+    HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
+    PrepareToRead(&request_);
+    this->StartRead(&request_);
+  }
+  bool reading() const { return reading_; }
+  // The message that was read. Requires that none is being read.
+  Request& request() {
+    HULLD_DCHECK(!reading_);
+    return request_;
+  }
+  const Request& request() const {
+    HULLD_DCHECK(!reading_);
+    return request_;
+  }
+
+  // What follows a read, as Stream::React runs it.
+  virtual void OnMessage() = 0;
+  // OK: the client has said all, or is gone. INVALID_ARGUMENT: its last message was malformed.
+  virtual void OnNoMessage(const absl::Status& why) = 0;
+
+ private:
+  void OnReadDone(bool ok) final {
+    this->React([this, ok] {
+      HULLD_CHECK(std::exchange(reading_, false));
+      if (ok) {
+        OnMessage();
+      } else {
+        OnNoMessage(WhyNotRead(request_));
+      }
+    });
+  }
+
+  Request request_;
+  bool reading_ = false;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_CALL_CALL_STREAM_H_

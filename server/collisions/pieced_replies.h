@@ -1,0 +1,249 @@
+#ifndef HULLD_SERVER_COLLISIONS_PIECED_REPLIES_H_
+#define HULLD_SERVER_COLLISIONS_PIECED_REPLIES_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "core/base/check.h"
+#include "server/call/queued_stream.h"
+#include "server/process/task_pool.h"
+#include "server/process/worker_pool.h"
+#include "server/settings/config.h"
+
+namespace hulld::server {
+
+// A piece of a call's work, a range of units (pairs, or placements of a scene), and its answers
+// that wait for those of the pieces before.
+template <typename Reply>
+struct Piece {
+  // What is left of it.
+  uint64_t next = 0;
+  uint64_t end = 0;
+  std::vector<Reply> replies = {};
+  // The size of each reply, and of all.
+  std::vector<size_t> reply_bytes = {};
+  size_t bytes = 0;
+  bool is_done = false;
+
+  // For PiecedReplies: a slice is queued or runs; what the slices took so far.
+  bool is_running = false;
+  uint64_t units = 0;
+  std::chrono::steady_clock::duration elapsed{0};
+
+  void Add(Reply reply) {
+    const size_t size = reply.ByteSizeLong();
+    bytes += size;
+    reply_bytes.push_back(size);
+    replies.push_back(std::move(reply));
+  }
+};
+
+// A stream whose answers are computed in pieces by all threads of a pool and sent in order. A piece
+// is worked on by one slice at a time, each of about TaskPool::kSliceTime, so that other calls get
+// their turn. A bounded number of pieces is under way, and each holds a bounded number of bytes;
+// while a bounded number of bytes waits for the client, no slice starts. So memory is bounded, and
+// a client that does not read holds up no other.
+//
+// Work: what a piece keeps from one slice to the next, derived from Piece<Reply>.
+template <typename Reply, typename Work>
+class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply> {
+ protected:
+  using Base = QueuedStream<grpc::ServerWriteReactor<Reply>, Reply>;
+  using Clock = std::chrono::steady_clock;
+
+  // Bytes that may wait for the client before no slice is started. A choice: some messages, so that
+  // the threads need not wait while gRPC's get their turn.
+  static constexpr size_t kMostUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
+  // Bytes that a piece may hold while another is before it.
+  static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
+  // Replies up to this size join the one that waits before them.
+  static constexpr size_t kSmallReplyBytes = 32 << 10;
+
+  // Where the call is prepared and computed.
+  struct Threads {
+    // For what may wait.
+    WorkerPool& readers;
+    TaskPool& pool;
+  };
+  // How pieces grow, and whether preparing takes about a slice when nothing has to be waited for.
+  struct Shape {
+    uint64_t first_units;
+    uint64_t most_units;
+    bool is_short;
+  };
+
+  PiecedReplies(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc,
+                const Threads& threads, const Shape& shape)
+      : Base(context, admission, rpc),
+        readers_(threads.readers),
+        is_short_(shape.is_short),
+        lane_(threads.pool),
+        most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
+        most_units_(shape.most_units),
+        piece_units_(shape.first_units) {}
+
+  // The call is prepared step by step, without the mutex, on one thread at a time.
+  virtual absl::Status Validate() = 0;
+  // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
+  virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
+  virtual absl::Status Prepare() { return absl::OkStatus(); }
+
+  // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
+  // without the mutex, on any thread, by one thread at a time for each piece.
+  virtual absl::Status Advance(Work& piece, Clock::time_point end) = 0;
+
+  // The rest requires the mutex.
+
+  // Queues what comes first; the number of units.
+  virtual uint64_t Begin() = 0;
+  // Where the piece that starts at `begin` ends, at most `end`; for units whose cost is known.
+  virtual uint64_t EndOfPiece(uint64_t begin, uint64_t end) const {
+    static_cast<void>(begin);
+    return end;
+  }
+  // Starts a slice of the piece. To be overridden where some pieces run elsewhere.
+  virtual void Submit(Work& piece) {
+    this->RunOn(lane_, [this, &piece] { RunSlice(piece); });
+  }
+  // Queues replies of the piece at the front; sees it with is_done once, at its end.
+  virtual void Deliver(Work& piece) = 0;
+  // Adds a small reply to the one that waits, in place of queueing it; false where they do not fit.
+  virtual bool Join(const Reply& reply, Reply* waiting) = 0;
+  // Every piece was delivered. To queue what comes last; the end is set afterwards.
+  virtual void OnAllDelivered() {}
+
+  void RunSlice(Work& piece) {
+    const auto start = Clock::now();
+    const uint64_t before = piece.next;
+    absl::Status status = this->call().ShouldStop() ? this->call().StopStatus()
+                                                    : Advance(piece, start + TaskPool::kSliceTime);
+    if (this->call().ShouldStop()) status = this->call().StopStatus();
+    piece.elapsed += Clock::now() - start;
+    piece.units += piece.next - before;
+    this->Locked([this, &piece, &status] {
+      HULLD_CHECK(std::exchange(piece.is_running, false));
+      --running_;
+      if (!status.ok()) return this->End(status);
+      if (piece.is_done) AdaptUnits(piece);
+    });
+  }
+
+  // Queues the replies that the piece holds, in order.
+  void DeliverReplies(Work& piece) {
+    for (size_t i = 0; i < piece.replies.size(); ++i) {
+      QueueOrJoin(std::move(piece.replies[i]), piece.reply_bytes[i]);
+    }
+    piece.replies.clear();
+    piece.reply_bytes.clear();
+    piece.bytes = 0;
+  }
+
+  void QueueOrJoin(Reply reply, size_t bytes) {
+    const bool is_small =
+        bytes <= kSmallReplyBytes && this->LastWaitingBytes() + bytes <= Config::kReplyMessageBytes;
+    Reply* const waiting = this->LastWaiting();
+    if (is_small && waiting != nullptr && Join(reply, waiting)) {
+      this->GrowLastWaiting(bytes);
+    } else {
+      this->Queue(std::move(reply), bytes);
+    }
+  }
+
+ private:
+  // A short call whose hulls are ready need not wait for another thread.
+  void Open() final {
+    if (is_short_) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
+    this->RunOn(readers_, [this] { OpenWith(Validate(), true); });
+  }
+
+  void OpenWith(absl::Status status, bool may_wait) {
+    if (status.ok()) {
+      const absl::StatusOr<bool> resolved = ResolveHulls(may_wait);
+      if (resolved.ok() && !*resolved) {
+        HULLD_CHECK(!may_wait);
+        return this->RunOn(readers_, [this] { OpenWith(absl::OkStatus(), true); });
+      }
+      status = resolved.status();
+    }
+    if (status.ok()) status = Prepare();
+    if (this->call().ShouldStop()) status = this->call().StopStatus();
+    this->Locked([this, &status] {
+      opening_ = false;
+      if (!status.ok()) return this->End(status);
+      unit_count_ = Begin();
+    });
+  }
+
+  bool IsWorking() const final { return opening_ || running_ > 0; }
+
+  void StartWork() final {
+    if (opening_) return;
+    while (!pieces_.empty() && !pieces_.front()->is_running) {
+      Work& front = *pieces_.front();
+      Deliver(front);
+      if (!front.is_done) break;
+      pieces_.pop_front();
+    }
+    if (this->unsent_bytes() < kMostUnsentBytes) StartSlices();
+    if (!pieces_.empty() || next_unit_ < unit_count_) return;
+    OnAllDelivered();
+    this->End(absl::OkStatus());
+  }
+
+  void StartSlices() {
+    while (pieces_.size() < most_pieces_ && next_unit_ < unit_count_) {
+      auto piece = std::make_unique<Work>();
+      piece->next = next_unit_;
+      piece->end = EndOfPiece(next_unit_, std::min(unit_count_, next_unit_ + piece_units_));
+      HULLD_CHECK(piece->end > piece->next);
+      next_unit_ = piece->end;
+      pieces_.push_back(std::move(piece));
+    }
+    for (const std::unique_ptr<Work>& piece : pieces_) {
+      if (piece->is_running || piece->is_done) continue;
+      if (piece != pieces_.front() && piece->bytes >= kMostHeldBytes) continue;
+      piece->is_running = true;
+      ++running_;
+      Submit(*piece);
+    }
+  }
+
+  // Pieces grow and shrink so that each takes about one slice.
+  void AdaptUnits(const Work& piece) {
+    const auto least = std::chrono::nanoseconds(1);
+    const double factor = std::chrono::duration<double>(TaskPool::kSliceTime) /
+                          std::max<Clock::duration>(piece.elapsed, least);
+    const double wished = static_cast<double>(piece.units) * std::min(factor, 4.0);
+    piece_units_ = static_cast<uint64_t>(std::clamp(wished, 1.0, static_cast<double>(most_units_)));
+  }
+
+  WorkerPool& readers_;
+  const bool is_short_;
+  TaskPool::Lane lane_;
+  const size_t most_pieces_;
+  const uint64_t most_units_;
+
+  // The rest is guarded by the mutex; a running piece belongs to its slice.
+  bool opening_ = true;
+  uint64_t unit_count_ = 0;
+  uint64_t next_unit_ = 0;
+  // The size of the next piece.
+  uint64_t piece_units_;
+  // Under way, in order.
+  std::deque<std::unique_ptr<Work>> pieces_;
+  size_t running_ = 0;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_PIECED_REPLIES_H_

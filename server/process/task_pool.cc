@@ -1,0 +1,122 @@
+#include "server/process/task_pool.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+
+using Clock = std::chrono::steady_clock;
+
+TaskPool::Lane::~Lane() { HULLD_CHECK(slices_.empty()); }
+
+void TaskPool::Lane::Submit(std::function<void()> slice) {
+  pool_.SubmitSlice(*this, std::move(slice));
+}
+
+TaskPool::TaskPool(int threads, std::optional<PoolMetrics> single_metrics,
+                   std::optional<PoolMetrics> slice_metrics)
+    : single_metrics_(single_metrics),
+      slice_metrics_(slice_metrics),
+      last_single_call_((Clock::now() - kReserveTime).time_since_epoch()) {
+  HULLD_CHECK(threads > 0);
+  // Under the mutex, as threads() is read by the first of them.
+  const std::lock_guard lock(mutex_);
+  threads_.reserve(threads);
+  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Work(); });
+}
+
+TaskPool::~TaskPool() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  ready_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void TaskPool::Submit(std::function<void()> task) {
+  NoteSingleCall();
+  {
+    const std::lock_guard lock(mutex_);
+    single_calls_.push_back({std::move(task), Clock::now(), false});
+    NoteWaiting();
+  }
+  ready_.notify_one();
+}
+
+void TaskPool::NoteSingleCall() {
+  last_single_call_.store(Clock::now().time_since_epoch(), std::memory_order_relaxed);
+}
+
+void TaskPool::SubmitSlice(Lane& lane, std::function<void()> slice) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (lane.slices_.empty()) lanes_.push_back(&lane);
+    lane.slices_.push_back({std::move(slice), Clock::now(), true});
+    ++slices_waiting_;
+    NoteWaiting();
+  }
+  ready_.notify_one();
+}
+
+void TaskPool::NoteWaiting() {
+  waiting_.store(single_calls_.size(), std::memory_order_relaxed);
+  if (single_metrics_) single_metrics_->waiting.Set(static_cast<double>(single_calls_.size()));
+  if (slice_metrics_) slice_metrics_->waiting.Set(static_cast<double>(slices_waiting_));
+}
+
+bool TaskPool::MayRunSlice() const {
+  if (ending_ || threads_.size() == 1) return true;
+  const Clock::time_point last(last_single_call_.load(std::memory_order_relaxed));
+  const bool is_reserved = Clock::now() - last < kReserveTime;
+  return slices_running_ < threads() - (is_reserved ? 1 : 0);
+}
+
+std::optional<TaskPool::Task> TaskPool::Next() {
+  std::optional<Task> task;
+  if (!single_calls_.empty()) {
+    task = std::move(single_calls_.front());
+    single_calls_.pop_front();
+  } else if (!lanes_.empty() && MayRunSlice()) {
+    Lane& lane = *lanes_.front();
+    lanes_.pop_front();
+    task = std::move(lane.slices_.front());
+    lane.slices_.pop_front();
+    if (!lane.slices_.empty()) lanes_.push_back(&lane);
+    --slices_waiting_;
+    ++slices_running_;
+  }
+  if (task.has_value()) NoteWaiting();
+  return task;
+}
+
+void TaskPool::Work() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    std::optional<Task> task = Next();
+    if (!task.has_value()) {
+      if (!lanes_.empty()) {
+        ready_.wait_for(lock, kReserveTime);  // slices wait until the reserve ends
+      } else if (ending_) {
+        return;
+      } else {
+        ready_.wait(lock);
+      }
+      continue;
+    }
+    lock.unlock();
+    const std::optional<PoolMetrics>& metrics = task->is_slice ? slice_metrics_ : single_metrics_;
+    if (metrics.has_value()) {
+      const auto waited = Clock::now() - task->submitted;
+      metrics->wait_seconds.Observe(std::chrono::duration<double>(waited).count());
+    }
+    task->run();
+    task->run = nullptr;  // what it holds goes before the lock is taken again
+    lock.lock();
+    if (task->is_slice) --slices_running_;
+  }
+}
+
+}  // namespace hulld::server

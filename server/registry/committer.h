@@ -1,0 +1,89 @@
+#ifndef HULLD_SERVER_REGISTRY_COMMITTER_H_
+#define HULLD_SERVER_REGISTRY_COMMITTER_H_
+
+#include <absl/status/status.h>
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "server/process/metrics.h"
+#include "server/registry/locked.h"
+#include "server/store/store.h"
+
+namespace hulld::server {
+
+// How changes reached the store so far.
+struct CommitStatistics {
+  uint64_t batches = 0;
+  uint64_t changes = 0;
+  uint64_t failed_batches = 0;
+  // The last batch failed.
+  bool failing = false;
+};
+
+// Brings changes to the store, in the order in which they are submitted. One thread takes all that
+// waits as one batch, which the store keeps or refuses as a whole (group commit), again and again.
+//
+// A change may build on those submitted before it, although they are not committed yet. So when
+// the store refuses a batch, everything that was submitted until then is refused with it, and the
+// submitters undo it. The store is made to recover before the next batch.
+//
+// Two locks. `order` belongs to the submitters. They hold it while they submit, so the order of the
+// queue is that of their records. The completions of a batch run under it in one go, which makes a
+// refusal safe: from the moment when the queue is emptied to the last completion, no change that
+// builds on a refused one can be submitted. The queue has a mutex of its own, so that the
+// committer's thread takes the next batch without waiting for the records. That mutex is taken
+// after `order`, and nothing is called under it. No lock is held while the store works.
+class Committer {
+ public:
+  // Told whether a change is committed: OK, or why it was refused. Called once, on the committer's
+  // thread, with `order` held: completions come in the order of submission, no batch of another
+  // comes between, and no submission either. May submit the next change.
+  using Completion = std::function<void(Locked& order, const absl::Status&)>;
+
+  // Both must outlive this.
+  Committer(Store& store, std::mutex& order);
+  Committer(const Committer&) = delete;
+  Committer& operator=(const Committer&) = delete;
+  // Commits what is queued, then ends.
+  ~Committer();
+
+  // Queues a change that follows all changes submitted before. Requires that `locked` holds
+  // `order`. Cost: O(1).
+  void Submit(const Locked& locked, Change change, Completion done);
+
+  CommitStatistics Statistics() const;
+  // Where each batch is timed and counted; set before the first change, and outlives this.
+  void SetMetrics(StoreMetrics& metrics) { metrics_ = &metrics; }
+
+ private:
+  struct Pending {
+    Change change;
+    Completion done;
+  };
+
+  void Run();
+  std::vector<Pending> WaitForBatch();
+  absl::Status Write(const std::vector<Pending>& batch);
+  void Settle(std::vector<Pending>& batch, const absl::Status& status);
+
+  Store& store_;
+  std::mutex& order_;
+  StoreMetrics* metrics_ = nullptr;
+
+  mutable std::mutex mutex_;
+  // The rest is guarded by mutex_.
+  std::condition_variable ready_;
+  std::vector<Pending> queue_;
+  CommitStatistics statistics_;
+  bool ending_ = false;
+  std::thread thread_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_COMMITTER_H_

@@ -1,0 +1,96 @@
+#include "server/registry/hull_state.h"
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+
+void HullState::Schedule() {
+  HULLD_CHECK(can_schedule());
+  work_ = Work::kScheduled;
+}
+
+void HullState::StartBuilding() {
+  HULLD_CHECK(work_ == Work::kScheduled);
+  HULLD_CHECK(life_ == Life::kPresent && !damaged());
+  work_ = Work::kBuilding;
+}
+
+void HullState::Submit() {
+  HULLD_CHECK(work_ == Work::kBuilding);
+  HULLD_CHECK(life_ == Life::kPresent && !damaged() && in_flight_ < kMaxInFlight);
+  ++in_flight_;
+}
+
+void HullState::StartReading() {
+  HULLD_CHECK(life_ == Life::kPresent && quiet());
+  HULLD_CHECK(pinned() && !damaged());
+  work_ = Work::kReading;
+}
+
+bool HullState::EndWork() {
+  HULLD_CHECK(work_ != Work::kIdle);
+  const bool kept = work_ != Work::kReverting;
+  work_ = Work::kIdle;
+  return kept;
+}
+
+void HullState::StartEnding() {
+  HULLD_CHECK(life_ == Life::kPresent && quiet());
+  life_ = Life::kEnding;
+  in_flight_ = 1;
+}
+
+void HullState::Commit() {
+  HULLD_CHECK(in_flight_ > 0);
+  --in_flight_;
+  switch (life_) {
+    case Life::kCreating:
+      life_ = Life::kPresent;
+      return;
+    case Life::kPresent:
+      return;
+    case Life::kEnding:
+      life_ = Life::kGone;
+      return;
+    case Life::kGone:
+      break;
+  }
+  HULLD_UNREACHABLE();  // nothing of it is in flight
+}
+
+void HullState::Refuse() {
+  HULLD_CHECK(in_flight_ > 0);
+  --in_flight_;
+  switch (life_) {
+    case Life::kCreating:
+      life_ = Life::kGone;
+      return;
+    case Life::kPresent:
+      if (work_ == Work::kBuilding) work_ = Work::kReverting;
+      return;
+    case Life::kEnding:
+      life_ = Life::kPresent;
+      return;
+    case Life::kGone:
+      break;
+  }
+  HULLD_UNREACHABLE();  // nothing of it is in flight
+}
+
+void HullState::Pin() {
+  HULLD_CHECK(visible());
+  ++pins_;
+}
+
+bool HullState::Unpin() {
+  HULLD_CHECK(pins_ > 0);
+  return --pins_ == 0;
+}
+
+void HullState::Damage(const absl::Status& damage) {
+  HULLD_CHECK(life_ == Life::kPresent && !damaged());
+  HULLD_CHECK(!damage.ok());
+  damage_ = damage;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,136 @@
+#ifndef HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
+#define HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/hull/growth/hull_builder.h"
+#include "server/registry/served_hull.h"
+#include "server/store/hull_record.h"
+
+// What the registry is asked and what it answers.
+namespace hulld::server {
+
+// A hull as one reader sees it: what is served belongs to the record's revision.
+struct HullView {
+  HullRecord record;
+  std::shared_ptr<const ServedHull> served;
+};
+
+// Hulls that all were current at one revision of the store.
+struct Resolved {
+  uint64_t store_revision = 0;
+  // In the order asked for; NOT_FOUND where there is none, DATA_LOSS where the store is damaged.
+  std::vector<absl::StatusOr<HullView>> hulls;
+};
+
+struct CreateResult {
+  uint64_t store_revision = 0;
+  HullRecord hull;
+  bool created = false;
+};
+
+struct ReplaceResult {
+  uint64_t store_revision = 0;
+  HullRecord hull;
+  // Whether there was none before.
+  bool created = false;
+};
+
+// What takes the place of a hull.
+struct Replacement {
+  std::string hull_id;
+  // 0: the hull must not exist.
+  std::optional<uint64_t> if_revision;
+  bool create_if_absent = false;
+  std::shared_ptr<HullBuilder> builder;
+  // Sums over the points that the builder was given.
+  PointCounts counts;
+  // The builder's, for the store; Registry::Replace fills it.
+  std::vector<Vector> vertices = {};
+};
+
+struct ListedHull {
+  HullRecord record;
+  // The store cannot read it; of a damaged record no more than the ID is known.
+  bool damaged = false;
+};
+
+struct HullPage {
+  uint64_t store_revision = 0;
+  std::vector<ListedHull> hulls;
+  bool more = false;
+};
+
+struct RegistrySizes {
+  uint64_t store_revision = 0;
+  uint64_t hull_count = 0;
+  uint64_t vertex_count = 0;
+};
+
+// What the registry holds of hulls in memory, and how that served so far.
+struct CacheStatistics {
+  // Builders and served hulls; points that wait to be built, and vertices that wait for the store;
+  // and what calls hold for long (MemoryCharge).
+  uint64_t bytes = 0;
+  uint64_t limit_bytes = 0;
+  // Hulls that a reader asked for and that were ready to be served.
+  uint64_t hits = 0;
+  // Those that had to be made ready.
+  uint64_t misses = 0;
+  // Hulls read back from the store.
+  uint64_t loads = 0;
+  // How often a hull dropped its builder or what it serves to stay within the limit.
+  uint64_t evictions = 0;
+  // Hulls found damaged in the store.
+  uint64_t damaged = 0;
+};
+
+// One chunk of a writer.
+struct Chunk {
+  uint64_t sequence = 0;
+  std::vector<Vector> points;
+  // 0: this session created the hull and nothing was appended since.
+  std::optional<uint64_t> if_revision;
+};
+
+struct ChunkResult {
+  uint64_t store_revision = 0;
+  bool already_applied = false;
+  uint64_t hull_revision = 0;
+  uint64_t vertex_count = 0;
+  // All zero when already applied.
+  PointCounts counts;
+};
+
+// One hull and all that belongs to it; known to the registry alone.
+struct RegisteredHull;
+
+// One writer's open stream into one incarnation of a hull.
+struct AppendSession {
+  std::shared_ptr<RegisteredHull> hull;
+  std::string writer_id;
+  bool created_hull = false;
+  uint64_t watch = 0;
+};
+
+struct OpenResult {
+  uint64_t store_revision = 0;
+  AppendSession session;
+  HullRecord hull;
+  uint64_t last_sequence = 0;
+};
+
+// Called once with the answer.
+template <typename T>
+using Reply = std::function<void(absl::StatusOr<T>)>;
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_

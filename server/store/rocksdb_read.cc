@@ -1,0 +1,166 @@
+// How a store is read: single values, all hulls, the vertices of one.
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "server/contract/status_map.h"
+#include "server/store/rocksdb_store.h"
+#include "server/store/store_errors.h"
+#include "server/store/store_keys.h"
+
+namespace hulld::server {
+namespace {
+
+std::string_view View(const rocksdb::Slice& slice) { return {slice.data(), slice.size()}; }
+
+}  // namespace
+
+absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string& key) {
+  std::string sealed;
+  rocksdb::Status status;
+  {
+    const std::shared_lock lock(db_mutex_);
+    if (db_ == nullptr) {
+      ++read_failures_;
+      return CannotBeRead(options_.data_dir);
+    }
+    status = db_->Get(rocksdb::ReadOptions(), key, &sealed);
+    // A block's checksum speaks for many values; our own tells whether this one is among the
+    // damaged.
+    if (status.IsCorruption()) {
+      rocksdb::ReadOptions unverified;
+      unverified.verify_checksums = false;
+      status = db_->Get(unverified, key, &sealed);
+    }
+  }
+  if (status.IsNotFound()) return std::nullopt;
+  if (!status.ok()) return ReadFailed(status);
+  const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
+  if (!value.ok()) return value.status();
+  return std::string(*value);
+}
+
+absl::StatusOr<std::optional<uint64_t>> RocksDbStore::ReadNumber(const std::string& key) {
+  const absl::StatusOr<std::optional<std::string>> value = Read(key);
+  if (!value.ok()) return value.status();
+  if (!value->has_value()) return std::nullopt;
+  const absl::StatusOr<uint64_t> number = DecodeNumber(**value);
+  if (!number.ok()) return number.status();
+  return *number;
+}
+
+// Visits the keys from begin to end and their sealed values.
+absl::Status RocksDbStore::ScanRange(
+    const std::string& begin, const std::string& end,
+    const std::function<absl::Status(std::string_view, std::string_view)>& visit) {
+  const std::shared_lock lock(db_mutex_);
+  if (db_ == nullptr) {
+    ++read_failures_;
+    return CannotBeRead(options_.data_dir);
+  }
+  std::string next = begin;
+  const rocksdb::Slice upper_bound(end);
+  // As in Read: after damage to a block go on from the last key without the blocks' checksums.
+  for (const bool verify : {true, false}) {
+    rocksdb::ReadOptions options;
+    options.verify_checksums = verify;
+    options.fill_cache = false;
+    options.iterate_upper_bound = &upper_bound;
+    const std::unique_ptr<rocksdb::Iterator> iterator(db_->NewIterator(options));
+    for (iterator->Seek(next); iterator->Valid(); iterator->Next()) {
+      if (absl::Status s = visit(View(iterator->key()), View(iterator->value())); !s.ok()) return s;
+      next.assign(iterator->key().data(), iterator->key().size());
+      next.push_back('\0');
+    }
+    if (iterator->status().ok()) return absl::OkStatus();
+    if (!iterator->status().IsCorruption() || !verify) {
+      return ReadFailed(iterator->status());
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RocksDbStore::ForEachHull(const StoredHullVisitor& visit) {
+  return ScanRange(std::string(1, kHullPrefix), std::string(1, kHullPrefix + 1),
+                   [&](std::string_view key, std::string_view sealed) {
+                     const std::string hull_id(key.substr(1));
+                     const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
+                     absl::StatusOr<StoredHull> hull =
+                         value.ok() ? DecodeStoredHull(hull_id, *value) : value.status();
+                     if (!hull.ok()) {
+                       hull = DamagedHull(hull_id, std::string(hull.status().message()));
+                     }
+                     visit(hull_id, std::move(hull));
+                     return absl::OkStatus();
+                   });
+}
+
+absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {
+  std::vector<Vector> vertices;
+  vertices.reserve(hull.layout.base_vertices + hull.layout.delta_vertices);
+  absl::Status status = LoadBase(hull, &vertices);
+  if (status.ok()) status = LoadDeltas(hull, &vertices);
+  if (absl::IsDataLoss(status)) {
+    return DamagedHull(hull.record.hull_id, std::string(status.message()));
+  }
+  if (!status.ok()) return status;
+  return vertices;
+}
+
+absl::Status RocksDbStore::LoadBase(const StoredHull& hull, std::vector<Vector>* vertices) {
+  const uint64_t incarnation = hull.record.create_revision;
+  const VertexLayout& layout = hull.layout;
+  for (uint32_t part = 0; vertices->size() < layout.base_vertices; ++part) {
+    const absl::StatusOr<std::optional<std::string>> value =
+        Read(BaseKey(incarnation, layout.base_revision, part));
+    const std::string name = absl::StrCat("part ", part, " of its base: ");
+    if (!value.ok()) return Prefixed(name, value.status());
+    if (!value->has_value()) return absl::DataLossError(absl::StrCat(name, "it is missing"));
+    if ((*value)->empty()) return absl::DataLossError(absl::StrCat(name, "it is empty"));
+    if (absl::Status s = AppendVertices(**value, vertices); !s.ok()) return Prefixed(name, s);
+  }
+  if (vertices->size() == layout.base_vertices) return absl::OkStatus();
+  return absl::DataLossError(
+      absl::StrCat("its base holds ", vertices->size(), " vertices, not ", layout.base_vertices));
+}
+
+absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices) {
+  const uint64_t incarnation = hull.record.create_revision;
+  const VertexLayout& layout = hull.layout;
+  const size_t base = vertices->size();
+  uint64_t count = 0;
+  if (layout.delta_count > 0) {
+    const absl::Status scanned = ScanRange(
+        DeltaKey(incarnation, layout.base_revision + 1),
+        DeltaKey(incarnation, hull.record.revision + 1),
+        [&](std::string_view key, std::string_view sealed) {
+          const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
+          const absl::Status status =
+              value.ok() ? AppendVertices(*value, vertices) : value.status();
+          ++count;
+          return Prefixed(absl::StrCat("its delta of revision ", DeltaRevision(key), ": "), status);
+        });
+    if (!scanned.ok()) return scanned;
+  }
+  if (count == layout.delta_count && vertices->size() - base == layout.delta_vertices) {
+    return absl::OkStatus();
+  }
+  return absl::DataLossError(absl::StrCat("it has ", count, " deltas with ",
+                                          vertices->size() - base, " vertices, not ",
+                                          layout.delta_count, " with ", layout.delta_vertices));
+}
+
+absl::StatusOr<uint64_t> RocksDbStore::LoadSequence(const HullRecord& hull,
+                                                    const std::string& writer_id) {
+  const absl::StatusOr<std::optional<uint64_t>> sequence =
+      ReadNumber(WriterKey(hull.create_revision, writer_id));
+  if (absl::IsDataLoss(sequence.status())) {
+    return DamagedHull(hull.hull_id,
+                       absl::StrCat("a writer's sequence: ", sequence.status().message()));
+  }
+  if (!sequence.ok()) return sequence.status();
+  return sequence->value_or(0);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,61 @@
+#include "server/store/store_errors.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "server/contract/error_info.h"
+
+namespace hulld::server {
+
+absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
+  const std::string cause = status.ToString();
+  if (status.IsNoSpace()) {
+    return WithReason(
+        absl::ResourceExhaustedError(absl::StrCat(
+            "the disk that holds --data-dir ", data_dir, " is full (", cause,
+            "); nothing was changed; make room and append again, no restart is needed")),
+        v1::ERROR_REASON_DISK_FULL);
+  }
+  return absl::UnavailableError(
+      absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
+                   "); append again once that is repaired, no restart is needed"));
+}
+
+absl::Status ReadError(const rocksdb::Status& status, const std::string& what) {
+  const std::string text = absl::StrCat(what, ": ", status.ToString());
+  if (status.IsCorruption()) return absl::DataLossError(text);
+  return absl::UnavailableError(text);
+}
+
+absl::Status CannotBeRead(const std::string& data_dir) {
+  return absl::UnavailableError(
+      absl::StrCat("the store in --data-dir ", data_dir, " cannot be read since an error"));
+}
+
+absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only) {
+  const std::string cause = status.ToString();
+  if (cause.find("lock") != std::string::npos || cause.find("LOCK") != std::string::npos) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("--data-dir ", data_dir, " is in use by another hulld (", cause,
+                     "); stop that one, or name another directory"));
+  }
+  if (status.IsCorruption()) {
+    return absl::DataLossError(absl::StrCat(
+        "--data-dir ", data_dir, " is damaged (", cause,
+        "); restore a backup into another directory, or see 'hulld doctor --cut-log'"));
+  }
+  if (read_only && (status.IsNotFound() || status.IsPathNotFound() || status.IsInvalidArgument())) {
+    return absl::NotFoundError(
+        absl::StrCat("--data-dir ", data_dir, " holds no store (", cause, ")"));
+  }
+  return absl::UnavailableError(
+      absl::StrCat("cannot open the store in --data-dir ", data_dir, ": ", cause));
+}
+
+absl::Status DamagedHull(const std::string& hull_id, const std::string& finding) {
+  return WithReason(
+      absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (", finding,
+                                       "); delete it and append it anew, or restore a backup")),
+      v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", hull_id}});
+}
+
+}  // namespace hulld::server

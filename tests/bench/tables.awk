@@ -1,0 +1,417 @@
+# Makes the tables of the pages from the rows of results/: awk -v table=NAME -v machine=MACHINE -f tables.awk. See tables.sh.
+
+# read_rows(FILE): the rows of a file, by the names in its head: cell[workload, library, column].
+function read_rows(file,   path, line, fields, names, count, i, key) {
+  path = "results/" file ".csv"
+  while ((getline line < path) > 0) {
+    count = split_row(line, fields)
+    if (!(file in seen)) {
+      seen[file] = 1
+      for (i = 1; i <= count; i++) names[i] = fields[i]
+      continue
+    }
+    key = names[2] == "library" || names[2] == "transport" ? fields[1] SUBSEP fields[2] : fields[1]
+    if (names[3] == "server") key = key SUBSEP fields[3]
+    for (i = 1; i <= count; i++) cell[key, names[i]] = fields[i]
+    order[++rows] = key
+  }
+  if (!(file in seen)) {
+    print "tables.awk: cannot read " path > "/dev/stderr"
+    exit 1
+  }
+  files = files (files == "" ? "" : ", ") "[`" file ".csv`](" results file ".csv)"
+}
+
+# Splits at commas that are not within quotes.
+function split_row(line, fields,   count, text, quoted, i, c) {
+  count = 1
+  text = ""
+  for (i = 1; i <= length(line); i++) {
+    c = substr(line, i, 1)
+    if (c == "\"") { quoted = !quoted; continue }
+    if (c == "," && !quoted) { fields[count++] = text; text = ""; continue }
+    text = text c
+  }
+  fields[count] = text
+  return count
+}
+
+function head(text,   part, count, i) {
+  print text
+  count = split(text, part, "|")
+  for (i = 2; i < count; i++) printf "|---"
+  print "|"
+}
+
+# Where the rows above come from.
+function measured(   path, line, fields) {
+  path = "results/hull_build_" machine ".csv"
+  close(path)
+  getline line < path
+  getline line < path
+  split_row(line, fields)
+  sub(/\(virtual; /, "(", fields[8])
+  printf "\n*Measured on a virtual %s, %s; rows in %s.*\n", fields[8], fields[7], files
+}
+
+# Nanoseconds, or "-".
+function short(value) {
+  if (value == "") return "-"
+  value += 0
+  if (value < 999.5) return sprintf("%.0f", value)
+  if (value < 99950) return sprintf("%.1fk", value / 1e3)
+  if (value < 999500) return sprintf("%.0fk", value / 1e3)
+  return sprintf("%.1fM", value / 1e6)
+}
+function three(x) { x += 0; return x < 1 ? sprintf("%.2f", x) : x < 100 ? sprintf("%.3g", x) : sprintf("%d", x) }
+# Three digits at least, and no exponent.
+function digits(x) { x += 0; return x < 1000 ? sprintf("%.3g", x) : sprintf("%d", x) }
+function times(x) { x += 0; return x < 100 ? sprintf("%.2g", x) : sprintf("%.0f", x) }
+function million(x) { x += 0; return (x < 2e6 ? sprintf("%.2f", x / 1e6) : sprintf("%.1f", x / 1e6)) " million/s" }
+# A time in the unit that suits it.
+function unit(ns) {
+  ns += 0
+  if (ns < 999.5) return sprintf("%.3g ns", ns)
+  if (ns < 999500) return sprintf("%.3g us", ns / 1e3)
+  if (ns < 999.5e6) return sprintf("%.3g ms", ns / 1e6)
+  return sprintf("%.3g s", ns / 1e9)
+}
+
+function hulls(   n, i, part, at, missing) {
+  read_rows("hull_build_" machine)
+  head("| points | number | vertices | hulld, ms | qhull, ms | CGAL, ms | qhull / hulld | CGAL / hulld |")
+  n = split("ball:1000=ball|ball:10000=ball|ball:100000=ball|ball:1000000=ball|cube:1000000=cube|" \
+            "sphere:10000=sphere|sphere:100000=sphere|sphere:1000000=sphere|" \
+            "mesh:stanford-bunny.obj=Stanford bunny|mesh:rocker-arm.obj=rocker arm|mesh:spot.obj=spot|" \
+            "lattice:50=lattice, rotated", list, "|")
+  for (i = 1; i <= n; i++) {
+    split(list[i], part, "=")
+    at = part[1] SUBSEP
+    missing = cell[at "qhull", "vertices_missing_or_extra"]
+    printf "| %s | %d | %d | %s | %s%s | %s | %s | %s |\n", part[2], cell[at "hulld", "points"], cell[at "hulld", "vertices"],
+           digits(cell[at "hulld", "milliseconds"]), digits(cell[at "qhull", "milliseconds"]),
+           (missing > 0 ? " (" missing " vertices missing)" : ""), digits(cell[at "cgal", "milliseconds"]),
+           times(cell[at "qhull", "milliseconds"] / cell[at "hulld", "milliseconds"]),
+           times(cell[at "cgal", "milliseconds"] / cell[at "hulld", "milliseconds"])
+  }
+  measured()
+}
+
+function stream(   n, i, key, part) {
+  read_rows("hull_stream_" machine)
+  head("| points | number | library | us a point | p50 | p99 | p99.9 | max |")
+  n = split("ball:100000,sphere:100000,ball:1000000,sphere:1000000", list, ",")
+  for (i = 1; i <= n; i++) {
+    split(list[i], part, ":")
+    for (j = 1; j <= 2; j++) {
+      key = list[i] SUBSEP (j == 1 ? "hulld one at a time" : "cgal delaunay one at a time")
+      if (!((key, "points") in cell)) continue
+      printf "| %s | %d | %s | %.3g | %.3g | %.3g | %.3g | %.3g |\n", part[1], part[2], j == 1 ? "hulld" : "CGAL Delaunay",
+             cell[key, "milliseconds"] * 1000 / part[2], cell[key, "p50_us"], cell[key, "p99_us"], cell[key, "p999_us"],
+             cell[key, "max_us"]
+    }
+  }
+  measured()
+}
+
+function extremes(   n, i, part, a, b) {
+  read_rows("hull_extremes_" machine)
+  head("| points | number | vertices | at once, ms | times generic | one by one, ms | times generic |")
+  n = split("scale_5e_324=ball of multiples of 5e-324|scale_1e_310=ball of radius 1e-310|scale_1e_300=ball of radius 1e-300|" \
+            "scale_1e300=ball of radius 1e300|scale_1e300_sphere=sphere of radius 1e300|" \
+            "scale_largest=cube up to the largest double|offset_1e15=ball of radius 100 at 1e15|" \
+            "offset_1e15_few_ulps=sphere of 16 units in the last place at 1e15|" \
+            "ulp_tilted_plane=tilted plane, each point rounded|ulp_one_point_off_plane=integer plane, one point an ulp off|" \
+            "ulp_box_faces=box, its faces jittered by an ulp|ulp_rotated_lattice=lattice, rotated|" \
+            "cospherical=integer points on a sphere|cocircular_drum=prism of two integer circles|" \
+            "sliver_pancake=ball squeezed to 1 : 1 : 1e-12, rotated|sliver_needle=ball squeezed to 1 : 1e-12 : 1e-12, rotated|" \
+            "mixed_1e60=coordinates of 1e-60 to 1e60|mixed_1e300=coordinates of 1e-300 to 1e300|" \
+            "mixed_tiny_clusters=clusters 1e-9 wide on a cube's corners|order_sorted=sphere, sorted along x|" \
+            "order_spiral=sphere, as a spiral|order_growing_shells=shells, each outside all before|" \
+            "order_plane_first=a plane first, then a ball|order_rising_apexes=a circle, then rising apexes|" \
+            "duplicates_of_cube=8 points over and over|duplicates_of_sphere=500 points over and over", list, "|")
+  for (i = 1; i <= n; i++) {
+    split(list[i], part, "=")
+    a = part[1] SUBSEP "hulld"
+    b = part[1] SUBSEP "hulld one at a time"
+    printf "| %s | %d | %d | %s | %s | %s | %s |\n", part[2], cell[a, "points"], cell[a, "vertices"],
+           three(cell[a, "milliseconds"]), three(cell[a, "times_generic"]),
+           three(cell[b, "milliseconds"]), three(cell[b, "times_generic"])
+  }
+  measured()
+}
+
+function set_name(set) {
+  if (set == "ur5") return "UR5, 72 to 220"
+  sub(/^sphere:/, "", set)
+  return set
+}
+function peer_names() {
+  name["FCL libccd"] = "FCL, libccd"; name["FCL indep"] = "FCL, own"; name["SAT double"] = "SAT, plain double"
+  name["SAT perturbed"] = "SAT, perturbed by 1e-9"; name["GJK double"] = "GJK, plain double"; name["GJK float"] = "GJK, float"
+}
+function named(library) { return library in name ? name[library] : library }
+
+function relation(   s, p, r, key, text, n) {
+  read_rows("query_relation_" machine)
+  head("| vertices | hulld | FCL, libccd | FCL, own | libccd MPR | libccd GJK | Bullet | SAT, plain double |")
+  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
+  n = split("hulld,FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet,SAT double", peers, ",")
+  split("far,close,gap,deep", regimes, ",")
+  for (s = 1; s <= 5; s++) {
+    printf "| %s |", set_name(sets[s])
+    for (p = 1; p <= n; p++) {
+      text = ""
+      for (r = 1; r <= 4; r++) {
+        key = sets[s] " " regimes[r] SUBSEP peers[p]
+        text = text (r > 1 ? " / " : "") short(cell[key, "ns"])
+        if (cell[key, "wrong"] > 0) text = text " (" cell[key, "wrong"] " wrong)"
+      }
+      printf " %s |", p == 1 ? "**" text "**" : text
+    }
+    print ""
+  }
+  measured()
+}
+
+function touching(   s, p, n, key) {
+  read_rows("query_relation_" machine)
+  head("| vertices | hulld | FCL, libccd | FCL, own | libccd MPR | libccd GJK | Bullet |")
+  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
+  n = split("hulld,FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet", peers, ",")
+  for (s = 1; s <= 5; s++) {
+    printf "| %s |", set_name(sets[s])
+    for (p = 1; p <= n; p++) {
+      key = sets[s] " contact" SUBSEP peers[p]
+      printf " %s (%s) |", short(cell[key, "ns"]), cell[key, "wrong"]
+    }
+    print ""
+  }
+  measured()
+}
+
+function lengths(question,   s, p, n, m, key, label) {
+  read_rows("query_" question "_" machine)
+  head("| hulls | hulld | FCL, libccd | FCL, own | libccd GJK | Bullet |")
+  m = split(question == "contact" ? "sphere:64 deep,sphere:512 deep,ur5 graze,ur5 deep" \
+                                  : "sphere:64 close,sphere:512 close,ur5 far,ur5 close,ur5 gap", sets, ",")
+  n = split("hulld,FCL libccd,FCL indep,libccd GJK,Bullet", peers, ",")
+  for (s = 1; s <= m; s++) {
+    label = sets[s]
+    sub(/^sphere:/, "", label)
+    sub(/^ur5/, "UR5", label)
+    printf "| %s |", label
+    for (p = 1; p <= n; p++) {
+      key = sets[s] SUBSEP peers[p]
+      if ((key, "ns") in cell) printf " %s (%.0e) |", short(cell[key, "ns"]), cell[key, "largest_error"]
+      else printf " - |"
+    }
+    print ""
+  }
+  measured()
+}
+
+function motion(   s, r, at) {
+  read_rows("query_motion_" machine)
+  head("| vertices | close, warm | cold | gap, warm | cold | deep, warm | cold |")
+  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
+  split("close,gap,deep", regimes, ",")
+  for (s = 1; s <= 5; s++) {
+    printf "| %s |", set_name(sets[s])
+    for (r = 1; r <= 3; r++) {
+      at = sets[s] " " regimes[r]
+      printf " %s | %s |", short(cell[at " warm" SUBSEP "hulld", "ns"]), short(cell[at " cold" SUBSEP "hulld", "ns"])
+    }
+    print ""
+  }
+  measured()
+}
+
+function batch(   s, n, one, two, label) {
+  read_rows("query_batch_" machine)
+  head("| pairs | one thread, ns | two threads, ns | on two threads | gain |")
+  n = split("sphere:8 deep,sphere:64 deep,sphere:64 close,sphere:512 close,ur5 deep,ur5 close", sets, ",")
+  for (s = 1; s <= n; s++) {
+    one = cell[sets[s] " 1 thread" SUBSEP "hulld", "ns"]
+    two = cell[sets[s] " 2 threads" SUBSEP "hulld", "ns"]
+    label = sets[s]
+    sub(/^sphere:/, "", label)
+    sub(/^ur5/, "UR5", label)
+    printf "| %s | %.0f | %.0f | %s | %.1f |\n", label, one, two, million(1e9 / two), one / two
+  }
+  measured()
+}
+
+function scenes(   s, n, ours, theirs, label) {
+  read_rows("query_scene_" machine)
+  head("| scene | colliding pairs | hulld, ms | FCL, tree, ms | FCL / hulld |")
+  n = split("1000 of sphere:64,10000 of sphere:64,1000 of ur5,10000 of ur5", sets, ",")
+  for (s = 1; s <= n; s++) {
+    ours = cell[sets[s] SUBSEP "hulld", "ns"]
+    theirs = cell[sets[s] SUBSEP "FCL tree", "ns"]
+    label = sets[s]
+    sub(/of sphere:64/, "of 64 vertices", label)
+    sub(/of ur5/, "UR5 links", label)
+    printf "| %s | %s | %.3g | %.3g | %.1f |\n", label, cell[sets[s] SUBSEP "hulld", "pairs"], ours / 1e6, theirs / 1e6, theirs / ours
+  }
+  measured()
+}
+
+function accuracy(   i, key) {
+  read_rows("query_accuracy")
+  peer_names()
+  head("| library | wrong | open | collisions missed | collisions invented |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    printf "| %s | %s | %s | %s | %s |\n", named(key), cell[key, "wrong"], cell[key, "open"], cell[key, "missed_collisions"],
+           cell[key, "invented_collisions"]
+  }
+  printf "\n*Counts of %s questions, the same on every machine; rows in %s.*\n", cell[key, "questions"], files
+}
+
+function trade(only,   i, key) {
+  read_rows("query_trade_" machine)
+  peer_names()
+  head("| method | ordinary | wrong | open | within 1e-6 of contact | wrong | open | depth | largest error of depth |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    if (only != "" && index(only, "|" key "|") == 0) continue
+    printf "| %s | %s | %d | %d | %s | %d | %d | %s | %s |\n", named(key), unit(cell[key, "ordinary_ns"]),
+           cell[key, "ordinary_wrong"], cell[key, "ordinary_open"], unit(cell[key, "near_contact_ns"]),
+           cell[key, "near_contact_wrong"], cell[key, "near_contact_open"],
+           cell[key, "depth_ns"] == "" ? "-" : unit(cell[key, "depth_ns"]),
+           cell[key, "depth_ns"] == "" ? "-" : sprintf("%.0e", cell[key, "depth_largest_relative_error"])
+  }
+  measured()
+}
+
+function network(   n, i, part, key, over_unix, text) {
+  read_rows("remote_" machine)
+  head("| | hulld over TCP | of the floor | of the floor, unix sockets | of core in one process |")
+  n = split("check 1 client=CheckCollision, one client: p50|check 8 clients=CheckCollision, eight clients: p50|" \
+            "stream 1 pair=StreamCollisions, one pair: p50|batch ur5 close=batch, close pairs of UR5 links|" \
+            "batch ur5 deep=batch, deep pairs of UR5 links|" \
+            "batch ur5 close, two placements a pair=close pairs, two placements of its own for each|" \
+            "batch ur5 close, two packed placements a pair=the same, packed|" \
+            "scene 10000 ur5 links=scene of 10000 UR5 links|scene 10000 ur5 links, packed=the same, packed|" \
+            "ingest ball, doubles=points of a ball into one hull, on disk|ingest ball, floats=the same, as floats", list, "|")
+  for (i = 1; i <= n; i++) {
+    split(list[i], part, "=")
+    key = part[1] SUBSEP "tcp" SUBSEP (part[1] ~ /^ingest/ ? "hulld durable" : "hulld")
+    over_unix = key
+    sub(SUBSEP "tcp" SUBSEP, SUBSEP "unix" SUBSEP, over_unix)
+    if (part[2] ~ /p50/) {
+      printf "| %s | %s | %.2f | %.2f | - |\n", part[2], unit(cell[key, "p50_us"] * 1000), cell[key, "p50_of_floor"],
+             cell[over_unix, "p50_of_floor"]
+      continue
+    }
+    text = part[1] ~ /^scene/ ? sprintf("%.0f scenes/s", cell[key, "per_second"]) : million(cell[key, "per_second"])
+    printf "| %s | %s | %.2f | %.2f | %.2f |\n", part[2], text, cell[key, "of_floor"], cell[over_unix, "of_floor"],
+           cell[key, "of_in_process"]
+  }
+  measured()
+}
+
+function start(   i, key) {
+  read_rows("server_start_" machine)
+  head("| hulls of 64 vertices | listens after | first answer after | resident | on disk |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    printf "| %d | %.0f ms | %.0f ms | %.0f MiB | %.1f MiB |\n", key, cell[key, "listens_ms"], cell[key, "answers_ms"],
+           cell[key, "resident_mib"], cell[key, "store_mib"]
+  }
+  measured()
+}
+
+function overload(   line, fields, row) {
+  head("| clients that send batches | CheckCollision: p50 | p99 | p99.9 | p99 / idle | pairs of batches |")
+  while ((getline line < ("results/server_overload_" machine ".csv")) > 0) {
+    split_row(line, fields)
+    if (row++ == 0) continue
+    printf "| %d | %.0f us | %.0f us | %.1f ms | %.1f | %s |\n", fields[2], fields[4], fields[5], fields[6] / 1000, fields[8],
+           (fields[9] > 0 ? million(fields[9]) : "-")
+  }
+  files = "[`server_overload_" machine ".csv`](" results "server_overload_" machine ".csv)"
+  measured()
+}
+
+function busy(   line, fields, row) {
+  head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
+  while ((getline line < ("results/server_busy_" machine ".csv")) > 0) {
+    split_row(line, fields)
+    if (row++ == 0) continue
+    sub(/^alone$/, "nothing", fields[2])
+    printf "| %s | %s | %.3g | %.3g | %.2f | %.2f |\n", fields[1], fields[2], fields[4], fields[5], fields[6], fields[7]
+  }
+  files = "[`server_busy_" machine ".csv`](" results "server_busy_" machine ".csv)"
+  measured()
+}
+
+# One row of the summary; times in nanoseconds. wrong: what hulld and the peer got wrong.
+function compare(what, ours, peer, theirs, wrong) {
+  printf "| %s | %s | %s: %s | %s | %s |\n", what, unit(ours), peer, unit(theirs), times(theirs / ours), wrong
+}
+function hull(what, cloud) {
+  compare(what, 1e6 * cell[cloud, "hulld", "milliseconds"], "qhull", 1e6 * cell[cloud, "qhull", "milliseconds"],
+          cell[cloud, "hulld", "vertices_missing_or_extra"] " / " cell[cloud, "qhull", "vertices_missing_or_extra"])
+}
+function pair(what, set,   peers, n, i, best) {
+  peer_names()
+  n = split("FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet", peers, ",")
+  for (i = 1; i <= n; i++) {
+    if (best == "" || cell[set, peers[i], "ns"] + 0 < cell[set, best, "ns"] + 0) best = peers[i]
+  }
+  compare(what, cell[set, "hulld", "ns"], named(best), cell[set, best, "ns"],
+          cell[set, "hulld", "wrong"] " / " cell[set, best, "wrong"])
+}
+function summary(   one) {
+  read_rows("hull_build_" machine)
+  read_rows("hull_stream_" machine)
+  read_rows("query_relation_" machine)
+  read_rows("query_scene_" machine)
+  head("| task, on one thread | hulld | fastest peer | times | wrong: hulld / peer |")
+  hull("hull of 100000 points in a ball", "ball:100000")
+  hull("hull of 100000 points on a sphere", "sphere:100000")
+  one = "sphere:100000"
+  # 100000 points, milliseconds: 10 ns a point for each.
+  compare("one more of 100000 points on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
+          10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
+          cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \
+          cell[one, "cgal delaunay one at a time", "vertices_missing_or_extra"])
+  pair("pair of 64 vertices, far apart", "sphere:64 far")
+  pair("pair of 64 vertices, 1 to 5 % apart", "sphere:64 close")
+  pair("pair of 64 vertices, 1e-6 apart", "sphere:64 gap")
+  pair("pair of 64 vertices, deep", "sphere:64 deep")
+  pair("pair of 64 vertices, touching", "sphere:64 contact")
+  pair("pair of 10000 vertices, 1 to 5 % apart", "sphere:10000 close")
+  pair("two UR5 links, 1 to 5 % apart", "ur5 close")
+  compare("all colliding pairs of 10000 UR5 links", cell["10000 of ur5", "hulld", "ns"], "FCL, tree",
+          cell["10000 of ur5", "FCL tree", "ns"], cell["10000 of ur5", "hulld", "wrong"] " / " cell["10000 of ur5", "FCL tree", "wrong"])
+  measured()
+}
+
+BEGIN {
+  if (table == "hulls") hulls()
+  else if (table == "stream") stream()
+  else if (table == "extremes") extremes()
+  else if (table == "relation") relation()
+  else if (table == "touching") touching()
+  else if (table == "accuracy") accuracy()
+  else if (table == "depth") lengths("contact")
+  else if (table == "distance") lengths("distance")
+  else if (table == "motion") motion()
+  else if (table == "batch") batch()
+  else if (table == "scenes") scenes()
+  else if (table == "trade") trade("")
+  else if (table == "trade-short")
+    trade("|hulld|hulld tau 1e-09|simplified 1e-02|GJK double|FCL libccd|libccd MPR|Bullet|SAT double|")
+  else if (table == "network") network()
+  else if (table == "start") start()
+  else if (table == "overload") overload()
+  else if (table == "busy") busy()
+  else if (table == "summary") summary()
+  else {
+    print "tables.awk: no table " table > "/dev/stderr"
+    exit 1
+  }
+}

@@ -1,0 +1,33 @@
+#!/bin/bash
+# Installs a build and uses what was installed, as a project of somebody else does.
+#
+#   install_test.sh BUILD_DIRECTORY WORK_DIRECTORY COMPILER
+set -euo pipefail
+
+build=$1 work=$2/work compiler=$3
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+server=
+trap '[[ -z $server ]] || { kill "$server"; wait "$server" || true; }' EXIT
+
+rm -rf "$work"
+mkdir -p "$work"
+cmake --install "$build" --prefix "$work/prefix" >"$work/install.log"
+cmake -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
+  -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
+cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
+# What client/README.md tells its readers to write finds the package, too; tests/pages compiles the code.
+mkdir "$work/page"
+pages=$here/../pages client_page=$here/../../client/README.md
+bash "$pages/extract_code.sh" "$client_page" cmake >"$work/page/CMakeLists.txt"
+bash "$pages/extract_code.sh" "$client_page" cpp >"$work/page/example.cc"
+cmake -S "$work/page" -B "$work/page/build" -DCMAKE_PREFIX_PATH="$work/prefix" \
+  -DCMAKE_CXX_COMPILER="$compiler" >"$work/page/configure.log"
+
+"$work/prefix/bin/hulld" --store memory --listen 127.0.0.1:0 2>"$work/hulld.log" &
+server=$!
+until address=$(sed -n 's/.*listening on //p' "$work/hulld.log") && [[ -n $address ]]; do
+  kill -0 "$server"
+  sleep 0.1
+done
+"$work/prefix/bin/hullctl" --server "$address" create from/hullctl
+"$work/consumer/consumer" "$address" from/hullctl

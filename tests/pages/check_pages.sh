@@ -1,0 +1,93 @@
+#!/bin/bash
+# Checks what can be read off the pages: links lead to files and headings that exist, paths in
+# `backticks` too, the first page is short, and the tables of settings, errors and commands are
+# complete.
+#
+#   bash tests/pages/check_pages.sh PROGRAMS
+#
+# PROGRAMS: the directory of hulld and hullctl.
+set -uo pipefail
+programs=$(cd "$1" && pwd) || exit 2
+cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 2
+export LC_ALL=C
+
+readonly most_readme_bytes=14336
+problems=0
+problem() {
+  echo "$*"
+  problems=$((problems + 1))
+}
+
+pages() { find . \( -name build -o -name .git \) -prune -o -name '*.md' -print | sort; }
+
+# text PAGE: its lines, blocks of code left out.
+text() { awk '/^ *```/ { inside = !inside; next } !inside' "$1"; }
+
+# anchors PAGE: what links to its headings look like: small letters, no punctuation, hyphens for spaces.
+anchors() {
+  text "$1" | sed -n 's/^#\{1,6\} *//p' | tr '[:upper:]' '[:lower:]' | sed 's/[^a-z0-9 _-]//g; s/ /-/g'
+}
+
+check_links() {
+  local page=$1 link path anchor
+  while read -r link; do
+    [[ $link =~ ^(https?|mailto): ]] && continue
+    path=${link%%#*}
+    anchor=
+    [[ $link == *#* ]] && anchor=${link#*#}
+    if [[ -n $path && ! -e $(dirname "$page")/$path ]]; then
+      problem "$page: the link $link leads nowhere"
+      continue
+    fi
+    [[ -z $anchor ]] && continue
+    anchors "${path:+$(dirname "$page")/}${path:-$page}" | grep -qxF -- "$anchor" ||
+      problem "$page: there is no heading for the link $link"
+  done < <(text "$page" | grep -oE '\]\([^) ]+\)' | sed 's/^](//; s/)$//')
+}
+
+check_paths() {
+  local page=$1 path
+  while read -r path; do
+    compgen -G "$path" >/dev/null || problem "$page: there is no $path"
+  done < <(text "$page" | grep -oE '`(core|server|client|docker|proto|tests)/[A-Za-z0-9_./*-]*`' | tr -d '`')
+}
+
+# check_complete PAGE WHAT LIST...: each of the list stands in the first column of a table of the page.
+check_complete() {
+  local page=$1 what=$2 name
+  shift 2
+  for name in "$@"; do
+    grep -qE "^\|[^|]*\`$name[\` ]" "$page" || problem "$page: the tables lack the $what $name"
+  done
+}
+
+for page in $(pages); do
+  check_links "$page"
+  check_paths "$page"
+done
+
+bytes=$(wc -c <README.md)
+((bytes <= most_readme_bytes)) || problem "README.md holds $bytes bytes; $most_readme_bytes are enough"
+
+mapfile -t flags < <("$programs/hulld" --help | grep -oE '^  (-[a-z],)?--[a-z-]+' | grep -oE -- '--[a-z-]+')
+((${#flags[@]} > 20)) || problem "hulld --help names no flags"
+for flag in "${flags[@]}"; do
+  case $flag in
+    --help | --version | --config | --check-config) ;;
+    *) check_complete server/README.md setting "$flag" ;;
+  esac
+done
+while read -r flag; do
+  [[ " ${flags[*]} " == *" $flag "* ]] || problem "server/README.md: hulld has no $flag"
+done < <(sed -n '/^## Settings/,/^## /p' server/README.md | grep -oE '^\| `--[a-z-]+' | grep -oE -- '--[a-z-]+')
+
+while read -r reason; do
+  grep -qw "$reason" server/README.md || problem "server/README.md: the errors lack the reason $reason"
+done < <(sed -nE 's/^ *ERROR_REASON_([A-Z_]+) = [1-9][0-9]*;$/\1/p' proto/hulld/v1/error.proto)
+
+mapfile -t commands < <("$programs/hullctl" --help | sed -n '/^Subcommands:/,$p' | sed -nE 's/^  ([a-z]+) .*/\1/p')
+((${#commands[@]} > 10)) || problem "hullctl --help names no commands"
+check_complete client/README.md command "${commands[@]}"
+
+echo "$(pages | wc -l) pages, $problems problems"
+((problems == 0))

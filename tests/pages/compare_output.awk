@@ -1,0 +1,53 @@
+# Compares what a command printed with what a page says: compare_output.awk EXPECTED ACTUAL. In the
+# page "..." stands for any part of a line, and alone on a line for any number of lines. Times,
+# durations, random IDs and the server's port may differ. Prints the first difference; fails then.
+function normal(line) {
+  gsub(/[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]T[0-9:.]+\+00:00/, "<time>", line)
+  gsub(/[0-9][0-9][0-9][0-9]-[0-9][0-9]-[0-9][0-9]T[0-9:.]+Z/, "<time>", line)
+  gsub(/127\.0\.0\.1:[0-9]+/, "<address>", line)
+  gsub(/[0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f][0-9a-f]+/,
+       "<random>", line)
+  gsub(/[0-9.]+ (ns|us|ms|s)( |$)/, "<duration> ", line)
+  sub(/ +$/, "", line)
+  # Columns are as wide as what they hold.
+  gsub(/  +/, "  ", line)
+  return line
+}
+
+# Whether the parts between the dots come in this order, the first and the last at the ends.
+function matches(pattern, text,   parts, count, i, at) {
+  count = split(pattern, parts, /\.\.\./)
+  if (count == 1) return pattern == text
+  if (substr(text, 1, length(parts[1])) != parts[1]) return 0
+  text = substr(text, length(parts[1]) + 1)
+  for (i = 2; i < count; i++) {
+    at = index(text, parts[i])
+    if (!at) return 0
+    text = substr(text, at + length(parts[i]))
+  }
+  if (length(text) < length(parts[count])) return 0
+  return substr(text, length(text) - length(parts[count]) + 1) == parts[count]
+}
+
+FILENAME == ARGV[1] { expected[++expected_count] = $0; next }
+{ actual[++actual_count] = $0 }
+
+END {
+  j = 1
+  for (i = 1; i <= expected_count; i++) {
+    if (expected[i] == "...") {
+      if (i == expected_count) exit 0
+      while (j <= actual_count && !matches(normal(expected[i + 1]), normal(actual[j]))) j++
+      continue
+    }
+    if (j > actual_count || !matches(normal(expected[i]), normal(actual[j]))) {
+      printf "  the page says: %s\n  it printed:    %s\n", expected[i], (j > actual_count ? "(nothing more)" : actual[j])
+      exit 1
+    }
+    j++
+  }
+  if (j <= actual_count) {
+    printf "  the page does not say: %s\n", actual[j]
+    exit 1
+  }
+}

@@ -1,0 +1,216 @@
+#include "tests/server/harness/hull_specification.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <bit>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+
+std::string SpecifiedHull::Key() const {
+  std::string key = absl::StrCat(exists, ",", create_revision, ",", create_revision_known, ",",
+                                 revision, ",", revision_known, ",", grown, ",", points, ",",
+                                 received, ",", outside, ",", duplicate);
+  for (const auto& [writer, sequence] : writers) absl::StrAppend(&key, ",", writer, ":", sequence);
+  return key;
+}
+
+namespace {
+
+using Kind = Operation::Kind;
+using Outcome = Operation::Outcome;
+
+bool AgreeOnIncarnation(SpecifiedHull& state, uint64_t create_revision) {
+  if (!state.create_revision_known) {
+    state.create_revision = create_revision;
+    state.create_revision_known = true;
+  }
+  return state.create_revision == create_revision;
+}
+
+// Whether an answer may say that the hull is at this revision; from then on it is.
+bool Agree(SpecifiedHull& state, uint64_t revision) {
+  if (state.revision_known) return state.revision == revision;
+  if (revision <= state.revision) return false;
+  if (!state.grown && !AgreeOnIncarnation(state, revision)) return false;
+  state.revision = revision;
+  state.revision_known = true;
+  return true;
+}
+
+// A change that was answered with this revision, or, when lost, had a later one than before.
+bool Advance(SpecifiedHull& state, const Operation& operation, uint64_t revision) {
+  if (operation.outcome == Outcome::kUnknown) {
+    state.revision_known = false;
+    return true;
+  }
+  if (revision <= state.revision) return false;
+  state.revision = revision;
+  state.revision_known = true;
+  return true;
+}
+
+// A new incarnation, of no points, in the place of whatever there was.
+bool Create(SpecifiedHull& state, const Operation& operation) {
+  const uint64_t revision = state.revision;
+  const bool known = state.revision_known;
+  state = SpecifiedHull();
+  state.revision = revision;
+  state.revision_known = known;
+  if (!Advance(state, operation, operation.create_revision)) return false;
+  state.exists = true;
+  state.create_revision = state.revision;
+  state.create_revision_known = state.revision_known;
+  return true;
+}
+
+// Whether the condition may have failed. A lost answer leaves open which revision it is.
+bool Mismatch(const SpecifiedHull& state, const Operation& operation) {
+  if (!operation.if_revision) return false;
+  return !state.revision_known || *operation.if_revision != state.revision;
+}
+
+// Whether the condition may have held.
+bool Match(const SpecifiedHull& state, const Operation& operation) {
+  if (!operation.if_revision) return true;
+  return state.revision_known ? *operation.if_revision == state.revision
+                              : *operation.if_revision > state.revision;
+}
+
+bool SameCounts(const SpecifiedHull& state, const Operation& operation) {
+  return operation.received == state.received && operation.outside == state.outside &&
+         operation.duplicate == state.duplicate &&
+         operation.vertex_count == static_cast<uint64_t>(std::popcount(state.points));
+}
+
+bool StepCreateOrOpen(SpecifiedHull& state, const Operation& operation) {
+  const bool open = operation.kind == Kind::kOpen;
+  switch (operation.outcome) {
+    case Outcome::kNotFound:
+      return open && !operation.if_absent && !state.exists;
+    case Outcome::kAlreadyExists:
+      return !open && !operation.if_absent && state.exists;
+    case Outcome::kUnknown:
+      return !state.exists && (!open || operation.if_absent) && Create(state, operation);
+    case Outcome::kOk:
+      break;
+    default:
+      return false;
+  }
+  // The opening of a stream does not say whether it created the hull; that there was none does.
+  if (open ? operation.if_absent && !state.exists : operation.created) {
+    return !state.exists && Create(state, operation) && SameCounts(state, operation) &&
+           operation.revision == operation.create_revision && operation.last_sequence == 0;
+  }
+  if (!state.exists || (!open && !operation.if_absent)) return false;
+  if (!Agree(state, operation.revision)) return false;
+  if (!AgreeOnIncarnation(state, operation.create_revision)) return false;
+  if (!SameCounts(state, operation)) return false;
+  return !open || operation.last_sequence == state.LastSequence(operation.writer);
+}
+
+bool StepAppend(SpecifiedHull& state, const Operation& operation) {
+  if (!state.exists || !AgreeOnIncarnation(state, operation.incarnation)) return false;
+  const uint64_t last = state.LastSequence(operation.writer);
+  if (operation.outcome == Outcome::kOk && operation.already_applied) {
+    return operation.sequence <= last && Agree(state, operation.revision);
+  }
+  if (operation.sequence != last + 1) return false;
+  if (operation.outcome == Outcome::kAborted) return Mismatch(state, operation);
+  if (!Match(state, operation)) return false;
+  const PointSet added = operation.points & ~state.points;
+  const uint64_t outside = static_cast<uint64_t>(std::popcount(added));
+  const bool lost = operation.outcome == Outcome::kUnknown;
+  if (!lost && operation.outcome != Outcome::kOk) return false;
+  if (added != 0) {
+    if (!Advance(state, operation, operation.revision)) return false;
+  } else if (!lost && !Agree(state, operation.revision)) {
+    return false;
+  }
+  state.points |= added;
+  state.grown = state.grown || added != 0;
+  state.received += operation.sent;
+  state.outside += outside;
+  state.duplicate += operation.sent - outside;
+  state.writers[operation.writer] = operation.sequence;
+  if (lost) return true;
+  return operation.received == operation.sent && operation.outside == outside &&
+         operation.duplicate == operation.sent - outside &&
+         operation.vertex_count == static_cast<uint64_t>(std::popcount(state.points));
+}
+
+// One change, in which the hull is never without the new points or with others.
+bool StepReplace(SpecifiedHull& state, const Operation& operation) {
+  const bool absent_fits = operation.if_revision.value_or(0) == 0;
+  switch (operation.outcome) {
+    case Outcome::kNotFound:
+      return !state.exists && absent_fits && !operation.if_absent;
+    case Outcome::kAborted:
+      return state.exists ? Mismatch(state, operation) : !absent_fits;
+    case Outcome::kOk:
+    case Outcome::kUnknown:
+      break;
+    default:
+      return false;
+  }
+  const bool existed = state.exists;
+  if (existed ? !Match(state, operation) : !absent_fits || !operation.if_absent) return false;
+  if (!Create(state, operation)) return false;
+  state.points = operation.points;
+  state.received = operation.sent;
+  state.outside = static_cast<uint64_t>(std::popcount(operation.points));
+  state.duplicate = operation.sent - state.outside;
+  if (operation.outcome == Outcome::kUnknown) return true;
+  return operation.created == !existed && operation.revision == operation.create_revision &&
+         SameCounts(state, operation);
+}
+
+bool StepDelete(SpecifiedHull& state, const Operation& operation) {
+  if (operation.outcome == Outcome::kNotFound) return !state.exists;
+  if (!state.exists) return false;
+  if (operation.outcome == Outcome::kAborted) return Mismatch(state, operation);
+  if (operation.outcome != Outcome::kOk && operation.outcome != Outcome::kUnknown) return false;
+  if (!Match(state, operation) || !Advance(state, operation, operation.store_revision)) {
+    return false;
+  }
+  state.exists = false;
+  return true;
+}
+
+bool StepRead(SpecifiedHull& state, const Operation& operation) {
+  if (operation.outcome == Outcome::kNotFound) return !state.exists;
+  if (operation.outcome != Outcome::kOk || !state.exists) return false;
+  if (!Agree(state, operation.revision)) return false;
+  switch (operation.kind) {
+    case Kind::kGet:
+      return AgreeOnIncarnation(state, operation.create_revision) && SameCounts(state, operation);
+    case Kind::kMesh:
+      return operation.points == state.points;
+    default:
+      return operation.touching == ((state.points >> operation.probe & 1) != 0);
+  }
+}
+
+}  // namespace
+
+bool Step(SpecifiedHull& state, const Operation& operation) {
+  switch (operation.kind) {
+    case Kind::kCreate:
+    case Kind::kOpen:
+      return StepCreateOrOpen(state, operation);
+    case Kind::kAppend:
+      return StepAppend(state, operation);
+    case Kind::kReplace:
+      return StepReplace(state, operation);
+    case Kind::kDelete:
+      return StepDelete(state, operation);
+    case Kind::kGet:
+    case Kind::kMesh:
+    case Kind::kProbe:
+      return StepRead(state, operation);
+  }
+  HULLD_UNREACHABLE();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,43 @@
+#ifndef HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
+#define HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "tests/server/harness/hull_history.h"
+
+namespace hulld::server {
+
+// One hull as the specification (hull.proto) has it, doing one thing at a time.
+struct SpecifiedHull {
+  bool exists = false;
+  uint64_t create_revision = 0;
+  // The revision of the last change, a deletion included. When not known: a change whose answer was
+  // lost gave it a greater one, which the next answer tells.
+  uint64_t revision = 0;
+  bool revision_known = true;
+  bool create_revision_known = true;
+  // Whether vertices came since its creation: until then both revisions are the same.
+  bool grown = false;
+  PointSet points = 0;
+  uint64_t received = 0;
+  uint64_t outside = 0;
+  uint64_t duplicate = 0;
+  std::map<std::string, uint64_t> writers;
+
+  uint64_t LastSequence(const std::string& writer) const {
+    const auto found = writers.find(writer);
+    return found == writers.end() ? 0 : found->second;
+  }
+
+  // The same text for the same state.
+  std::string Key() const;
+};
+
+// Whether the hull may answer an operation so; if it may, `hull` is what it is after that.
+bool Step(SpecifiedHull& hull, const Operation& operation);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_

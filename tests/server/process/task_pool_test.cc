@@ -1,0 +1,151 @@
+#include "server/process/task_pool.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace hulld::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+// Tasks say their names in the order in which they run.
+class Order {
+ public:
+  std::function<void()> Task(const std::string& name) {
+    return [this, name] {
+      const std::lock_guard lock(mutex_);
+      names_.push_back(name);
+    };
+  }
+  // After the pool is gone.
+  const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::string> names_;
+};
+
+// A pool of one thread, which is held back until Release.
+class HeldPool {
+ public:
+  HeldPool()
+      : pool_(std::make_unique<TaskPool>(1)), lane_(std::make_unique<TaskPool::Lane>(*pool_)) {
+    std::promise<void> held;
+    lane_->Submit([this, &held] {
+      held.set_value();
+      released_.get_future().wait();
+    });
+    held.get_future().wait();
+  }
+
+  TaskPool& pool() { return *pool_; }
+  void Release() { released_.set_value(); }
+  // Runs what is queued.
+  void End() { pool_.reset(); }
+
+ private:
+  std::promise<void> released_;
+  std::unique_ptr<TaskPool> pool_;
+  std::unique_ptr<TaskPool::Lane> lane_;
+};
+
+TEST(TaskPool, SingleCallsGoBeforeSlicesThatWereQueuedFirst) {
+  HeldPool held;
+  Order order;
+  TaskPool::Lane batch(held.pool());
+  batch.Submit(order.Task("slice 1"));
+  batch.Submit(order.Task("slice 2"));
+  held.pool().Submit(order.Task("single 1"));
+  held.pool().Submit(order.Task("single 2"));
+  EXPECT_EQ(held.pool().waiting(), 2u);
+  held.Release();
+  held.End();
+  EXPECT_THAT(order.names(), ElementsAre("single 1", "single 2", "slice 1", "slice 2"));
+}
+
+TEST(TaskPool, ASingleCallWaitsForOneSliceAtMost) {
+  HeldPool held;
+  Order order;
+  TaskPool& pool = held.pool();
+  TaskPool::Lane batch(pool);
+  batch.Submit([&] {
+    order.Task("slice 1")();
+    pool.Submit(order.Task("single"));
+    batch.Submit(order.Task("slice 3"));
+  });
+  batch.Submit(order.Task("slice 2"));
+  held.Release();
+  held.End();
+  EXPECT_THAT(order.names(), ElementsAre("slice 1", "single", "slice 2", "slice 3"));
+}
+
+TEST(TaskPool, LanesTakeTurnsWhateverTheirLength) {
+  HeldPool held;
+  Order order;
+  TaskPool::Lane a(held.pool());
+  TaskPool::Lane b(held.pool());
+  for (const char* name : {"a1", "a2", "a3", "a4"}) a.Submit(order.Task(name));
+  for (const char* name : {"b1", "b2"}) b.Submit(order.Task(name));
+  held.Release();
+  held.End();
+  EXPECT_THAT(order.names(), ElementsAre("a1", "b1", "a2", "b2", "a3", "a4"));
+}
+
+TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
+  TaskPool pool(2);
+  TaskPool::Lane lane(pool);
+  std::promise<void> first;
+  std::promise<void> second;
+  // Each waits for the other.
+  lane.Submit([&] {
+    first.set_value();
+    second.get_future().wait();
+  });
+  std::promise<void> done;
+  lane.Submit([&] {
+    first.get_future().wait();
+    second.set_value();
+    done.set_value();
+  });
+  done.get_future().wait();
+}
+
+TEST(TaskPool, SlicesWaitNoLongerThanSingleCallsArrive) {
+  TaskPool pool(2);
+  TaskPool::Lane lane(pool);
+  std::promise<void> both;
+  std::atomic<int> running = 0;
+  pool.NoteSingleCall();
+  const std::shared_future<void> ready = both.get_future();
+  for (int i = 0; i < 2; ++i) {
+    lane.Submit([&, ready] {
+      if (++running == 2) both.set_value();
+      ready.wait();
+    });
+  }
+  ready.wait();
+}
+
+TEST(TaskPool, EndingRunsWhatIsQueued) {
+  std::atomic<int> ran = 0;
+  {
+    auto pool = std::make_unique<TaskPool>(2);
+    TaskPool::Lane lane(*pool);
+    for (int i = 0; i < 100; ++i) {
+      lane.Submit([&] { ++ran; });
+      pool->Submit([&] { ++ran; });
+    }
+    pool.reset();
+  }
+  EXPECT_EQ(ran, 200);
+}
+
+}  // namespace
+}  // namespace hulld::server

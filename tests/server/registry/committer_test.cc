@@ -1,0 +1,213 @@
+#include "server/registry/committer.h"
+
+#include <absl/status/status.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <future>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "server/store/memory_store.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::SizeIs;
+
+// Keeps the revisions of each batch. A test can hold the next commit, and decide how it ends.
+class GatedStore : public MemoryStore {
+ public:
+  absl::Status Commit(std::span<const Change* const> changes) override {
+    std::vector<uint64_t> batch;
+    for (const Change* change : changes) batch.push_back(change->revision);
+    Gate* gate = nullptr;
+    {
+      const std::lock_guard lock(mutex_);
+      gate = std::exchange(gate_, nullptr);
+    }
+    if (gate != nullptr) {
+      gate->entered.set_value();
+      const absl::Status status = gate->outcome.get_future().get();
+      if (!status.ok()) return status;
+    }
+    const std::lock_guard lock(mutex_);
+    batches_.push_back(std::move(batch));
+    return absl::OkStatus();
+  }
+  absl::Status Recover() override {
+    const std::lock_guard lock(mutex_);
+    ++recoveries_;
+    return recovery_;
+  }
+
+  struct Gate {
+    std::promise<void> entered;
+    std::promise<absl::Status> outcome;
+  };
+  // Holds the next Commit.
+  void Close(Gate& gate) {
+    const std::lock_guard lock(mutex_);
+    gate_ = &gate;
+  }
+  void SetRecovery(absl::Status status) {
+    const std::lock_guard lock(mutex_);
+    recovery_ = std::move(status);
+  }
+  int recoveries() {
+    const std::lock_guard lock(mutex_);
+    return recoveries_;
+  }
+  std::vector<std::vector<uint64_t>> batches() {
+    const std::lock_guard lock(mutex_);
+    return batches_;
+  }
+
+ private:
+  std::mutex mutex_;
+  Gate* gate_ = nullptr;
+  absl::Status recovery_;
+  int recoveries_ = 0;
+  std::vector<std::vector<uint64_t>> batches_;
+};
+
+class CommitterTest : public ::testing::Test {
+ protected:
+  using Outcome = std::pair<uint64_t, absl::StatusCode>;
+
+  static Change ChangeOf(uint64_t revision) {
+    Change change;
+    change.revision = revision;
+    return change;
+  }
+  // Notes how the change ends.
+  std::future<void> Submit(uint64_t revision) {
+    Locked locked(order_);
+    return SubmitLocked(locked, revision);
+  }
+  std::future<void> SubmitLocked(const Locked& locked, uint64_t revision) {
+    const auto ended = std::make_shared<std::promise<void>>();
+    committer_.Submit(locked, ChangeOf(revision),
+                      [this, revision, ended](Locked& later, const absl::Status& status) {
+                        EXPECT_TRUE(later.Holds(order_));
+                        outcomes_.emplace_back(revision, status.code());
+                        later.Afterwards([ended] { ended->set_value(); });
+                      });
+    return ended->get_future();
+  }
+
+  std::mutex order_;
+  // Guarded by order_.
+  std::vector<Outcome> outcomes_;
+  GatedStore store_;
+  Committer committer_{store_, order_};
+};
+
+TEST_F(CommitterTest, WhatWaitsIsOneBatchInTheOrderOfSubmission) {
+  GatedStore::Gate gate;
+  store_.Close(gate);
+  Submit(1);
+  gate.entered.get_future().wait();
+  for (uint64_t revision = 2; revision <= 4; ++revision) Submit(revision);
+  std::future<void> last = Submit(5);
+  gate.outcome.set_value(absl::OkStatus());
+  last.wait();
+  EXPECT_THAT(store_.batches(), ElementsAre(ElementsAre(1), ElementsAre(2, 3, 4, 5)));
+  const CommitStatistics statistics = committer_.Statistics();
+  EXPECT_EQ(statistics.batches, 2);
+  EXPECT_EQ(statistics.changes, 5);
+  EXPECT_EQ(statistics.failed_batches, 0);
+  const std::lock_guard lock(order_);
+  ASSERT_THAT(outcomes_, SizeIs(5));
+  for (uint64_t i = 0; i < 5; ++i) EXPECT_EQ(outcomes_[i], Outcome(i + 1, absl::StatusCode::kOk));
+}
+
+TEST_F(CommitterTest, ARefusedBatchTakesWhatWaitsWithIt) {
+  GatedStore::Gate gate;
+  store_.Close(gate);
+  Submit(1);
+  gate.entered.get_future().wait();
+  Submit(2);
+  std::future<void> last = Submit(3);
+  gate.outcome.set_value(absl::UnavailableError("no disk"));
+  last.wait();
+  EXPECT_THAT(store_.batches(), SizeIs(0));
+  EXPECT_TRUE(committer_.Statistics().failing);
+  EXPECT_EQ(committer_.Statistics().failed_batches, 1);
+  EXPECT_EQ(store_.recoveries(), 0);
+  const std::lock_guard lock(order_);
+  ASSERT_THAT(outcomes_, SizeIs(3));
+  for (uint64_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(outcomes_[i], Outcome(i + 1, absl::StatusCode::kUnavailable));
+  }
+}
+
+// What is submitted once everything is undone does not build on what was refused.
+TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
+  GatedStore::Gate gate;
+  store_.Close(gate);
+  std::promise<std::future<void>> next;
+  {
+    const Locked locked(order_);
+    committer_.Submit(locked, ChangeOf(1), [&](Locked& later, const absl::Status& status) {
+      EXPECT_TRUE(absl::IsUnavailable(status));
+      next.set_value(SubmitLocked(later, 2));
+    });
+  }
+  gate.outcome.set_value(absl::UnavailableError("no disk"));
+  next.get_future().get().wait();
+  EXPECT_THAT(store_.batches(), ElementsAre(ElementsAre(2)));
+  EXPECT_EQ(store_.recoveries(), 1);
+  EXPECT_FALSE(committer_.Statistics().failing);
+}
+
+TEST_F(CommitterTest, TheStoreRecoversBeforeTheNextBatch) {
+  GatedStore::Gate gate;
+  store_.Close(gate);
+  gate.outcome.set_value(absl::UnavailableError("no disk"));
+  Submit(1).wait();
+  store_.SetRecovery(absl::UnavailableError("still no disk"));
+  Submit(2).wait();
+  EXPECT_EQ(store_.recoveries(), 1);
+  EXPECT_THAT(store_.batches(), SizeIs(0));
+  store_.SetRecovery(absl::OkStatus());
+  Submit(3).wait();
+  Submit(4).wait();
+  EXPECT_EQ(store_.recoveries(), 2);
+  EXPECT_THAT(store_.batches(), ElementsAre(ElementsAre(3), ElementsAre(4)));
+  EXPECT_EQ(committer_.Statistics().failed_batches, 2);
+  EXPECT_FALSE(committer_.Statistics().failing);
+}
+
+TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
+  GatedStore store;
+  std::mutex order;
+  int ended = 0;
+  {
+    Committer committer(store, order);
+    const Locked locked(order);
+    for (uint64_t revision = 1; revision <= 3; ++revision) {
+      committer.Submit(locked, ChangeOf(revision), [&](Locked&, const absl::Status&) { ++ended; });
+    }
+  }
+  EXPECT_EQ(ended, 3);
+}
+
+TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
+  GatedStore store;
+  std::mutex order;
+  std::mutex another;
+  EXPECT_DEATH(
+      {
+        Committer committer(store, order);
+        const Locked locked(another);
+        committer.Submit(locked, Change(), [](Locked&, const absl::Status&) {});
+      },
+      "check failed");
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,223 @@
+#include "server/registry/hull_state.h"
+
+#include <absl/status/status.h>
+#include <gtest/gtest.h>
+
+namespace hulld::server {
+namespace {
+
+using Life = HullState::Life;
+using Work = HullState::Work;
+
+HullState Building() {
+  HullState state = HullState::Present();
+  state.Schedule();
+  state.StartBuilding();
+  return state;
+}
+
+HullState Reading() {
+  HullState state = HullState::Present();
+  state.Pin();
+  state.StartReading();
+  return state;
+}
+
+// With one chunk in flight.
+HullState Growing() {
+  HullState state = Building();
+  state.Submit();
+  state.EndWork();
+  return state;
+}
+
+HullState Ending() {
+  HullState state = HullState::Present();
+  state.StartEnding();
+  return state;
+}
+
+HullState Gone() {
+  HullState state = Ending();
+  state.Commit();
+  return state;
+}
+
+HullState Damaged() {
+  HullState state = HullState::Present();
+  state.Damage(absl::DataLossError("damaged"));
+  return state;
+}
+
+TEST(HullState, ACreationIsCommittedOrLeavesNothing) {
+  HullState created = HullState::Creating();
+  EXPECT_FALSE(created.visible());
+  EXPECT_TRUE(created.changing_life());
+  EXPECT_FALSE(created.can_schedule());
+  created.Commit();
+  EXPECT_EQ(created.life(), Life::kPresent);
+  EXPECT_TRUE(created.visible());
+  EXPECT_TRUE(created.quiet());
+
+  HullState refused = HullState::Creating();
+  refused.Refuse();
+  EXPECT_TRUE(refused.gone());
+  EXPECT_FALSE(refused.visible());
+}
+
+TEST(HullState, AnEndIsCommittedOrTheHullStays) {
+  HullState state = Ending();
+  EXPECT_TRUE(state.visible());
+  EXPECT_TRUE(state.changing_life());
+  EXPECT_FALSE(state.quiet());
+  EXPECT_FALSE(state.can_schedule());
+  state.Refuse();
+  EXPECT_EQ(state.life(), Life::kPresent);
+  EXPECT_TRUE(state.quiet());
+  state.StartEnding();
+  state.Commit();
+  EXPECT_TRUE(state.gone());
+  EXPECT_TRUE(state.quiet());
+}
+
+TEST(HullState, ChunksOverlapUpToTheirLimit) {
+  HullState state = HullState::Present();
+  for (int i = 1; i <= HullState::kMaxInFlight; ++i) {
+    ASSERT_TRUE(state.can_schedule());
+    state.Schedule();
+    EXPECT_EQ(state.work(), Work::kScheduled);
+    state.StartBuilding();
+    EXPECT_EQ(state.work(), Work::kBuilding);
+    state.Submit();
+    EXPECT_TRUE(state.EndWork());
+    EXPECT_EQ(state.in_flight(), i);
+  }
+  EXPECT_FALSE(state.can_schedule());
+  state.Commit();
+  EXPECT_TRUE(state.can_schedule());
+  while (state.in_flight() > 0) state.Commit();
+  EXPECT_TRUE(state.quiet());
+}
+
+TEST(HullState, ARefusalTellsTheThreadThatBuildsOnIt) {
+  HullState state = Growing();
+  state.Schedule();
+  state.StartBuilding();
+  state.Refuse();
+  EXPECT_EQ(state.work(), Work::kReverting);
+  EXPECT_FALSE(state.EndWork());
+  EXPECT_TRUE(state.quiet());
+}
+
+// It finds the builder dropped, and starts from what is committed.
+TEST(HullState, ARefusalDoesNotConcernAThreadThatHasNotBegun) {
+  HullState state = Growing();
+  state.Schedule();
+  state.Refuse();
+  EXPECT_EQ(state.work(), Work::kScheduled);
+  state.StartBuilding();
+  state.Submit();
+  EXPECT_TRUE(state.EndWork());
+}
+
+TEST(HullState, AScheduledChunkMayEndWithoutBeingBuilt) {
+  HullState state = HullState::Present();
+  state.Schedule();
+  EXPECT_TRUE(state.EndWork());
+  EXPECT_TRUE(state.quiet());
+}
+
+TEST(HullState, APinnedHullComesToRestAndIsRead) {
+  HullState state = Growing();
+  state.Pin();
+  state.Pin();
+  EXPECT_FALSE(state.can_schedule());
+  state.Commit();
+  state.StartReading();
+  EXPECT_FALSE(state.quiet());
+  EXPECT_TRUE(state.EndWork());
+  EXPECT_FALSE(state.Unpin());
+  EXPECT_FALSE(state.can_schedule());
+  EXPECT_TRUE(state.Unpin());
+  EXPECT_TRUE(state.can_schedule());
+}
+
+TEST(HullState, ADamagedHullCanOnlyEnd) {
+  HullState state = Damaged();
+  EXPECT_TRUE(state.visible());
+  EXPECT_TRUE(state.damaged());
+  EXPECT_FALSE(state.can_schedule());
+  state.StartEnding();
+  state.Commit();
+  EXPECT_TRUE(state.gone());
+}
+
+TEST(HullState, DamageIsFoundByAThreadThatWorks) {
+  HullState state = Building();
+  state.Damage(absl::DataLossError("damaged"));
+  EXPECT_TRUE(state.EndWork());
+  EXPECT_EQ(state.damage(), absl::DataLossError("damaged"));
+}
+
+using HullStateDeathTest = ::testing::Test;
+
+TEST(HullStateDeathTest, AChunkStartsOnlyInAHullThatIsIdleUnpinnedAndSound) {
+  EXPECT_DEATH(HullState::Creating().Schedule(), "check failed");
+  EXPECT_DEATH(Building().Schedule(), "check failed");
+  EXPECT_DEATH(Reading().Schedule(), "check failed");
+  EXPECT_DEATH(Ending().Schedule(), "check failed");
+  EXPECT_DEATH(Gone().Schedule(), "check failed");
+  EXPECT_DEATH(Damaged().Schedule(), "check failed");
+  HullState pinned = HullState::Present();
+  pinned.Pin();
+  EXPECT_DEATH(pinned.Schedule(), "check failed");
+  EXPECT_DEATH(HullState::Present().StartBuilding(), "check failed");
+}
+
+TEST(HullStateDeathTest, OnlyWhatWasBuiltOnWhatStandsIsSubmitted) {
+  EXPECT_DEATH(HullState::Present().Submit(), "check failed");
+  HullState reverting = Growing();
+  reverting.Schedule();
+  reverting.StartBuilding();
+  reverting.Refuse();
+  EXPECT_DEATH(reverting.Submit(), "check failed");
+  EXPECT_DEATH(Reading().Submit(), "check failed");
+}
+
+TEST(HullStateDeathTest, AReaderWorksOnlyOnAQuietPinnedHull) {
+  EXPECT_DEATH(HullState::Present().StartReading(), "check failed");
+  HullState growing = Growing();
+  growing.Pin();
+  EXPECT_DEATH(growing.StartReading(), "check failed");
+  HullState damaged = Damaged();
+  damaged.Pin();
+  EXPECT_DEATH(damaged.StartReading(), "check failed");
+  EXPECT_DEATH(Gone().Pin(), "check failed");
+  EXPECT_DEATH(HullState::Creating().Pin(), "check failed");
+  EXPECT_DEATH(HullState::Present().Unpin(), "check failed");
+}
+
+TEST(HullStateDeathTest, OnlyAQuietHullEnds) {
+  EXPECT_DEATH(HullState::Creating().StartEnding(), "check failed");
+  EXPECT_DEATH(Growing().StartEnding(), "check failed");
+  EXPECT_DEATH(Building().StartEnding(), "check failed");
+  EXPECT_DEATH(Reading().StartEnding(), "check failed");
+  EXPECT_DEATH(Ending().StartEnding(), "check failed");
+  EXPECT_DEATH(Gone().StartEnding(), "check failed");
+}
+
+TEST(HullStateDeathTest, NothingComesBackThatWasNotStarted) {
+  EXPECT_DEATH(HullState::Present().EndWork(), "check failed");
+  EXPECT_DEATH(HullState::Present().Commit(), "check failed");
+  EXPECT_DEATH(HullState::Present().Refuse(), "check failed");
+  EXPECT_DEATH(Gone().Commit(), "check failed");
+}
+
+TEST(HullStateDeathTest, DamageHasOneCause) {
+  EXPECT_DEATH(Damaged().Damage(absl::DataLossError("again")), "check failed");
+  EXPECT_DEATH(HullState::Present().Damage(absl::OkStatus()), "check failed");
+  EXPECT_DEATH(Gone().Damage(absl::DataLossError("damaged")), "check failed");
+}
+
+}  // namespace
+}  // namespace hulld::server
