@@ -17,7 +17,7 @@ namespace hulld {
 // A cube map of directions round a point c strictly inside a growing convex set: 6 faces of n x n
 // cells. Each cell holds a radius below which every point in its directions is certainly inside,
 // and a hint where on the surface its directions lead. The set only grows, so what the map holds
-// stays true for ever.
+// stays true.
 //
 // Idea: measured by the largest absolute component m of p - c, the gauge of a convex set is convex
 // on a face of the cube, so its maximum over a cell is at a corner: points of the set found along

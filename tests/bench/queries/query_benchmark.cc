@@ -106,7 +106,7 @@ struct Subject {
 
 void ReportTime(benchmark::State& state, size_t questions) {
   state.counters["questions"] = static_cast<double>(questions);
-  // Of the processor's time, but for rows that use real time.
+  // Processor time, except for rows that use real time.
   state.counters["ns"] = benchmark::Counter(
       1e-9 * static_cast<double>(questions),
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
@@ -164,8 +164,8 @@ void Measure(benchmark::State& state, Subject& subject) {
   ReportValues(state, *subject.workload, values);
 }
 
-// Frames of a motion: each turns B by about a milliradian and moves it by about a thousandth of
-// its radius. The motion goes to and fro, so that it may last for ever.
+// Frames of a motion: each turns B by about a milliradian and moves it by about a thousandth of its
+// radius. The motion goes to and fro, so that it can last as long as the benchmark.
 std::vector<std::vector<PlacedHull>> MakeFrames(const QuerySet& set) {
   constexpr int kFrames = 32;
   constexpr double kStep = 1e-3;

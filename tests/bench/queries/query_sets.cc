@@ -16,7 +16,7 @@ namespace hulld::bench {
 namespace {
 
 constexpr size_t kHullsPerSet = 32;
-// Of hulls with more vertices than kLargeHull there are fewer: their copies fill the memory.
+// Sets of hulls with more vertices than kLargeHull hold fewer, as their copies fill the memory.
 constexpr size_t kLargeHullsPerSet = 8;
 constexpr size_t kLargeHull = 5000;
 

@@ -35,7 +35,7 @@ struct TradeDepths {
   double nanoseconds = 0;
   size_t questions = 0;
   size_t none = 0;  // no depth was found, though the hulls overlap
-  // Of those found, relative to TradeQuestions::size.
+  // Errors of the depths that were found, relative to TradeQuestions::size.
   double median_error = 0;
   double largest_error = 0;
 };
@@ -55,9 +55,9 @@ struct TradeSettings {
 
 struct Trade {
   std::vector<TradeRow> rows;
-  // What is counted as right is hulld's exact relation. So many questions were asked of the tests'
-  // oracle too, where it is built in and can answer in reasonable time, and so many times it
-  // differed.
+  // What is counted as right is hulld's exact relation. `checked` questions were also asked of the
+  // tests' oracle, where it is built in and can answer in reasonable time; it differed `differing`
+  // times.
   size_t questions = 0;
   size_t checked = 0;
   size_t differing = 0;
