@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/grpc_status.h"
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {
@@ -249,8 +250,10 @@ TEST_F(AppenderTest, AServerThatDoesNotOpenMeetsTheDeadline) {
 TEST_F(AppenderTest, AMissingHullIsNotFound) {
   ClientOptions options;
   options.server = fake_.address();
-  EXPECT_EQ(Client(options).OpenAppend("nope").status(),
-            absl::NotFoundError("hull \"nope\" not found"));
+  const absl::Status status = Client(options).OpenAppend("nope").status();
+  EXPECT_TRUE(absl::IsNotFound(status)) << status;
+  EXPECT_EQ(ReasonOf(status), v1::ERROR_REASON_HULL_NOT_FOUND);
+  EXPECT_EQ(MetadataOf(status, "hull_id"), "nope");
 }
 
 TEST_F(AppenderTest, LeavingWithoutFinishEndsTheStream) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "client/connection_security.h"
+#include "client/grpc_status.h"
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {
@@ -32,7 +33,10 @@ class ClientTest : public testing::Test {
 
 TEST_F(ClientTest, ErrorsCarryTheServersCodeAndMessage) {
   const auto hull = MakeClient().GetHull("arm/3");
-  EXPECT_EQ(hull.status(), absl::NotFoundError("hull \"arm/3\" not found"));
+  EXPECT_EQ(hull.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_EQ(std::string(hull.status().message()), "hull \"arm/3\" not found");
+  EXPECT_EQ(ReasonOf(hull.status()), v1::ERROR_REASON_HULL_NOT_FOUND);
+  EXPECT_EQ(MetadataOf(hull.status(), "hull_id"), "arm/3");
 }
 
 TEST_F(ClientTest, CallsThatAreSafeToRepeatAreRepeated) {
