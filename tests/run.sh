@@ -1,10 +1,11 @@
 #!/bin/bash
 # Builds hulld and runs its tests, as continuous integration does: presets release and asan-ubsan.
 #
-#   bash tests/run.sh [--release-only] [--tsan] [--fuzz] [--no-install]
+#   bash tests/run.sh [--release-only] [--tsan] [--fuzz] [--tidy] [--no-install]
 #
 # --tsan runs, instead, the tests of what uses threads under ThreadSanitizer (clang; preset tsan);
-# --fuzz runs each fuzzer for a fixed number of inputs under libFuzzer (clang; preset fuzz).
+# --fuzz runs each fuzzer for a fixed number of inputs under libFuzzer (clang; preset fuzz);
+# --tidy runs clang-tidy over what changed (tests/tidy.sh).
 #
 # On a bare Debian 12 it first installs what docker/packages.txt lists (as root); with everything
 # there it asks apt for nothing. Builds into build/. Ends with a summary; fails when any part did.
@@ -13,15 +14,17 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 2
 
 presets=(release asan-ubsan)
 install=yes
+tidy=no
 sections=(build test models)
 for option in "$@"; do
   case $option in
     --release-only) presets=(release) ;;
     --tsan) presets=(tsan) sections+=(tsan) ;;
     --fuzz) presets=(fuzz) sections+=(fuzz) ;;
+    --tidy) presets=() sections+=(tidy) tidy=yes ;;
     --no-install) install=no ;;
     --help)
-      sed -n '2,10s/^# \{0,1\}//p' tests/run.sh
+      sed -n '2,11s/^# \{0,1\}//p' tests/run.sh
       exit 0
       ;;
     *)
@@ -71,6 +74,7 @@ fi
 command -v ccache >/dev/null && export CMAKE_CXX_COMPILER_LAUNCHER=ccache
 
 run_part "format" check_format
+[[ $tidy == no ]] || run_part "tidy" bash tests/tidy.sh
 for preset in "${presets[@]}"; do
   run_part "$preset: build" configure_and_build "$preset" &&
     run_part "$preset: tests" ctest --preset "$preset" --parallel "$jobs"

@@ -82,7 +82,8 @@ TEST_F(HullctlOnServer, VerifyTellsValidInvalidAndUncheckableApart) {
   EXPECT_EQ(Ask({"verify", tolerant.path()}).code, 6);
 
   response.set_relation(v1::RELATION_TOUCHING);
-  response.mutable_header()->set_store_id("another");
+  response.mutable_hull_a()->set_store_id("another");
+  response.mutable_hull_b()->set_store_id("another");
   const TempFile elsewhere("elsewhere.json", Recorded(request, response));
   ran = Ask({"verify", elsewhere.path()});
   EXPECT_EQ(ran.code, 6);

@@ -236,7 +236,7 @@ std::string StoreRevisionFault(const HullHistory& history) {
 }  // namespace
 
 void HullHistory::Record(const std::string& hull_id, const Operation& operation) {
-  HULLD_CHECK(operation.invoked <= clock_ && operation.invoked < operation.returned);
+  HULLD_CHECK(operation.invoked < operation.returned);
   const std::lock_guard lock(mutex_);
   operations_[hull_id].push_back(operation);
 }
