@@ -24,10 +24,10 @@ struct EdgeProjections {
   double on_ac;  // (c - a) . x
 };
 
-// Finds the part in floating point, up to rounding: near the boundary of two parts it may be either,
-// and weights of the inside that are near 0 may be negative. project(corner), for the corners 0 to
-// 2, gives EdgeProjections; how it rounds is the caller's choice. A corner that is not needed is
-// not asked for. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
+// Finds the part in floating point, up to rounding: near the boundary of two parts it may be
+// either, and weights of the inside that are near 0 may be negative. project(corner), for the
+// corners 0 to 2, gives EdgeProjections; how it rounds is the caller's choice. A corner that is not
+// needed is not asked for. Source: Ericson 2005, Real-Time Collision Detection, 5.1.5.
 template <typename Project>
 inline TriangleNearest FindNearestOnTriangle(Project project) {
   const EdgeProjections from_a = project(0);

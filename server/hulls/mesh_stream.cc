@@ -40,8 +40,7 @@ absl::Status MeshStream::MakeHeader() {
   if (!valid.ok()) return valid;
   auto resolved = registry_.Resolve(request_.hull_id(), [this] { return call().ShouldStop(); });
   if (!resolved.ok()) return resolved.status();
-  mesh_ =
-      std::shared_ptr<const Hull>(resolved->second.served, &resolved->second.served->hull());
+  mesh_ = std::shared_ptr<const Hull>(resolved->second.served, &resolved->second.served->hull());
   v1::MeshHeader* header = reply().mutable_header();
   if (request_.has_simplification()) {
     const absl::Status simplified = Simplify(request_.simplification(), header);

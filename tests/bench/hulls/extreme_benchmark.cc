@@ -1,5 +1,5 @@
-// What each extreme of tests/core/checks/extreme_clouds.h costs, relative to a cloud without difficulty
-// that has as many points and a hull with as many vertices:
+// What each extreme of tests/core/checks/extreme_clouds.h costs, relative to a cloud without
+// difficulty that has as many points and a hull with as many vertices:
 //
 //   extreme_benchmark --benchmark_out=FILE
 //

@@ -23,8 +23,8 @@ enum class Arithmetic {
   kIntegers,
 };
 
-// One way in which a cloud of points is hard to build a hull of. The rows of the table of extremes in
-// tests/bench/README.md, and the parameters of the suite that checks them.
+// One way in which a cloud of points is hard to build a hull of. The rows of the table of extremes
+// in tests/bench/README.md, and the parameters of the suite that checks them.
 struct Extreme {
   std::string name;
   // About n points in an order that is part of the difficulty; the same on every call. n >= 16.

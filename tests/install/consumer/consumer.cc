@@ -1,4 +1,5 @@
-// A program of somebody else: appends a cube, asks a question, and verifies the certificate of the answer.
+// A program of somebody else: appends a cube, asks a question, and verifies the certificate of the
+// answer.
 #include <cstdio>
 #include <string>
 
