@@ -96,6 +96,12 @@ inline constexpr double kGapPositionFactor = 4;
 // times |n_W| M. Proven.
 inline constexpr double kSupportBlurFactor = 32 * kUnitRoundoff;
 
+// How much farther a point lies than another at the best corner of a square of directions (s, t, 1),
+// |s|, |t| at most 1 + 2^-20 (support_map.h): five terms of differences of at most E. The
+// differences err by u E each, the products by u E, the sums by 4 u * 5 E: below 32 u E in all; twice
+// that, as underflow adds less. Times E. Proven.
+inline constexpr double kLeadErrorFactor = 64 * kUnitRoundoff;
+
 // The distance of a vertex from the hull's centre: the difference errs by u of itself, the norm by
 // at most 8 u. Proven.
 inline constexpr double kRadiusRoundUp = 1 + 16 * kUnitRoundoff;

@@ -42,8 +42,8 @@ SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n) {
   axis.direction = UnitDirection(n);
   axis.feature_a.vertices = pair.FeatureA(n);
   axis.feature_b.vertices = pair.FeatureB(n);
-  axis.feature_a.facet = FacetOf(pair.a(), axis.feature_a.vertices);
-  axis.feature_b.facet = FacetOf(pair.b(), axis.feature_b.vertices);
+  axis.feature_a.facet = FacetOf(pair.a().hull(), axis.feature_a.vertices);
+  axis.feature_b.facet = FacetOf(pair.b().hull(), axis.feature_b.vertices);
   axis.kind = KindOf(pair, axis);
   return axis;
 }

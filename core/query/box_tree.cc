@@ -19,22 +19,21 @@ constexpr uint32_t kLeafBoxes = 8;
 }  // namespace
 
 Box BoundingBox(const PlacedHull& placed) {
-  if (placed.hull().empty()) {
+  if (placed.empty()) {
     return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};
   }
   const Vector& t = placed.X_WH().t;
-  const double size = placed.hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
+  const double size = placed.query_hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
   if (!IsFilterSize(size)) {
     return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
   }
-  const SupportMap& support = placed.query_hull().support();
-  const double blur = kSupportBlurFactor * size;
+  const QueryHull& hull = placed.query_hull();
   const double error = kSupportErrorFactor * size;
   Box box;
   for (int axis = 0; axis < 3; ++axis) {
     const PlainVector n = Vector(placed.R_WH().row(axis));
-    box.high[axis] = t[axis] + support.CertainFarthest(n, blur).value + error;
-    box.low[axis] = t[axis] - support.CertainFarthest(-n, blur).value - error;
+    box.high[axis] = t[axis] + hull.Farthest(n).value + error;
+    box.low[axis] = t[axis] - hull.Farthest(-n).value - error;
   }
   return box;
 }

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/query/axis_description.h"
 #include "core/query/certification.h"
@@ -39,12 +40,13 @@ std::span<const double> Coordinates(const Vector& v) { return {v.data(), 3}; }
     return order;
   }
   if (const auto order = Compare(a.X_WH().q, b.X_WH().q); order != 0) return order;
-  const auto va = a.hull().vertices();
-  const auto vb = b.hull().vertices();
-  if (const auto order = va.size() <=> vb.size(); order != 0) return order;
-  for (size_t i = 0; i < va.size(); ++i) {
-    const auto order = Compare(Coordinates(va[i]), Coordinates(vb[i]));
-    if (order != 0) return order;
+  const QueryHull& hull_a = a.query_hull();
+  const QueryHull& hull_b = b.query_hull();
+  if (const auto order = hull_a.point_count() <=> hull_b.point_count(); order != 0) return order;
+  for (uint32_t i = 0; i < hull_a.point_count(); ++i) {
+    const Vector p_a = hull_a.point(i);
+    const Vector p_b = hull_b.point(i);
+    if (const auto order = Compare(Coordinates(p_a), Coordinates(p_b)); order != 0) return order;
   }
   return std::weak_ordering::equivalent;
 }
@@ -227,8 +229,10 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
 [[gnu::noinline]] absl::StatusOr<Answer> AnswerAny(const PlacedHull& a, const PlacedHull& b,
                                                    const QueryOptions& options, PairCache* cache) {
   if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
-  if (a.hull().empty() || b.hull().empty()) return AnswerOfEmpty(options);
+  if (a.empty() || b.empty()) return AnswerOfEmpty(options);
   if (options.WantsRelationOnly()) return RelationOnly(a, b, options, cache);
+  HULLD_CHECK(!options.WantsCanonical() ||
+              (a.query_hull().canonical() != nullptr && b.query_hull().canonical() != nullptr));
   std::optional<std::chrono::steady_clock::time_point> start;
   if (options.want_analysis) start = std::chrono::steady_clock::now();
   absl::StatusOr<Answer> answer = options.method == Method::kTextbookSat
@@ -243,7 +247,7 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {
   const bool valid = options.tolerance >= 0 && !options.max_error.has_value();
-  if (valid && options.WantsRelationOnly() && !a.hull().empty() && !b.hull().empty()) {
+  if (valid && options.WantsRelationOnly() && !a.empty() && !b.empty()) {
     return RelationOnly(a, b, options, cache);
   }
   return AnswerAny(a, b, options, cache);

@@ -44,16 +44,16 @@ class AxisTable {
   AxisTable(ExactPair& exact, const FloatPair& filter)
       : exact_(exact),
         filter_(filter),
-        facets_a_(exact.a().facet_count()),
-        facets_b_(exact.b().facet_count()),
-        edges_b_(exact.b().edges().size()),
-        edge_pairs_(exact.a().edges().size() * edges_b_) {
+        facets_a_(exact.a().hull().facet_count()),
+        facets_b_(exact.b().hull().facet_count()),
+        edges_b_(exact.b().hull().edges().size()),
+        edge_pairs_(exact.a().hull().edges().size() * edges_b_) {
     exact_.CacheAllVertices();
     AppendFlatAxes();
-    for (uint32_t i = 0; i < exact_.a().vertices().size(); ++i) {
+    for (uint32_t i = 0; i < exact_.a().hull().vertices().size(); ++i) {
       positions_a_.push_back(filter_.PositionA(i));
     }
-    for (uint32_t i = 0; i < exact_.b().vertices().size(); ++i) {
+    for (uint32_t i = 0; i < exact_.b().hull().vertices().size(); ++i) {
       positions_b_.push_back(filter_.PositionB(i));
     }
   }
@@ -93,7 +93,7 @@ class AxisTable {
   // Facet corners, or the ends of an edge of A and of an edge of B.
   std::pair<Edge, Edge> EdgePair(uint64_t axis) const {
     const uint64_t pair = axis - facets_a_ - facets_b_;
-    return {exact_.a().edges()[pair / edges_b_], exact_.b().edges()[pair % edges_b_]};
+    return {exact_.a().hull().edges()[pair / edges_b_], exact_.b().hull().edges()[pair % edges_b_]};
   }
 
   FloatNormal Filtered(uint64_t axis) const {
@@ -104,9 +104,9 @@ class AxisTable {
       f = v[facet[2]] - v[facet[0]];
     };
     if (axis < facets_a_) {
-      use_facet(exact_.a().facet(axis), positions_a_);
+      use_facet(exact_.a().hull().facet(axis), positions_a_);
     } else if (axis < facets_a_ + facets_b_) {
-      use_facet(exact_.b().facet(axis - facets_a_), positions_b_);
+      use_facet(exact_.b().hull().facet(axis - facets_a_), positions_b_);
     } else {
       const auto [edge_a, edge_b] = EdgePair(axis);
       e = positions_a_[edge_a.head] - positions_a_[edge_a.tail];
@@ -119,12 +119,12 @@ class AxisTable {
 
   IntegerVector Exact(uint64_t axis) {
     if (axis < facets_a_) {
-      const std::span<const uint32_t> facet = exact_.a().facet(axis);
+      const std::span<const uint32_t> facet = exact_.a().hull().facet(axis);
       return Cross(exact_.VertexA(facet[1]) - exact_.VertexA(facet[0]),
                    exact_.VertexA(facet[2]) - exact_.VertexA(facet[0]));
     }
     if (axis < facets_a_ + facets_b_) {
-      const std::span<const uint32_t> facet = exact_.b().facet(axis - facets_a_);
+      const std::span<const uint32_t> facet = exact_.b().hull().facet(axis - facets_a_);
       return Cross(exact_.VertexB(facet[1]) - exact_.VertexB(facet[0]),
                    exact_.VertexB(facet[2]) - exact_.VertexB(facet[0]));
     }
@@ -170,11 +170,11 @@ class AxisTable {
     if (span.dimension == 3) return;
     if (span.dimension == 2) {
       flat_axes_.push_back(span.direction);
-      for (const Edge& e : exact_.a().edges()) {
+      for (const Edge& e : exact_.a().hull().edges()) {
         flat_axes_.push_back(
             Cross(span.direction, exact_.VertexA(e.head) - exact_.VertexA(e.tail)));
       }
-      for (const Edge& e : exact_.b().edges()) {
+      for (const Edge& e : exact_.b().hull().edges()) {
         flat_axes_.push_back(
             Cross(span.direction, exact_.VertexB(e.head) - exact_.VertexB(e.tail)));
       }

@@ -75,17 +75,17 @@ IntegerVector ExactPair::ToWorld(const Side& side, const IntegerVector& own) {
 
 const IntegerVector& ExactPair::Vertex(Side& side, uint32_t i) {
   if (const auto found = side.vertices.find(i); found != side.vertices.end()) return found->second;
-  const IntegerVector own = ToInteger(side.hull->hull().vertices()[i], side.hull->exponent());
+  const IntegerVector own = ToInteger(side.hull->point(i), side.hull->exponent());
   return side.vertices.emplace(i, ToWorld(side, own) + side.shift).first->second;
 }
 
 void ExactPair::CacheAllVertices() {
-  for (uint32_t i = 0; i < a().vertices().size(); ++i) VertexA(i);
-  for (uint32_t i = 0; i < b().vertices().size(); ++i) VertexB(i);
+  for (uint32_t i = 0; i < a().point_count(); ++i) VertexA(i);
+  for (uint32_t i = 0; i < b().point_count(); ++i) VertexB(i);
 }
 
 std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
-  std::vector<uint32_t> all(side.hull->hull().vertices().size());
+  std::vector<uint32_t> all(side.hull->point_count());
   std::iota(all.begin(), all.end(), 0u);
   return all;
 }
@@ -122,17 +122,16 @@ std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n) {
 }
 
 IntegerVector ExactPair::SumOfInnerVertices(const Side& side) {
-  const auto vertices = side.hull->hull().vertices();
   IntegerVector own = {0, 0, 0};
-  for (const uint32_t i : side.hull->inner_vertices()) {
-    own = own + ToInteger(vertices[i], side.hull->exponent());
+  for (const uint32_t i : side.hull->inner_points()) {
+    own = own + ToInteger(side.hull->point(i), side.hull->exponent());
   }
-  return ToWorld(side, own) + Integer(side.hull->inner_vertices().size()) * side.shift;
+  return ToWorld(side, own) + Integer(side.hull->inner_points().size()) * side.shift;
 }
 
 IntegerVector ExactPair::CenterDifference() const {
-  return Integer(b_.hull->inner_vertices().size()) * SumOfInnerVertices(a_) -
-         Integer(a_.hull->inner_vertices().size()) * SumOfInnerVertices(b_);
+  return Integer(b_.hull->inner_points().size()) * SumOfInnerVertices(a_) -
+         Integer(a_.hull->inner_points().size()) * SumOfInnerVertices(b_);
 }
 
 }  // namespace hulld

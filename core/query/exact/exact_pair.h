@@ -28,8 +28,8 @@ class ExactPair {
   explicit ExactPair(const FloatPair& filter);
 
   const FloatPair& filter() const { return *filter_; }
-  const Hull& a() const { return a_.hull->hull(); }
-  const Hull& b() const { return b_.hull->hull(); }
+  const QueryHull& a() const { return *a_.hull; }
+  const QueryHull& b() const { return *b_.hull; }
 
   // The scale: an integer coordinate times 2^exponent() / norm() is the length. norm() > 0.
   int exponent() const { return exponent_; }

@@ -31,14 +31,13 @@ absl::StatusOr<ExactSearchResult> SearchPortal(PortalSearch& search) {
   return result;
 }
 
-// Directions that span the hull: differences of its vertices, one per dimension.
+// Directions that span the hull: differences of its points, one per dimension.
 template <typename VertexOf>
-void AppendSpan(const Hull& hull, VertexOf vertex, std::vector<IntegerVector>& directions) {
-  if (hull.dimension() == 1) directions.push_back(vertex(1) - vertex(0));
-  if (hull.dimension() < 2) return;
-  const std::span<const uint32_t> facet = hull.facet(0);
-  directions.push_back(vertex(facet[1]) - vertex(facet[0]));
-  directions.push_back(vertex(facet[2]) - vertex(facet[0]));
+void AppendSpan(const QueryHull& hull, VertexOf vertex, std::vector<IntegerVector>& directions) {
+  const std::span<const uint32_t> spanning = hull.spanning();
+  for (size_t i = 1; i < spanning.size(); ++i) {
+    directions.push_back(vertex(spanning[i]) - vertex(spanning[0]));
+  }
 }
 
 // A and B in parallel planes, and the origin in the plane of C: thickened, the origin's position is

@@ -70,14 +70,9 @@ class Expansion {
     return farthest.value + kReachErrorFactor * pair_.size();
   }
 
-  // Certifying a support value is expensive on flat parts of A - B, so this is deferred until it
-  // could end the expansion.
-  FloatPair::Support Reach(const PlainVector& n, double low) {
-    FloatPair::Support farthest = pair_.Farthest(n);
-    if (!farthest.certain && goal_.Met(low, std::min(bounds_.high, HighOf(farthest)))) {
-      farthest = pair_.CertainFarthest(n, farthest);
-    }
-    if (farthest.certain) bounds_.high = std::min(bounds_.high, HighOf(farthest));
+  FloatPair::Support Reach(const PlainVector& n) {
+    const FloatPair::Support farthest = pair_.Farthest(n);
+    bounds_.high = std::min(bounds_.high, HighOf(farthest));
     return farthest;
   }
 
@@ -99,7 +94,7 @@ class Expansion {
     const double length = Norm(n);
     if (!(length > 0)) return false;
     n = (1 / length) * n;
-    const VertexPair pairs[2] = {Reach(n, 0).pair, Reach(-n, 0).pair};
+    const VertexPair pairs[2] = {Reach(n).pair, Reach(-n).pair};
     double heights[2];
     for (int i = 0; i < 2; ++i) {
       heights[i] = std::abs(Dot(n, At(pairs[i]).w - corners_[0].w));
@@ -110,7 +105,7 @@ class Expansion {
   }
 
   bool SpanTetrahedron() {
-    corners_.push_back(At(Reach({1, 0, 0}, 0).pair));
+    corners_.push_back(At(Reach({1, 0, 0}).pair));
     if (!AddFarther({1, 0, 0})) return false;
     const PlainVector e = corners_[1].w - corners_[0].w;
     const PlainVector across = Cross(e, {0, 1, 0});
@@ -172,14 +167,9 @@ class Expansion {
     if (!nearest || corners_.size() >= kMaxVertices) return false;
     const PlainVector n = planes_[*nearest].n;
     const double low = std::max(0.0, Low(nearest));
-    FloatPair::Support farthest = Reach(n, low);
+    const FloatPair::Support farthest = Reach(n);
     if (goal_.Met(low, bounds_.high)) return false;
-    Corner corner = At(farthest.pair);
-    if (!farthest.certain && !IsAbove(*nearest, corner)) {
-      farthest = pair_.CertainFarthest(n, farthest);
-      bounds_.high = std::min(bounds_.high, HighOf(farthest));
-      corner = At(farthest.pair);
-    }
+    const Corner corner = At(farthest.pair);
     // One of its own vertices: the surface is not convex up to rounding.
     if (!IsAbove(*nearest, corner) || Contains(farthest.pair)) return false;
     corners_.push_back(corner);

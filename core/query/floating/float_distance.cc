@@ -30,14 +30,8 @@ class Walk {
       const double length = n.norm();
       if (!(length > 0)) break;
       n /= length;
-      FloatPair::Support farthest = pair_.Farthest(n);
-      // Certifying a support value is expensive on flat parts of A - B, so this is deferred until
-      // it could end the walk.
-      if (!farthest.certain &&
-          (goal_.Met(LowOf(farthest), bounds_.high) || Contains(farthest.pair))) {
-        farthest = pair_.CertainFarthest(n, farthest);
-      }
-      if (farthest.certain) bounds_.low = std::max(bounds_.low, LowOf(farthest));
+      const FloatPair::Support farthest = pair_.Farthest(n);
+      bounds_.low = std::max(bounds_.low, LowOf(farthest));
       if (goal_.Met(bounds_.low, bounds_.high) || Contains(farthest.pair)) break;
       corners_[count_++] = {per_unit_ * pair_.Difference(farthest.pair), farthest.pair};
       const NearestPart part = Nearest();

@@ -23,10 +23,10 @@ class FloatPair {
       : a_(&a),
         b_(&b),
         offset_(PlainVector(b.X_WH().t) - a.X_WH().t),
-        size_(a.hull().max_abs_coordinate() + b.hull().max_abs_coordinate() +
+        size_(a.query_hull().max_abs_coordinate() + b.query_hull().max_abs_coordinate() +
               LargestComponent(offset_)),
         usable_(IsFilterSize(size_)) {
-    HULLD_DCHECK(!a.hull().empty() && !b.hull().empty());
+    HULLD_DCHECK(!a.empty() && !b.empty());
   }
 
   const PlacedHull& a() const { return *a_; }
@@ -40,19 +40,12 @@ class FloatPair {
   // A vertex of A - B far along a direction.
   struct Support {
     VertexPair pair;
-    // n . (a - b): where certain, within SupportError of the largest over A - B.
+    // n . (a - b): within SupportError of the largest over A - B.
     double value;
-    bool certain;
   };
-  // A vertex of A far along n_W, and of B far against it.
+  // The vertex of A farthest along n_W, and that of B farthest against it.
   Support Farthest(const PlainVector& n_W) const;
-  // The farthest, from what Farthest(n_W) found.
-  Support CertainFarthest(const PlainVector& n_W, const Support& found) const;
-  // The farthest.
-  Support CertainFarthest(const PlainVector& n_W) const {
-    return CertainFarthest(n_W, Farthest(n_W));
-  }
-  // How far a certain value may be from the true maximum. Requires the largest component of n_W
+  // How far that value may be from the true maximum. Requires the largest component of n_W
   // between kDirectionMin and kDirectionMax.
   double SupportError(const PlainVector& n_W) const {
     const double largest = LargestComponent(n_W);
@@ -90,8 +83,13 @@ class FloatPair {
     return 2 * (kSupportErrorFactor * LargestComponent(n_W) * size_) +
            kDirectionErrorFactor * error * size_;
   }
+  // What errors of up to `error` per component of n_W become in a hull's own frame, with those of
+  // turning it there (see kSupportErrorFactor).
+  static double TurnedError(const PlainVector& n_W, double error) {
+    return 2 * error + 64 * kUnitRoundoff * LargestComponent(n_W);
+  }
   static PlainVector Rotated(const PlacedHull& placed, uint32_t i) {
-    return OutOfOwnFrame(placed, placed.hull().vertices()[i]);
+    return OutOfOwnFrame(placed, placed.query_hull().point(i));
   }
   static PlainVector OutOfOwnFrame(const PlacedHull& placed, const PlainVector& v) {
     const double* const R = placed.R_WH().data();  // column by column
@@ -116,8 +114,8 @@ class FloatPair {
 
 class FloatPair::CenterView {
  public:
-  CenterBounds::Bounds bounds_a() const { return center_bounds_a().At(place_a_); }
-  CenterBounds::Bounds bounds_b() const { return center_bounds_b().At(place_b_); }
+  CenterBounds::Bounds bounds_a() const { return pair_->a_->query_hull().BoundsAt(place_a_, n_a_); }
+  CenterBounds::Bounds bounds_b() const { return pair_->b_->query_hull().BoundsAt(place_b_, n_b_); }
   // About the direction from A's surface to B's, where the line of the centres crosses them; zero
   // where unknown.
   PlainVector LikelyAxis() const {
@@ -129,13 +127,17 @@ class FloatPair::CenterView {
   friend class FloatPair;
   CenterView(const FloatPair& pair, const PlainVector& n_W)
       : pair_(&pair),
-        place_a_(center_bounds_a().PlaceOf(pair.InA(n_W))),
-        place_b_(center_bounds_b().PlaceOf(-pair.InB(n_W))) {}
+        n_a_(pair.InA(n_W)),
+        n_b_(-pair.InB(n_W)),
+        place_a_(center_bounds_a().PlaceOf(n_a_)),
+        place_b_(center_bounds_b().PlaceOf(n_b_)) {}
 
   const CenterBounds& center_bounds_a() const { return pair_->a_->query_hull().center_bounds(); }
   const CenterBounds& center_bounds_b() const { return pair_->b_->query_hull().center_bounds(); }
 
   const FloatPair* pair_;
+  PlainVector n_a_;
+  PlainVector n_b_;
   CenterBounds::Place place_a_;
   CenterBounds::Place place_b_;
 };
@@ -147,9 +149,9 @@ inline FloatPair::CenterView FloatPair::ViewCenters(const PlainVector& n_W) cons
 // In the header, as it is the step of every search. The values are those that the support maps
 // found in the hulls' own frames, so that the bound on the maximum holds for them.
 inline FloatPair::Support FloatPair::Farthest(const PlainVector& n_W) const {
-  const SupportMap::Support a = a_->query_hull().support().Farthest(InA(n_W));
-  const SupportMap::Support b = b_->query_hull().support().Farthest(-InB(n_W));
-  return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), a.certain && b.certain};
+  const SupportPoint a = a_->query_hull().Farthest(InA(n_W));
+  const SupportPoint b = b_->query_hull().Farthest(-InB(n_W));
+  return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_)};
 }
 
 }  // namespace hulld

@@ -279,12 +279,9 @@ class FloatSearch {
       largest = LargestComponent(n);
     }
     ++result_.directions_tried;
-    FloatPair::Support farthest = pair_.Farthest(n);
+    const FloatPair::Support farthest = pair_.Farthest(n);
     const double error = kSupportErrorFactor * largest * pair_.size();
-    if (farthest.value < -error) {
-      farthest = pair_.CertainFarthest(n, farthest);
-      if (farthest.value < -error) return EndSeparated(n);
-    }
+    if (farthest.value < -error) return EndSeparated(n);
     const PlainVector along = n;
     // Else nothing is farther towards the origin.
     const bool progress = !simplex_.Contains(farthest.pair);
@@ -317,10 +314,9 @@ class FloatSearch {
 
   // Whether |separation| <= tolerance is certain: A - B has a point so near to the origin, and
   // along some direction does not reach farther than that beyond it. `farthest` is that along n.
-  bool IsWithinTolerance(const PlainVector& n, FloatPair::Support farthest, double error) {
+  bool IsWithinTolerance(const PlainVector& n, const FloatPair::Support& farthest, double error) {
     const double length = Norm(n);
     if (farthest.value < tolerance_ * length) {
-      farthest = pair_.CertainFarthest(n, farthest);
       reach_ = std::min(reach_, std::max(0.0, farthest.value + error) / length);
     }
     nearest_ = std::min(nearest_, Norm(simplex_.NearPoint()));
@@ -353,16 +349,14 @@ FloatSearchResult TryCached(const FloatPair& pair, const PairCache& cache) {
     const PlainVector n = *cache.axis;
     ++result.directions_tried;
     const double error = pair.SupportError(n);
-    FloatPair::Support farthest = pair.Farthest(n);
-    if (farthest.value < -error) farthest = pair.CertainFarthest(n, farthest);
-    if (farthest.value < -error) {
+    if (pair.Farthest(n).value < -error) {
       result.verdict = FloatVerdict::kSeparated;
       result.axis = n;
     }
   } else if (cache.pair_count == 4) {
     for ([[maybe_unused]] const VertexPair& known : cache.pairs) {
-      HULLD_DCHECK(known.a < pair.a().hull().vertices().size() &&
-                   known.b < pair.b().hull().vertices().size());
+      HULLD_DCHECK(known.a < pair.a().query_hull().point_count() &&
+                   known.b < pair.b().query_hull().point_count());
     }
     const auto difference = [&](int i) { return pair.Difference(cache.pairs[i]); };
     if (HoldsOrigin(pair, difference(0), difference(1), difference(2), difference(3))) {

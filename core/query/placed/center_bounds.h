@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "core/base/check.h"
@@ -30,9 +31,14 @@ class CenterBounds {
  public:
   // None: every bound is unknown.
   CenterBounds() = default;
-  // None for a hull that is flat. The gauge is unknown unless c is certain to be strictly inside.
-  // Cost: O(C F) for C corners, which are O(V) and at most 6 x 81, and F facets.
-  CenterBounds(const Hull& hull, const SupportMap& support);
+  // Of the hull of some points about a centre. None for one that is flat (`dimension` below 3). The
+  // gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
+  // largest absolute coordinate. Cost: some support points for each of 54 or 486 corners.
+  CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
+               const SupportMap& support);
+  CenterBounds(const Hull& hull, const SupportMap& support)
+      : CenterBounds(hull.vertices(), hull.dimension(), hull.center(), hull.max_abs_coordinate(),
+                     support) {}
 
   // Not a number where unknown.
   struct Bounds {
@@ -68,8 +74,12 @@ class CenterBounds {
     float gauge;
   };
 
-  void AddSupports(const Hull& hull, const SupportMap& support, double radius);
-  void AddGauges(const Hull& hull);
+  // Of each corner the first one with the same direction, on another face where the faces meet.
+  std::vector<uint32_t> Twins() const;
+  void AddSupports(const Vector& center, double radius, const SupportMap& support,
+                   std::span<const uint32_t> twins);
+  void AddGauges(std::span<const Vector> points, const Vector& center, double max_abs,
+                 const SupportMap& support, std::span<const uint32_t> twins);
   Vector DirectionOf(uint32_t corner) const;
 
   // (side_ + 1)^2 corners for each of the six faces.

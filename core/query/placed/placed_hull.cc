@@ -30,10 +30,7 @@ Eigen::Matrix3d RotationOf(const std::array<double, 4>& q) {
 }  // namespace
 
 PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH)
-    : hull_(&hull),
-      X_WH_(X_WH),
-      R_WH_(RotationOf(X_WH.q)),
-      rotated_center_(R_WH_ * hull.hull().center()) {
+    : hull_(&hull), X_WH_(X_WH), R_WH_(RotationOf(X_WH.q)), rotated_center_(R_WH_ * hull.center()) {
   HULLD_DCHECK(ValidatePose(X_WH).ok());
 }
 

@@ -17,7 +17,9 @@ class PlacedHull {
   PlacedHull(const QueryHull& hull, const Pose& X_WH);
 
   const QueryHull& query_hull() const { return *hull_; }
+  // Requires a canonical one.
   const Hull& hull() const { return hull_->hull(); }
+  bool empty() const { return hull_->empty(); }
   const Pose& X_WH() const { return X_WH_; }
   // The rotation R(q) / |q|^2, each entry within kRotationEntryError.
   const Eigen::Matrix3d& R_WH() const { return R_WH_; }

@@ -1,76 +1,83 @@
 #include "core/query/placed/query_hull.h"
 
 #include <algorithm>
-#include <cmath>
-#include <optional>
+#include <utility>
 
-#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
-#include "core/numeric/exponent_limits.h"
-#include "core/numeric/integer.h"
+#include "core/query/placed/live_parts.h"
 
 namespace hulld {
-namespace {
 
-double RadiusOf(const Hull& hull) {
-  double largest = 0;
-  for (const Vector& v : hull.vertices()) {
-    largest = std::max(largest, (v - hull.center()).stableNorm());
+QueryHull::QueryHull(const Hull& hull) : canonical_(&hull) {
+  if (hull.empty()) return;
+  auto base = std::make_shared<const HullBase>(hull);
+  dimension_ = hull.dimension();
+  point_count_ = static_cast<uint32_t>(base->points().size());
+  exponent_ = base->exponent();
+  max_abs_ = base->max_abs_coordinate();
+  radius_ = base->radius();
+  center_ = base->center();
+  base_ = std::move(base);
+}
+
+Vector QueryHull::GrownPoint(uint32_t i) const {
+  size_t at = i - base_->points().size();
+  for (const auto& level : growth_->parts->levels) {
+    if (at < level->mapped.points.size()) return level->mapped.points[at];
+    at -= level->mapped.points.size();
   }
-  return hull.empty() ? 0 : largest * kRadiusRoundUp + kLeastPositive;
+  HULLD_DCHECK(at < growth_->tail_count);
+  return growth_->parts->tail->point(at);
 }
 
-int ExponentOf(const Hull& hull) {
-  int exponent = kAboveAllExponents;
-  for (const Vector& v : hull.vertices()) exponent = LowestBitExponent(v, exponent);
-  return exponent;
-}
-
-// A vertex off the plane of facet 0: the farthest in floating point of those that are not its
-// corners, since facets are maximal.
-uint32_t VertexOffFirstFacet(const Hull& hull) {
-  const std::span<const uint32_t> facet = hull.facet(0);
-  const auto v = hull.vertices();
-  const Vector e = v[facet[1]] - v[facet[0]];
-  const Vector f = v[facet[2]] - v[facet[0]];
-  const Vector n = e.cross(f);
-  std::optional<uint32_t> farthest;
-  double largest = 0;
-  for (uint32_t i = 0; i < v.size(); ++i) {
-    if (std::find(facet.begin(), facet.end(), i) != facet.end()) continue;
-    const double distance = std::abs(n.dot(v[i] - v[facet[0]]));
-    if (farthest.has_value() && !(distance > largest)) continue;
-    farthest = i;
-    largest = distance;
+SupportPoint QueryHull::FartherInGrowth(const PlainVector& n, SupportPoint found) const {
+  const LiveParts& parts = *growth_->parts;
+  auto first = static_cast<uint32_t>(base_->points().size());
+  const auto consider = [&](const SupportPoint& other) {
+    if (other.value > found.value) found = {first + other.vertex, other.value};
+  };
+  for (const auto& level : parts.levels) {
+    consider(level->mapped.support.Farthest(n));
+    first += static_cast<uint32_t>(level->mapped.points.size());
   }
-  HULLD_CHECK(farthest.has_value());
-  return *farthest;
-}
-
-}  // namespace
-
-QueryHull::QueryHull(const Hull& hull)
-    : hull_(&hull),
-      support_(*hull_),
-      center_bounds_(*hull_, support_),
-      radius_(RadiusOf(*hull_)),
-      exponent_(ExponentOf(*hull_)) {
-  if (hull_->empty()) return;
-  const auto v = hull_->vertices();
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto [low, high] = std::minmax_element(
-        v.begin(), v.end(), [axis](const Vector& a, const Vector& b) { return a[axis] < b[axis]; });
-    AddInnerVertex(low - v.begin());
-    AddInnerVertex(high - v.begin());
+  if (growth_->tail_count > 0) consider(parts.tail->Farthest(growth_->tail_count, n));
+  if (growth_->scans > 0) {
+    // A counter shared by all threads is expensive to raise each time.
+    constexpr uint32_t kBetween = 16;
+    thread_local uint32_t questions = 0;
+    if (++questions % kBetween == 0) {
+      growth_->scanned->fetch_add(kBetween * growth_->scans, std::memory_order_relaxed);
+    }
   }
-  if (hull_->dimension() < 2) return;
-  for (int i = 0; i < 3; ++i) AddInnerVertex(hull_->facet(0)[i]);
-  if (hull_->dimension() == 3) AddInnerVertex(VertexOffFirstFacet(*hull_));
+  return found;
 }
 
-void QueryHull::AddInnerVertex(size_t vertex) {
-  HULLD_DCHECK(inner_count_ < inner_vertices_.size());
-  inner_vertices_[inner_count_++] = static_cast<uint32_t>(vertex);
+CenterBounds::Bounds QueryHull::BoundsWithGrowth(CenterBounds::Bounds bounds,
+                                                 const PlainVector& n) const {
+  const double reach = Farthest(n).value - Dot(n, PlainVector(center_));
+  const double margin = kCenterMargin * radius_ * LargestComponent(n);
+  // Not a number where the base's is unknown.
+  bounds.support = std::max(bounds.support, reach + margin);
+  return bounds;
+}
+
+std::vector<uint32_t> QueryHull::Candidates(const PlainVector& n, double error,
+                                            double slack) const {
+  std::vector<uint32_t> candidates;
+  const double least = Farthest(n).value - slack;
+  base_->support().AppendCandidates(n, error, least, 0, candidates);
+  if (growth_ == nullptr) return candidates;
+  const LiveParts& parts = *growth_->parts;
+  auto first = static_cast<uint32_t>(base_->points().size());
+  for (const auto& level : parts.levels) {
+    level->mapped.support.AppendCandidates(n, error, least, first, candidates);
+    first += static_cast<uint32_t>(level->mapped.points.size());
+  }
+  for (uint32_t i = 0; i < growth_->tail_count; ++i) {
+    const Vector p = parts.tail->point(i);
+    if (SupportValue(n, p.x(), p.y(), p.z()) >= least) candidates.push_back(first + i);
+  }
+  return candidates;
 }
 
 }  // namespace hulld

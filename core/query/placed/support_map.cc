@@ -1,403 +1,454 @@
 #include "core/query/placed/support_map.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
-#include <numeric>
 #include <utility>
 
+#include "core/numeric/error_bounds.h"
 #include "core/numeric/simd_path.h"
 
 namespace hulld {
 namespace {
 
-// Up to this many vertices are scanned: ten blocks of four. A choice, not tuned.
+// Up to this many points are scanned: ten blocks of four. A choice, not tuned.
 constexpr size_t kMostScanned = 40;
-// Cells of the cube map per vertex. A choice: two of 16 bytes each keep all that queries need
-// beyond the snapshot below 75 bytes a vertex (observed: tests/core/hull/growth/hull_cost_test).
-constexpr double kCellsPerVertex = 2;
-// A cell with more vertices than this lists one of them, to climb from.
-constexpr size_t kMostListed = 24;
-// A plateau larger than this is not flooded; every vertex is looked at instead.
-constexpr size_t kMostFlooded = 64;
-// How far, in cells, arcs are drawn beyond where they pass: far more than rounding, far less than a
-// cell.
-constexpr double kArcMargin = 1e-7;
+// Cells of the cube map per point. A choice: with two, of 16 bytes each, most cells list at most
+// four points.
+constexpr double kCellsPerPoint = 2;
+// A cell with more points than this is divided.
+constexpr size_t kMostListed = 12;
+// Among at most this many points each is compared with each.
+constexpr size_t kMostCompared = 16;
+// No cell is made narrower than this; it stays far wider than kCellMargin. Observed: points this
+// near to a common plane come from rounding, and a list of them is as good as a finer division.
+constexpr double kLeastWidth = 0x1p-22;
+// Cells per point beyond which none is divided any more.
+constexpr size_t kMostCellsPerPoint = 8;
+// Coordinates beyond these are scanned: products might overflow, or underflow where it counts.
+constexpr double kLargestCoordinate = 0x1p900;
+constexpr double kLeastExtent = 0x1p-800;
 
-// Four doubles, and four integers as wide, in whatever registers the function is compiled for.
 using Lanes = double __attribute__((vector_size(32)));
-using LaneIds = int64_t __attribute__((vector_size(32)));
 
 [[gnu::always_inline]] inline void Load(const double* from, Lanes& lanes) {
   std::memcpy(&lanes, from, sizeof lanes);
 }
-
 [[gnu::always_inline]] inline void Broadcast(double value, Lanes& lanes) {
   lanes = Lanes{value, value, value, value};
 }
-
-// The values along (x, y, z) of four vertices.
-template <typename Block>
-[[gnu::always_inline]] inline void Evaluate(const Block& block, const Lanes& x, const Lanes& y,
-                                            const Lanes& z, Lanes& values) {
-  Lanes px, py, pz;
-  Load(block.x, px);
-  Load(block.y, py);
-  Load(block.z, pz);
-  values = (x * px + y * py) + z * pz;
+[[gnu::always_inline]] inline void Absolute(Lanes& lanes) {
+  lanes = lanes > -lanes ? lanes : -lanes;
 }
 
-// The lane with the largest value, of these the one with the lowest id.
-[[gnu::always_inline]] inline int LargestLane(const Lanes& values, const LaneIds& ids) {
-  int best = 0;
-  for (int i = 1; i < 4; ++i) {
-    if (values[i] > values[best] || (values[i] == values[best] && ids[i] < ids[best])) best = i;
+// Powers of two that make the extents of the points about equal, none below 2^-10: the size along
+// each axis relative to the largest.
+Vector ScaleOf(const Vector& extents) {
+  constexpr int kLeast = -10;
+  int exponents[3];
+  for (int i = 0; i < 3; ++i) {
+    exponents[i] = extents[i] > 0 ? std::ilogb(extents[i]) : kLeast - 2000;
   }
-  return best;
+  const int largest = *std::max_element(exponents, exponents + 3);
+  Vector scale;
+  for (int i = 0; i < 3; ++i) scale[i] = std::ldexp(1.0, std::max(exponents[i] - largest, kLeast));
+  return scale;
 }
 
-template <typename Block, typename Support>
-[[gnu::always_inline]] inline void ScanBlocks(const std::vector<Block>& blocks, size_t count,
-                                              const PlainVector& n, Support& support) {
-  Lanes x, y, z, best, values;
-  Broadcast(n.x, x);
-  Broadcast(n.y, y);
-  Broadcast(n.z, z);
-  Evaluate(blocks[0], x, y, z, best);
-  LaneIds best_ids = {0, 1, 2, 3};
-  LaneIds ids = best_ids;
-  const LaneIds four = {4, 4, 4, 4};
-  for (size_t i = 1; i < blocks.size(); ++i) {
-    ids += four;
-    Evaluate(blocks[i], x, y, z, values);
-    const LaneIds better = values > best;
-    best = better ? values : best;
-    best_ids = better ? ids : best_ids;
+// Points seen on a face of the cube: along direction (s, t) the value is s a + t b + c.
+struct FacePoints {
+  std::vector<double> a;
+  std::vector<double> b;
+  std::vector<double> c;
+  std::vector<uint32_t> ids;
+  // The arrays are longer: the last point is repeated up to a multiple of four.
+  size_t size = 0;
+
+  void Reserve(size_t n) {
+    if (a.size() >= n + 4) return;
+    a.resize(n + 4);
+    b.resize(n + 4);
+    c.resize(n + 4);
+    ids.resize(n + 4);
   }
-  const int lane = LargestLane(best, best_ids);
-  support.vertex =
-      static_cast<uint32_t>(std::min<int64_t>(best_ids[lane], static_cast<int64_t>(count) - 1));
-  support.value = best[lane];
-  support.certain = true;
+  void Pad() {
+    for (size_t i = size; i % 4 != 0; ++i) {
+      a[i] = a[size - 1];
+      b[i] = b[size - 1];
+      c[i] = c[size - 1];
+      ids[i] = ids[size - 1];
+    }
+  }
+};
+
+// A square on a face, widened.
+struct Square {
+  double s;
+  double t;
+  double half_s;
+  double half_t;
+};
+
+// The largest value at any of the square's corners that the first point has beyond the second, but
+// for rounding.
+[[gnu::always_inline]] inline double LeadOf(const FacePoints& points, size_t p, size_t q,
+                                            const Square& square) {
+  const double a = points.a[p] - points.a[q];
+  const double b = points.b[p] - points.b[q];
+  const double c = points.c[p] - points.c[q];
+  return (c + (square.s * a + square.t * b)) +
+         (square.half_s * std::abs(a) + square.half_t * std::abs(b));
 }
 
-// The area vector of a facet, from the outside.
-Vector NormalOf(std::span<const uint32_t> facet, std::span<const Vector> vertices) {
-  const Vector& origin = vertices[facet[0]];
-  Vector normal = Vector::Zero();
-  for (size_t i = 2; i < facet.size(); ++i) {
-    normal += (vertices[facet[i - 1]] - origin).cross(vertices[facet[i]] - origin);
+// Keeps those points of `from` that may be farthest along a direction in the square. `bound`: what
+// a lead may err.
+[[gnu::always_inline]] inline void FilterWith(const FacePoints& from, const Square& square,
+                                              double bound, FacePoints& to) {
+  Lanes s, t, half_s, half_t, a, b, c, least;
+  Broadcast(square.s, s);
+  Broadcast(square.t, t);
+  Broadcast(square.half_s, half_s);
+  Broadcast(square.half_t, half_t);
+  Broadcast(-bound, least);
+  // The point to compare with is the farthest along the middle.
+  Lanes best;
+  Broadcast(-INFINITY, best);
+  for (size_t i = 0; i < from.size; i += 4) {
+    Load(&from.a[i], a);
+    Load(&from.b[i], b);
+    Load(&from.c[i], c);
+    const Lanes value = c + (s * a + t * b);
+    best = value > best ? value : best;
   }
-  return normal;
+  const double largest = std::max(std::max(best[0], best[1]), std::max(best[2], best[3]));
+  size_t q = 0;
+  Lanes wanted;
+  Broadcast(largest, wanted);
+  for (size_t i = 0; i < from.size; i += 4) {
+    Load(&from.a[i], a);
+    Load(&from.b[i], b);
+    Load(&from.c[i], c);
+    const Lanes value = c + (s * a + t * b);
+    const auto same = value >= wanted;
+    if ((same[0] | same[1] | same[2] | same[3]) != 0) {
+      q = i + (same[0] != 0 ? 0 : same[1] != 0 ? 1 : same[2] != 0 ? 2 : 3);
+      break;
+    }
+  }
+  Lanes q_a, q_b, q_c;
+  Broadcast(from.a[q], q_a);
+  Broadcast(from.b[q], q_b);
+  Broadcast(from.c[q], q_c);
+  to.Reserve(from.size);
+  size_t size = 0;
+  for (size_t i = 0; i < from.size; i += 4) {
+    Load(&from.a[i], a);
+    Load(&from.b[i], b);
+    Load(&from.c[i], c);
+    a -= q_a;
+    b -= q_b;
+    c -= q_c;
+    Lanes size_a = a;
+    Lanes size_b = b;
+    Absolute(size_a);
+    Absolute(size_b);
+    const Lanes lead = (c + (s * a + t * b)) + (half_s * size_a + half_t * size_b);
+    const auto keep = lead > least;
+    if ((keep[0] | keep[1] | keep[2] | keep[3]) == 0) continue;
+    for (size_t k = i; k < i + 4; ++k) {
+      to.a[size] = from.a[k];
+      to.b[size] = from.b[k];
+      to.c[size] = from.c[k];
+      to.ids[size] = from.ids[k];
+      size += static_cast<size_t>(keep[k - i] & 1) & static_cast<size_t>(k < from.size);
+    }
+  }
+  to.size = size;
+  to.Pad();
 }
 
-// The size of the vertices' bounding box, relative to its longest side; at least a thousandth of
-// it.
-Vector ExtentsOf(std::span<const Vector> vertices) {
-  Vector low = vertices[0];
-  Vector high = vertices[0];
-  for (const Vector& vertex : vertices) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
-  }
-  // Halved first, so that it does not overflow.
-  const Vector extents = 0.5 * high - 0.5 * low;
-  constexpr double kLeastExtent = 1e-3;
-  return (extents / extents.maxCoeff()).cwiseMax(kLeastExtent);
+void FilterPortably(const FacePoints& from, const Square& square, double bound, FacePoints& to) {
+  FilterWith(from, square, bound, to);
+}
+
+#ifdef HULLD_HAS_AVX2_PATH
+__attribute__((target("avx2"))) void FilterAvx2(const FacePoints& from, const Square& square,
+                                                double bound, FacePoints& to) {
+  FilterWith(from, square, bound, to);
+}
+#else
+void FilterAvx2(const FacePoints& from, const Square& square, double bound, FacePoints& to) {
+  FilterPortably(from, square, bound, to);
+}
+#endif
+
+void Filter(const FacePoints& from, const Square& square, double bound, FacePoints& to) {
+  CurrentSimdPath() == SimdPath::kAvx2 ? FilterAvx2(from, square, bound, to)
+                                       : FilterPortably(from, square, bound, to);
 }
 
 }  // namespace
 
-// Draws the arcs of the Gauss map into cells.
-class SupportMap::ArcDrawing {
+// Fills the cells of a map.
+class SupportMap::Filling {
  public:
-  explicit ArcDrawing(uint32_t side) : side_(side) {}
+  explicit Filling(SupportMap& map) : map_(map) {}
 
-  // The arc between directions m and n, where the cones of two vertices meet.
-  void Draw(const Vector& m, const Vector& n, uint32_t first, uint32_t second) {
-    for (uint32_t axis = 0; axis < 3; ++axis) {
-      for (const double sign : {1.0, -1.0}) {
-        double from = 0;
-        double to = 1;
-        // The part of m + t (n - m) on this face: the face's component is positive and at least as
-        // large as each of the others, but for rounding.
-        for (const uint32_t other : {kCubeAxisAfter[axis], kCubeAxisAfter[axis + 1]}) {
-          for (const double side : {1.0, -1.0}) {
-            Clip(sign * m[axis] + side * m[other], sign * n[axis] + side * n[other], &from, &to);
-          }
-        }
-        if (!(from <= to)) continue;
-        DrawOnFace(axis, sign, m + from * (n - m), m + to * (n - m), first, second);
-      }
+  // `bound`: see Filter.
+  void Fill(double bound) {
+    bound_ = bound;
+    most_cells_ = map_.cells_.size() + kMostCellsPerPoint * map_.points_.size();
+    const uint32_t side = map_.side_;
+    for (uint32_t face = 0; face < 6; ++face) {
+      const FacePoints points = PointsOn(face);
+      FillRange(points, {face * side * side, side, -1, -1, 2.0 / side}, {0, side, 0, side}, 0);
     }
   }
-
-  std::vector<CellVertex> Take() { return std::move(entries_); }
 
  private:
-  // Keeps those t in [from, to] where the linear function that is a at 0 and b at 1 is not
-  // negative.
-  static void Clip(double a, double b, double* from, double* to) {
-    constexpr double kSlack = 1e-9;
-    a += kSlack;
-    b += kSlack;
-    if (a >= 0 && b >= 0) return;
-    if (a < 0 && b < 0) {
-      *from = 2;
+  // Cells: `side` rows of as many, of a width on the face, from a corner on.
+  struct Grid {
+    uint32_t first;
+    uint32_t side;
+    double s;
+    double t;
+    double width;
+  };
+  struct Range {
+    uint32_t i_begin;
+    uint32_t i_end;
+    uint32_t j_begin;
+    uint32_t j_end;
+  };
+
+  FacePoints PointsOn(uint32_t face) const {
+    const uint32_t axis = face / 2;
+    const uint32_t first = kCubeAxisAfter[axis];
+    const uint32_t second = kCubeAxisAfter[axis + 1];
+    const double sign = face % 2 == 0 ? 1 : -1;
+    // A direction is scaled by what coordinates are divided by: powers of two.
+    const Vector scale = map_.scale_;
+    const Vector per_scale = scale.cwiseInverse();
+    FacePoints points;
+    points.Reserve(map_.points_.size());
+    points.size = map_.points_.size();
+    for (size_t i = 0; i < points.size; ++i) {
+      const Vector& p = map_.points_[i];
+      points.a[i] = p[first] * per_scale[first];
+      points.b[i] = p[second] * per_scale[second];
+      points.c[i] = sign * p[axis] * per_scale[axis];
+      points.ids[i] = static_cast<uint32_t>(i);
+    }
+    points.Pad();
+    return points;
+  }
+
+  static Square Widened(const Grid& grid, const Range& range) {
+    // Twice the margin: the rest is for the rounding of all this.
+    const double half_s = 0.5 * grid.width * (range.i_end - range.i_begin);
+    const double half_t = 0.5 * grid.width * (range.j_end - range.j_begin);
+    return {grid.s + grid.width * range.i_begin + half_s,
+            grid.t + grid.width * range.j_begin + half_t, half_s + 2 * kCellMargin,
+            half_t + 2 * kCellMargin};
+  }
+
+  // Fills the cells of a range, whose farthest points are among those given.
+  void FillRange(const FacePoints& points, const Grid& grid, const Range& range, size_t depth) {
+    if (depth >= lists_.size()) lists_.emplace_back(std::make_unique<FacePoints>());
+    FacePoints& found = *lists_[depth];
+    Filter(points, Widened(grid, range), bound_, found);
+    const uint32_t rows = range.i_end - range.i_begin;
+    const uint32_t columns = range.j_end - range.j_begin;
+    if (found.size <= 4) return FillAll(found, grid, range);
+    if (rows == 1 && columns == 1) return FillCell(found, grid, range, depth);
+    Range low = range;
+    Range high = range;
+    if (rows >= columns) {
+      low.i_end = high.i_begin = range.i_begin + rows / 2;
+    } else {
+      low.j_end = high.j_begin = range.j_begin + columns / 2;
+    }
+    FillRange(found, grid, low, depth + 1);
+    FillRange(found, grid, high, depth + 1);
+  }
+
+  void FillAll(const FacePoints& found, const Grid& grid, const Range& range) {
+    Cell cell;
+    for (size_t k = 0; k < 4; ++k) cell.ids[k] = found.ids[std::min(k, found.size - 1)];
+    for (uint32_t i = range.i_begin; i < range.i_end; ++i) {
+      for (uint32_t j = range.j_begin; j < range.j_end; ++j) {
+        map_.cells_[grid.first + i * grid.side + j] = cell;
+      }
+    }
+  }
+
+  void FillCell(FacePoints& found, const Grid& grid, const Range& range, size_t depth) {
+    if (found.size <= kMostCompared) CompareEach(found, Widened(grid, range));
+    if (found.size <= 4) return FillAll(found, grid, range);
+    Cell& cell = map_.cells_[grid.first + range.i_begin * grid.side + range.j_begin];
+    const bool divides = found.size > kMostListed && grid.width > kLeastWidth * kPartsASide &&
+                         map_.cells_.size() < most_cells_;
+    if (!divides) {
+      cell.ids[3] = kLong + static_cast<uint32_t>(map_.lists_.size());
+      map_.lists_.push_back(static_cast<uint32_t>(found.size));
+      map_.lists_.insert(map_.lists_.end(), found.ids.begin(), found.ids.begin() + found.size);
       return;
     }
-    const double zero = a / (a - b);
-    if (a < 0) {
-      *from = std::max(*from, zero);
-    } else {
-      *to = std::min(*to, zero);
-    }
+    const auto first = static_cast<uint32_t>(map_.cells_.size());
+    cell.ids[3] = kDivided + first;
+    map_.cells_.resize(first + kPartsASide * kPartsASide);
+    const Grid parts = {first, kPartsASide, grid.s + grid.width * range.i_begin,
+                        grid.t + grid.width * range.j_begin, grid.width / kPartsASide};
+    FillRange(found, parts, {0, kPartsASide, 0, kPartsASide}, depth + 1);
   }
 
-  double Place(double component, double along) const {
-    return (component / along + 1) * 0.5 * side_;
-  }
-  uint32_t Index(double place) const {
-    return static_cast<uint32_t>(std::clamp(place, 0.0, side_ - 1.0));
-  }
-
-  void DrawOnFace(uint32_t axis, double sign, const Vector& m, const Vector& n, uint32_t first,
-                  uint32_t second) {
-    const double m_along = sign * m[axis];
-    const double n_along = sign * n[axis];
-    if (!(m_along > 0 && n_along > 0)) return;
-    double x0 = Place(m[kCubeAxisAfter[axis]], m_along);
-    double y0 = Place(m[kCubeAxisAfter[axis + 1]], m_along);
-    double x1 = Place(n[kCubeAxisAfter[axis]], n_along);
-    double y1 = Place(n[kCubeAxisAfter[axis + 1]], n_along);
-    if (x0 > x1) {
-      std::swap(x0, x1);
-      std::swap(y0, y1);
-    }
-    const uint32_t face = CubeFace(axis, sign < 0);
-    const double slope = x1 > x0 ? (y1 - y0) / (x1 - x0) : 0;
-    for (uint32_t i = Index(x0 - kArcMargin); i <= Index(x1 + kArcMargin); ++i) {
-      double low = y0;
-      double high = y1;
-      if (x1 - x0 > kArcMargin) {
-        low = y0 + slope * (std::clamp<double>(i, x0, x1) - x0);
-        high = y0 + slope * (std::clamp<double>(i + 1.0, x0, x1) - x0);
-      }
-      if (low > high) std::swap(low, high);
-      for (uint32_t j = Index(low - kArcMargin); j <= Index(high + kArcMargin); ++j) {
-        const uint32_t cell = CubeCell(face, side_, i, j);
-        entries_.push_back({cell, first});
-        entries_.push_back({cell, second});
+  // Drops those that another is ahead of all over the square.
+  void CompareEach(FacePoints& found, const Square& square) const {
+    for (size_t p = found.size; p-- > 0;) {
+      for (size_t q = 0; q < found.size; ++q) {
+        if (p == q || LeadOf(found, p, q, square) > -bound_) continue;
+        const size_t last = --found.size;
+        // Those before p stay where they are.
+        for (size_t k = p; k < last; ++k) {
+          found.a[k] = found.a[k + 1];
+          found.b[k] = found.b[k + 1];
+          found.c[k] = found.c[k + 1];
+          found.ids[k] = found.ids[k + 1];
+        }
+        break;
       }
     }
+    found.Pad();
   }
 
-  const uint32_t side_;
-  std::vector<CellVertex> entries_;
+  SupportMap& map_;
+  double bound_ = 0;
+  size_t most_cells_ = 0;
+  // One for each depth.
+  std::vector<std::unique_ptr<FacePoints>> lists_;
 };
 
-SupportMap::SupportMap(const Hull& hull) : vertices_(hull.vertices()) {
-  // A flat hull's Gauss map has arcs of half a circle; as large flat hulls are rare, it is scanned.
-  if (vertices_.size() <= kMostScanned || hull.dimension() < 3) {
+SupportMap SupportMap::ForScanning(std::span<const Vector> points) {
+  SupportMap map;
+  map.points_ = points;
+  return map;
+}
+
+SupportMap::SupportMap(std::span<const Vector> points) : points_(points) {
+  if (points_.size() <= kMostScanned) {
     BuildBlocks();
     return;
   }
-  BuildNeighbors(hull);
-  BuildCells(hull);
-}
-
-void SupportMap::BuildBlocks() {
-  blocks_.resize((vertices_.size() + 3) / 4);
-  for (size_t i = 0; i < 4 * blocks_.size(); ++i) {
-    const Vector& vertex = vertices_[std::min(i, vertices_.size() - 1)];
-    blocks_[i / 4].x[i % 4] = vertex.x();
-    blocks_[i / 4].y[i % 4] = vertex.y();
-    blocks_[i / 4].z[i % 4] = vertex.z();
+  Vector low = points_[0];
+  Vector high = points_[0];
+  for (const Vector& p : points_) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
   }
-}
-
-void SupportMap::BuildNeighbors(const Hull& hull) {
-  neighbor_starts_.resize(vertices_.size() + 1);
-  for (const Edge& edge : hull.edges()) {
-    ++neighbor_starts_[edge.tail + 1];
-    ++neighbor_starts_[edge.head + 1];
+  const double largest = std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff());
+  const Vector extents = largest <= kLargestCoordinate ? Vector(high - low) : Vector::Zero();
+  if (!(extents.maxCoeff() >= kLeastExtent)) {
+    BuildBlocks();
+    return;
   }
-  std::partial_sum(neighbor_starts_.begin(), neighbor_starts_.end(), neighbor_starts_.begin());
-  neighbors_.resize(neighbor_starts_.back());
-  std::vector<uint32_t> next(neighbor_starts_.begin(), neighbor_starts_.end() - 1);
-  for (const Edge& edge : hull.edges()) {
-    neighbors_[next[edge.tail]++] = edge.head;
-    neighbors_[next[edge.head]++] = edge.tail;
-  }
-}
-
-void SupportMap::BuildCells(const Hull& hull) {
-  const double cells = kCellsPerVertex * static_cast<double>(vertices_.size());
+  const Vector scale = ScaleOf(extents);
+  scale_ = scale;
+  const double cells = kCellsPerPoint * static_cast<double>(points_.size());
   side_ = std::max(2u, static_cast<uint32_t>(std::lround(std::sqrt(cells / 6))));
   half_ = 0.5 * side_;
-  below_half_ = half_ * (1 - 0x1p-40);
-  const Vector scale = ExtentsOf(vertices_);
-  scale_ = scale;
-
-  // The unit normals on the two sides of each edge, in the map's directions.
-  std::vector<std::array<Vector, 2>> sides(hull.edges().size());
-  for (size_t f = 0; f < hull.facet_count(); ++f) {
-    const std::span<const uint32_t> facet = hull.facet(f);
-    const Vector normal = NormalOf(facet, vertices_).cwiseProduct(scale).stableNormalized();
-    for (size_t i = 0; i < facet.size(); ++i) {
-      const uint32_t tail = facet[i];
-      const uint32_t head = facet[i + 1 < facet.size() ? i + 1 : 0];
-      const Edge edge{std::min(tail, head), std::max(tail, head)};
-      const auto found = std::lower_bound(hull.edges().begin(), hull.edges().end(), edge);
-      sides[found - hull.edges().begin()][tail < head] = normal;
-    }
-  }
-  ArcDrawing drawing(side_);
-  for (size_t e = 0; e < sides.size(); ++e) {
-    drawing.Draw(sides[e][0], sides[e][1], hull.edges()[e].tail, hull.edges()[e].head);
-  }
-  FillCells(drawing.Take());
-}
-
-// Sorts the entries by cell. A cell without any lies within the cone of one vertex.
-void SupportMap::FillCells(std::vector<CellVertex> entries) {
-  std::sort(entries.begin(), entries.end());
-  entries.erase(std::unique(entries.begin(), entries.end()), entries.end());
+  below_side_ = std::nextafter(static_cast<double>(side_), 0.0);
   cells_.resize(size_t{6} * side_ * side_);
-  std::vector<uint32_t> listed;
-  uint32_t last = 0;
-  auto entry = entries.begin();
-  for (uint32_t c = 0; c < cells_.size(); ++c) {
-    listed.clear();
-    for (; entry != entries.end() && entry->cell == c; ++entry) listed.push_back(entry->vertex);
-    const bool too_many = listed.size() > kMostListed;
-    if (listed.empty() || too_many) {
-      listed.assign(1, Climb({last, -INFINITY, false}, CenterOf(c)).vertex);
-    }
-    last = listed.back();
-    Cell& cell = cells_[c];
-    for (size_t i = 0; i < 4; ++i) cell.ids[i] = listed[std::min(i, listed.size() - 1)];
-    if (listed.size() <= 4 && !too_many) continue;
-    cell.ids[3] = kLong + static_cast<uint32_t>(lists_.size());
-    lists_.push_back(static_cast<uint32_t>(listed.size()));
-    lists_.insert(lists_.end(), listed.begin(), listed.end());
-  }
+  Filling(*this).Fill(kLeadErrorFactor * extents.cwiseQuotient(scale).maxCoeff());
+  cells_.shrink_to_fit();
   lists_.shrink_to_fit();
 }
 
-// A direction of the hull's frame in the middle of a cell.
-Vector SupportMap::CenterOf(uint32_t cell) const {
-  const double s = (2.0 * (cell / side_ % side_) + 1) / side_ - 1;
-  const double t = (2.0 * (cell % side_) + 1) / side_ - 1;
-  return CubeDirection(cell / (side_ * side_), s, t).cwiseQuotient(Vector(scale_));
-}
-
-SupportMap::Support SupportMap::LookUpLong(const Cell& cell, const PlainVector& n) const {
-  const uint32_t* const list = lists_.data() + (cell.ids[3] - kLong);
-  Support best{list[1], ValueOf(list[1], n), false};
-  // A single one stands for many.
-  if (list[0] == 1) return Climb(best, n);
-  for (uint32_t i = 2; i <= list[0]; ++i) {
-    const double value = ValueOf(list[i], n);
-    if (value > best.value) best = {list[i], value, false};
-  }
-  return best;
-}
-
-SupportMap::Support SupportMap::Climb(Support from, const PlainVector& n) const {
-  for (;;) {
-    Support best = from;
-    for (const uint32_t id : NeighborsOf(from.vertex)) {
-      const double value = ValueOf(id, n);
-      if (value > best.value) best = {id, value, false};
-    }
-    if (best.vertex == from.vertex) return from;
-    from = best;
-  }
-}
-
-SupportMap::Support SupportMap::ScanPortably(const PlainVector& n) const {
-  Support support;
-  ScanBlocks(blocks_, vertices_.size(), n, support);
-  return support;
-}
-
-#ifdef HULLD_HAS_AVX2_PATH
-__attribute__((target("avx2"))) SupportMap::Support SupportMap::ScanAvx2(
-    const PlainVector& n) const {
-  Support support;
-  ScanBlocks(blocks_, vertices_.size(), n, support);
-  return support;
-}
-#else
-SupportMap::Support SupportMap::ScanAvx2(const PlainVector& n) const { return ScanPortably(n); }
-#endif
-
 SupportMap::Support SupportMap::Scan(const PlainVector& n) const {
-  return CurrentSimdPath() == SimdPath::kAvx2 ? ScanAvx2(n) : ScanPortably(n);
-}
-
-// Calls visit(vertex, value) for all vertices with a value of at least from.value - slack, or says
-// false when there are too many. Such vertices are connected by edges among themselves.
-template <typename Visit>
-bool SupportMap::VisitPlateau(const Support& from, const PlainVector& n, double slack,
-                              Visit visit) const {
-  const double least = from.value - slack;
-  std::array<uint32_t, kMostFlooded> found;
-  size_t count = 1;
-  found[0] = from.vertex;
-  visit(from.vertex, from.value);
-  for (size_t next = 0; next < count; ++next) {
-    for (const uint32_t id : NeighborsOf(found[next])) {
-      const double value = ValueOf(id, n);
-      if (!(value >= least)) continue;
-      if (std::find(found.begin(), found.begin() + count, id) != found.begin() + count) continue;
-      if (count == kMostFlooded) return false;
-      found[count++] = id;
-      visit(id, value);
-    }
+  if (!blocks_.empty()) return FarthestOf(blocks_, points_.size(), n);
+  Support best{0, -INFINITY};
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    const double value = ValueOf(i, n);
+    if (value > best.value) best = {i, value};
   }
-  return true;
-}
-
-SupportMap::Support SupportMap::MakeCertain(Support from, const PlainVector& n, double blur) const {
-  double nearest = -INFINITY;
-  for (const uint32_t id : NeighborsOf(from.vertex)) nearest = std::max(nearest, ValueOf(id, n));
-  if (nearest < from.value - blur) return {from.vertex, from.value, true};
-  from = Climb(from, n);
-  Support best = from;
-  const auto consider = [&](uint32_t vertex, double value) {
-    if (value > best.value || (value == best.value && vertex < best.vertex)) {
-      best = {vertex, value, true};
-    }
-  };
-  if (!VisitPlateau(from, n, blur, consider)) {
-    for (uint32_t i = 0; i < vertices_.size(); ++i) consider(i, ValueOf(i, n));
-  }
-  best.certain = true;
   return best;
 }
 
-std::vector<uint32_t> SupportMap::Plateau(const PlainVector& n, double slack) const {
-  const Support top = CertainFarthest(n, slack);
-  const double least = top.value - slack;
-  std::vector<uint32_t> plateau;
-  const auto add = [&](uint32_t vertex, double value) {
-    if (value >= least) plateau.push_back(vertex);
-  };
-  if (!blocks_.empty() || !VisitPlateau(top, n, slack, add)) {
-    plateau.clear();
-    for (uint32_t i = 0; i < vertices_.size(); ++i) add(i, ValueOf(i, n));
+void SupportMap::BuildBlocks() {
+  blocks_.resize((points_.size() + 3) / 4);
+  for (size_t i = 0; i < 4 * blocks_.size(); ++i) {
+    blocks_[i / 4].Set(i % 4, points_[std::min(i, points_.size() - 1)]);
   }
-  std::sort(plateau.begin(), plateau.end());
-  return plateau;
+}
+
+// Calls visit(id) for each point that the cell of n lists, some of them more than once.
+template <typename Visit>
+void SupportMap::VisitCell(const PlainVector& n, Visit visit) const {
+  Place place = PlaceOf(n);
+  const Cell* cell = &CellAt(place);
+  while (cell->ids[3] >= kDivided) {
+    const auto part = [](double& x) {
+      x = (x - std::floor(x)) * kPartsASide;
+      return std::min(static_cast<uint32_t>(x), kPartsASide - 1);
+    };
+    const uint32_t i = part(place.s);
+    const uint32_t j = part(place.t);
+    cell = &cells_[(cell->ids[3] - kDivided) + i * kPartsASide + j];
+  }
+  if (cell->ids[3] < kLong) {
+    for (const uint32_t id : cell->ids) visit(id);
+    return;
+  }
+  const uint32_t* const list = lists_.data() + (cell->ids[3] - kLong);
+  for (uint32_t k = 1; k <= list[0]; ++k) visit(list[k]);
+}
+
+SupportMap::Support SupportMap::LookUpDeep(const PlainVector& n) const {
+  Support best{0, -INFINITY};
+  VisitCell(n, [&](uint32_t id) {
+    const double value = ValueOf(id, n);
+    // NaN, of a direction beyond all ranges, still gives some point.
+    if (value > best.value || best.value == -INFINITY) best = {id, value};
+  });
+  return best;
+}
+
+void SupportMap::AppendCandidates(const PlainVector& n, double error, double least, uint32_t first,
+                                  std::vector<uint32_t>& candidates) const {
+  const auto begin = static_cast<std::ptrdiff_t>(candidates.size());
+  const auto consider = [&](uint32_t id) {
+    if (ValueOf(id, n) >= least) candidates.push_back(first + id);
+  };
+  const double largest = OnCube(n.x * scale_.x, n.y * scale_.y, n.z * scale_.z).largest();
+  // A component over the largest moves by less than three times the error over the largest.
+  if (scans() || !(4 * error <= kCellMargin * largest)) {
+    for (uint32_t i = 0; i < points_.size(); ++i) consider(i);
+    return;
+  }
+  VisitCell(n, consider);
+  std::sort(candidates.begin() + begin, candidates.end());
+  candidates.erase(std::unique(candidates.begin() + begin, candidates.end()), candidates.end());
+}
+
+std::vector<uint32_t> SupportMap::Listed() const {
+  std::vector<char> is_listed(points_.size(), scans());
+  for (const Cell& cell : cells_) {
+    if (cell.ids[3] >= kLong) continue;
+    for (const uint32_t id : cell.ids) is_listed[id] = 1;
+  }
+  for (size_t at = 0; at < lists_.size(); at += lists_[at] + 1) {
+    for (uint32_t k = 1; k <= lists_[at]; ++k) is_listed[lists_[at + k]] = 1;
+  }
+  std::vector<uint32_t> listed;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    if (is_listed[i]) listed.push_back(i);
+  }
+  return listed;
 }
 
 size_t SupportMap::MemoryBytes() const {
-  return blocks_.capacity() * sizeof(Block) + cells_.capacity() * sizeof(Cell) +
-         (neighbor_starts_.capacity() + neighbors_.capacity() + lists_.capacity()) *
-             sizeof(uint32_t);
+  return blocks_.capacity() * sizeof(SupportBlock) + cells_.capacity() * sizeof(Cell) +
+         lists_.capacity() * sizeof(uint32_t);
 }
 
 }  // namespace hulld

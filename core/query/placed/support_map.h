@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,138 +14,125 @@
 #include "core/numeric/cube_map.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/plain_vector.h"
+#include "core/query/placed/support_blocks.h"
 
 namespace hulld {
 
-// Finds the vertices of a hull that lie farthest along a direction.
+// Finds the points of a finite set that lie farthest along a direction.
 //
-// A small hull is scanned, four vertices at a time. For a large one the directions are divided into
-// the cells of a cube map, each of which lists the vertices that are farthest along some direction
-// in it: those whose normal cone meets the cell. The lists are made by drawing the edges of the
-// Gauss map (the arcs between the normals of neighbouring facets) into the cells; a cell without
-// any lies within one cone. Directions are first scaled by the extents of the hull, so that the
-// cells of an oblong hull are filled evenly. Rounding may misplace an arc, so what a list gives is
-// certain only after a look at its neighbours. On a convex polytope a path of edges that never
-// descends leads from every vertex to the farthest. So a vertex whose neighbours are all nearer is
-// the farthest. Where some neighbour is within `blur` of it, the plateau of vertices within `blur`
-// is flooded, which holds the path.
+// Few points are scanned, four at a time. For many the directions are divided into the cells of a
+// cube map, each of which lists the points that may be the farthest along some direction in it. A
+// point p is left out of a cell where another point q is at least as far along every direction of
+// the cell, exactly: along the directions of a square on a face of the cube, n . (p - q) is largest
+// at a corner, so that one evaluation with a proven bound shows it. Cells are filled from the whole
+// face down, each from the list of the square that it is a part of. Cells with many points are
+// divided further. Directions are first scaled by the extents of the set, so that the cells of an
+// oblong set are filled evenly.
+//
+// The set need not be convex: points inside its hull are listed in few cells or in none, and flat
+// sets are like any other. Squares are widened by kCellMargin, so that a list also holds every
+// point that is farthest along a direction which differs from the one looked up by less.
 //
 // Values n . v are computed as (n.x v.x + n.y v.y) + n.z v.z, the same bits on any instruction set.
-// `blur` must be at least twice the largest error of such a value over the vertices of the hull.
 class SupportMap {
  public:
+  // On a face of the cube, whose coordinates run from -1 to 1.
+  static constexpr double kCellMargin = 0x1p-30;
+
   SupportMap() = default;
-  // `hull` must outlive the map. Cost: O(V), for a large hull O(V log V).
-  explicit SupportMap(const Hull& hull);
+  // `points` must outlive the map. Cost: O(V log V), 0.2 to 1 us a point; O(V) for few.
+  explicit SupportMap(std::span<const Vector> points);
+  explicit SupportMap(const Hull& hull) : SupportMap(hull.vertices()) {}
+  // The same answers at O(V) each, without any preparation.
+  static SupportMap ForScanning(std::span<const Vector> points);
 
-  struct Support {
-    uint32_t vertex = 0;
-    double value = 0;
-    // Whether `value` is the largest computed value of all vertices.
-    bool certain = false;
-  };
+  using Support = SupportPoint;
 
-  // A vertex far along n, the farthest where certain and almost always otherwise. Requires the hull
-  // not empty. Cost: O(V) for a small hull, O(1) on average for a large one.
+  // A point farthest along n: its computed value is the largest of all but for the rounding of two
+  // values. Requires points. Cost: O(V) where points are scanned, O(1) on average otherwise.
   Support Farthest(const PlainVector& n) const {
-    HULLD_DCHECK(!vertices_.empty());
+    HULLD_DCHECK(!points_.empty());
     return cells_.empty() ? Scan(n) : LookUp(n);
   }
 
-  // The farthest: `value` is within `blur` of the largest computed value.
-  Support CertainFarthest(const PlainVector& n, double blur) const {
-    return CertainFarthest(n, blur, Farthest(n).vertex);
-  }
-  // The same, from what Farthest(n) found.
-  Support CertainFarthest(const PlainVector& n, double blur, uint32_t found) const {
-    const Support from{found, ValueOf(found, n), cells_.empty()};
-    return from.certain ? from : MakeCertain(from, n, blur);
-  }
+  // Appends, ascending, points whose value is at least `least`, which is below the largest: among
+  // them all that are exactly farthest along some direction whose components differ from those of n
+  // by up to `error`, when `least` allows for what their values may err. `first` is added to each
+  // index. Cost: O(V) where points are scanned or the error is too large for the cells.
+  void AppendCandidates(const PlainVector& n, double error, double least, uint32_t first,
+                        std::vector<uint32_t>& candidates) const;
 
-  // All vertices whose computed value is within `slack` of the largest, ascending. Requires slack
-  // >= blur (unchecked: the map does not know the caller's blur).
-  std::vector<uint32_t> Plateau(const PlainVector& n, double slack) const;
+  // The points that some cell lists, ascending: their hull is that of all. All, where points are
+  // scanned.
+  std::vector<uint32_t> Listed() const;
 
+  bool scans() const { return cells_.empty(); }
   size_t MemoryBytes() const;
 
  private:
-  // Four vertices, as structure of arrays; the last one repeated where there are fewer.
-  struct Block {
-    double x[4];
-    double y[4];
-    double z[4];
-  };
-  // The vertices of a cell of the cube map, repeated where there are fewer than four. Where there
-  // are more, ids[3] is kLong plus where in lists_ their number and they begin.
+  // The points of a cell, repeated where there are fewer than four. Where there are more, ids[3] is
+  // kLong plus where in lists_ their number and they begin. Where the cell is divided, ids[3] is
+  // kDivided plus where in cells_ its parts begin, kPartsASide rows of as many.
   struct Cell {
     uint32_t ids[4];
   };
   static constexpr uint32_t kLong = uint32_t{1} << 31;
-  struct CellVertex {
-    uint32_t cell;
-    uint32_t vertex;
-    friend auto operator<=>(const CellVertex&, const CellVertex&) = default;
-  };
-  class ArcDrawing;
+  static constexpr uint32_t kDivided = uint32_t{3} << 30;
+  static constexpr uint32_t kPartsASide = 4;
+  class Filling;
 
   void BuildBlocks();
-  void BuildNeighbors(const Hull& hull);
-  void BuildCells(const Hull& hull);
-  void FillCells(std::vector<CellVertex> entries);
-
-  std::span<const uint32_t> NeighborsOf(uint32_t vertex) const {
-    return std::span(neighbors_)
-        .subspan(neighbor_starts_[vertex], neighbor_starts_[vertex + 1] - neighbor_starts_[vertex]);
-  }
   Support Scan(const PlainVector& n) const;
-  Support ScanPortably(const PlainVector& n) const;
-  Support ScanAvx2(const PlainVector& n) const;
-  uint32_t CellOf(const PlainVector& n_own) const;
-  Vector CenterOf(uint32_t cell) const;
-  Support LookUp(const PlainVector& n) const;
-  Support LookUpLong(const Cell& cell, const PlainVector& n) const;
-  Support Climb(Support from, const PlainVector& n) const;
-  Support MakeCertain(Support from, const PlainVector& n, double blur) const;
   template <typename Visit>
-  bool VisitPlateau(const Support& from, const PlainVector& n, double slack, Visit visit) const;
+  void VisitCell(const PlainVector& n, Visit visit) const;
+  Support LookUp(const PlainVector& n) const;
+  Support LookUpDeep(const PlainVector& n) const;
   double ValueOf(uint32_t vertex, const PlainVector& n) const {
-    const Vector& v = vertices_[vertex];
-    return (n.x * v.x() + n.y * v.y()) + n.z * v.z();
+    const Vector& v = points_[vertex];
+    return SupportValue(n, v.x(), v.y(), v.z());
   }
 
-  std::span<const Vector> vertices_;
-  // Small hulls: all vertices.
-  std::vector<Block> blocks_;
-  // Large hulls: the neighbours of vertex i are those from neighbor_starts_[i] to [i + 1].
-  std::vector<uint32_t> neighbor_starts_;
-  std::vector<uint32_t> neighbors_;
-  // Large hulls: the cube map, 6 x side x side.
+  // Where a direction is among the cells: the face, and the coordinates there in cells.
+  struct Place {
+    uint32_t face;
+    double s;
+    double t;
+  };
+  Place PlaceOf(const PlainVector& n) const;
+  const Cell& CellAt(const Place& place) const {
+    return cells_[CubeCell(place.face, side_, static_cast<uint32_t>(static_cast<int32_t>(place.s)),
+                           static_cast<uint32_t>(static_cast<int32_t>(place.t)))];
+  }
+
+  std::span<const Vector> points_;
+  // Few points: all of them.
+  std::vector<SupportBlock> blocks_;
+  // Many points: the cube map, 6 x side x side, and the parts of cells that are divided.
   std::vector<Cell> cells_;
   std::vector<uint32_t> lists_;
   PlainVector scale_ = {1, 1, 1};
   uint32_t side_ = 0;
-  // side_ / 2, and a little less.
+  // side_ / 2, and the largest double below side_.
   double half_ = 0;
-  double below_half_ = 0;
+  double below_side_ = 0;
 };
 
-// Zero and what overflows get some cell, too.
-inline uint32_t SupportMap::CellOf(const PlainVector& n_own) const {
-  const OnCube n(n_own.x * scale_.x, n_own.y * scale_.y, n_own.z * scale_.z);
-  const double factor = half_ / n.largest();
+// Zero and what overflows get some place, too.
+inline SupportMap::Place SupportMap::PlaceOf(const PlainVector& n) const {
+  const OnCube on_cube(n.x * scale_.x, n.y * scale_.y, n.z * scale_.z);
+  const double factor = half_ / on_cube.largest();
   // Written so that NaN becomes a number.
-  const auto index = [&](double component) {
-    double place = component * factor;
-    place = place < below_half_ ? place : below_half_;
-    place = place > -below_half_ ? place : -below_half_;
-    return static_cast<uint32_t>(static_cast<int64_t>(place + half_));
+  const auto place = [&](double component) {
+    double x = component * factor + half_;
+    x = x < below_side_ ? x : below_side_;
+    return x > 0 ? x : 0;
   };
-  return CubeCell(n.face(), side_, index(n.first()), index(n.second()));
+  return {on_cube.face(), place(on_cube.first()), place(on_cube.second())};
 }
 
 inline SupportMap::Support SupportMap::LookUp(const PlainVector& n) const {
-  const Cell& cell = cells_[CellOf(n)];
-  if (cell.ids[3] >= kLong) return LookUpLong(cell, n);
+  const Cell& cell = CellAt(PlaceOf(n));
+  if (cell.ids[3] >= kLong) return LookUpDeep(n);
   const double v0 = ValueOf(cell.ids[0], n);
   const double v1 = ValueOf(cell.ids[1], n);
   const double v2 = ValueOf(cell.ids[2], n);
@@ -156,7 +144,7 @@ inline SupportMap::Support SupportMap::LookUp(const PlainVector& n) const {
   const uint32_t high = 2 + (v3 > v2);
   const uint32_t is_high = high_value > low_value;
   const uint32_t best = (low & (is_high - 1)) | (high & -is_high);
-  return {cell.ids[best], std::max(low_value, high_value), false};
+  return {cell.ids[best], std::max(low_value, high_value)};
 }
 
 }  // namespace hulld

@@ -46,6 +46,9 @@ struct QueryOptions {
     // Every pair asks this, so it has no branches.
     return (want_axis | want_analysis | want_certificate | want_separation | want_witness) != 0;
   }
+  // Whether an answer names vertices or facets by index, or depends on a hull's canonical snapshot
+  // otherwise: then a version of a LiveHull will not do.
+  bool WantsCanonical() const { return method == Method::kTextbookSat || WantsDetails(); }
   // Whether the search may stop as soon as it knows the relation, which is the cheapest question.
   // Nothing else decides this.
   bool WantsRelationOnly() const {
