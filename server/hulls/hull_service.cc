@@ -102,11 +102,14 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   EncodeHeader(registry_.store(), revision, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
   EncodeBox(*view.served, response);
+  if (request.without_facets() && !request.audit()) return absl::OkStatus();
   const auto should_stop = [&call] { return call.ShouldStop(); };
   const absl::StatusOr<const Hull*> hull = registry_.Canonical(view, should_stop);
   if (!hull.ok()) return hull.status();
-  response->set_edge_count((*hull)->edges().size());
-  response->set_facet_count((*hull)->facet_count());
+  if (!request.without_facets()) {
+    response->set_edge_count((*hull)->edges().size());
+    response->set_facet_count((*hull)->facet_count());
+  }
   if (!request.audit()) return absl::OkStatus();
   const absl::Status finding = AuditHull(**hull, should_stop);
   if (absl::IsCancelled(finding)) return finding;
