@@ -1,5 +1,7 @@
 #include "server/process/task_pool.h"
 
+#include <sys/prctl.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -67,11 +69,14 @@ void TaskPool::NoteWaiting() {
   if (slice_metrics_) slice_metrics_->waiting.Set(static_cast<double>(slices_waiting_));
 }
 
+bool TaskPool::IsReserved() const {
+  const Clock::time_point last(last_single_call_.load(std::memory_order_relaxed));
+  return Clock::now() - last < kReserveTime;
+}
+
 bool TaskPool::MayRunSlice() const {
   if (ending_ || threads_.size() == 1) return true;
-  const Clock::time_point last(last_single_call_.load(std::memory_order_relaxed));
-  const bool is_reserved = Clock::now() - last < kReserveTime;
-  return slices_running_ < threads() - (is_reserved ? 1 : 0);
+  return slices_running_ < threads() - (IsReserved() ? 1 : 0);
 }
 
 std::optional<TaskPool::Task> TaskPool::Next() {
@@ -93,6 +98,8 @@ std::optional<TaskPool::Task> TaskPool::Next() {
 }
 
 void TaskPool::Work() {
+  // Else the system may let a pause last 50 us longer.
+  prctl(PR_SET_TIMERSLACK, 1000UL);
   std::unique_lock lock(mutex_);
   while (true) {
     std::optional<Task> task = Next();
@@ -114,6 +121,7 @@ void TaskPool::Work() {
     }
     task->run();
     task->run = nullptr;  // what it holds goes before the lock is taken again
+    if (task->is_slice && IsReserved()) std::this_thread::sleep_for(kPauseTime);
     lock.lock();
     if (task->is_slice) --slices_running_;
   }

@@ -32,12 +32,18 @@ class TaskPool {
 
  public:
   // How long a slice may take. A choice: an answer of a single call takes about as long over the
-  // wire, and a switch of tasks (observed: 2 us) costs a thousandth.
-  static constexpr std::chrono::milliseconds kSliceTime{1};
+  // wire, and a switch of tasks (observed: 2 us) costs a hundredth.
+  static constexpr std::chrono::microseconds kSliceTime{250};
   // While single calls arrive, and this long after, slices leave one thread's core to them: the
   // system lets a thread that computes go on for some milliseconds (a tick of Linux is 1 to 10 ms)
   // before gRPC's threads, which bring the calls, get their turn.
   static constexpr std::chrono::milliseconds kReserveTime{20};
+  // Meanwhile a thread pauses so long after each slice: the system gives its core to the threads of
+  // gRPC, and of clients on this machine, that wait for one, and would otherwise let this thread go
+  // on until the next tick. Observed on two cores: single calls beside batches have a p99 of 2.2 to
+  // 2.5 times idle, without pauses 7 to 9 times; batches make 45 % fewer pairs meanwhile. Beside
+  // other programs nothing is lost, as a thread that paused is owed its share.
+  static constexpr std::chrono::microseconds kPauseTime{80};
 
   // The slices of one long call. Destroyed with none of them waiting: let each hold its owner.
   class Lane {
@@ -81,6 +87,8 @@ class TaskPool {
   size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 
  private:
+  // Whether a single call came less than kReserveTime ago.
+  bool IsReserved() const;
   void SubmitSlice(Lane& lane, std::function<void()> slice);
   void Work();
   // The rest requires the mutex.

@@ -91,7 +91,7 @@ Pose TouchVertices(const QueryHull& a, const Pose& X_WA, const QueryHull& b, Pos
   const Eigen::Matrix3d R_WA = PlacedHull::Make(a, X_WA)->R_WH();
   const Eigen::Matrix3d R_WB = PlacedHull::Make(b, X_WB)->R_WH();
   const auto farthest = [](const QueryHull& hull, const Vector& n) {
-    return hull.hull().vertices()[hull.support().CertainFarthest(n, 0).vertex];
+    return hull.hull().vertices()[hull.Farthest(n).vertex];
   };
   const Vector p = R_WA * farthest(a, R_WA.transpose() * direction) + X_WA.t;
   X_WB.t = p - R_WB * farthest(b, R_WB.transpose() * -direction);

@@ -127,7 +127,7 @@ class LookedUp {
   explicit LookedUp(const Hull& hull) : query_hull_(hull) {}
   const Vector& center() const { return query_hull_.hull().center(); }
   const Vector& Farthest(const Vector& n, uint32_t& /*from*/) const {
-    return query_hull_.hull().vertices()[query_hull_.support().Farthest(n).vertex];
+    return query_hull_.hull().vertices()[query_hull_.Farthest(n).vertex];
   }
 
  private:

@@ -220,12 +220,12 @@ TEST(LiveHull, WorkAStepIsPolylogarithmic) {
   Random random(TestSeed(945));
   const Hull probe = BuildHull(RandomOnSphere(random, 20, 1));
   const QueryHull query_probe(probe);
-  for (const int n : {1000, 8000}) {
+  for (const int n : {500, 4000}) {
     Growing growing;
     growing.Add(RandomOnSphere(random, n, 1));
     growing.live.Prepare(growing.mark);
     const uint64_t before = growing.live.points_moved();
-    const int steps = n;
+    const int steps = 4000;
     uint64_t longest_tail = 0;
     uint64_t since = 0;
     for (int i = 0; i < steps; ++i) {
@@ -233,7 +233,8 @@ TEST(LiveHull, WorkAStepIsPolylogarithmic) {
       ++since;
       const auto version = growing.live.VersionAt(growing.mark);
       Pose pose;
-      pose.t = (1.98 + 1e-3 * i) * Vector(1, 0, 0);
+      // Just out of contact.
+      pose.t = (1.99 + 1e-3 * i) * RandomOnSphere(random, 1, 1)[0];
       ASSERT_TRUE(CheckCollision(PlacedHull(*version, Pose()), PlacedHull(query_probe, pose)).ok());
       if (growing.live.WantsPreparing(growing.mark)) {
         longest_tail = std::max(longest_tail, since);
@@ -244,7 +245,7 @@ TEST(LiveHull, WorkAStepIsPolylogarithmic) {
     const double moved = static_cast<double>(growing.live.points_moved() - before) / steps;
     EXPECT_LT(moved, 2 * std::log2(n)) << n;
     EXPECT_GT(longest_tail, 0u) << n;
-    EXPECT_LT(longest_tail, 2000u) << n;
+    EXPECT_LT(longest_tail, 4000u) << n;
   }
 }
 
