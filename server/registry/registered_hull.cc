@@ -33,6 +33,12 @@ void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
   live = std::move(points);
   committed_mark = live->Now();
   live_is_ahead = false;
+  points_since_prepared = 0;
+}
+
+bool RegisteredHull::HoldsMuchElse() const {
+  constexpr uint64_t kFewPoints = 1 << 14;
+  return points_since_prepared > 2 * committed.record.vertex_count + kFewPoints;
 }
 
 // A mark may be the last to hold what was prepared before.

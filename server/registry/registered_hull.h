@@ -54,6 +54,10 @@ struct RegisteredHull {
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                  MemoryBudget& budget);
 
+  // Whether most points of `live` are no vertices any more: preparing drops them, and keeps memory
+  // bounded where points take each other in and nobody asks. It costs a part of what appending
+  // those points did.
+  bool HoldsMuchElse() const;
   // Counts what the hull holds now, and that it was used just now.
   void NoteUse() { account.Set(MemoryBytes()); }
   // Drops the builder, unless a thread owns it.
@@ -90,6 +94,8 @@ struct RegisteredHull {
   bool loading = false;
   // A thread prepares `live`, or is about to.
   bool preparing = false;
+  // What was committed since that was done last, or since `live` was made.
+  uint64_t points_since_prepared = 0;
   // The version of `live` at committed_mark; null until the first reader after a change asks.
   std::shared_ptr<const ServedHull> served;
   // Its snapshot, shared by all that is served of committed.record.revision.

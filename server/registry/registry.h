@@ -53,8 +53,9 @@ struct PendingChunk;
 // occupy no thread meanwhile.
 //
 // Once questions about a hull have paid for preparing it (LiveHull::WantsPreparing), that is done
-// by a thread of its own, or by a reader that expects to ask that much. The canonical snapshot of a
-// version is made by the first reader that needs it, without the mutex. Thread-safe.
+// by a thread of its own, or by a reader that expects to ask that much. The same thread prepares
+// hulls that would otherwise come to hold many points that are no vertices any more. The canonical
+// snapshot of a version is made by the first reader that needs it, without the mutex. Thread-safe.
 //
 // Lock order: first the mutex of the records; then that of the committer's queue, of the budget, of
 // a pool or within a LiveHull. None of the latter is held while another lock is taken. Callbacks

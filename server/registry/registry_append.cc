@@ -401,6 +401,8 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const Pendin
       return AnswerChunk(later, done, sequence, status);
     }
     CommitChunk(later, *hull, after, mark, writer_id, sequence);
+    hull->points_since_prepared += counts.outside;
+    if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
     const HullRecord& record = after.record;
     AnswerChunk(later, done, sequence,
                 ChunkResult{revision_, false, record.revision, record.vertex_count, counts});

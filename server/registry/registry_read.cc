@@ -250,6 +250,7 @@ bool Registry::WantsPreparing(const RegisteredHull& hull, uint64_t expected_ques
 void Registry::Prepare(Locked& locked, RegisteredHull& hull) {
   HULLD_CHECK(!hull.preparing && hull.live != nullptr);
   hull.preparing = true;
+  hull.points_since_prepared = 0;
   const std::shared_ptr<LiveHull> live = hull.live;
   const LiveHull::Mark mark = hull.committed_mark;
   locked.Unlock();

@@ -230,6 +230,23 @@ TEST_F(RegistryTest, WhatQuestionsPayForIsPreparedFirstOnlyForWhoeverWaits) {
   EXPECT_EQ(&CanonicalOf(*before->hulls[0]), &CanonicalOf(*after->hulls[0]));
 }
 
+// Each chunk takes all points before it into the hull. Nobody asks.
+TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
+  constexpr int kVertices = 100;
+  constexpr uint64_t kChunks = 1000;
+  const AppendSession session = Open("h");
+  for (uint64_t i = 1; i <= kChunks; ++i) {
+    const auto result = Append(session, i, SpherePoints(kVertices, static_cast<double>(i)));
+    ASSERT_EQ(result->counts.outside, kVertices);
+    ASSERT_EQ(result->vertex_count, kVertices);
+  }
+  // All of them would be 2.4 MB. Bounded by the time limit of the test alone.
+  while (registry_.Cache().bytes > 2'000'000) std::this_thread::yield();
+  const HullView view = registry_.Resolve("h", {})->second;
+  EXPECT_LT(view.served->query_hull().point_count(), 30'000);
+  EXPECT_EQ(CanonicalOf(view).vertices().size(), view.record.vertex_count);
+}
+
 // The thread that prepares does it after the reader has gone on.
 TEST_F(RegistryTest, WhatManyQuestionsPaidForIsPrepared) {
   const std::vector<std::string> ids = {"h"};
