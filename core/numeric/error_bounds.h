@@ -43,9 +43,10 @@ inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 // Queries in floating point: S is the size of a pair, |.| the largest absolute component, and all
 // bounds hold for S between kFilterMinSize and kFilterMaxSize.
 
-// Entries of the rotation matrix R(q)/|q|^2, computed from q scaled by a power of two to a largest
-// component in [1/2, 1): each numerator is a sum of at most 4 products (error at most 7 u |q|^2),
-// the squared norm has relative error at most 4 u, the quotient one rounding more: |error| <= 12 u
+// Entries of the rotation matrix R(q)/|q|^2, computed from q of which the largest component is
+// within [kQuaternionMin, kQuaternionMax], or brought into [1/2, 1) by a power of two: each
+// numerator is a sum of at most 4 products (error at most 7 u |q|^2), the squared norm has relative
+// error at most 4 u, its reciprocal one rounding more, their product one: |error| <= 13 u + 50 u^2
 // < 16 u, as no entry exceeds 1. Proven.
 inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 

@@ -1,5 +1,8 @@
 #include "core/query/floating/float_pair.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace hulld {
 
 FloatPair::Support FloatPair::CertainFarthest(const PlainVector& n_W, const Support& found) const {
@@ -12,12 +15,29 @@ FloatPair::Support FloatPair::CertainFarthest(const PlainVector& n_W, const Supp
   return {{a.vertex, b.vertex}, a.value + b.value - Dot(n_W, offset_), true};
 }
 
-std::vector<uint32_t> FloatPair::CandidatesA(const Vector& n_W, double error) const {
-  return a_->query_hull().support().Plateau(InA(n_W), Slack(n_W, error));
-}
-
-std::vector<uint32_t> FloatPair::CandidatesB(const Vector& n_W, double error) const {
-  return b_->query_hull().support().Plateau(-InB(n_W), Slack(n_W, error));
+std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
+                                                  const PlainVector& n_own, double slack,
+                                                  CandidateBuffer& buffer) {
+  const std::span<const Vector> vertices = placed.hull().vertices();
+  if (vertices.size() > CandidateBuffer::kMostFew) {
+    buffer.many = placed.query_hull().support().Plateau(n_own, slack);
+    return buffer.many;
+  }
+  // A small hull is scanned here, as a plateau needs an allocation.
+  std::array<double, CandidateBuffer::kMostFew> values;
+  double largest = -INFINITY;
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    const Vector& v = vertices[i];
+    values[i] = (n_own.x * v.x() + n_own.y * v.y()) + n_own.z * v.z();
+    largest = std::max(largest, values[i]);
+  }
+  const double least = largest - slack;
+  size_t count = 0;
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    buffer.few[count] = static_cast<uint32_t>(i);
+    count += values[i] >= least ? 1 : 0;
+  }
+  return std::span(buffer.few).first(count);
 }
 
 Vector FloatPair::InnerPoint(const PlacedHull& placed) {

@@ -1,7 +1,9 @@
 #ifndef HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_
 #define HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/check.h"
@@ -12,6 +14,13 @@
 #include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
+
+// Where lists of candidates live: those of small hulls without allocation.
+struct CandidateBuffer {
+  static constexpr size_t kMostFew = 64;
+  std::array<uint32_t, kMostFew> few;
+  std::vector<uint32_t> many;
+};
 
 // A pair of placed hulls in floating point, with proven error bounds (core/numeric/error_bounds.h).
 // Everything is relative to the world shifted by -t_A: A is rotated only, B is rotated and moved by
@@ -61,10 +70,16 @@ class FloatPair {
   }
 
   // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
-  // up to `error`.
-  std::vector<uint32_t> CandidatesA(const Vector& n_W, double error) const;
+  // up to `error`. They live in the buffer.
+  std::span<const uint32_t> CandidatesA(const Vector& n_W, double error,
+                                        CandidateBuffer& buffer) const {
+    return CandidatesOf(*a_, InA(n_W), Slack(n_W, error), buffer);
+  }
   // All vertices of B that may be farthest against n_W.
-  std::vector<uint32_t> CandidatesB(const Vector& n_W, double error) const;
+  std::span<const uint32_t> CandidatesB(const Vector& n_W, double error,
+                                        CandidateBuffer& buffer) const {
+    return CandidatesOf(*b_, -InB(n_W), Slack(n_W, error), buffer);
+  }
 
   // Positions, each component within kMinkowskiErrorFactor * size().
   PlainVector PositionA(uint32_t i) const { return Rotated(*a_, i); }
@@ -90,6 +105,8 @@ class FloatPair {
     return 2 * (kSupportErrorFactor * LargestComponent(n_W) * size_) +
            kDirectionErrorFactor * error * size_;
   }
+  static std::span<const uint32_t> CandidatesOf(const PlacedHull& placed, const PlainVector& n_own,
+                                                double slack, CandidateBuffer& buffer);
   static PlainVector Rotated(const PlacedHull& placed, uint32_t i) {
     return OutOfOwnFrame(placed, placed.hull().vertices()[i]);
   }

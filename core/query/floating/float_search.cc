@@ -33,6 +33,9 @@ class Simplex {
     return false;
   }
 
+  // Drops all but the newest.
+  void KeepNewest() { Keep(order_[count_ - 1]); }
+
   // Requires count() < 4.
   void Add(const PlainVector& w, VertexPair pair) {
     HULLD_DCHECK(count_ < 4);
@@ -262,6 +265,7 @@ class FloatSearch {
     while (result_.directions_tried < kMaxDirections && Explore(n)) {
     }
     if (result_.verdict != FloatVerdict::kSeparated) {
+      result_.axis = along_;
       result_.pair_count = simplex_.count();
       for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.corner(i).pair;
     }
@@ -286,17 +290,28 @@ class FloatSearch {
       if (farthest.value < -error) return EndSeparated(n);
     }
     const PlainVector along = n;
+    along_ = along;
     // Else nothing is farther towards the origin.
     const bool progress = !simplex_.Contains(farthest.pair);
     bool outside = true;
+    bool at_corner = false;
     if (progress) {
-      simplex_.Add(pair_.Difference(farthest.pair), farthest.pair);
-      outside = simplex_.Reduce(n);
+      const PlainVector w = pair_.Difference(farthest.pair);
+      simplex_.Add(w, farthest.pair);
+      // A vertex this near to the origin: its direction is rounding, and nothing can be certain of
+      // which the bounds are larger.
+      at_corner = LargestComponent(w) <= kMinkowskiErrorFactor * pair_.size();
+      if (at_corner) {
+        simplex_.KeepNewest();
+      } else {
+        outside = simplex_.Reduce(n);
+      }
     }
     if (tolerance_ > 0 && IsWithinTolerance(along, farthest, error)) {
       result_.verdict = FloatVerdict::kWithinTolerance;
       return false;
     }
+    if (at_corner) return false;
     if (outside) return progress;
     if (HoldsOrigin(pair_, simplex_.corner(0).w, simplex_.corner(1).w, simplex_.corner(2).w,
                     simplex_.corner(3).w)) {
@@ -331,6 +346,8 @@ class FloatSearch {
   const FloatPair& pair_;
   const double tolerance_;
   Simplex simplex_;
+  // The last direction tried.
+  PlainVector along_;
   // With a tolerance: the least reach of A - B beyond the origin along some direction, and the
   // least distance of some point of it, so far.
   double reach_ = INFINITY;
