@@ -62,6 +62,14 @@ inline constexpr double kMinkowskiErrorFactor = 128 * kUnitRoundoff;
 // M in all. The translation's part errs by at most 12 u |n| |t|, the final sums by at most 11 u |n|
 // S. In total below 200 u |n| S; 512 u leaves room for a direction that itself errs by up to 16 u
 // |n| per component (sqrt(3) * 16 * 3 u |n| M < 84 u |n| M more). Proven.
+//
+// The same for a small pair, whose vertices are turned instead (small_pair.h), to the same total. A
+// turned vertex errs by 57 u M per component, so its value by 171 u |n| M. Values are rounded by 16 u
+// |n| S, and the number of a vertex in the low 4 bits of a value, at most 3 |n| S in magnitude,
+// changes it by 16 units in the last place, 96 u |n| S: the largest so found is below the true one by
+// at most (171 + 16 + 96) u |n| S, and what its turned vertices give by (96 + 16) u |n| S more. The
+// value is then computed from their difference, at most 4 S: rounding the difference and moving B
+// take 3 * 7 u |n| S, the product 36 u |n| S. In total below 460 u |n| S. Proven.
 inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 
 // det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most

@@ -45,6 +45,8 @@ class FloatPair {
   bool usable() const { return usable_; }
   // The size S of the pair that the bounds are relative to.
   double size() const { return size_; }
+  // t_B - t_A, rounded.
+  const PlainVector& offset() const { return offset_; }
 
   // A vertex of A - B far along a direction.
   struct Support {
