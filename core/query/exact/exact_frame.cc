@@ -27,8 +27,8 @@ int ExponentAbove(double x) {
   return d.exponent + static_cast<int>(std::bit_width(d.magnitude));
 }
 
-// Divides by the least component that is not zero, where it divides all; the rest is up to the
-// caller.
+// Divides by the least component that is not zero, where it divides all. A greatest common divisor
+// would find more, at the price of many divisions; common powers of two are left to the caller.
 void DivideByLeast(std::array<int64_t, 4>& q) {
   int64_t least = INT64_MAX;
   for (const int64_t c : q) {
@@ -42,7 +42,7 @@ void DivideByLeast(std::array<int64_t, 4>& q) {
   for (int64_t& c : q) c /= least;
 }
 
-// What two hulls share of their world coordinates' bits.
+// The bits of a hull's own coordinates once they are turned and in the pair's unit.
 int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
   // |R p| = N |p| <= N sqrt(3) times the largest component.
   return norm_bits + (side.exponent - exponent) + side.own_bits + 1;
