@@ -143,6 +143,7 @@ function extremes(   n, i, part, a, b) {
 
 function set_name(set) {
   if (set == "ur5") return "UR5, 72 to 220"
+  if (sub(/^mating:/, "", set)) return set ", face on face"
   sub(/^sphere:/, "", set)
   return set
 }
@@ -177,9 +178,11 @@ function relation(   s, p, r, key, text, n) {
 function touching(   s, p, n, key) {
   read_rows("query_relation_" machine)
   head("| vertices | hulld | FCL, libccd | FCL, own | libccd MPR | libccd GJK | Bullet |")
-  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
+  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5,mating:8,mating:64", sets, ",")
   n = split("hulld,FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet", peers, ",")
-  for (s = 1; s <= 5; s++) {
+  for (s = 1; s <= 7; s++) {
+    # Measured since these sets exist.
+    if (!((sets[s] " contact" SUBSEP "hulld", "ns") in cell)) continue
     printf "| %s |", set_name(sets[s])
     for (p = 1; p <= n; p++) {
       key = sets[s] " contact" SUBSEP peers[p]
