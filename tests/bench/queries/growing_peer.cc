@@ -31,6 +31,8 @@ class BulletHull : public GrowingPeer {
   // The box is not brought up to date, as neither GJK looks at it.
   void Add(const Vector& point) override { shape_.addPoint(ToBullet(point), false); }
 
+  void UpdateBox() override { shape_.recalcLocalAabb(); }
+
   bool CollidesBySolver(const GrowingPeer& other, const Pose& X_AB) const override {
     const auto& b = static_cast<const BulletHull&>(other);
     const btTransform X_B = ToBullet(X_AB);

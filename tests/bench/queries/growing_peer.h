@@ -14,6 +14,8 @@ class GrowingPeer {
  public:
   virtual ~GrowingPeer() = default;
   virtual void Add(const Vector& point) = 0;
+  // Brings its bounding box up to date, which no question needs.
+  virtual void UpdateBox() = 0;
   // Whether it collides with another, at the pose X_AB of that: by btGjkEpaSolver2, and by
   // btGjkPairDetector.
   virtual bool CollidesBySolver(const GrowingPeer& other, const Pose& X_AB) const = 0;
