@@ -20,7 +20,8 @@ namespace hulld {
 using TriangleId = uint32_t;
 
 // A triangle of the surface, counter-clockwise seen from outside, in one cache line. neighbours[i]
-// lies across the edge from corners[i] to corners[(i + 1) % 3].
+// lies across the edge from corners[i] to corners[(i + 1) % 3]. The last corner is the apex: the
+// triangle was made when that vertex came, as one of a fan round it.
 struct alignas(64) SurfaceTriangle {
   // The plane, rounded: normal . p - offset, which errs by at most slope * (|p| + |corner|), |.|
   // the largest component.
@@ -42,7 +43,8 @@ static_assert(sizeof(SurfaceTriangle) == 64);
 // visible region of the point moved outwards by an infinitesimal amount, hence a disk; a vertex
 // that the new point makes non-extreme has only such triangles around it and goes with them; and
 // every triangle beyond the horizon is strictly invisible, so that no new triangle is degenerate
-// and no horizon vertex redundant.
+// and no horizon vertex redundant. So only neighbours with a common apex, made together, can lie in
+// one plane: the later of two others was joined to the earlier one across the horizon.
 //
 // The triangle to start from is found by walking on the surface, towards the one that the ray from
 // a fixed interior point through the new point pierces; a map of directions round that point
@@ -88,6 +90,10 @@ class Surface {
   // True when the point lies strictly outside the triangle's plane, exactly.
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
     return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
+  }
+  // True when the point lies in the triangle's plane, exactly.
+  bool IsInPlane(const VertexTable& vertices, TriangleId id, const Vector& point) const {
+    return SideOf(vertices, id, point, SizeWith(vertices, point)) == 0;
   }
   // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
   // returns the triangles that go, for the caller to move what it keeps by triangle; the second
