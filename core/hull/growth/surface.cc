@@ -96,8 +96,7 @@ size_t Surface::MemoryBytes() const {
   size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + vertex_mark_.MemoryBytes();
   if (directions_) bytes += directions_->MemoryBytes();
   if (measuring_) {
-    bytes += measuring_->map.MemoryBytes() + measuring_->reach.capacity() * sizeof(double) +
-             measuring_->hint.capacity() * sizeof(TriangleId);
+    bytes += measuring_->map.MemoryBytes() + measuring_->hint.capacity() * sizeof(TriangleId);
   }
   return bytes + region_.capacity() * sizeof(TriangleId) +
          horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit);

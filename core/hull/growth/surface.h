@@ -79,13 +79,15 @@ class Surface {
     Side side;
     TriangleId triangle;
   };
-  // Finds where a point lies and changes nothing. `start`: where to start walking. Requires that an
-  // interior point is known; empty when the walk is longer than the surface warrants.
-  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
-                                 TriangleId start) const {
+  // Finds where a point lies, fast when the last point in its cell of the map lay near it. Requires
+  // that an interior point is known; empty when the walk is longer than the surface warrants.
+  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point) {
     HULLD_CHECK(directions_.has_value());
-    uint64_t steps = 0;
-    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), steps);
+    const size_t cell = directions_->PlaceOf(point).cell;
+    const std::optional<Location> location =
+        Walk(vertices, point, SizeWith(vertices, point), Alive(directions_->hint(cell)), work_);
+    if (location) directions_->SetHint(cell, location->triangle);
+    return location;
   }
   // True when the point lies strictly outside the triangle's plane, exactly.
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
@@ -116,9 +118,12 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Measures the surface anew when that pays for so many points to be inserted. Does nothing where
-  // no interior point is known. Cost: at most some walks per ten points.
-  void MeasureBefore(const VertexTable& vertices, size_t points);
+  // Measures the surface anew when a map is worth that for so many points to be looked up.
+  // fineness: at most so many times the cells a side that suit points one by one. True when it did;
+  // it does not where no interior point is known. Cost: at most `walks_per_point` walks for each
+  // point.
+  bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
+                     double walks_per_point);
   // Tells how many points were looked up in the map and how many it rejected: what it is worth.
   void CountRejected(size_t asked, size_t rejected) {
     asked_ += asked;
@@ -180,11 +185,9 @@ class Surface {
   struct Measurement {
     DirectionMap map;
     // Of the corners of the last row up to the one to measure, and of the row before from there on:
-    // how far the surface is, and where the direction leaves it.
-    std::vector<double> reach;
+    // where the direction leaves the surface.
     std::vector<TriangleId> hint;
-    // Both of the corner that stood before in the last one's place.
-    double reach_before = 0;
+    // The one that stood before in the last one's place.
     TriangleId hint_before = 0;
     // The corner to measure: its face, row and column.
     int face = 0;
@@ -217,8 +220,8 @@ class Surface {
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
                                TriangleId start, uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
-  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
-             const Ray& ray) const;
+  size_t EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
+                     const Ray& ray, std::optional<uint32_t> first) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Measure(const VertexTable& vertices);
   void Update(const VertexTable& vertices);
