@@ -75,7 +75,7 @@ class HullBuilder {
   // the builder's former state gives the same hull. Cost: O(points of that block).
   std::vector<Vector> NewVertices() const;
 
-  // What the builder holds in memory, by capacities, in bytes. Below 300 a vertex from 1000
+  // What the builder holds in memory, by capacities, in bytes. Below 230 a vertex from 1000
   // vertices on; inside points are not kept. Cost: O(1) from dimension 3 on.
   size_t MemoryBytes() const;
   // Steps of work that insertions did so far beyond the triangles that they removed and created:

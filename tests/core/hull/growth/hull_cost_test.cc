@@ -73,7 +73,7 @@ TEST(HullCost, MemoryIsBoundedByTheVertices) {
       ASSERT_GE(vertices, 1000) << cloud.name;
       const Hull hull = b->Snapshot();
       EXPECT_LE(static_cast<double>(hull.MemoryBytes()) / vertices, 100) << cloud.name;
-      EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 300) << cloud.name;
+      EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 230) << cloud.name;
       const auto queried = static_cast<double>(hull.MemoryBytes() + QueryHull(hull).MemoryBytes());
       EXPECT_LE(queried / vertices, 350) << cloud.name;
       std::printf("%s, %s: %.0f vertices, bytes for each: %.0f, for queries %.0f, builder %.0f\n",
