@@ -30,7 +30,7 @@ inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
 // above; 64 u leaves slack. For D between kTripleProductMin and kTripleProductMax. Proven.
 inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
 
-// What a direction map takes off its radii; its rounding errors are below half of this (see
+// What a direction map adds to its gauges; its rounding errors are below half of this (see
 // DirectionMap::Finish).
 inline constexpr double kDirectionMapMargin = 0x1p-20;
 
