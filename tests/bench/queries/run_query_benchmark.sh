@@ -36,7 +36,7 @@ for suite in "${suites[@]}"; do
       ;;
     live)
       "$programs/live_benchmark" "${VERTICES:-1000000}" "${SECONDS_EACH:-3}" >"$out"
-      bash tests/bench/queries/plot_live.sh "$machine"
+      bash tests/bench/live/plot_live.sh "$machine"
       ;;
     # Counts, the same on every machine.
     accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;

@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_BENCH_QUERIES_GROWING_PEER_H_
-#define HULLD_TESTS_BENCH_QUERIES_GROWING_PEER_H_
+#ifndef HULLD_TESTS_BENCH_LIVE_GROWING_PEER_H_
+#define HULLD_TESTS_BENCH_LIVE_GROWING_PEER_H_
 
 #include <memory>
 #include <span>
@@ -27,4 +27,4 @@ std::unique_ptr<GrowingPeer> MakeGrowingPeer(std::span<const Vector> points);
 
 }  // namespace hulld::bench
 
-#endif  // HULLD_TESTS_BENCH_QUERIES_GROWING_PEER_H_
+#endif  // HULLD_TESTS_BENCH_LIVE_GROWING_PEER_H_

@@ -1,4 +1,4 @@
-#include "tests/bench/queries/growing_peer.h"
+#include "tests/bench/live/growing_peer.h"
 
 #ifdef HULLD_HAVE_BULLET
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>

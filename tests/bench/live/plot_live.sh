@@ -2,7 +2,7 @@
 # Draws query_live_MACHINE.csv of tests/bench/results/ as query_live_MACHINE.svg, with gnuplot: the
 # time of a step of a growing hull, one point and one question, against its size.
 #
-#   bash tests/bench/queries/plot_live.sh [MACHINE] [png]
+#   bash tests/bench/live/plot_live.sh [MACHINE] [png]
 #
 # With `png`, draws a PNG beside it instead, to look at.
 set -euo pipefail

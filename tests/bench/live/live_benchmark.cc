@@ -33,7 +33,7 @@
 #include "core/query/placed/live_hull.h"
 #include "tests/bench/bench_random.h"
 #include "tests/bench/csv_reporter.h"
-#include "tests/bench/queries/growing_peer.h"
+#include "tests/bench/live/growing_peer.h"
 
 namespace hulld::bench {
 namespace {
