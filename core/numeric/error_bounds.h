@@ -30,7 +30,7 @@ inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
 // above; 64 u leaves slack. For D between kTripleProductMin and kTripleProductMax. Proven.
 inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
 
-// What a direction map takes off its radii; its rounding errors are below half of this (see
+// What a direction map adds to its gauges; its rounding errors are below half of this (see
 // DirectionMap::Finish).
 inline constexpr double kDirectionMapMargin = 0x1p-20;
 
@@ -43,9 +43,10 @@ inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 // Queries in floating point: S is the size of a pair, |.| the largest absolute component, and all
 // bounds hold for S between kFilterMinSize and kFilterMaxSize.
 
-// Entries of the rotation matrix R(q)/|q|^2, computed from q scaled by a power of two to a largest
-// component in [1/2, 1): each numerator is a sum of at most 4 products (error at most 7 u |q|^2),
-// the squared norm has relative error at most 4 u, the quotient one rounding more: |error| <= 12 u
+// Entries of the rotation matrix R(q)/|q|^2, computed from q of which the largest component is
+// within [kQuaternionMin, kQuaternionMax], or brought into [1/2, 1) by a power of two: each
+// numerator is a sum of at most 4 products (error at most 7 u |q|^2), the squared norm has relative
+// error at most 4 u, its reciprocal one rounding more, their product one: |error| <= 13 u + 50 u^2
 // < 16 u, as no entry exceeds 1. Proven.
 inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 
@@ -61,6 +62,14 @@ inline constexpr double kMinkowskiErrorFactor = 128 * kUnitRoundoff;
 // M in all. The translation's part errs by at most 12 u |n| |t|, the final sums by at most 11 u |n|
 // S. In total below 200 u |n| S; 512 u leaves room for a direction that itself errs by up to 16 u
 // |n| per component (sqrt(3) * 16 * 3 u |n| M < 84 u |n| M more). Proven.
+//
+// The same for a small pair, whose vertices are turned instead (small_pair.h), to the same total. A
+// turned vertex errs by 57 u M per component, so its value by 171 u |n| M. Values are rounded by 16 u
+// |n| S, and the number of a vertex in the low 4 bits of a value, at most 3 |n| S in magnitude,
+// changes it by 16 units in the last place, 96 u |n| S: the largest so found is below the true one by
+// at most (171 + 16 + 96) u |n| S, and what its turned vertices give by (96 + 16) u |n| S more. The
+// value is then computed from their difference, at most 4 S: rounding the difference and moving B
+// take 3 * 7 u |n| S, the product 36 u |n| S. In total below 460 u |n| S. Proven.
 inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 
 // det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most

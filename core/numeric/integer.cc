@@ -1,32 +1,18 @@
 #include "core/numeric/integer.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "core/base/check.h"
 
 namespace hulld {
-namespace {
-
-// x = mantissa * 2^exponent with an integer mantissa, exactly.
-struct Decomposed {
-  int64_t mantissa;
-  int exponent;
-};
-
-Decomposed Decompose(double x) {
-  int exponent = 0;
-  const double fraction = std::frexp(x, &exponent);
-  return {static_cast<int64_t>(std::ldexp(fraction, 53)), exponent - 53};
-}
-
-}  // namespace
 
 int LowestBitExponent(double x) {
   HULLD_CHECK(x != 0 && std::isfinite(x));
-  const Decomposed d = Decompose(x);
-  return d.exponent + __builtin_ctzll(static_cast<uint64_t>(d.mantissa));
+  const BinaryDouble d = Decompose(x);
+  return d.exponent + std::countr_zero(d.magnitude);
 }
 
 int LowestBitExponent(const Vector& v, int otherwise) {
@@ -39,13 +25,23 @@ int LowestBitExponent(const Vector& v, int otherwise) {
 Integer ToInteger(double x, int exponent) {
   if (x == 0) return 0;
   HULLD_CHECK(std::isfinite(x));
-  const Decomposed d = Decompose(x);
+  const BinaryDouble d = Decompose(x);
   const int shift = d.exponent - exponent;
-  if (shift >= 0) return Integer(d.mantissa) << shift;
-  HULLD_CHECK(shift > -53 && d.mantissa % (int64_t{1} << -shift) == 0);
-  // A multiple of 2^exponent: the bits that fall out are zero, so division is exact for either
-  // sign.
-  return Integer(d.mantissa / (int64_t{1} << -shift));
+  if (shift < 0) {
+    HULLD_CHECK(shift > -53 && d.magnitude % (uint64_t{1} << -shift) == 0);
+  }
+  const Integer magnitude =
+      shift >= 0 ? Integer(d.magnitude) << shift : Integer(d.magnitude >> -shift);
+  return d.negative ? Integer(-magnitude) : magnitude;
+}
+
+Integer IntegerOf(std::span<const uint64_t> words, bool negative) {
+  Integer magnitude = 0;
+  for (size_t i = words.size(); i-- > 0;) {
+    magnitude <<= 64;
+    magnitude += words[i];
+  }
+  return negative ? Integer(-magnitude) : magnitude;
 }
 
 IntegerVector ToInteger(const Vector& v, int exponent) {

@@ -1,11 +1,15 @@
 #ifndef HULLD_CORE_NUMERIC_INTEGER_H_
 #define HULLD_CORE_NUMERIC_INTEGER_H_
 
+#include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
+#include <cstdint>
+#include <span>
 
 #include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
+#include "core/numeric/wide_integer.h"
 
 namespace hulld {
 
@@ -56,6 +60,22 @@ inline IntegerVector AnyPerpendicular(const IntegerVector& d) {
   return {0, 0, d.x};
 }
 
+// x = magnitude * 2^exponent, or minus that. Exact for every finite x.
+struct BinaryDouble {
+  uint64_t magnitude;  // below 2^53
+  int exponent;
+  bool negative;
+};
+inline BinaryDouble Decompose(double x) {
+  constexpr uint64_t kImplicitBit = uint64_t{1} << 52;
+  const auto bits = std::bit_cast<uint64_t>(x);
+  const int biased = static_cast<int>(bits >> 52 & 0x7ff);
+  const uint64_t fraction = bits & (kImplicitBit - 1);
+  // Subnormals share their exponent with the least normal numbers.
+  if (biased == 0) return {fraction, -1074, x < 0};
+  return {fraction | kImplicitBit, biased - 1075, x < 0};
+}
+
 // The exponent e of the lowest set bit of x: x is an odd multiple of 2^e. Requires x finite and not
 // 0. Exact, subnormals included.
 int LowestBitExponent(double x);
@@ -67,6 +87,38 @@ int LowestBitExponent(const Vector& v, int otherwise);
 // x / 2^exponent. Requires x finite and a multiple of 2^exponent.
 Integer ToInteger(double x, int exponent);
 IntegerVector ToInteger(const Vector& v, int exponent);
+
+// The same in a fixed width. Requires the quotient to fit (unchecked).
+template <int kWords>
+WideInteger<kWords> WideIntegerOf(double x, int exponent) {
+  const BinaryDouble d = Decompose(x);
+  if (d.magnitude == 0) return 0;
+  const int shift = d.exponent - exponent;
+  HULLD_DCHECK(shift >= -52 && shift < 64 * kWords);
+  WideInteger<kWords> magnitude;
+  if constexpr (kWords == 1) {
+    magnitude = static_cast<int64_t>(shift >= 0 ? d.magnitude << shift : d.magnitude >> -shift);
+  } else {
+    magnitude = static_cast<int64_t>(shift >= 0 ? d.magnitude : d.magnitude >> -shift);
+    if (shift > 0) magnitude = Shifted(magnitude, shift);
+  }
+  return d.negative ? -magnitude : magnitude;
+}
+
+// The number whose magnitude has these words, the least significant first.
+Integer IntegerOf(std::span<const uint64_t> words, bool negative);
+
+// The same number.
+template <int kWords>
+Integer ToInteger(const WideInteger<kWords>& a) {
+  const WideInteger<kWords> magnitude = a.is_negative() ? -a : a;
+  return IntegerOf(magnitude.words(), a.is_negative());
+}
+template <int kWords>
+IntegerVector ToInteger(const WideVector<kWords>& v) {
+  return {ToInteger(v.x), ToInteger(v.y), ToInteger(v.z)};
+}
+inline const IntegerVector& ToInteger(const IntegerVector& v) { return v; }
 
 // The number of bits of the largest component; 0 for the zero vector.
 unsigned BitLength(const IntegerVector& v);

@@ -13,6 +13,7 @@
 #include "core/numeric/expansion.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
+#include "core/numeric/wide_integer.h"
 
 namespace hulld {
 namespace {
@@ -45,8 +46,6 @@ std::optional<int> FilteredOrient3d(const Vector& r, const Vector& s, const Vect
                       std::abs(t.z());
   return CertainSign(det, kOrient3dErrorFactor * permanent + (size + 1) * kUnderflowError);
 }
-
-__extension__ using Int128 = __int128;
 
 // Four points as integers below 2^60 in magnitude, on one scale.
 struct FixedPoints {

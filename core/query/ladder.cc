@@ -7,7 +7,6 @@
 #include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
-#include "core/query/exact/exact_pair.h"
 #include "core/query/exact/exact_search.h"
 #include "core/query/floating/float_search.h"
 
@@ -102,15 +101,16 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
 }
 
 // The rungs between spheres and exact arithmetic; false when none of them decides. `n` leads from
-// A's centre to B's. Requires pair.usable(). Kept apart from what distant pairs need.
+// A's centre to B's; `found` becomes where the search ended. Requires pair.usable(). Kept apart
+// from what distant pairs need.
 [[gnu::noinline]] bool DecideInFloatingPoint(const FloatPair& pair, const PlainVector& n,
                                              double tolerance, PairCache* cache, Purpose purpose,
-                                             Decision& decision) {
+                                             FloatSearchResult& found, Decision& decision) {
   if (cache != nullptr) {
-    const FloatSearchResult found = TryCached(pair, *cache);
-    decision.directions_tried += found.directions_tried;
-    if (found.verdict != FloatVerdict::kUndecided) {
-      Accept(found, Rung::kCached, purpose, decision);
+    const FloatSearchResult cached = TryCached(pair, *cache);
+    decision.directions_tried += cached.directions_tried;
+    if (cached.verdict != FloatVerdict::kUndecided) {
+      Accept(cached, Rung::kCached, purpose, decision);
       return true;
     }
   }
@@ -123,7 +123,7 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
       return true;
     }
   }
-  const FloatSearchResult found = SearchInFloatingPoint(pair, tolerance, first);
+  found = SearchInFloatingPoint(pair, tolerance, first);
   decision.directions_tried += found.directions_tried;
   if (cache != nullptr) Remember(found, *cache);
   if (found.verdict == FloatVerdict::kUndecided) return false;
@@ -131,18 +131,19 @@ void Remember(const FloatSearchResult& found, PairCache& cache) {
   return true;
 }
 
-[[gnu::noinline]] absl::Status DecideExactly(const FloatPair& pair,
+[[gnu::noinline]] absl::Status DecideExactly(const FloatPair& pair, const FloatSearchResult* end,
+                                             Purpose purpose,
                                              const std::function<bool()>& should_stop,
                                              Decision& decision) {
-  ExactPair exact(pair);
-  absl::StatusOr<ExactSearchResult> found = SearchExactly(exact, should_stop);
+  absl::StatusOr<ExactSearchResult> found =
+      SearchExactly(pair, end, purpose == Purpose::kEvidence, should_stop);
   if (!found.ok()) return found.status();
   decision.relation = found->relation;
   decision.rung = Rung::kExact;
   decision.directions_tried += found->directions_tried;
+  if (purpose == Purpose::kRelation) return absl::OkStatus();
   if (found->axis) decision.axis = *std::move(found->axis);
-  HULLD_CHECK(found->pairs.size() <= decision.pairs.size());
-  decision.pair_count = static_cast<uint32_t>(found->pairs.size());
+  decision.pair_count = found->pair_count;
   std::copy(found->pairs.begin(), found->pairs.end(), decision.pairs.begin());
   return absl::OkStatus();
 }
@@ -158,11 +159,13 @@ absl::Status Decide(const FloatPair& pair, double tolerance, PairCache* cache, P
       if (purpose == Purpose::kEvidence) decision.axis = Vector(n);
       return absl::OkStatus();
     }
-    if (DecideInFloatingPoint(pair, n, tolerance, cache, purpose, decision)) {
+    FloatSearchResult found;
+    if (DecideInFloatingPoint(pair, n, tolerance, cache, purpose, found, decision)) {
       return absl::OkStatus();
     }
+    return DecideExactly(pair, &found, purpose, should_stop, decision);
   }
-  return DecideExactly(pair, should_stop, decision);
+  return DecideExactly(pair, nullptr, purpose, should_stop, decision);
 }
 
 }  // namespace hulld

@@ -20,6 +20,9 @@ namespace hulld {
 
 // A relation and, where it is to be evidence, what showed it.
 struct Decision {
+  // Not defaulted: a compiler then clears the room for every kind of axis, half a kilobyte.
+  Decision() {}  // NOLINT
+
   Relation relation = Relation::kSeparated;
   Rung rung = Rung::kBounds;
   // Separated: n.(a - b) < 0 throughout; touching: <= 0; exactly, as it stands.

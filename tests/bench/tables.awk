@@ -143,6 +143,7 @@ function extremes(   n, i, part, a, b) {
 
 function set_name(set) {
   if (set == "ur5") return "UR5, 72 to 220"
+  if (sub(/^mating:/, "", set)) return set ", face on face"
   sub(/^sphere:/, "", set)
   return set
 }
@@ -177,9 +178,11 @@ function relation(   s, p, r, key, text, n) {
 function touching(   s, p, n, key) {
   read_rows("query_relation_" machine)
   head("| vertices | hulld | FCL, libccd | FCL, own | libccd MPR | libccd GJK | Bullet |")
-  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
+  split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5,mating:8,mating:64", sets, ",")
   n = split("hulld,FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet", peers, ",")
-  for (s = 1; s <= 5; s++) {
+  for (s = 1; s <= 7; s++) {
+    # Measured since these sets exist.
+    if (!((sets[s] " contact" SUBSEP "hulld", "ns") in cell)) continue
     printf "| %s |", set_name(sets[s])
     for (p = 1; p <= n; p++) {
       key = sets[s] " contact" SUBSEP peers[p]
@@ -335,6 +338,29 @@ function overload(   line, fields, row) {
   measured()
 }
 
+# One row per workload and size: hulld's step, Bullet's, and how many times faster hulld is.
+function live(   line, fields, row, key, order_of, i, n, part) {
+  head("| a step | vertices | hulld: p50 | p99 | Bullet: p50 | with its box | hulld faster | with its box |")
+  while ((getline line < ("results/query_live_" machine ".csv")) > 0) {
+    split_row(line, fields)
+    if (row++ == 0) continue
+    key = fields[1] SUBSEP fields[3]
+    if (fields[2] == "hulld") order_of[++n] = key
+    step[key, fields[2]] = fields[4]
+    slowest[key, fields[2]] = fields[5]
+    boxed[key, fields[2]] = fields[9]
+  }
+  for (i = 1; i <= n; i++) {
+    key = order_of[i]
+    split(key, part, SUBSEP)
+    printf "| %s | %d | %s | %s | %s | %s | %s | %s |\n", part[1], part[2], unit(1000 * step[key, "hulld"]),
+           unit(1000 * slowest[key, "hulld"]), unit(1000 * step[key, "Bullet"]), unit(1000 * boxed[key, "Bullet"]),
+           times(step[key, "Bullet"] / step[key, "hulld"]), times(boxed[key, "Bullet"] / boxed[key, "hulld"])
+  }
+  files = "[`query_live_" machine ".csv`](" results "query_live_" machine ".csv)"
+  measured()
+}
+
 function busy(   line, fields, row) {
   head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
   while ((getline line < ("results/server_busy_" machine ".csv")) > 0) {
@@ -409,6 +435,7 @@ BEGIN {
   else if (table == "start") start()
   else if (table == "overload") overload()
   else if (table == "busy") busy()
+  else if (table == "live") live()
   else if (table == "summary") summary()
   else {
     print "tables.awk: no table " table > "/dev/stderr"

@@ -13,14 +13,20 @@ namespace {
 
 // The smaller a surface, the cheaper it is to test a point against all its triangles.
 constexpr size_t kMostTrianglesToTest = 64;
-// A block of at most this many points is not worth a map of directions for rejecting most of them.
-constexpr size_t kSmallBlock = 65536;
-// Points of the first of the samples of a larger block, at most.
-constexpr size_t kLargestFirstSample = 16384;
+// A block of at most this many points is not worth a sample: all are tested against all triangles.
+constexpr size_t kSmallBlock = 4096;
 // Each sample, and then the block, is this many times the sample before.
 constexpr size_t kSampleRatio = 16;
 // Samples are made of runs of consecutive points, for the sake of memory.
-constexpr size_t kRun = 64;
+constexpr size_t kRun = 8;
+// The map of directions (see Surface::MeasureBefore) that a sample is looked up in, and the one
+// that follows where the first leaves many times as many points as the surface has triangles, as it
+// does where points lie along large facets.
+constexpr double kMapFineness = 2.8;
+constexpr double kWalksPerPoint = 0.2;
+constexpr size_t kManyPerTriangle = 32;
+constexpr double kFineMapFineness = 5.6;
+constexpr double kWalksPerSurvivor = 0.6;
 
 // One call of InsertBlock.
 //
@@ -40,34 +46,42 @@ class BlockInsertion {
   bool Run() {
     // A triangle's list takes memory whether it is used or not.
     if (!surface_.IsMeasurable() || 64 * points_.size() < surface_.triangle_count()) {
-      return InsertRounds(0);
+      return InsertRounds();
     }
     for (size_t stride = FirstStride(); stride > 0; stride /= kSampleRatio) {
       const ConflictLists::Outcome outcome = InsertSample(stride);
-      if (outcome == ConflictLists::Outcome::kStopped) return false;
-      if (outcome == ConflictLists::Outcome::kGaveUp) return InsertRounds(stride);
       stride_before_ = stride;
+      if (outcome == ConflictLists::Outcome::kStopped) return false;
+      if (outcome == ConflictLists::Outcome::kGaveUp) return InsertRounds();
     }
     return true;
   }
 
  private:
-  // Where the runs of a sample begin: each stride-th of the block, without those of earlier
-  // samples.
-  std::vector<size_t> RunsOf(size_t stride) const {
-    std::vector<size_t> runs;
+  // A range of the block.
+  struct Range {
+    size_t first;
+    size_t end;
+  };
+  // A sample in order: each stride-th run of the block, without those of earlier samples.
+  std::vector<Range> RangesOf(size_t stride) const {
+    std::vector<Range> ranges;
     for (size_t first = 0; first < points_.size(); first += kRun * stride) {
-      if (stride_before_ == 0 || first / kRun % stride_before_ != 0) runs.push_back(first);
+      if (stride_before_ != 0 && first / kRun % stride_before_ == 0) continue;
+      const size_t end = std::min(first + kRun, points_.size());
+      if (!ranges.empty() && ranges.back().end == first) {
+        ranges.back().end = end;
+      } else {
+        ranges.push_back({first, end});
+      }
     }
-    return runs;
+    return ranges;
   }
-  size_t RunSize(size_t first) const { return std::min(kRun, points_.size() - first); }
 
   // A power of kSampleRatio, or 1 for all points at once.
   size_t FirstStride() const {
-    if (points_.size() <= kSmallBlock) return 1;
     size_t stride = 1;
-    while (points_.size() / stride > kLargestFirstSample) stride *= kSampleRatio;
+    while (points_.size() / stride > kSmallBlock) stride *= kSampleRatio;
     return stride;
   }
 
@@ -93,25 +107,24 @@ class BlockInsertion {
 
   std::vector<Vector> Sample(size_t stride) const {
     std::vector<Vector> sample;
-    sample.reserve(points_.size() / stride + kRun);
-    for (const size_t first : RunsOf(stride)) {
-      for (size_t i = first; i < first + RunSize(first); ++i) {
+    AppendSample(stride, sample);
+    return sample;
+  }
+  void AppendSample(size_t stride, std::vector<Vector>& sample) const {
+    sample.reserve(sample.size() + points_.size() / stride + kRun);
+    for (const Range& range : RangesOf(stride)) {
+      for (size_t i = range.first; i < range.end; ++i) {
         if (!IsDone(i)) sample.push_back(points_[i]);
       }
     }
-    return sample;
   }
 
   // Looks up where each point of the sample lies and gives the lists those outside.
   void TakeByDirection(size_t stride, ConflictLists& lists) {
-    surface_.MeasureBefore(vertices_, points_.size() / stride);
-    const DirectionMap& directions = *surface_.directions();
-    const std::vector<Vector> survivors = SurvivorsOf(stride, directions);
     std::vector<Vector> outside;
     std::vector<TriangleId> seen;
-    for (const Vector& p : survivors) {
-      const std::optional<Surface::Location> location =
-          surface_.Locate(vertices_, p, directions.hint(directions.PlaceOf(p).cell));
+    for (const Vector& p : SurvivorsOf(stride)) {
+      const std::optional<Surface::Location> location = surface_.Locate(vertices_, p);
       if (!location) {
         astray_.push_back(p);
       } else if (location->side == Surface::Side::kOutside) {
@@ -124,36 +137,36 @@ class BlockInsertion {
     lists.Take(outside, seen);
   }
 
-  // The points of a sample that the map of directions cannot reject.
-  std::vector<Vector> SurvivorsOf(size_t stride, const DirectionMap& directions) {
+  // The points of a sample that the map of directions cannot reject, nor a finer one where these
+  // are many.
+  std::vector<Vector> SurvivorsOf(size_t stride) {
+    surface_.MeasureBefore(vertices_, points_.size() / stride, kMapFineness, kWalksPerPoint);
     std::vector<Vector> survivors;
-    std::vector<uint32_t> of_run;
     size_t asked = 0;
-    for (const size_t first : RunsOf(stride)) {
-      const std::span<const Vector> run = points_.subspan(first, RunSize(first));
-      of_run.clear();
-      directions.AppendSurvivors(run, of_run);
+    for (const Range& range : RangesOf(stride)) {
+      const std::span<const Vector> points = points_.subspan(range.first, range.end - range.first);
+      indices_.clear();
+      surface_.directions()->AppendSurvivors(points, indices_);
       // Gathered while they are in the cache.
-      for (const uint32_t i : of_run) {
-        if (!IsDone(first + i)) survivors.push_back(run[i]);
+      for (const uint32_t i : indices_) {
+        if (!IsDone(range.first + i)) survivors.push_back(points[i]);
       }
-      asked += run.size();
+      asked += points.size();
     }
     surface_.CountRejected(asked, asked - survivors.size());
+    if (survivors.size() > kManyPerTriangle * surface_.triangle_count() &&
+        surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness, kWalksPerSurvivor)) {
+      indices_.clear();
+      surface_.directions()->AppendSurvivors(survivors, indices_);
+      for (size_t k = 0; k < indices_.size(); ++k) survivors[k] = survivors[indices_[k]];
+      survivors.resize(indices_.size());
+    }
     return survivors;
   }
 
-  // Inserts in rounds what conflict lists gave up and what no sample up to this stride had; all,
-  // for stride 0.
-  bool InsertRounds(size_t stride) {
-    rest_.reserve(points_.size());
-    for (size_t first = 0; first < points_.size(); first += kRun) {
-      if (stride > 0 && first / kRun % stride == 0) continue;
-      const size_t end = std::min(first + kRun, points_.size());
-      for (size_t i = first; i < end; ++i) {
-        if (!IsDone(i)) rest_.push_back(points_[i]);
-      }
-    }
+  // Inserts in rounds what conflict lists gave up and what no sample had.
+  bool InsertRounds() {
+    if (stride_before_ != 1) AppendSample(1, rest_);
     return InsertInRounds(surface_, vertices_, rest_, poll_);
   }
 
@@ -169,6 +182,8 @@ class BlockInsertion {
   std::vector<Vector> astray_;
   // Points that are to be inserted in rounds.
   std::vector<Vector> rest_;
+  // Of the points that are looked up in the map, those to keep.
+  std::vector<uint32_t> indices_;
 };
 
 }  // namespace

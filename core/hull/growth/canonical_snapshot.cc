@@ -1,14 +1,68 @@
 #include "core/hull/growth/canonical_snapshot.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/numeric/orientation.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
+
+// A vertex on its way to its place in the canonical order.
+struct Ranked {
+  Vector point;
+  VertexId id;
+};
+
+void Sort(std::span<Ranked> vertices) {
+  std::sort(vertices.begin(), vertices.end(), [](const Ranked& a, const Ranked& b) {
+    return std::lexicographical_compare(a.point.begin(), a.point.end(), b.point.begin(),
+                                        b.point.end());
+  });
+}
+
+// Sorts into canonical order.
+//
+// Idea: the x of most hulls are spread out, so as many slices across x as there are vertices leave
+// few in each, and only these are compared. The slice of an x is a composition of rounded
+// operations that never decrease, so slices are in order whatever is rounded.
+std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices) {
+  // Ends of a range whose length overflows, or is zero, have no slices.
+  double least = INFINITY;
+  double largest = -INFINITY;
+  for (const Ranked& v : vertices) {
+    least = std::min(least, v.point.x());
+    largest = std::max(largest, v.point.x());
+  }
+  const double scale = static_cast<double>(vertices.size()) / (largest - least);
+  constexpr size_t kWorthSlicing = 32;
+  if (vertices.size() < kWorthSlicing || !(scale > 0 && scale <= kLargestDouble)) {
+    Sort(vertices);
+    return vertices;
+  }
+  const auto last = static_cast<double>(vertices.size() - 1);
+  const auto slice_of = [&](const Ranked& v) {
+    return static_cast<size_t>(std::min((v.point.x() - least) * scale, last));
+  };
+  // ends[s]: first where slice s begins, then, as it fills, where it ends.
+  std::vector<uint32_t> ends(vertices.size(), 0);
+  for (const Ranked& v : vertices) ++ends[slice_of(v)];
+  uint32_t begin = 0;
+  for (uint32_t& end : ends) begin += std::exchange(end, begin);
+  std::vector<Ranked> sorted(vertices.size());
+  for (const Ranked& v : vertices) sorted[ends[slice_of(v)]++] = v;
+  uint32_t first = 0;
+  for (const uint32_t end : ends) {
+    if (end - first > 1) Sort(std::span(sorted).subspan(first, end - first));
+    first = end;
+  }
+  return sorted;
+}
 
 // The canonical order of vertices: index_of[id] is the place of vertex `id` in `points`.
 struct Ranking {
@@ -16,104 +70,242 @@ struct Ranking {
   std::vector<uint32_t> index_of;
 };
 
-Ranking Rank(const VertexTable& vertices, std::vector<VertexId> ids) {
-  std::sort(ids.begin(), ids.end(), [&](VertexId a, VertexId b) {
-    const Vector& p = vertices[a];
-    const Vector& q = vertices[b];
-    return std::lexicographical_compare(p.begin(), p.end(), q.begin(), q.end());
-  });
+// Of all vertices that live.
+Ranking Rank(const VertexTable& vertices) {
+  std::vector<Ranked> ranked;
+  ranked.reserve(vertices.size());
+  for (VertexId id = 0; id < vertices.id_bound(); ++id) {
+    if (vertices.IsAlive(id)) ranked.push_back({vertices[id], id});
+  }
+  ranked = SortedByPoint(std::move(ranked));
   Ranking ranking;
-  ranking.points.reserve(ids.size());
+  ranking.points.reserve(ranked.size());
   ranking.index_of.resize(vertices.id_bound());
-  for (const VertexId id : ids) {
-    ranking.index_of[id] = static_cast<uint32_t>(ranking.points.size());
-    ranking.points.push_back(vertices[id]);
+  for (const Ranked& v : ranked) {
+    ranking.index_of[v.id] = static_cast<uint32_t>(ranking.points.size());
+    ranking.points.push_back(v.point);
   }
   return ranking;
 }
 
-std::vector<VertexId> VerticesOf(const VertexTable& vertices, const Surface& surface) {
-  std::vector<char> used(vertices.id_bound(), 0);
-  std::vector<VertexId> ids;
-  surface.ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-    for (const VertexId v : t.corners) {
-      if (!std::exchange(used[v], 1)) ids.push_back(v);
-    }
-  });
-  return ids;
-}
-
-// An edge of the surface between two triangles that are not coplanar, with its facet to the left.
-struct Boundary {
-  uint32_t tail;
-  uint32_t head;
+// Facets and edges of a hull of dimension 3 in canonical order.
+struct Faces {
+  std::vector<uint32_t> facet_starts;
+  std::vector<uint32_t> facet_vertices;
+  std::vector<Edge> edges;
 };
 
-// Walks over one maximal facet and collects its boundary. is_flat[3 * t + i]: edge i of triangle t
-// lies within a facet.
-std::vector<Boundary> CollectFacet(const Surface& surface, const Ranking& ranking,
-                                   const std::vector<char>& is_flat, TriangleId first,
-                                   std::vector<char>& visited) {
-  std::vector<Boundary> boundary;
-  std::vector<TriangleId> pending = {first};
-  visited[first] = 1;
-  while (!pending.empty()) {
-    const TriangleId id = pending.back();
-    pending.pop_back();
-    const SurfaceTriangle& t = surface.triangle(id);
-    for (int i = 0; i < 3; ++i) {
-      if (!is_flat[3 * id + i]) {
-        boundary.push_back(
-            {ranking.index_of[t.corners[i]], ranking.index_of[t.corners[(i + 1) % 3]]});
-      } else if (!std::exchange(visited[t.neighbours[i]], 1)) {
-        pending.push_back(t.neighbours[i]);
+// One call of SnapshotOf.
+//
+// Idea: an edge between facets is passed once in each direction, each time with another facet to
+// the left. Written down at its lower vertex, together with the facet to the left when it is the
+// first edge of that facet, and sorted by its higher vertex among the few that are written there,
+// edges and facets come out in canonical order: a facet is told from the others that start at the
+// same vertex by its second vertex alone.
+class FaceCollector {
+ public:
+  FaceCollector(const VertexTable& vertices, const Surface& surface, const Ranking& ranking)
+      : vertices_(vertices),
+        surface_(surface),
+        ranking_(ranking),
+        flags_(surface.id_bound(), 0),
+        departures_at_(ranking.points.size() + 1, 0) {
+    polygon_starts_.push_back(0);
+  }
+
+  // False when stopped.
+  bool Run(StopPoll& poll) {
+    FindFlatEdges(poll);
+    if (poll.stopped()) return false;
+    TracePolygons();
+    CountDepartures();
+    WriteDepartures(poll);
+    return !poll.stopped();
+  }
+
+  // Requires that Run was not stopped. Once.
+  Faces Assemble() {
+    Faces faces;
+    // Reserved, as a snapshot stays as it is for long.
+    faces.facet_starts.reserve(triangle_facets_ + polygon_starts_.size());
+    faces.facet_vertices.reserve(3 * triangle_facets_ + polygon_vertices_.size());
+    faces.edges.reserve(departures_.size());
+    faces.facet_starts.push_back(0);
+    const auto vertex_count = static_cast<uint32_t>(ranking_.points.size());
+    uint32_t first = 0;
+    for (uint32_t tail = 0; tail < vertex_count; ++tail) {
+      // Its departures were written, so this is where they end.
+      const uint32_t end = departures_at_[tail];
+      SortByHead(std::span(departures_).subspan(first, end - first));
+      for (; first < end; ++first) {
+        const Departure& d = departures_[first];
+        faces.edges.push_back({tail, d.head});
+        if (d.next <= tail) continue;
+        if (d.next < vertex_count) {
+          faces.facet_vertices.insert(faces.facet_vertices.end(), {tail, d.head, d.next});
+        } else {
+          const std::span<const uint32_t> polygon = Polygon(d.next - vertex_count);
+          faces.facet_vertices.insert(faces.facet_vertices.end(), polygon.begin(), polygon.end());
+        }
+        faces.facet_starts.push_back(static_cast<uint32_t>(faces.facet_vertices.size()));
       }
+    }
+    HULLD_CHECK(faces.facet_starts.size() == triangle_facets_ + polygon_starts_.size());
+    return faces;
+  }
+
+ private:
+  // Of a triangle: bit i tells that edge i lies within a facet, the fourth that the facet is known.
+  static constexpr uint8_t kAnyFlat = 7;
+  static constexpr uint8_t kVisited = 8;
+
+  // An edge from its lower vertex to its higher one.
+  struct Departure {
+    uint32_t head;
+    // The third vertex of the facet to the left if that is a triangle; the number of vertices and
+    // then the polygon's if it is a polygon that starts with this edge; 0 otherwise. A facet starts
+    // with this edge when this is above the edge's lower vertex.
+    uint32_t next;
+  };
+
+  std::array<uint32_t, 3> RanksOf(const SurfaceTriangle& t) const {
+    return {ranking_.index_of[t.corners[0]], ranking_.index_of[t.corners[1]],
+            ranking_.index_of[t.corners[2]]};
+  }
+  std::span<const uint32_t> Polygon(size_t k) const {
+    return std::span(polygon_vertices_)
+        .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
+  }
+
+  // Only neighbours with a common apex can lie in one plane (see Surface): the next one round the
+  // apex is asked for.
+  void FindFlatEdges(StopPoll& poll) {
+    surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
+      if (poll.Step()) return;
+      const TriangleId next = t.neighbours[1];
+      const SurfaceTriangle& other = surface_.triangle(next);
+      if (other.corners[2] != t.corners[2]) return;
+      HULLD_CHECK(other.neighbours[2] == id);
+      if (surface_.IsInPlane(vertices_, id, vertices_[other.corners[1]])) {
+        flags_[id] |= 1 << 1;
+        flags_[next] |= 1 << 2;
+      }
+    });
+  }
+
+  void TracePolygons() {
+    for (TriangleId id = 0; id < flags_.size(); ++id) {
+      if ((flags_[id] & kAnyFlat) == 0 || (flags_[id] & kVisited) != 0) continue;
+      // A triangle all of whose edges are within its facet is met from its neighbours.
+      uint32_t edge = 0;
+      while (edge < 3 && IsFlat(id, edge)) ++edge;
+      if (edge < 3) TracePolygon(id, edge);
     }
   }
-  return boundary;
-}
+  bool IsFlat(TriangleId id, uint32_t edge) const { return (flags_[id] >> edge & 1) != 0; }
 
-// The boundary's loop from its lowest vertex. Requires edges that form one loop.
-std::vector<uint32_t> LoopOf(std::vector<Boundary> boundary) {
-  std::sort(boundary.begin(), boundary.end(),
-            [](const Boundary& a, const Boundary& b) { return a.tail < b.tail; });
-  HULLD_CHECK(!boundary.empty());
-  std::vector<uint32_t> loop;
-  loop.reserve(boundary.size());
-  uint32_t at = boundary.front().tail;
-  do {
-    loop.push_back(at);
-    const auto edge =
-        std::lower_bound(boundary.begin(), boundary.end(), at,
-                         [](const Boundary& b, uint32_t tail) { return b.tail < tail; });
-    HULLD_CHECK(edge != boundary.end() && edge->tail == at && loop.size() <= boundary.size());
-    at = edge->head;
-  } while (at != boundary.front().tail);
-  return loop;
-}
-
-// Incomplete when stopped.
-std::vector<char> FlatEdges(const VertexTable& vertices, const Surface& surface, StopPoll& poll) {
-  std::vector<char> is_flat(3 * surface.id_bound(), 0);
-  surface.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
-    if (poll.Step()) return;
-    for (int i = 0; i < 3; ++i) {
-      const TriangleId other = t.neighbours[i];
-      if (other < id) continue;
-      const SurfaceTriangle& o = surface.triangle(other);
-      int j = 0;
-      while (j < 3 && o.corners[j] != t.corners[(i + 1) % 3]) ++j;
-      HULLD_CHECK(j < 3);
-      const Vector& opposite = vertices[o.corners[(j + 2) % 3]];
-      if (Orient3d(vertices[t.corners[0]], vertices[t.corners[1]], vertices[t.corners[2]],
-                   opposite) == 0) {
-        is_flat[3 * id + i] = 1;
-        is_flat[3 * other + j] = 1;
+  // Walks round one facet, from one edge of its boundary to the next through the triangles round
+  // the vertex between them. All triangles of the facet are met, as each has its corners on the
+  // boundary.
+  void TracePolygon(TriangleId first, uint32_t first_edge) {
+    const size_t start = polygon_vertices_.size();
+    TriangleId id = first;
+    uint32_t edge = first_edge;
+    // Steps of a walk that is right: through each corner of each triangle at most once.
+    size_t steps_left = 3 * surface_.triangle_count();
+    do {
+      polygon_vertices_.push_back(ranking_.index_of[surface_.triangle(id).corners[edge]]);
+      flags_[id] |= kVisited;
+      edge = (edge + 1) % 3;
+      while (IsFlat(id, edge)) {
+        HULLD_CHECK(steps_left-- > 0);
+        const TriangleId across = surface_.triangle(id).neighbours[edge];
+        const auto& back = surface_.triangle(across).neighbours;
+        edge = back[0] == id ? 1 : back[1] == id ? 2 : 0;
+        id = across;
+        flags_[id] |= kVisited;
       }
+      HULLD_CHECK(steps_left-- > 0);
+    } while (id != first || edge != first_edge);
+    const auto polygon = polygon_vertices_.begin() + static_cast<ptrdiff_t>(start);
+    std::rotate(polygon, std::min_element(polygon, polygon_vertices_.end()),
+                polygon_vertices_.end());
+    polygon_starts_.push_back(static_cast<uint32_t>(polygon_vertices_.size()));
+  }
+
+  // Calls visit(tail, head, next) for every edge of a triangle that is a facet, and of a polygon,
+  // that leads from a lower vertex to a higher one.
+  template <typename Visitor>
+  void ForEachTriangleDeparture(const SurfaceTriangle& t, Visitor&& visit) const {
+    const auto [a, b, c] = RanksOf(t);
+    if (a < b) visit(a, b, c);
+    if (b < c) visit(b, c, a);
+    if (c < a) visit(c, a, b);
+  }
+  template <typename Visitor>
+  void ForEachPolygonDeparture(size_t k, Visitor&& visit) const {
+    const std::span<const uint32_t> polygon = Polygon(k);
+    visit(polygon[0], polygon[1], static_cast<uint32_t>(ranking_.points.size() + k));
+    for (size_t i = 1; i + 1 < polygon.size(); ++i) {
+      if (polygon[i] < polygon[i + 1]) visit(polygon[i], polygon[i + 1], 0);
     }
-  });
-  return is_flat;
-}
+  }
+
+  // Leaves in departures_at_[v] where those at vertex v begin.
+  void CountDepartures() {
+    const auto count = [this](uint32_t tail, uint32_t, uint32_t) { ++departures_at_[tail]; };
+    surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
+      if ((flags_[id] & kAnyFlat) != 0) return;
+      ++triangle_facets_;
+      ForEachTriangleDeparture(t, count);
+    });
+    for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, count);
+    uint32_t begin = 0;
+    for (uint32_t& at : departures_at_) begin += std::exchange(at, begin);
+    departures_.resize(begin);
+  }
+
+  // Leaves in departures_at_[v] where those at vertex v end.
+  void WriteDepartures(StopPoll& poll) {
+    const auto write = [this](uint32_t tail, uint32_t head, uint32_t next) {
+      departures_[departures_at_[tail]++] = {head, next};
+    };
+    surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
+      if (poll.Step() || (flags_[id] & kAnyFlat) != 0) return;
+      ForEachTriangleDeparture(t, write);
+    });
+    if (poll.stopped()) return;
+    for (size_t k = 0; k + 1 < polygon_starts_.size(); ++k) ForEachPolygonDeparture(k, write);
+  }
+
+  static void SortByHead(std::span<Departure> departures) {
+    constexpr size_t kFew = 16;
+    if (departures.size() > kFew) {
+      std::sort(departures.begin(), departures.end(),
+                [](const Departure& a, const Departure& b) { return a.head < b.head; });
+      return;
+    }
+    for (size_t i = 1; i < departures.size(); ++i) {
+      const Departure d = departures[i];
+      size_t k = i;
+      for (; k > 0 && departures[k - 1].head > d.head; --k) departures[k] = departures[k - 1];
+      departures[k] = d;
+    }
+  }
+
+  const VertexTable& vertices_;
+  const Surface& surface_;
+  const Ranking& ranking_;
+  // By triangle.
+  std::vector<uint8_t> flags_;
+  size_t triangle_facets_ = 0;
+  // The facets that are not triangles of the surface, by ranks, each from its lowest.
+  std::vector<uint32_t> polygon_starts_;
+  std::vector<uint32_t> polygon_vertices_;
+  // In order of their lower vertices, and where those of each begin or end.
+  std::vector<Departure> departures_;
+  std::vector<uint32_t> departures_at_;
+};
 
 }  // namespace
 
@@ -129,7 +321,7 @@ Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends)
 
 Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop) {
   HULLD_CHECK(loop.size() >= 3);
-  Ranking ranking = Rank(vertices, {loop.begin(), loop.end()});
+  Ranking ranking = Rank(vertices);
   const auto n = static_cast<uint32_t>(loop.size());
   std::vector<uint32_t> facet;
   for (const VertexId id : loop) facet.push_back(ranking.index_of[id]);
@@ -146,41 +338,12 @@ Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> lo
 
 std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface,
                                StopPoll& poll) {
-  const std::vector<char> is_flat = FlatEdges(vertices, surface, poll);
-  if (poll.stopped()) return std::nullopt;
-  Ranking ranking = Rank(vertices, VerticesOf(vertices, surface));
-
-  std::vector<std::vector<uint32_t>> facets;
-  std::vector<char> visited(surface.id_bound(), 0);
-  surface.ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) {
-    if (poll.Step() || visited[id]) return;
-    facets.push_back(LoopOf(CollectFacet(surface, ranking, is_flat, id, visited)));
-  });
-  if (poll.stopped()) return std::nullopt;
-  std::sort(facets.begin(), facets.end());
-
-  size_t corners = 0;
-  for (const std::vector<uint32_t>& facet : facets) corners += facet.size();
-  // Reserved, as a snapshot stays as it is for long.
-  std::vector<uint32_t> starts;
-  starts.reserve(facets.size() + 1);
-  starts.push_back(0);
-  std::vector<uint32_t> facet_vertices;
-  facet_vertices.reserve(corners);
-  std::vector<Edge> edges;
-  edges.reserve(corners / 2);
-  for (const std::vector<uint32_t>& facet : facets) {
-    facet_vertices.insert(facet_vertices.end(), facet.begin(), facet.end());
-    starts.push_back(static_cast<uint32_t>(facet_vertices.size()));
-    for (size_t i = 0; i < facet.size(); ++i) {
-      const uint32_t tail = facet[i];
-      const uint32_t head = facet[(i + 1) % facet.size()];
-      if (tail < head) edges.push_back({tail, head});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
-  return Hull(3, std::move(ranking.points), std::move(starts), std::move(facet_vertices),
-              std::move(edges));
+  Ranking ranking = Rank(vertices);
+  FaceCollector collector(vertices, surface, ranking);
+  if (!collector.Run(poll)) return std::nullopt;
+  Faces faces = collector.Assemble();
+  return Hull(3, std::move(ranking.points), std::move(faces.facet_starts),
+              std::move(faces.facet_vertices), std::move(faces.edges));
 }
 
 }  // namespace hulld

@@ -12,8 +12,9 @@
 namespace hulld {
 
 // Turn the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles merged
-// exactly, facets and edges sorted. Cost: O(V log V), and one exact sign for each edge of a
-// surface; that of a surface is stopped by the poll, and nullopt then.
+// exactly, facets and edges sorted. Cost: O(V log V), linear where the x of the vertices are spread
+// out, and an exact sign for each pair of neighbours with a common apex; that of a surface is
+// stopped by the poll, and nullopt then.
 
 // Requires at most two vertices, in lexicographic order (unchecked: AuditHull sees it).
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);

@@ -7,7 +7,7 @@
 
 namespace hulld {
 
-// A vector that grows in chunks of 512 elements and never moves one: no single push_back costs
+// A vector that grows in chunks of 256 elements and never moves one: no single push_back costs
 // more than a chunk, however long the vector, and nothing is held in reserve for a doubling.
 template <typename T>
 class ChunkedVector {
@@ -47,7 +47,7 @@ class ChunkedVector {
   }
 
  private:
-  static constexpr int kBits = 9;
+  static constexpr int kBits = 8;
   static constexpr size_t kMask = (size_t{1} << kBits) - 1;
   struct Chunk {
     T elements[kMask + 1];

@@ -1,6 +1,7 @@
 #include "core/hull/growth/direction_map.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <utility>
@@ -15,20 +16,25 @@
 #endif
 
 namespace hulld {
+
 DirectionMap::DirectionMap(const Vector& center) : center_(center), n_(1), half_(0.5) {
-  radii_.assign(cell_count(), 0);
+  gauges_.assign(corner_count(), INFINITY);
   hints_.assign(cell_count(), UINT32_MAX);
 }
 
 DirectionMap::DirectionMap(const Vector& center, int resolution)
     : center_(center), n_(resolution), half_(0.5 * resolution) {
-  radii_.reserve(cell_count());
+  gauges_.reserve(corner_count());
   hints_.reserve(cell_count());
 }
 
-void DirectionMap::AppendCell(double reach, uint32_t hint) {
-  HULLD_DCHECK(radii_.size() < cell_count());
-  radii_.push_back((1 - kDirectionMapMargin) * reach);
+void DirectionMap::AppendCorner(double reach) {
+  HULLD_DCHECK(gauges_.size() < corner_count());
+  gauges_.push_back((1 + kDirectionMapMargin) / reach);
+}
+
+void DirectionMap::AppendCell(uint32_t hint) {
+  HULLD_DCHECK(hints_.size() < cell_count());
   hints_.push_back(hint);
 }
 
@@ -37,67 +43,106 @@ Vector DirectionMap::CornerDirection(int face, int i, int j) const {
   return CubeDirection(static_cast<uint32_t>(face), (i - half_) / half_, (j - half_) / half_);
 }
 
-// The gauge g of the set round c is convex and subadditive. A point's computed direction u is
-// within 8 u0 (u0 the unit roundoff) of its cell, a corner's point within 2 u0 (|c| + m) / m of the
-// corner's direction, so g(u) <= max g(corners) + (8 + 4 (|c| + m) / m) u0 * max g over all
-// directions. Relative to the least reach of the cell the second term is at most `ratio` (8 + 4
-// (kappa + ratio)) u0, with ratio = largest / least reach and kappa = |c| / least reach; half of
-// kDirectionMapMargin bounds it. Proven.
+// The gauge g of the set round c is convex and subadditive. The direction that a point is
+// interpolated at is within 8 u0 (u0 the unit roundoff) of its own, a corner's point within 2 u0
+// (|c| + m) of the corner's ray at distance m, so that g there is at most 1 / m (1 + 2 u0 (|c| + m)
+// max g) and g(p - c) at most what interpolation gives and (8 + 4 (|c| + m) / m) u0 * max g, max g
+// over all directions. The interpolation is of positive terms and errs, with the distance and the
+// stored gauges, by 16 u0 of itself, which is at least the least gauge. Relative to that all this
+// is at most `ratio` (24 + 4 (kappa + ratio)) u0, with ratio = largest / least reach and kappa =
+// |c| / least reach; half of kDirectionMapMargin bounds it. Proven.
 void DirectionMap::Finish(double least_reach, double largest_reach) {
-  HULLD_CHECK(radii_.size() == cell_count());
+  HULLD_CHECK(gauges_.size() == corner_count() && hints_.size() == cell_count());
   if (!(least_reach > 0)) return;
   const double ratio = largest_reach / least_reach;
   const double kappa = center_.cwiseAbs().maxCoeff() / least_reach;
-  const double error = ratio * (8 + 4 * (kappa + ratio)) * kUnitRoundoff;
+  const double error = ratio * (24 + 4 * (kappa + ratio)) * kUnitRoundoff;
   rejects_ = error < 0.5 * kDirectionMapMargin;
 }
 
-void DirectionMap::Coarsen() {
-  if (n_ % 2 != 0) return;
+bool DirectionMap::Coarsen() {
+  if (n_ % 2 != 0) return false;
   DirectionMap coarse(center_, n_ / 2);
-  const auto row = static_cast<size_t>(n_);
-  for (size_t top = 0; top < radii_.size(); top += 2 * row) {
-    for (size_t k = top; k < top + row; k += 2) {
-      const double least = std::min(std::min(radii_[k], radii_[k + 1]),
-                                    std::min(radii_[k + row], radii_[k + row + 1]));
-      coarse.radii_.push_back(least);
-      coarse.hints_.push_back(hints_[k + row + 1]);
+  const auto cells = static_cast<size_t>(n_);
+  for (size_t row = 0; row < 6 * cells; row += 2) {
+    for (size_t k = 0; k < cells; k += 2) coarse.hints_.push_back(hints_[row * cells + k]);
+  }
+  for (size_t face = 0; face < 6; ++face) {
+    for (size_t i = 0; i <= cells; i += 2) {
+      const size_t row = (face * (cells + 1) + i) * (cells + 1);
+      for (size_t k = 0; k <= cells; k += 2) coarse.gauges_.push_back(gauges_[row + k]);
     }
   }
   coarse.rejects_ = rejects_;
   *this = std::move(coarse);
+  return true;
 }
 
 void DirectionMap::AppendSurvivors(std::span<const Vector> points,
                                    std::vector<uint32_t>& survivors) const {
-  const size_t done =
-      CurrentSimdPath() == SimdPath::kAvx2 && rejects_ ? AppendSurvivorsAvx2(points, survivors) : 0;
-  AppendSurvivorsBaseline(points, done, survivors);
-}
-
-void DirectionMap::AppendSurvivorsBaseline(std::span<const Vector> points, size_t from,
-                                           std::vector<uint32_t>& survivors) const {
-  for (size_t i = from; i < points.size(); ++i) {
-    if (!IsCertainlyInside(PlaceOf(points[i]))) survivors.push_back(static_cast<uint32_t>(i));
+  // By the chunk, so that the buffer stays in the nearest cache.
+  constexpr size_t kChunk = 1024;
+  // Room beyond the chunk's, as four are written at a time.
+  std::array<uint32_t, kChunk + 4> buffer;
+  const bool has_avx2 = CurrentSimdPath() == SimdPath::kAvx2 && rejects_;
+  for (size_t first = 0; first < points.size(); first += kChunk) {
+    const std::span<const Vector> chunk =
+        points.subspan(first, std::min(kChunk, points.size() - first));
+    uint32_t* end = buffer.data();
+    const size_t done = has_avx2 ? WriteSurvivorsAvx2(chunk, end) : 0;
+    for (size_t i = done; i < chunk.size(); ++i) {
+      *end = static_cast<uint32_t>(i);
+      end += IsCertainlyInside(PlaceOf(chunk[i])) ? 0 : 1;
+    }
+    for (const uint32_t* i = buffer.data(); i < end; ++i) {
+      survivors.push_back(static_cast<uint32_t>(first) + *i);
+    }
   }
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
 namespace {
 
-// The largest integer that is no more than component * scale + half, from 0 to `last`.
-__attribute__((target("avx2"))) inline __m256d CellIndices(__m256d component, __m256d scale,
-                                                           __m256d half, __m256d last) {
-  const __m256d index = _mm256_add_pd(_mm256_mul_pd(component, scale), half);
-  return _mm256_floor_pd(_mm256_max_pd(_mm256_min_pd(index, last), _mm256_setzero_pd()));
+// component * scale + half, from 0 to n.
+__attribute__((target("avx2"))) inline __m256d AlongSide(__m256d component, __m256d scale,
+                                                         __m256d half, __m256d n) {
+  const __m256d along = _mm256_add_pd(_mm256_mul_pd(component, scale), half);
+  return _mm256_max_pd(_mm256_min_pd(along, n), _mm256_setzero_pd());
 }
+
+// a where t is 0, b where it is 1.
+__attribute__((target("avx2"))) inline __m256d Interpolate(__m256d a, __m256d b, __m256d t,
+                                                           __m256d rest) {
+  return _mm256_add_pd(_mm256_mul_pd(a, rest), _mm256_mul_pd(b, t));
+}
+
+// The gauges at four corners, and at the next corner after each. Pairs are loaded together, as four
+// gathers take longer.
+struct GaugesOfRow {
+  __attribute__((target("avx2"))) GaugesOfRow(const double* gauges, const int32_t* at) {
+    const __m256d even = _mm256_loadu2_m128d(gauges + at[2], gauges + at[0]);
+    const __m256d odd = _mm256_loadu2_m128d(gauges + at[3], gauges + at[1]);
+    first = _mm256_unpacklo_pd(even, odd);
+    second = _mm256_unpackhi_pd(even, odd);
+  }
+  __m256d first;
+  __m256d second;
+};
+
+// By which of four are kept: the numbers of these, in order, and then anything.
+alignas(16) constexpr int32_t kKeptFirst[16][4] = {
+    {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0},
+    {1, 2, 0, 0}, {0, 1, 2, 0}, {3, 0, 0, 0}, {0, 3, 0, 0}, {1, 3, 0, 0}, {0, 1, 3, 0},
+    {2, 3, 0, 0}, {0, 2, 3, 0}, {1, 2, 3, 0}, {0, 1, 2, 3}};
 
 }  // namespace
 
 // Four points at a time, operation by operation as PlaceOf and OnCube compute, so that the results
-// are the same. Returns how many points it has done.
-__attribute__((target("avx2"))) size_t DirectionMap::AppendSurvivorsAvx2(
-    std::span<const Vector> points, std::vector<uint32_t>& survivors) const {
+// are the same. Writes the survivors' indices to `end` and moves it beyond them, without a branch
+// on which these are; up to four places beyond are overwritten. Returns how many points it has
+// done.
+__attribute__((target("avx2"))) size_t DirectionMap::WriteSurvivorsAvx2(
+    std::span<const Vector> points, uint32_t*& end) const {
   const __m256d center_x = _mm256_set1_pd(center_.x());
   const __m256d center_y = _mm256_set1_pd(center_.y());
   const __m256d center_z = _mm256_set1_pd(center_.z());
@@ -108,6 +153,9 @@ __attribute__((target("avx2"))) size_t DirectionMap::AppendSurvivorsAvx2(
   const __m256d last = _mm256_set1_pd(n_ - 1);
   const __m256d least = _mm256_set1_pd(kMapMinDistance);
   const __m256d largest = _mm256_set1_pd(kMapMaxDistance);
+  const __m256d one = _mm256_set1_pd(1);
+  const __m256d corners = _mm256_set1_pd(n_ + 1);
+  const double* const gauges = gauges_.data();
   size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
     const double* p = points[i].data();
@@ -134,27 +182,38 @@ __attribute__((target("avx2"))) size_t DirectionMap::AppendSurvivorsAvx2(
     face = _mm256_add_pd(face,
                          _mm256_and_pd(_mm256_cmp_pd(along, zero, _CMP_LT_OQ), _mm256_set1_pd(1)));
     const __m256d scale = _mm256_div_pd(half, m);
-    const __m256d row = CellIndices(first, scale, half, last);
-    const __m256d column = CellIndices(second, scale, half, last);
-    const __m256d cell =
-        _mm256_add_pd(_mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(face, n), row), n), column);
-    // A distance out of range, or zero, reads no radius and keeps its point.
+    const __m256d along_first = AlongSide(first, scale, half, n);
+    const __m256d along_second = AlongSide(second, scale, half, n);
+    const __m256d row = _mm256_floor_pd(_mm256_min_pd(along_first, last));
+    const __m256d column = _mm256_floor_pd(_mm256_min_pd(along_second, last));
+    const __m256d s = _mm256_sub_pd(along_first, row);
+    const __m256d t = _mm256_sub_pd(along_second, column);
+    // A distance out of range, or zero, reads the first gauges and keeps its point.
     const __m256d in_range =
         _mm256_and_pd(_mm256_cmp_pd(m, least, _CMP_GE_OQ), _mm256_cmp_pd(m, largest, _CMP_LE_OQ));
-    const __m256d radius =
-        _mm256_mask_i32gather_pd(zero, radii_.data(), _mm256_cvttpd_epi32(cell), in_range, 8);
-    const __m256d inside = _mm256_cmp_pd(m, radius, _CMP_LT_OQ);
-    for (int kept = ~_mm256_movemask_pd(inside) & 0b1111; kept != 0; kept &= kept - 1) {
-      survivors.push_back(static_cast<uint32_t>(i) +
-                          static_cast<uint32_t>(std::countr_zero(static_cast<unsigned>(kept))));
-    }
+    const __m256d corner = _mm256_add_pd(
+        _mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(face, corners), row), corners), column);
+    alignas(16) int32_t at[4];
+    _mm_store_si128(reinterpret_cast<__m128i*>(at),
+                    _mm256_cvttpd_epi32(_mm256_and_pd(corner, in_range)));
+    const GaugesOfRow low(gauges, at);
+    const GaugesOfRow high(gauges + n_ + 1, at);
+    const __m256d rest_s = _mm256_sub_pd(one, s);
+    const __m256d rest_t = _mm256_sub_pd(one, t);
+    const __m256d gauge = Interpolate(Interpolate(low.first, low.second, t, rest_t),
+                                      Interpolate(high.first, high.second, t, rest_t), s, rest_s);
+    const __m256d inside =
+        _mm256_and_pd(_mm256_cmp_pd(_mm256_mul_pd(m, gauge), one, _CMP_LT_OQ), in_range);
+    const auto kept = static_cast<unsigned>(~_mm256_movemask_pd(inside)) & 0b1111;
+    const __m128i numbers = _mm_load_si128(reinterpret_cast<const __m128i*>(kKeptFirst[kept]));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(end),
+                     _mm_add_epi32(numbers, _mm_set1_epi32(static_cast<int>(i))));
+    end += std::popcount(kept);
   }
   return i;
 }
 #else
-size_t DirectionMap::AppendSurvivorsAvx2(std::span<const Vector>, std::vector<uint32_t>&) const {
-  return 0;
-}
+size_t DirectionMap::WriteSurvivorsAvx2(std::span<const Vector>, uint32_t*&) const { return 0; }
 #endif
 
 }  // namespace hulld

@@ -15,32 +15,41 @@
 namespace hulld {
 
 // A cube map of directions round a point c strictly inside a growing convex set: 6 faces of n x n
-// cells. Each cell holds a radius below which every point in its directions is certainly inside,
-// and a hint where on the surface its directions lead. The set only grows, so what the map holds
-// stays true.
+// cells. Each corner of a cell holds a bound of the set's gauge in its direction, and each cell a
+// hint where on the surface its directions lead. The set only grows, so what the map holds stays
+// true.
 //
-// Idea: measured by the largest absolute component m of p - c, the gauge of a convex set is convex
-// on a face of the cube, so its maximum over a cell is at a corner: points of the set found along
-// the four corner directions bound the whole cell.
+// Idea: the gauge of a convex set, the factor by which the set about c must be scaled to reach a
+// point, is convex along any line. A point's direction, scaled to the largest absolute component 1,
+// lies in a cell on a face of the cube; there the gauge is at most what the values at the cell's
+// four corners give by interpolation along one side and then the other. So a few points of the set,
+// found along the corners' directions, reject all points below a surface that follows planes
+// exactly and curves closely, even where points lie along the surface.
 class DirectionMap {
  public:
-  // Where a point lies: its cell, and its distance m from c.
+  // Where a point lies: its cell, that cell's first corner among all corners, how far from there
+  // to the opposite corner along either side, from 0 to 1, and its distance m from c, the largest
+  // absolute component.
   struct Place {
     size_t cell;
+    size_t corner;
+    double along_first;
+    double along_second;
     double distance;
   };
 
   // One cell a face, and nothing is certainly inside.
   explicit DirectionMap(const Vector& center);
-  // No cells yet: they are appended, so that a map can be made little by little.
+  // No corners and no cells yet: they are appended, so that a map can be made little by little.
   DirectionMap(const Vector& center, int resolution);
-  // Appends the next cell, face by face, i major. reach: the least, over the cell's corners, of a
-  // distance m such that the double nearest to center + m * direction, component by component, is
-  // in the set. Cost: O(1).
-  void AppendCell(double reach, uint32_t hint);
-  // Says what the least and the largest reach of all corners are. Requires that all cells are
-  // there. Where the shape is too slender for the rounding of this map to be negligible, nothing is
-  // certainly inside.
+  // Appends the next corner, face by face, i major. reach: a distance m such that the double
+  // nearest to center + m * direction, component by component, is in the set.
+  void AppendCorner(double reach);
+  // Appends the next cell, in the same order.
+  void AppendCell(uint32_t hint);
+  // Says what the least and the largest reach of all corners are. Requires that all corners and
+  // cells are there. Where the shape is too slender for the rounding of this map to be negligible,
+  // nothing is certainly inside.
   void Finish(double least_reach, double largest_reach);
 
   const Vector& center() const { return center_; }
@@ -48,24 +57,30 @@ class DirectionMap {
   size_t cell_count() const { return 6 * static_cast<size_t>(n_) * static_cast<size_t>(n_); }
 
   // NaN-free for every finite point. The cell may be a neighbour of the true one by rounding; the
-  // radii allow for that.
+  // gauges allow for that.
   Place PlaceOf(const Vector& point) const { return PlaceIn(center_, n_, point); }
   // The same for a map of any resolution.
   static Place PlaceIn(const Vector& center, int resolution, const Vector& point) {
     const Vector v = point - center;
     const OnCube on_cube(v.x(), v.y(), v.z());
     const double m = on_cube.largest();
-    if (m == 0) return {0, 0};
-    if (!(m >= kMapMinDistance && m <= kMapMaxDistance)) return {0, INFINITY};
-    const double half = 0.5 * resolution;
+    if (m == 0) return {0, 0, 0, 0, 0};
+    if (!(m >= kMapMinDistance && m <= kMapMaxDistance)) return {0, 0, 0, 0, INFINITY};
+    const double side = resolution;
+    const double half = 0.5 * side;
     const double scale = half / m;
-    const int i = std::min(resolution - 1, static_cast<int>(on_cube.first() * scale + half));
-    const int j = std::min(resolution - 1, static_cast<int>(on_cube.second() * scale + half));
-    const auto side = static_cast<uint32_t>(resolution);
-    return {CubeCell(on_cube.face(), side, static_cast<uint32_t>(i), static_cast<uint32_t>(j)), m};
+    const double first = std::max(0.0, std::min(side, on_cube.first() * scale + half));
+    const double second = std::max(0.0, std::min(side, on_cube.second() * scale + half));
+    const int i = std::min(resolution - 1, static_cast<int>(first));
+    const int j = std::min(resolution - 1, static_cast<int>(second));
+    const auto row = static_cast<uint32_t>(i);
+    const auto column = static_cast<uint32_t>(j);
+    const auto cells = static_cast<uint32_t>(resolution);
+    return {CubeCell(on_cube.face(), cells, row, column),
+            CubeCell(on_cube.face(), cells + 1, row, column), first - i, second - j, m};
   }
   bool IsCertainlyInside(const Place& place) const {
-    return rejects_ && place.distance < radii_[place.cell];
+    return rejects_ && place.distance * GaugeAt(place) < 1;
   }
 
   uint32_t hint(size_t cell) const { return hints_[cell]; }
@@ -74,26 +89,34 @@ class DirectionMap {
   // The direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest component is
   // +-1.
   Vector CornerDirection(int face, int i, int j) const;
-  // Halves the resolution where that is possible: fewer cells, each as near as its nearest part.
-  void Coarsen();
+  // Halves the resolution, keeping one of four corners; false, and no change, where it is odd.
+  bool Coarsen();
   size_t MemoryBytes() const {
-    return radii_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
+    return gauges_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
   }
 
   // Appends the indices of the points that are not certainly inside, ascending.
   void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors) const;
 
  private:
-  void AppendSurvivorsBaseline(std::span<const Vector> points, size_t from,
-                               std::vector<uint32_t>& survivors) const;
-  size_t AppendSurvivorsAvx2(std::span<const Vector> points,
-                             std::vector<uint32_t>& survivors) const;
+  size_t corner_count() const {
+    return 6 * (static_cast<size_t>(n_) + 1) * (static_cast<size_t>(n_) + 1);
+  }
+  double GaugeAt(const Place& place) const {
+    const double* const low = gauges_.data() + place.corner;
+    const double* const high = low + n_ + 1;
+    const double s = place.along_first;
+    const double t = place.along_second;
+    return (low[0] * (1 - t) + low[1] * t) * (1 - s) + (high[0] * (1 - t) + high[1] * t) * s;
+  }
+  size_t WriteSurvivorsAvx2(std::span<const Vector> points, uint32_t*& end) const;
 
   Vector center_;
   int n_;
   double half_;
   bool rejects_ = false;
-  std::vector<double> radii_;
+  // By corner: the gauge of its direction, rounded up.
+  std::vector<double> gauges_;
   std::vector<uint32_t> hints_;
 };
 

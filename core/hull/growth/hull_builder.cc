@@ -83,6 +83,7 @@ bool LexicographicallyLess(const Vector& a, const Vector& b) {
 class HullBuilder::State {
  public:
   void BeginBlock() { vertices_.BeginBlock(); }
+  void FinishBlock() { vertices_.FinishBlock(); }
   void Insert(const Vector& point) {
     if (surface_) return surface_->Insert(vertices_, point);
     switch (dimension()) {
@@ -221,6 +222,7 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
     return absl::ResourceExhaustedError(absl::StrCat(
         "the hull would have ", reached, " vertices; the limit is ", limits.max_vertices));
   }
+  state_->FinishBlock();
   HULLD_CHECK(state_->vertices().outside() + state_->vertices().duplicate() <= points.size());
   PointCounts counts;
   counts.received = points.size();

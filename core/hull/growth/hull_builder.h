@@ -75,15 +75,15 @@ class HullBuilder {
   // the builder's former state gives the same hull. Cost: O(points of that block).
   std::vector<Vector> NewVertices() const;
 
-  // What the builder holds in memory, by capacities, in bytes. Below 300 a vertex from 1000
+  // What the builder holds in memory, by capacities, in bytes. Below 230 a vertex from 1000
   // vertices on; inside points are not kept. Cost: O(1) from dimension 3 on.
   size_t MemoryBytes() const;
   // Steps of work that insertions did so far beyond the triangles that they removed and created:
   // for tests that no single point stalls.
   uint64_t housekeeping_steps() const;
 
-  // The canonical snapshot of all points added so far. Cost: O(V log V), exact coplanarity tests at
-  // every ridge.
+  // The canonical snapshot of all points added so far. Cost: O(V log V), most often O(V): a quarter
+  // to four tenths of what adding points that all are vertices costs.
   Hull Snapshot() const;
   // The same, but CANCELLED when should_stop, which may be empty, said so. It is polled every 1024
   // triangles, twice over; sorting what they made is not interrupted.

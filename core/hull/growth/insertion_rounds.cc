@@ -13,6 +13,10 @@ namespace {
 // Points of the first round, about.
 constexpr size_t kFirstRound = 64;
 
+// Of the map of directions for a round (see Surface::MeasureBefore).
+constexpr double kMapFineness = 2.8;
+constexpr double kWalksPerPoint = 0.2;
+
 // Odd, and far from any power of two: consecutive numbers get ranks far apart.
 constexpr uint32_t kMultiplier = 0x9E3779B1u;
 
@@ -107,7 +111,8 @@ class RoundsInsertion {
     const bool is_last = round + 1 == rounds_.count();
     members_.clear();
     if (!is_last) rounds_.AppendRound(round, members_);
-    surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size());
+    surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(), kMapFineness,
+                           kWalksPerPoint);
     const DirectionMap* directions = surface_.directions();
     if (is_last) ChooseLast(round, directions);
     chosen_.clear();

@@ -34,7 +34,7 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
   if (side > 0) std::reverse(loop.begin(), loop.end());
   const size_t n = loop.size();
   for (size_t i = 1; i + 1 < n; ++i) {
-    SetTriangle(vertices, NewId(), loop[0], loop[i], loop[i + 1]);
+    SetTriangle(vertices, NewId(), loop[i], loop[i + 1], loop[0]);
   }
   for (size_t i = 0; i < n; ++i) {
     SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
@@ -96,8 +96,7 @@ size_t Surface::MemoryBytes() const {
   size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + vertex_mark_.MemoryBytes();
   if (directions_) bytes += directions_->MemoryBytes();
   if (measuring_) {
-    bytes += measuring_->map.MemoryBytes() + measuring_->reach.capacity() * sizeof(double) +
-             measuring_->hint.capacity() * sizeof(TriangleId);
+    bytes += measuring_->map.MemoryBytes() + measuring_->hint.capacity() * sizeof(TriangleId);
   }
   return bytes + region_.capacity() * sizeof(TriangleId) +
          horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit);

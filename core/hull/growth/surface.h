@@ -20,7 +20,8 @@ namespace hulld {
 using TriangleId = uint32_t;
 
 // A triangle of the surface, counter-clockwise seen from outside, in one cache line. neighbours[i]
-// lies across the edge from corners[i] to corners[(i + 1) % 3].
+// lies across the edge from corners[i] to corners[(i + 1) % 3]. The last corner is the apex: the
+// triangle was made when that vertex came, as one of a fan round it.
 struct alignas(64) SurfaceTriangle {
   // The plane, rounded: normal . p - offset, which errs by at most slope * (|p| + |corner|), |.|
   // the largest component.
@@ -42,7 +43,8 @@ static_assert(sizeof(SurfaceTriangle) == 64);
 // visible region of the point moved outwards by an infinitesimal amount, hence a disk; a vertex
 // that the new point makes non-extreme has only such triangles around it and goes with them; and
 // every triangle beyond the horizon is strictly invisible, so that no new triangle is degenerate
-// and no horizon vertex redundant.
+// and no horizon vertex redundant. So only neighbours with a common apex, made together, can lie in
+// one plane: the later of two others was joined to the earlier one across the horizon.
 //
 // The triangle to start from is found by walking on the surface, towards the one that the ray from
 // a fixed interior point through the new point pierces; a map of directions round that point
@@ -77,17 +79,23 @@ class Surface {
     Side side;
     TriangleId triangle;
   };
-  // Finds where a point lies and changes nothing. `start`: where to start walking. Requires that an
-  // interior point is known; empty when the walk is longer than the surface warrants.
-  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point,
-                                 TriangleId start) const {
+  // Finds where a point lies, fast when the last point in its cell of the map lay near it. Requires
+  // that an interior point is known; empty when the walk is longer than the surface warrants.
+  std::optional<Location> Locate(const VertexTable& vertices, const Vector& point) {
     HULLD_CHECK(directions_.has_value());
-    uint64_t steps = 0;
-    return Walk(vertices, point, SizeWith(vertices, point), Alive(start), steps);
+    const size_t cell = directions_->PlaceOf(point).cell;
+    const std::optional<Location> location =
+        Walk(vertices, point, SizeWith(vertices, point), Alive(directions_->hint(cell)), work_);
+    if (location) directions_->SetHint(cell, location->triangle);
+    return location;
   }
   // True when the point lies strictly outside the triangle's plane, exactly.
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
     return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
+  }
+  // True when the point lies in the triangle's plane, exactly.
+  bool IsInPlane(const VertexTable& vertices, TriangleId id, const Vector& point) const {
+    return SideOf(vertices, id, point, SizeWith(vertices, point)) == 0;
   }
   // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
   // returns the triangles that go, for the caller to move what it keeps by triangle; the second
@@ -110,9 +118,12 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Measures the surface anew when that pays for so many points to be inserted. Does nothing where
-  // no interior point is known. Cost: at most some walks per ten points.
-  void MeasureBefore(const VertexTable& vertices, size_t points);
+  // Measures the surface anew when a map is worth that for so many points to be looked up.
+  // fineness: at most so many times the cells a side that suit points one by one. True when it did;
+  // it does not where no interior point is known. Cost: at most `walks_per_point` walks for each
+  // point.
+  bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
+                     double walks_per_point);
   // Tells how many points were looked up in the map and how many it rejected: what it is worth.
   void CountRejected(size_t asked, size_t rejected) {
     asked_ += asked;
@@ -174,11 +185,9 @@ class Surface {
   struct Measurement {
     DirectionMap map;
     // Of the corners of the last row up to the one to measure, and of the row before from there on:
-    // how far the surface is, and where the direction leaves it.
-    std::vector<double> reach;
+    // where the direction leaves the surface.
     std::vector<TriangleId> hint;
-    // Both of the corner that stood before in the last one's place.
-    double reach_before = 0;
+    // The one that stood before in the last one's place.
     TriangleId hint_before = 0;
     // The corner to measure: its face, row and column.
     int face = 0;
@@ -211,8 +220,8 @@ class Surface {
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
                                TriangleId start, uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
-  int TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
-             const Ray& ray) const;
+  size_t EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
+                     const Ray& ray, std::optional<uint32_t> first) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Measure(const VertexTable& vertices);
   void Update(const VertexTable& vertices);

@@ -21,13 +21,16 @@ constexpr int kMostRounds = 64;
 // A smaller surface is walked across faster than it is measured.
 constexpr size_t kWorthMeasuring = 64;
 
+// Steps of a walk from which on it is no longer always straight.
+constexpr size_t kStepsBeforeChance = 16;
+
 // Corners of a map that one insertion measures: a map is done long before the surface has doubled.
 constexpr size_t kCornersPerInsertion = 8;
 
-// Cells of a map for this many triangles: some triangles to a cell, fewer where the map rejects
-// many points than where it only tells where to start walking.
+// Cells a side of a map for this many triangles: some triangles to a cell, fewer where the map
+// rejects many points than where it only tells where to start walking.
 int ResolutionFor(size_t triangles, bool rejects) {
-  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 6 : 96));
+  const double cells_a_side = std::sqrt(static_cast<double>(triangles) / (rejects ? 12 : 96));
   return std::clamp(static_cast<int>(cells_a_side), 2, 256);
 }
 
@@ -41,46 +44,59 @@ Surface::Ray Surface::RayTo(const Vector& point) const {
   return {y, in_range ? kTripleProductErrorFactor * d * d * d : INFINITY};
 }
 
-// Which side of the plane through the interior point and the edge a, b the point lies on: +1 on the
-// side of a triangle to the left of the edge.
-int Surface::TurnOf(const VertexTable& vertices, VertexId a, VertexId b, const Vector& point,
-                    const Ray& ray) const {
+// The edge of a triangle to cross on the way to the point: one whose plane through the interior
+// point has the point on its far side, strictly and exactly. 3 when there is none: the triangle's
+// cone holds the point. Of several the one of which this is most so, or, from `first` on round the
+// triangle, the next one. Computing all three without a branch is faster than guessing which to
+// start with.
+size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t,
+                            const Vector& point, const Ray& ray,
+                            std::optional<uint32_t> first) const {
   const Vector& center = directions_->center();
-  const double value = Dot(ray.y, Cross(vertices[a] - center, vertices[b] - center));
-  if (value > ray.bound) return 1;
-  if (value < -ray.bound) return -1;
-  return Orient3d(center, vertices[a], vertices[b], point);
+  const Vector a = vertices[t.corners[0]] - center;
+  const Vector b = vertices[t.corners[1]] - center;
+  const Vector c = vertices[t.corners[2]] - center;
+  const double turns[3] = {Dot(ray.y, Cross(a, b)), Dot(ray.y, Cross(b, c)),
+                           Dot(ray.y, Cross(c, a))};
+  const double least = std::min(turns[0], std::min(turns[1], turns[2]));
+  if (least > ray.bound) return 3;
+  if (least < -ray.bound && !first) return least == turns[0] ? 0 : least == turns[1] ? 1 : 2;
+  for (uint32_t k = 0; k < 3; ++k) {
+    const uint32_t i = (first.value_or(0) + k) % 3;
+    if (turns[i] > ray.bound) continue;
+    if (turns[i] < -ray.bound ||
+        Orient3d(center, vertices[t.corners[i]], vertices[t.corners[(i + 1) % 3]], point) < 0) {
+      return i;
+    }
+  }
+  return 3;
 }
 
-// Crosses any edge whose plane through the interior point has the point on its far side, starting
-// with a random one: among coplanar triangles a fixed order could go in circles. Empty when the
-// walk is longer than the surface warrants.
+// Crosses edges that have the point on their far side. Each such step leads to a triangle whose
+// plane the ray from the interior point through the point meets no later, and sooner unless both
+// are coplanar. So only among coplanar triangles can a walk go in circles, and not for ever once it
+// chooses at random. Empty when the walk is longer than the surface warrants.
 std::optional<Surface::Location> Surface::Walk(const VertexTable& vertices, const Vector& point,
                                                double size, TriangleId start,
                                                uint64_t& steps) const {
+  ++steps;
+  if (SideOf(vertices, start, point, size) > 0) return Location{Side::kOutside, start};
   const Ray ray = RayTo(point);
   TriangleId at = start;
   uint32_t random = 1;
-  TriangleId from = kDead;
   const size_t longest = 4 * alive_ + 64;
   for (size_t step = 0; step < longest; ++step) {
+    std::optional<uint32_t> first;
+    if (step >= kStepsBeforeChance) {
+      random = random * 1664525u + 1013904223u;
+      first = (random >> 16) % 3;
+    }
+    const SurfaceTriangle& t = triangles_[at];
+    const size_t edge = EdgeTowards(vertices, t, point, ray, first);
+    if (edge == 3) return Location{Side::kInside, at};
+    at = t.neighbours[edge];
     ++steps;
     if (SideOf(vertices, at, point, size) > 0) return Location{Side::kOutside, at};
-    random = random * 1664525u + 1013904223u;
-    const uint32_t first = (random >> 16) % 3;
-    const SurfaceTriangle& t = triangles_[at];
-    TriangleId next = kDead;
-    for (uint32_t k = 0; k < 3 && next == kDead; ++k) {
-      const uint32_t i = (first + k) % 3;
-      // The edge just crossed has the point on this side, as the sign was exact.
-      if (t.neighbours[i] == from) continue;
-      if (TurnOf(vertices, t.corners[i], t.corners[(i + 1) % 3], point, ray) < 0) {
-        next = t.neighbours[i];
-      }
-    }
-    if (next == kDead) return Location{Side::kInside, at};
-    from = at;
-    at = next;
   }
   return std::nullopt;
 }
@@ -152,16 +168,18 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
 // At extreme scales every sign is decided by integers, and a map costs more than it saves.
 bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
-void Surface::MeasureBefore(const VertexTable& vertices, size_t points) {
-  if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return;
-  // A tenth as many walks as points, at most.
-  const int affordable = static_cast<int>(std::sqrt(static_cast<double>(points) / 60.0));
-  const int wanted = std::min(affordable, 3 * ResolutionFor(alive_, true)) & ~1;
-  if (wanted < 4) return;
-  if (wanted > directions_->resolution() || 4 * alive_ > 5 * measured_at_) {
-    StartMeasuring(vertices, wanted);
-    ContinueMeasuring(vertices, SIZE_MAX);
-  }
+bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
+                            double walks_per_point) {
+  if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return false;
+  // Six faces, and some two walks to measure a corner.
+  const double affordable = std::sqrt(static_cast<double>(points) * walks_per_point / 12);
+  const double useful = fineness * ResolutionFor(alive_, true);
+  const int wanted = static_cast<int>(std::min({affordable, useful, 256.0})) & ~1;
+  if (wanted < 4) return false;
+  if (wanted <= directions_->resolution() && 4 * alive_ <= 5 * measured_at_) return false;
+  StartMeasuring(vertices, wanted);
+  ContinueMeasuring(vertices, SIZE_MAX);
+  return true;
 }
 
 void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
@@ -173,7 +191,7 @@ void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
   const size_t row = static_cast<size_t>(resolution) + 1;
   work_ += row;
   measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
-                           std::vector<double>(row), std::vector<TriangleId>(row, Alive(last_))};
+                           std::vector<TriangleId>(row, Alive(last_))};
 }
 
 void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
@@ -188,21 +206,15 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
 void Surface::MeasureCorner(const VertexTable& vertices) {
   Measurement& m = *measuring_;
   const auto j = static_cast<size_t>(m.j);
-  const double reach_above = m.reach[j];
   const TriangleId hint_above = m.hint[j];
   // From the corner to the left, or from the one above.
   TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
   const double reach = Reach(vertices, m.map.CornerDirection(m.face, m.i, m.j), near);
-  m.reach[j] = reach;
+  m.map.AppendCorner(reach);
   m.hint[j] = near;
   m.least = std::min(m.least, reach);
   m.largest = std::max(m.largest, reach);
-  if (m.i > 0 && m.j > 0) {
-    m.map.AppendCell(
-        std::min(std::min(m.reach_before, reach_above), std::min(m.reach[j - 1], reach)),
-        m.hint_before);
-  }
-  m.reach_before = reach_above;
+  if (m.i > 0 && m.j > 0) m.map.AppendCell(m.hint_before);
   m.hint_before = hint_above;
   ++work_;
   if (++m.j <= m.map.resolution()) return;
@@ -220,12 +232,14 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
   double m = extent_;
   // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
   // nearly coplanar, their rounded planes tell little, hence the growing steps.
+  double step_back = 0x1p-30;
   for (int round = 0; round < kMostRounds; ++round) {
     const SurfaceTriangle& t = triangles_[near];
     const double climb = t.normal.dot(direction);
     const double height = t.offset - t.normal.dot(center);
     if (climb > 0 && height > 0 && height / climb < m) m = height / climb;
-    m *= 1 - std::ldexp(0x1p-30, round / 2);
+    m *= 1 - step_back;
+    if (round % 2 == 1) step_back *= 2;
     const Vector point = center + m * direction;
     const std::optional<Location> location =
         Walk(vertices, point, SizeWith(vertices, point), near, work_);
@@ -238,7 +252,8 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
 
 void Surface::FinishInsertions(const VertexTable& vertices) {
   // A map that was made fine for a large block takes more memory than it saves time from here on.
-  if (directions_ && directions_->cell_count() > 4 * alive_) directions_->Coarsen();
+  while (directions_ && 2 * directions_->cell_count() > alive_ && directions_->Coarsen()) {
+  }
   if (alive_ >= next_update_) Update(vertices);
 }
 

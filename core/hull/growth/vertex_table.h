@@ -25,6 +25,18 @@ class VertexTable {
     duplicate_ = 0;
     added_.clear();
   }
+  // Gives back the memory of what came and went within the block. Cost: amortized by the vertices
+  // that came.
+  void FinishBlock() {
+    if (added_.size() > outside_) {
+      if (id_bound() <= 8 * added_.size()) {
+        added_.clear();
+        for (VertexId id = 0; id < id_bound(); ++id) added_.push_back(id);
+      }
+      KeepNew(added_);
+    }
+    if (added_.capacity() > 2 * added_.size() + 16) added_.shrink_to_fit();
+  }
   uint64_t outside() const { return outside_; }
   uint64_t duplicate() const { return duplicate_; }
 
@@ -79,11 +91,7 @@ class VertexTable {
   // Cost: O(points of the block that were vertices at any time).
   std::vector<Vector> NewVertices() const {
     std::vector<VertexId> ids = added_;
-    std::erase_if(
-        ids, [this](VertexId id) { return counts_[id].block != block_ || !counts_[id].is_new; });
-    // An ID comes twice where one vertex of the block took the place of another.
-    std::sort(ids.begin(), ids.end());
-    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    KeepNew(ids);
     std::vector<Vector> vertices;
     vertices.reserve(ids.size());
     for (const VertexId id : ids) vertices.push_back(points_[id]);
@@ -117,6 +125,15 @@ class VertexTable {
     bool is_new;
     bool is_alive;
   };
+
+  // Leaves those that the current block added and that live, ascending and each once.
+  void KeepNew(std::vector<VertexId>& ids) const {
+    std::erase_if(
+        ids, [this](VertexId id) { return counts_[id].block != block_ || !counts_[id].is_new; });
+    // An ID comes twice where one vertex of the block took the place of another.
+    if (!std::is_sorted(ids.begin(), ids.end())) std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  }
 
   ChunkedVector<Vector> points_;
   ChunkedVector<Counts> counts_;

@@ -5,18 +5,27 @@
 #include <numeric>
 
 #include "core/numeric/exponent_limits.h"
+#include "core/query/exact/exact_frame.h"
 #include "core/query/terms/pose.h"
 
 namespace hulld {
 namespace {
 
-// A quaternion as integers without common power of two, its homogeneous matrix and squared norm.
+// The homogeneous matrix and squared norm of a quaternion as integers, but for common factors.
 struct IntegerRotation {
   IntegerVector rows[3];
   Integer norm_squared;
 };
 
 IntegerRotation RotationOf(const std::array<double, 4>& q) {
+  if (SmallRotation small; FindSmallRotation(q, small)) {
+    IntegerRotation rotation;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) rotation.rows[i][j] = ToInteger(WideOf(small.rows[i][j]));
+    }
+    rotation.norm_squared = ToInteger(WideOf(small.norm));
+    return rotation;
+  }
   int exponent = kAboveAllExponents;
   for (const double component : q) {
     if (component != 0) exponent = std::min(exponent, LowestBitExponent(component));
@@ -55,12 +64,16 @@ ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
   const int shift_exponent =
       LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents));
   const int common = std::min({exponent_a, exponent_b, shift_exponent});
+  // A common norm need not be multiplied in twice.
+  const bool same_norm = R_A.norm_squared == R_B.norm_squared;
+  const Integer factor_a = same_norm ? Integer(1) : R_B.norm_squared;
+  const Integer factor_b = same_norm ? Integer(1) : R_A.norm_squared;
   for (int i = 0; i < 3; ++i) {
-    a_.rows[i] = (R_B.norm_squared << (exponent_a - common)) * R_A.rows[i];
-    b_.rows[i] = (R_A.norm_squared << (exponent_b - common)) * R_B.rows[i];
+    a_.rows[i] = (factor_a << (exponent_a - common)) * R_A.rows[i];
+    b_.rows[i] = (factor_b << (exponent_b - common)) * R_B.rows[i];
   }
   exponent_ = common;
-  norm_ = R_A.norm_squared * R_B.norm_squared;
+  norm_ = factor_a * R_A.norm_squared;
   a_.shift = {0, 0, 0};
   b_.shift = norm_ * (ToInteger(X_WB.t, common) - ToInteger(X_WA.t, common));
 }
@@ -90,9 +103,9 @@ std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
   return all;
 }
 
-std::vector<uint32_t> ExactPair::Farthest(Side& side, const std::vector<uint32_t>& candidates,
+std::vector<uint32_t> ExactPair::Farthest(Side& side, std::span<const uint32_t> candidates,
                                           const IntegerVector& n) {
-  if (candidates.size() == 1) return candidates;
+  if (candidates.size() == 1) return {candidates[0]};
   std::vector<uint32_t> farthest;
   Integer best;
   for (const uint32_t i : candidates) {
@@ -110,15 +123,17 @@ std::vector<uint32_t> ExactPair::Farthest(Side& side, const std::vector<uint32_t
 std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n) {
   if (!filter_->usable() || IsZero(n)) return Farthest(a_, AllOf(a_), n);
   const Vector n_W = ToScaledDoubles(n);
-  return Farthest(a_, filter_->CandidatesA(n_W, kScaledDoublesError * n_W.cwiseAbs().maxCoeff()),
-                  n);
+  CandidateBuffer buffer;
+  return Farthest(
+      a_, filter_->CandidatesA(n_W, kScaledDoublesError * LargestComponent(n_W), buffer), n);
 }
 
 std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n) {
   if (!filter_->usable() || IsZero(n)) return Farthest(b_, AllOf(b_), -n);
   const Vector n_W = ToScaledDoubles(n);
-  return Farthest(b_, filter_->CandidatesB(n_W, kScaledDoublesError * n_W.cwiseAbs().maxCoeff()),
-                  -n);
+  CandidateBuffer buffer;
+  return Farthest(
+      b_, filter_->CandidatesB(n_W, kScaledDoublesError * LargestComponent(n_W), buffer), -n);
 }
 
 IntegerVector ExactPair::SumOfInnerVertices(const Side& side) {

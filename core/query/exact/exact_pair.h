@@ -2,6 +2,7 @@
 #define HULLD_CORE_QUERY_EXACT_EXACT_PAIR_H_
 
 #include <cstdint>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -19,13 +20,19 @@ using ExactCorner = MinkowskiVertex<IntegerVector>;
 //
 // With Q the quaternions' integers and N = |Q|^2, the world coordinates, shifted by -t_A and
 // multiplied by N_A N_B and a power of two, are integers: N_B R(Q_A) P_A for A, and N_A R(Q_B) P_B
-// + N_A N_B (T_B - T_A) for B. Degree 5 in the input; some 280 bits at a common exponent. The
-// floating-point pair, where it is usable, narrows down which vertices can be farthest, so that
-// only these are multiplied out.
+// + N_A N_B (T_B - T_A) for B; or by N_A alone where N_A = N_B. Degree 5 in the input; some 280
+// bits at a common exponent. The floating-point pair, where it is usable, narrows down which
+// vertices can be farthest, so that only these are multiplied out.
 class ExactPair {
  public:
   // Makes the pair for the hulls and poses of `filter`, which must outlive it.
   explicit ExactPair(const FloatPair& filter);
+
+  // What a search asks of its pair: this one, or WidePair.
+  using Number = Integer;
+  using Coordinates = IntegerVector;
+  using Direction = IntegerVector;
+  static const IntegerVector& ToDirection(const IntegerVector& n) { return n; }
 
   const FloatPair& filter() const { return *filter_; }
   const QueryHull& a() const { return *a_.hull; }
@@ -40,7 +47,8 @@ class ExactPair {
   const IntegerVector& VertexA(uint32_t i) { return Vertex(a_, i); }
   const IntegerVector& VertexB(uint32_t i) { return Vertex(b_, i); }
   // The vertex a - b of A - B.
-  ExactCorner Corner(VertexPair pair) { return {VertexA(pair.a) - VertexB(pair.b), pair}; }
+  ExactCorner Corner(VertexPair pair) { return {Difference(pair), pair}; }
+  IntegerVector Difference(VertexPair pair) { return VertexA(pair.a) - VertexB(pair.b); }
   // Multiplies out every vertex: from then on all functions may be called by several threads at
   // once.
   void CacheAllVertices();
@@ -53,10 +61,10 @@ class ExactPair {
   uint32_t FarthestA(const IntegerVector& n) { return FeatureA(n).front(); }
   uint32_t FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
   // The same when it is known to be among `candidates`, ascending.
-  uint32_t FarthestA(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
+  uint32_t FarthestA(const IntegerVector& n, std::span<const uint32_t> candidates) {
     return Farthest(a_, candidates, n).front();
   }
-  uint32_t FarthestB(const IntegerVector& n, const std::vector<uint32_t>& candidates) {
+  uint32_t FarthestB(const IntegerVector& n, std::span<const uint32_t> candidates) {
     return Farthest(b_, candidates, -n).front();
   }
 
@@ -79,7 +87,7 @@ class ExactPair {
   static IntegerVector ToWorld(const Side& side, const IntegerVector& own);
   static const IntegerVector& Vertex(Side& side, uint32_t i);
   static IntegerVector SumOfInnerVertices(const Side& side);
-  static std::vector<uint32_t> Farthest(Side& side, const std::vector<uint32_t>& candidates,
+  static std::vector<uint32_t> Farthest(Side& side, std::span<const uint32_t> candidates,
                                         const IntegerVector& n);
   std::vector<uint32_t> AllOf(const Side& side) const;
 

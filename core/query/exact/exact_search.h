@@ -3,36 +3,56 @@
 
 #include <absl/status/statusor.h>
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <vector>
 
 #include "core/numeric/integer.h"
 #include "core/query/exact/exact_pair.h"
+#include "core/query/floating/float_pair.h"
+#include "core/query/floating/float_search.h"
 #include "core/query/terms/relation.h"
 #include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
 
 struct ExactSearchResult {
-  Relation relation;
-  // Separated and touching: n, world frame, n.(a - b) <= 0 for all a and b, < 0 when separated.
+  Relation relation = Relation::kOverlapping;
+  // Separated and touching, where asked for: n, world frame, n.(a - b) <= 0 for all a and b, < 0
+  // when separated.
   std::optional<IntegerVector> axis;
   uint64_t directions_tried = 0;
   // Where touching and known: pairs whose differences hold 0 in their hull, with repetitions.
-  std::vector<VertexPair> pairs;
+  uint32_t pair_count = 0;
+  std::array<VertexPair, 3> pairs = {};
 };
 
-// Decides the relation of two hulls that are not empty, exactly. CANCELLED when should_stop said so
-// (it may be empty).
+// In which integers an exact search computes. The answer is the same in all, axis and pairs
+// included.
+enum class ExactWidth {
+  kNarrowest,  // the least that are certain to hold every number that may come up
+  k1Word,      // coordinates of 55 bits
+  k2Words,     // of 119
+  k3Words,     // of 183
+  k5Words,     // of 311: two rotations by any doubles of about one magnitude
+  kAny,        // integers of any size
+};
+
+// Decides the relation of two hulls that are not empty, exactly. `end`: where the search in
+// floating point ended without a verdict, which mostly shows the relation at once; may be null.
+// `with_axis`: whether the axis is wanted, which costs something where it is not otherwise needed
+// in integers of any size. CANCELLED when should_stop said so (it may be empty). `width`, for
+// tests: FAILED_PRECONDITION where the pair's numbers may exceed it.
 //
 // A flat Minkowski difference C, of dimension below 3, has no interior. Its plane or line either
 // misses the origin, or C is thickened along coordinate axes outside its span: that leaves the
 // position of the origin in the span as it was, and the portal search, which needs an interior,
 // applies.
-absl::StatusOr<ExactSearchResult> SearchExactly(ExactPair& pair,
-                                                const std::function<bool()>& should_stop);
+absl::StatusOr<ExactSearchResult> SearchExactly(const FloatPair& pair, const FloatSearchResult* end,
+                                                bool with_axis,
+                                                const std::function<bool()>& should_stop,
+                                                ExactWidth width = ExactWidth::kNarrowest);
 
 // The span of A - B.
 struct MinkowskiSpan {

@@ -6,6 +6,8 @@
 
 #include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
+#include "core/query/exact/exact_pair.h"
+#include "core/query/exact/wide_pair.h"
 
 namespace hulld {
 namespace {
@@ -26,7 +28,8 @@ std::optional<int> CertainSign(double value, double bound) {
 }  // namespace
 
 // A direction in floating point, where filtered, and exactly once it is asked for.
-class PortalSearch::Direction {
+template <typename Pair>
+class PortalSearch<Pair>::Direction {
  public:
   Direction(const PortalSearch& search, Kind kind, const Point* p = nullptr,
             const Point* q = nullptr, const Point* r = nullptr)
@@ -55,8 +58,20 @@ class PortalSearch::Direction {
         break;
     }
   }
-  Direction(const PortalSearch& search, IntegerVector n)
-      : search_(search), kind_(Kind::kOther), exact_(std::move(n)) {}
+  // Requires n not zero.
+  Direction(const PortalSearch& search, ExactDirection n)
+      : search_(search), kind_(Kind::kOther), exact_(std::move(n)) {
+    if (!search.filtered_) return;
+    n_ = ToScaledDoubles(ToInteger(*exact_));
+    error_ = kScaledDoublesError * LargestOf(n_);
+  }
+
+  // Requires filtered, and n not zero, of integers below 2^62.
+  Direction(const PortalSearch& search, const Vector& n)
+      : search_(search), kind_(Kind::kOther), n_(n) {
+    exact_ = ExactDirection{static_cast<int64_t>(n.x()), static_cast<int64_t>(n.y()),
+                            static_cast<int64_t>(n.z())};
+  }
 
   void Negate() {
     n_ = -n_;
@@ -69,11 +84,11 @@ class PortalSearch::Direction {
   const Point& p() const { return *p_; }
   const Point& q() const { return *q_; }
   const Point& r() const { return *r_; }
-  // Where filtered and not kOther: each component within error() of the exact one.
+  // Where filtered: each component within error() of the exact one.
   const Vector& n() const { return n_; }
   double error() const { return error_; }
 
-  const IntegerVector& exact() {
+  const ExactDirection& exact() {
     if (!exact_) {
       exact_ = Compute();
       if (negated_) exact_ = -*exact_;
@@ -82,18 +97,19 @@ class PortalSearch::Direction {
   }
 
  private:
-  IntegerVector Compute() const {
+  ExactDirection Compute() const {
     switch (kind_) {
       case Kind::kAcrossPoint:
         return Cross(search_.ExactRay(), search_.Exact(*p_));
       case Kind::kAcrossSegment:
-        return Cross(search_.ExactRay(), search_.Exact(*p_) - search_.Exact(*q_));
+        return Cross(search_.ExactRay(), Coordinates(search_.Exact(*p_) - search_.Exact(*q_)));
       case Kind::kNormal: {
-        const IntegerVector origin = search_.Exact(*p_);
-        return Cross(search_.Exact(*q_) - origin, search_.Exact(*r_) - origin);
+        const Coordinates& origin = search_.Exact(*p_);
+        return Cross(Coordinates(search_.Exact(*q_) - origin),
+                     Coordinates(search_.Exact(*r_) - origin));
       }
       case Kind::kRay:
-        return search_.ExactRay();
+        return Pair::ToDirection(search_.ExactRay());
       case Kind::kOther:
         break;
     }
@@ -109,54 +125,65 @@ class PortalSearch::Direction {
   Vector n_ = Vector::Zero();
   double error_ = 0;
   bool negated_ = false;
-  std::optional<IntegerVector> exact_;
+  std::optional<ExactDirection> exact_;
 };
 
-PortalSearch::PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop)
+template <typename Pair>
+PortalSearch<Pair>::PortalSearch(Pair& pair, const std::function<bool()>& should_stop)
     : pair_(pair),
       poll_(should_stop, 1),
       filtered_(pair.filter().usable()),
       position_error_(kMinkowskiErrorFactor * pair.filter().size()) {}
 
-void PortalSearch::Thicken(int axis, Integer half) {
+template <typename Pair>
+void PortalSearch<Pair>::Thicken(int axis, Number half) {
   axis_ = axis;
   half_ = std::move(half);
   filtered_ = false;
 }
 
-IntegerVector PortalSearch::Exact(const Point& point) const {
-  IntegerVector w = pair_.Corner(point.pair).w;
-  if (axis_ >= 0) w[axis_] += point.side < 0 ? Integer(-half_) : half_;
-  return w;
+template <typename Pair>
+const typename Pair::Coordinates& PortalSearch<Pair>::Exact(const Point& point) const {
+  if (!point.exact) {
+    point.exact = pair_.Difference(point.pair);
+    if (axis_ >= 0) {
+      Number& thick = (*point.exact)[axis_];
+      thick = point.side < 0 ? Number(thick - half_) : Number(thick + half_);
+    }
+  }
+  return *point.exact;
 }
 
-const IntegerVector& PortalSearch::ExactRay() const {
+template <typename Pair>
+const typename Pair::Coordinates& PortalSearch<Pair>::ExactRay() const {
   if (!exact_ray_) exact_ray_ = -pair_.CenterDifference();
   return *exact_ray_;
 }
 
 // Sign of det[p, q, r].
-int PortalSearch::Sign3(const Point& p, const Point& q, const Point& r) const {
+template <typename Pair>
+int PortalSearch<Pair>::Sign3(const Point& p, const Point& q, const Point& r) const {
   if (filtered_) {
     const double largest = LargestOf(p.w, q.w, r.w);
     const double bound = kTetrahedronErrorFactor * largest * largest * position_error_;
     if (const auto sign = CertainSign(p.w.dot(q.w.cross(r.w)), bound)) return *sign;
   }
-  return Sign(Dot(Exact(p), Cross(Exact(q), Exact(r))));
+  return Sign(Dot(Cross(Exact(q), Exact(r)), Exact(p)));
 }
 
 // Sign of det[d, p - c, q - c]: +1 when q is to the left of p seen along the ray. Ties as in the
 // class comment: the derivative by c is (p - q) x d. Zero only when p - q is parallel to the ray.
-int PortalSearch::TurnOf(const Point& p, const Point& q) const {
+template <typename Pair>
+int PortalSearch<Pair>::TurnOf(const Point& p, const Point& q) const {
   if (filtered_) {
     const double largest = LargestOf(ray_, p.w, q.w);
     const double bound = kTetrahedronErrorFactor * largest * largest * position_error_;
     if (const auto sign = CertainSign(ray_.dot(p.w.cross(q.w)), bound)) return *sign;
   }
-  const IntegerVector exact_p = Exact(p);
-  const IntegerVector exact_q = Exact(q);
-  if (const int sign = Sign(Dot(ExactRay(), Cross(exact_p, exact_q)))) return sign;
-  const IntegerVector slope = Cross(exact_p - exact_q, ExactRay());
+  const Coordinates& exact_p = Exact(p);
+  const Coordinates& exact_q = Exact(q);
+  if (const int sign = Sign(Dot(Cross(exact_p, exact_q), ExactRay()))) return sign;
+  const ExactDirection slope = Cross(Coordinates(exact_p - exact_q), ExactRay());
   for (int i = 0; i < 3; ++i) {
     if (const int sign = Sign(slope[i])) return sign;
   }
@@ -164,7 +191,8 @@ int PortalSearch::TurnOf(const Point& p, const Point& q) const {
 }
 
 // Whether ray x p = 0.
-bool PortalSearch::IsOnRay(const Point& p) const {
+template <typename Pair>
+bool PortalSearch<Pair>::IsOnRay(const Point& p) const {
   if (filtered_) {
     const double sizes = LargestOf(ray_) + LargestOf(p.w) + 3 * position_error_;
     const double bound = kNormalErrorFactor * position_error_ * sizes;
@@ -174,7 +202,8 @@ bool PortalSearch::IsOnRay(const Point& p) const {
 }
 
 // Sign of n.w.
-int PortalSearch::SignAlong(Direction& n, const Point& w) const {
+template <typename Pair>
+int PortalSearch<Pair>::SignAlong(Direction& n, const Point& w) const {
   if (filtered_ && n.kind() == Kind::kRay && !n.negated()) {
     const double largest = std::max(LargestOf(ray_), LargestOf(w.w));
     const double bound = kRayErrorFactor * largest * position_error_;
@@ -208,8 +237,9 @@ int PortalSearch::SignAlong(Direction& n, const Point& w) const {
 }
 
 // Sign of n.(w - p) for the normal n of the portal p, q, r.
-int PortalSearch::SignOfAdvance(Direction& n, const Point& p, const Point& q, const Point& r,
-                                const Point& w) const {
+template <typename Pair>
+int PortalSearch<Pair>::SignOfAdvance(Direction& n, const Point& p, const Point& q, const Point& r,
+                                      const Point& w) const {
   if (filtered_) {
     const Vector u = q.w - p.w;
     const Vector v = r.w - p.w;
@@ -218,36 +248,41 @@ int PortalSearch::SignOfAdvance(Direction& n, const Point& p, const Point& q, co
     const double bound = kDifferencesErrorFactor * largest * largest * position_error_;
     if (const auto sign = CertainSign(x.dot(u.cross(v)), bound)) return *sign;
   }
-  return Sign(Dot(n.exact(), Exact(w) - Exact(p)));
+  return Sign(Dot(n.exact(), Coordinates(Exact(w) - Exact(p))));
 }
 
 // Floating point leaves few candidates, mostly one; among several exact values decide.
-PortalSearch::Point PortalSearch::Farthest(Direction& n) {
+template <typename Pair>
+typename PortalSearch<Pair>::Point PortalSearch<Pair>::Farthest(Direction& n) {
   ++directions_tried_;
   Point point;
-  if (filtered_ && n.kind() != Kind::kOther) {
+  if (filtered_) {
     const FloatPair& filter = pair_.filter();
-    const std::vector<uint32_t> a = filter.CandidatesA(n.n(), n.error());
-    const std::vector<uint32_t> b = filter.CandidatesB(n.n(), n.error());
+    CandidateBuffer buffer;
+    const auto a = filter.CandidatesA(n.n(), n.error(), buffer);
     point.pair.a = a.size() == 1 ? a[0] : pair_.FarthestA(n.exact(), a);
+    const auto b = filter.CandidatesB(n.n(), n.error(), buffer);
     point.pair.b = b.size() == 1 ? b[0] : pair_.FarthestB(n.exact(), b);
   } else {
     point.pair = {pair_.FarthestA(n.exact()), pair_.FarthestB(n.exact())};
   }
-  if (axis_ >= 0) point.side = n.exact()[axis_] < 0 ? -1 : 1;
+  if (axis_ >= 0) point.side = Sign(n.exact()[axis_]) < 0 ? -1 : 1;
   if (filtered_) point.w = pair_.filter().Difference(point.pair);
   return point;
 }
 
 // Explores along n; a result when that settles it.
-std::optional<PortalSearch::Result> PortalSearch::Explore(Direction& n, Point* farthest) {
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::Explore(Direction& n,
+                                                                               Point* farthest) {
   if (poll_.Step()) return Result{};
   *farthest = Farthest(n);
   if (SignAlong(n, *farthest) < 0) return Result{Verdict::kSeparated, n.exact(), {}};
   return std::nullopt;
 }
 
-PortalSearch::Result PortalSearch::Run() {
+template <typename Pair>
+typename PortalSearch<Pair>::Result PortalSearch<Pair>::Run() {
   if (filtered_) ray_ = -pair_.filter().InnerDifference();
   const bool is_certain = filtered_ && LargestOf(ray_) > position_error_;
   if (!is_certain && IsZero(ExactRay())) return {Verdict::kOverlapping, {}, {}};
@@ -255,16 +290,113 @@ PortalSearch::Result PortalSearch::Run() {
   return RefinePortal();
 }
 
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryEnd(
+    const FloatSearchResult& end) {
+  HULLD_DCHECK(axis_ < 0);
+  if (!filtered_ || end.pair_count == 0) return std::nullopt;
+  if (poll_.Step()) return Result{};
+  std::array<Point, 4> corners;
+  for (uint32_t i = 0; i < end.pair_count; ++i) {
+    corners[i].pair = end.pairs[i];
+    corners[i].w = pair_.filter().Difference(end.pairs[i]);
+  }
+  switch (end.pair_count) {
+    case 1:
+      return TryDirection(end.axis, corners[0]);
+    case 3:
+      return TryTriangle(corners[0], corners[1], corners[2], end.axis);
+    case 4:
+      return TryTetrahedron(corners);
+    default:
+      return std::nullopt;
+  }
+}
+
+// The result where no vertex is beyond the origin along n; `holding` are corners whose hull holds
+// the origin, where they are known.
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::Judge(
+    Direction& n, const std::array<const Point*, 3>& holding) {
+  const Point w = Farthest(n);
+  const int side = SignAlong(n, w);
+  if (side < 0) return Result{Verdict::kSeparated, n.exact(), {}};
+  if (side > 0 || holding[0] == nullptr) return std::nullopt;
+  return Result{
+      Verdict::kTouching, n.exact(), {{holding[0]->pair, holding[1]->pair, holding[2]->pair}}};
+}
+
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryDirection(
+    const Vector& direction, const Point& corner) {
+  const double largest = LargestOf(direction);
+  if (!(largest > 0)) return std::nullopt;
+  // Of few bits, so that nearly the direction of an axis becomes one. It need not be exact: where
+  // the corner is the only contact, a cone of directions supports C there.
+  const Vector n = (direction * std::ldexp(1.0, 30 - std::ilogb(largest))).array().round();
+  Direction rounded(*this, n);
+  const Point* const holding = IsZero(Exact(corner)) ? &corner : nullptr;
+  return Judge(rounded, {holding, holding, holding});
+}
+
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryTriangle(
+    const Point& p, const Point& q, const Point& r, const Vector& along) {
+  Direction n(*this, Kind::kNormal, &p, &q, &r);
+  if (n.n().dot(along) < 0) n.Negate();
+  const ExactDirection& normal = n.exact();
+  if (IsZero(normal)) return std::nullopt;
+  bool holds = Sign3(p, q, r) == 0;
+  if (holds) {
+    // The origin's coordinates in the triangle: products that are parallel to the normal, so that a
+    // component in which it is not zero tells their signs.
+    int axis = 0;
+    while (normal[axis].is_zero()) ++axis;
+    int least = 1;
+    int most = -1;
+    for (const auto& [u, v] : {std::pair{&q, &r}, {&r, &p}, {&p, &q}}) {
+      const int sign = Sign(Cross(Exact(*u), Exact(*v))[axis]);
+      least = std::min(least, sign);
+      most = std::max(most, sign);
+    }
+    holds = least >= 0 || most <= 0;
+  }
+  return Judge(n, holds ? std::array{&p, &q, &r} : std::array<const Point*, 3>{});
+}
+
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryTetrahedron(
+    const std::array<Point, 4>& corners) {
+  const auto& [p, q, r, s] = corners;
+  // The origin's coordinates: the weight of each corner, up to a common factor.
+  const int weights[4] = {-Sign3(r, s, q), Sign3(r, s, p), -Sign3(p, q, s), Sign3(p, q, r)};
+  const auto [least, most] = std::minmax_element(weights, weights + 4);
+  if (*least * *most > 0) return Result{Verdict::kOverlapping, {}, {}};
+  // Outside, or flat.
+  if (*least == *most || (*least < 0 && *most > 0)) return std::nullopt;
+  for (int i = 0; i < 4; ++i) {
+    if (weights[i] != 0) continue;
+    // The origin is on the face across from corner i.
+    const std::array<const Point*, 3> face = {&corners[(i + 1) % 4], &corners[(i + 2) % 4],
+                                              &corners[(i + 3) % 4]};
+    Direction n(*this, Kind::kNormal, face[0], face[1], face[2]);
+    if (SignAlong(n, corners[i]) > 0) n.Negate();
+    if (std::optional<Result> result = Judge(n, face)) return result;
+  }
+  return std::nullopt;
+}
+
 // Fills portal_ with a triangle that the ray's line crosses: a vertex p, one to the left and one to
 // the right of the plane through p and the ray, moved until their segment passes on the far side of
 // the ray from p.
-std::optional<PortalSearch::Result> PortalSearch::FindPortal() {
+template <typename Pair>
+std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::FindPortal() {
   auto& [p, left, right] = portal_;
   Direction along(*this, Kind::kRay);
   if (auto result = Explore(along, &p)) return result;
   if (IsOnRay(p)) {
     // p is on the ray's line; a vertex farthest along a direction across the ray is not.
-    Direction across(*this, AnyPerpendicular(ExactRay()));
+    Direction across(*this, Pair::ToDirection(AnyPerpendicular(ExactRay())));
     if (auto result = Explore(across, &p)) return result;
   }
   Direction aside(*this, Kind::kAcrossPoint, &p);
@@ -280,7 +412,8 @@ std::optional<PortalSearch::Result> PortalSearch::FindPortal() {
   return std::nullopt;
 }
 
-PortalSearch::Result PortalSearch::RefinePortal() {
+template <typename Pair>
+typename PortalSearch<Pair>::Result PortalSearch<Pair>::RefinePortal() {
   auto& [p, q, r] = portal_;
   for (;;) {
     // n.p, as the triple product is the same for edges and for points.
@@ -304,7 +437,8 @@ PortalSearch::Result PortalSearch::RefinePortal() {
 // Puts w in place of the corner that leaves the ray crossing the portal. Corners turn left in
 // order; exactly one consecutive pair has w to the right of the first and to the left of the
 // second, unless w is in line with a corner.
-void PortalSearch::Replace(const Point& w) {
+template <typename Pair>
+void PortalSearch<Pair>::Replace(const Point& w) {
   int turn[3];
   for (int i = 0; i < 3; ++i) {
     turn[i] = TurnOf(portal_[i], w);
@@ -321,5 +455,11 @@ void PortalSearch::Replace(const Point& w) {
   }
   HULLD_UNREACHABLE();
 }
+
+template class PortalSearch<ExactPair>;
+template class PortalSearch<WidePair<1>>;
+template class PortalSearch<WidePair<2>>;
+template class PortalSearch<WidePair<3>>;
+template class PortalSearch<WidePair<5>>;
 
 }  // namespace hulld

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "core/base/stop_poll.h"
-#include "core/numeric/integer.h"
-#include "core/query/exact/exact_pair.h"
+#include "core/numeric/vector.h"
+#include "core/query/floating/float_search.h"
 #include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
@@ -30,25 +30,42 @@ namespace hulld {
 // every input. All signs are exact: floating point with a proven bound decides most, integers the
 // rest. Source: Snethen 2008 (XenoCollide, Minkowski portal refinement) for portals; Edelsbrunner
 // and Mücke 1990 (simulation of simplicity) for the ties.
+//
+// Pair is ExactPair or a WidePair: the same search in integers of any width or of a fixed one.
+template <typename Pair>
 class PortalSearch {
  public:
+  using Number = typename Pair::Number;
+  using Coordinates = typename Pair::Coordinates;
+  using ExactDirection = typename Pair::Direction;
+
   // `pair` and `should_stop`, which may be empty, must outlive the search. Requires C to have
   // dimension 3 (unchecked: SearchExactly finds the dimension first).
-  PortalSearch(ExactPair& pair, const std::function<bool()>& should_stop);
+  PortalSearch(Pair& pair, const std::function<bool()>& should_stop);
 
   // Thickens C: by +-half along a coordinate axis.
-  void Thicken(int axis, Integer half);
+  void Thicken(int axis, Number half);
 
   enum class Verdict { kSeparated, kTouching, kOverlapping, kStopped };
   struct Result {
     Verdict verdict = Verdict::kStopped;
     // Separated and touching: from A towards B, n.w <= 0 for all w in C.
-    std::optional<IntegerVector> axis;
+    std::optional<ExactDirection> axis;
     // Touching: pairs whose vertices of C are a triangle, possibly degenerate, that holds the
     // origin.
     std::optional<std::array<VertexPair, 3>> portal;
   };
   Result Run();
+
+  // What the end of the search in floating point shows once its signs are made exact; nothing where
+  // that is not enough. It costs a fraction of Run, and works for a C of any dimension that is not
+  // thickened.
+  //
+  // A direction along which nothing reaches the origin separates, whatever it was found by. A
+  // tetrahedron of vertices of C that holds the origin strictly inside shows an overlap. And a
+  // corner that is the origin, or a face that holds it, shows that the origin is in C, so that a
+  // supporting plane through it shows that it is on the boundary.
+  std::optional<Result> TryEnd(const FloatSearchResult& end);
 
   uint64_t directions_tried() const { return directions_tried_; }
 
@@ -60,6 +77,8 @@ class PortalSearch {
     // The end of C's thickness, -1 or 1; 0 when C is not thickened.
     int side = 0;
     Vector w = Vector::Zero();
+    // Once it is asked for.
+    mutable std::optional<Coordinates> exact;
   };
   // What a direction is made of.
   enum class Kind {
@@ -71,8 +90,8 @@ class PortalSearch {
   };
   class Direction;
 
-  IntegerVector Exact(const Point& point) const;
-  const IntegerVector& ExactRay() const;
+  const Coordinates& Exact(const Point& point) const;
+  const Coordinates& ExactRay() const;
   int Sign3(const Point& p, const Point& q, const Point& r) const;
   int TurnOf(const Point& p, const Point& q) const;
   bool IsOnRay(const Point& p) const;
@@ -81,20 +100,25 @@ class PortalSearch {
                     const Point& w) const;
   Point Farthest(Direction& n);
   std::optional<Result> Explore(Direction& n, Point* farthest);
+  std::optional<Result> Judge(Direction& n, const std::array<const Point*, 3>& holding);
+  std::optional<Result> TryDirection(const Vector& direction, const Point& corner);
+  std::optional<Result> TryTriangle(const Point& p, const Point& q, const Point& r,
+                                    const Vector& along);
+  std::optional<Result> TryTetrahedron(const std::array<Point, 4>& corners);
   std::optional<Result> FindPortal();
   Result RefinePortal();
   void Replace(const Point& w);
 
-  ExactPair& pair_;
+  Pair& pair_;
   StopPoll poll_;
   // Whether floating point may decide.
   bool filtered_;
   // Bound of the error of a point's components, where filtered.
   double position_error_;
   int axis_ = -1;
-  Integer half_;
+  Number half_;
   // From the centre through the origin; exactly once it is asked for.
-  mutable std::optional<IntegerVector> exact_ray_;
+  mutable std::optional<Coordinates> exact_ray_;
   Vector ray_ = Vector::Zero();
   std::array<Point, 3> portal_;
   uint64_t directions_tried_ = 0;

@@ -1,13 +1,33 @@
 #include "core/query/floating/float_pair.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace hulld {
 
-std::vector<uint32_t> FloatPair::CandidatesA(const Vector& n_W, double error) const {
-  return a_->query_hull().Candidates(InA(n_W), TurnedError(n_W, error), Slack(n_W, error));
-}
-
-std::vector<uint32_t> FloatPair::CandidatesB(const Vector& n_W, double error) const {
-  return b_->query_hull().Candidates(-InB(n_W), TurnedError(n_W, error), Slack(n_W, error));
+std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
+                                                  const PlainVector& n_own, double error,
+                                                   double slack, CandidateBuffer& buffer) {
+  const std::span<const Vector> vertices = placed.query_hull().points_together();
+  if (vertices.empty() || vertices.size() > CandidateBuffer::kMostFew) {
+    buffer.many = placed.query_hull().Candidates(n_own, error, slack);
+    return buffer.many;
+  }
+  // A small hull is scanned here, as a list needs an allocation.
+  std::array<double, CandidateBuffer::kMostFew> values;
+  double largest = -INFINITY;
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    const Vector& v = vertices[i];
+    values[i] = SupportValue(n_own, v.x(), v.y(), v.z());
+    largest = std::max(largest, values[i]);
+  }
+  const double least = largest - slack;
+  size_t count = 0;
+  for (size_t i = 0; i < vertices.size(); ++i) {
+    buffer.few[count] = static_cast<uint32_t>(i);
+    count += values[i] >= least ? 1 : 0;
+  }
+  return std::span(buffer.few).first(count);
 }
 
 Vector FloatPair::InnerPoint(const PlacedHull& placed) {

@@ -1,7 +1,9 @@
 #ifndef HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_
 #define HULLD_CORE_QUERY_FLOATING_FLOAT_PAIR_H_
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/check.h"
@@ -12,6 +14,13 @@
 #include "core/query/terms/vertex_pair.h"
 
 namespace hulld {
+
+// Where lists of candidates live: those of small hulls without allocation.
+struct CandidateBuffer {
+  static constexpr size_t kMostFew = 64;
+  std::array<uint32_t, kMostFew> few;
+  std::vector<uint32_t> many;
+};
 
 // A pair of placed hulls in floating point, with proven error bounds (core/numeric/error_bounds.h).
 // Everything is relative to the world shifted by -t_A: A is rotated only, B is rotated and moved by
@@ -36,6 +45,8 @@ class FloatPair {
   bool usable() const { return usable_; }
   // The size S of the pair that the bounds are relative to.
   double size() const { return size_; }
+  // t_B - t_A, rounded.
+  const PlainVector& offset() const { return offset_; }
 
   // A vertex of A - B far along a direction.
   struct Support {
@@ -54,10 +65,16 @@ class FloatPair {
   }
 
   // All vertices of A that may be farthest along n_W, ascending, when each component of n_W errs by
-  // up to `error`.
-  std::vector<uint32_t> CandidatesA(const Vector& n_W, double error) const;
+  // up to `error`. They live in the buffer.
+  std::span<const uint32_t> CandidatesA(const Vector& n_W, double error,
+                                        CandidateBuffer& buffer) const {
+    return CandidatesOf(*a_, InA(n_W), TurnedError(n_W, error), Slack(n_W, error), buffer);
+  }
   // All vertices of B that may be farthest against n_W.
-  std::vector<uint32_t> CandidatesB(const Vector& n_W, double error) const;
+  std::span<const uint32_t> CandidatesB(const Vector& n_W, double error,
+                                        CandidateBuffer& buffer) const {
+    return CandidatesOf(*b_, -InB(n_W), TurnedError(n_W, error), Slack(n_W, error), buffer);
+  }
 
   // Positions, each component within kMinkowskiErrorFactor * size().
   PlainVector PositionA(uint32_t i) const { return Rotated(*a_, i); }
@@ -88,6 +105,9 @@ class FloatPair {
   static double TurnedError(const PlainVector& n_W, double error) {
     return 2 * error + 64 * kUnitRoundoff * LargestComponent(n_W);
   }
+  static std::span<const uint32_t> CandidatesOf(const PlacedHull& placed, const PlainVector& n_own,
+                                                double error, double slack,
+                                                CandidateBuffer& buffer);
   static PlainVector Rotated(const PlacedHull& placed, uint32_t i) {
     return OutOfOwnFrame(placed, placed.query_hull().point(i));
   }

@@ -7,6 +7,8 @@
 #include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/numeric/simd_path.h"
+#include "core/query/floating/small_pair.h"
 #include "core/query/terms/minkowski_vertex.h"
 
 namespace hulld {
@@ -32,6 +34,9 @@ class Simplex {
     }
     return false;
   }
+
+  // Drops all but the newest.
+  void KeepNewest() { Keep(order_[count_ - 1]); }
 
   // Requires count() < 4.
   void Add(const PlainVector& w, VertexPair pair) {
@@ -237,8 +242,9 @@ class Simplex {
 };
 
 // Whether the origin is certain to be strictly inside a tetrahedron of computed Minkowski vertices.
-bool HoldsOrigin(const FloatPair& pair, const PlainVector& p, const PlainVector& q,
-                 const PlainVector& r, const PlainVector& s) {
+template <typename Pair>
+bool HoldsOrigin(const Pair& pair, const PlainVector& p, const PlainVector& q, const PlainVector& r,
+                 const PlainVector& s) {
   const double largest = std::max(std::max(LargestComponent(p), LargestComponent(q)),
                                   std::max(LargestComponent(r), LargestComponent(s)));
   const double position_error = kMinkowskiErrorFactor * pair.size();
@@ -253,15 +259,18 @@ bool HoldsOrigin(const FloatPair& pair, const PlainVector& p, const PlainVector&
          -turn * Dot(r_s, q) > bound;
 }
 
+// The search of a FloatPair or of a SmallPair.
+template <typename Pair>
 class FloatSearch {
  public:
-  FloatSearch(const FloatPair& pair, double tolerance) : pair_(pair), tolerance_(tolerance) {}
+  FloatSearch(const Pair& pair, double tolerance) : pair_(pair), tolerance_(tolerance) {}
 
   FloatSearchResult Run(PlainVector n) {
     if (IsZero(n)) n = {1, 0, 0};
     while (result_.directions_tried < kMaxDirections && Explore(n)) {
     }
     if (result_.verdict != FloatVerdict::kSeparated) {
+      result_.axis = along_;
       result_.pair_count = simplex_.count();
       for (uint32_t i = 0; i < simplex_.count(); ++i) result_.pairs[i] = simplex_.corner(i).pair;
     }
@@ -283,27 +292,38 @@ class FloatSearch {
     const double error = kSupportErrorFactor * largest * pair_.size();
     if (farthest.value < -error) return EndSeparated(n);
     const PlainVector along = n;
+    along_ = along;
     // Else nothing is farther towards the origin.
     const bool progress = !simplex_.Contains(farthest.pair);
     bool outside = true;
+    bool at_corner = false;
     if (progress) {
-      simplex_.Add(pair_.Difference(farthest.pair), farthest.pair);
-      outside = simplex_.Reduce(n);
+      const PlainVector w = pair_.Difference(farthest.pair);
+      simplex_.Add(w, farthest.pair);
+      // The direction of a vertex this near to the origin is rounding, and what is certain only
+      // beyond the same bound cannot be shown from there.
+      at_corner = LargestComponent(w) <= kMinkowskiErrorFactor * pair_.size();
+      if (at_corner) {
+        simplex_.KeepNewest();
+      } else {
+        outside = simplex_.Reduce(n);
+      }
+    }
+    if (!outside) {
+      if (HoldsOrigin(pair_, simplex_.corner(0).w, simplex_.corner(1).w, simplex_.corner(2).w,
+                      simplex_.corner(3).w)) {
+        result_.verdict = FloatVerdict::kOverlapping;
+        return false;
+      }
+      if (tolerance_ == 0) return false;
+      // Near the boundary of A - B: on through the nearest face, to see how far it reaches there.
+      n = simplex_.ReduceToNearestFace();
     }
     if (tolerance_ > 0 && IsWithinTolerance(along, farthest, error)) {
       result_.verdict = FloatVerdict::kWithinTolerance;
       return false;
     }
-    if (outside) return progress;
-    if (HoldsOrigin(pair_, simplex_.corner(0).w, simplex_.corner(1).w, simplex_.corner(2).w,
-                    simplex_.corner(3).w)) {
-      result_.verdict = FloatVerdict::kOverlapping;
-      return false;
-    }
-    if (tolerance_ == 0) return false;
-    // Near the boundary of A - B: on through the nearest face, to see how far it reaches there.
-    n = simplex_.ReduceToNearestFace();
-    return true;
+    return progress && !at_corner;
   }
 
   bool EndSeparated(const PlainVector& n) {
@@ -314,31 +334,66 @@ class FloatSearch {
 
   // Whether |separation| <= tolerance is certain: A - B has a point so near to the origin, and
   // along some direction does not reach farther than that beyond it. `farthest` is that along n.
+  // The reach is looked at first, as it costs little to see that it is too long.
   bool IsWithinTolerance(const PlainVector& n, const FloatPair::Support& farthest, double error) {
-    const double length = Norm(n);
-    if (farthest.value < tolerance_ * length) {
-      reach_ = std::min(reach_, std::max(0.0, farthest.value + error) / length);
+    if (!reach_is_short_) {
+      const double allowed = tolerance_ * Norm(n);
+      if (!(farthest.value < allowed)) return false;
+      if (!((farthest.value + error) * kSphereSquareRoundUp <= allowed)) return false;
+      reach_is_short_ = true;
     }
-    nearest_ = std::min(nearest_, Norm(simplex_.NearPoint()));
-    const double distance = nearest_ + kNearPointErrorFactor * pair_.size();
-    return std::max(reach_, distance) * kSphereSquareRoundUp <= tolerance_;
+    const double distance = Norm(simplex_.NearPoint()) + kNearPointErrorFactor * pair_.size();
+    return distance * kSphereSquareRoundUp <= tolerance_;
   }
 
-  const FloatPair& pair_;
+  const Pair& pair_;
   const double tolerance_;
   Simplex simplex_;
-  // With a tolerance: the least reach of A - B beyond the origin along some direction, and the
-  // least distance of some point of it, so far.
-  double reach_ = INFINITY;
-  double nearest_ = INFINITY;
+  // The last direction tried.
+  PlainVector along_;
+  // With a tolerance: whether A - B is known to reach no farther than that beyond the origin along
+  // some direction.
+  bool reach_is_short_ = false;
   FloatSearchResult result_;
 };
+
+template <uint32_t kMostVertices>
+FloatSearchResult SearchSmallPortably(const FloatPair& pair, double tolerance,
+                                      const PlainVector& first) {
+  const SmallPair<kMostVertices> small(pair);
+  return FloatSearch(small, tolerance).Run(first);
+}
+
+#ifdef HULLD_HAS_AVX2_PATH
+// All of it is compiled for AVX2, so that lanes stay in registers.
+template <uint32_t kMostVertices>
+__attribute__((target("avx2"), flatten)) FloatSearchResult SearchSmallAvx2(
+    const FloatPair& pair, double tolerance, const PlainVector& first) {
+  const SmallPair<kMostVertices> small(pair);
+  return FloatSearch(small, tolerance).Run(first);
+}
+#else
+template <uint32_t kMostVertices>
+FloatSearchResult SearchSmallAvx2(const FloatPair& pair, double tolerance,
+                                  const PlainVector& first) {
+  return SearchSmallPortably<kMostVertices>(pair, tolerance, first);
+}
+#endif
+
+template <uint32_t kMostVertices>
+FloatSearchResult SearchSmall(const FloatPair& pair, double tolerance, const PlainVector& first) {
+  return CurrentSimdPath() == SimdPath::kAvx2
+             ? SearchSmallAvx2<kMostVertices>(pair, tolerance, first)
+             : SearchSmallPortably<kMostVertices>(pair, tolerance, first);
+}
 
 }  // namespace
 
 FloatSearchResult SearchInFloatingPoint(const FloatPair& pair, double tolerance,
                                         const PlainVector& first) {
   HULLD_DCHECK(pair.usable());
+  if (SmallPair<8>::Fits(pair)) return SearchSmall<8>(pair, tolerance, first);
+  if (SmallPair<16>::Fits(pair)) return SearchSmall<16>(pair, tolerance, first);
   return FloatSearch(pair, tolerance).Run(first);
 }
 

@@ -15,7 +15,7 @@ enum class FloatVerdict { kSeparated, kOverlapping, kWithinTolerance, kUndecided
 // What the search in floating point claims, certified by proven bounds. Touching is never claimed.
 struct FloatSearchResult {
   FloatVerdict verdict = FloatVerdict::kUndecided;
-  // Separated: n.(a - b) < 0 throughout, as it stands.
+  // Separated: n.(a - b) < 0 throughout, as it stands. Otherwise the last direction tried: a hint.
   Vector axis = Vector::Zero();
   // Overlapping: four pairs whose differences hold the origin strictly inside their hull.
   // Otherwise where the search ended: a hint.

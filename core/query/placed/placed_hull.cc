@@ -5,6 +5,7 @@
 
 #include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/query/placed/plain_vector.h"
 
 namespace hulld {
 namespace {
@@ -19,24 +20,46 @@ Eigen::Matrix3d RotationOf(const std::array<double, 4>& q) {
     std::frexp(largest, &exponent);
     for (double* component : {&w, &x, &y, &z}) *component = std::ldexp(*component, -exponent);
   }
-  const double norm = w * w + x * x + y * y + z * z;
+  const double ww = w * w;
+  const double xx = x * x;
+  const double yy = y * y;
+  const double zz = z * z;
+  // One division instead of nine.
+  const double scale = 1 / ((ww + xx) + (yy + zz));
+  const double twice = 2 * scale;
   Eigen::Matrix3d R;
-  R << w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y), 2 * (x * y + w * z),
-      w * w - x * x + y * y - z * z, 2 * (y * z - w * x), 2 * (x * z - w * y), 2 * (y * z + w * x),
-      w * w - x * x - y * y + z * z;
-  return R / norm;
+  R << scale * ((ww + xx) - (yy + zz)), twice * (x * y - w * z), twice * (x * z + w * y),
+      twice * (x * y + w * z), scale * ((ww + yy) - (xx + zz)), twice * (y * z - w * x),
+      twice * (x * z - w * y), twice * (y * z + w * x), scale * ((ww + zz) - (xx + yy));
+  return R;
+}
+
+// A matrix times a vector, in registers.
+Vector Product(const Eigen::Matrix3d& R, const PlainVector& v) {
+  const double* const r = R.data();  // column by column
+  return {r[0] * v.x + r[3] * v.y + r[6] * v.z, r[1] * v.x + r[4] * v.y + r[7] * v.z,
+          r[2] * v.x + r[5] * v.y + r[8] * v.z};
 }
 
 }  // namespace
 
 PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH)
-    : hull_(&hull), X_WH_(X_WH), R_WH_(RotationOf(X_WH.q)), rotated_center_(R_WH_ * hull.center()) {
+    : hull_(&hull),
+      X_WH_(X_WH),
+      R_WH_(RotationOf(X_WH.q)),
+      rotated_center_(Product(R_WH_, hull.center())) {
   HULLD_DCHECK(ValidatePose(X_WH).ok());
 }
 
 absl::StatusOr<PlacedHull> PlacedHull::Make(const QueryHull& hull, const Pose& X_WH) {
-  if (absl::Status status = ValidatePose(X_WH); !status.ok()) return status;
-  return PlacedHull(hull, X_WH);
+  // Both returns name this one variable, so that the hull is constructed in the caller's place.
+  absl::StatusOr<PlacedHull> placed;
+  if (IsValidPose(X_WH)) {
+    placed.emplace(hull, X_WH);
+  } else {
+    placed = ValidatePose(X_WH);
+  }
+  return placed;
 }
 
 }  // namespace hulld

@@ -47,6 +47,11 @@ class QueryHull {
     HULLD_DCHECK(i < point_count_);
     return i < base_->points().size() ? base_->points()[i] : GrownPoint(i);
   }
+  // All points, where they lie together in memory: not so in a version that has grown, nor when
+  // empty.
+  std::span<const Vector> points_together() const {
+    return base_ == nullptr || growth_ != nullptr ? std::span<const Vector>() : base_->points();
+  }
   // Largest absolute coordinate; 0 when empty.
   double max_abs_coordinate() const { return max_abs_; }
   // A place in the hull to search from; zero when empty.

@@ -1,6 +1,7 @@
 #include "core/query/placed/support_blocks.h"
 
 #include <cstring>
+#include <limits>
 
 #include "core/base/check.h"
 #include "core/numeric/simd_path.h"
@@ -11,6 +12,8 @@ namespace {
 // Four doubles, and four integers as wide, in whatever registers the function is compiled for.
 using Lanes = double __attribute__((vector_size(32)));
 using LaneIds = int64_t __attribute__((vector_size(32)));
+// Above every index.
+constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
 
 [[gnu::always_inline]] inline void Load(const double* from, Lanes& lanes) {
   std::memcpy(&lanes, from, sizeof lanes);
@@ -48,11 +51,20 @@ using LaneIds = int64_t __attribute__((vector_size(32)));
     best = better ? values : best;
     best_ids = better ? ids : best_ids;
   }
-  int lane = 0;
-  for (int i = 1; i < 4; ++i) {
-    if (best[i] > best[lane] || (best[i] == best[lane] && best_ids[i] < best_ids[lane])) lane = i;
-  }
-  return {static_cast<uint32_t>(best_ids[lane]), best[lane]};
+  // Which lane wins cannot be foreseen, so no branch depends on it.
+  Lanes largest = best;
+  Lanes other = __builtin_shuffle(largest, LaneIds{2, 3, 0, 1});
+  largest = largest > other ? largest : other;
+  other = __builtin_shuffle(largest, LaneIds{1, 0, 3, 2});
+  largest = largest > other ? largest : other;
+  // Where nothing is equal to itself, as for a direction that is not a number, any point will do.
+  const LaneIds none = {kNone, kNone, kNone, kNone};
+  LaneIds first = best >= largest ? best_ids : none;
+  LaneIds other_ids = __builtin_shuffle(first, LaneIds{2, 3, 0, 1});
+  first = first < other_ids ? first : other_ids;
+  other_ids = __builtin_shuffle(first, LaneIds{1, 0, 3, 2});
+  first = first < other_ids ? first : other_ids;
+  return {first[0] == kNone ? 0 : static_cast<uint32_t>(first[0]), largest[0]};
 }
 
 SupportPoint ScanPortably(std::span<const SupportBlock> blocks, const PlainVector& n) {

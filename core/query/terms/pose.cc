@@ -16,6 +16,7 @@ absl::Status CheckFinite(const char* field, const char* coordinate, double value
 }  // namespace
 
 absl::Status ValidatePose(const Pose& pose) {
+  if (IsValidPose(pose)) return absl::OkStatus();
   constexpr const char* kRotation[] = {"w", "x", "y", "z"};
   constexpr const char* kTranslation[] = {"x", "y", "z"};
   for (int i = 0; i < 4; ++i) {
@@ -24,11 +25,7 @@ absl::Status ValidatePose(const Pose& pose) {
   for (int i = 0; i < 3; ++i) {
     if (absl::Status s = CheckFinite("translation", kTranslation[i], pose.t[i]); !s.ok()) return s;
   }
-  if (pose.q == std::array<double, 4>{0, 0, 0, 0}) {
-    return absl::InvalidArgumentError(
-        "rotation is zero; any other finite quaternion is a rotation");
-  }
-  return absl::OkStatus();
+  return absl::InvalidArgumentError("rotation is zero; any other finite quaternion is a rotation");
 }
 
 }  // namespace hulld

@@ -1,9 +1,10 @@
-// Hull building beside qhull and CGAL, on the same points, in one process. Three suites, each with
+// Hull building beside qhull and CGAL, on the same points, in one process. Four suites, each with
 // rows of its own columns:
 //
-//   build   whole clouds at once
-//   stream  points one at a time, each a call of its own: the total, and percentiles of the latency
-//   cost    build and stream against the number of points
+//   build     whole clouds at once
+//   snapshot  canonical snapshots beside what building their hulls costs
+//   stream    points one at a time, each a call of its own: the total, and percentiles of the
+//   latency cost      build and stream against the number of points
 //
 // tests/bench/hulls/run_hull_benchmark.sh runs all and keeps the rows as CSV.
 // `vertices_missing_or_extra` is by how many vertices a library's hull differs from hulld's exact
@@ -85,6 +86,14 @@ void BuildByHulld(benchmark::State& state, Workload& workload) {
     vertices = builder.vertex_count();
   }
   Report(state, workload, vertices);
+}
+
+void MakeSnapshot(benchmark::State& state, Workload& workload) {
+  if (!IsReady(state, workload)) return;
+  HullBuilder builder;
+  if (!builder.Add(workload.points()).ok()) return state.SkipWithError("the points were refused");
+  for (auto _ : state) benchmark::DoNotOptimize(builder.Snapshot());
+  Report(state, workload, builder.vertex_count());
 }
 
 void BuildByQhull(benchmark::State& state, Workload& workload) {
@@ -180,13 +189,22 @@ void RegisterBuilds() {
   for (const char* name :
        {"ball:1000", "ball:10000", "ball:100000", "ball:1000000", "cube:1000000", "sphere:10000",
         "sphere:100000", "sphere:1000000", "mesh:stanford-bunny.obj", "mesh:rocker-arm.obj",
-        "mesh:spot.obj", "lattice:50"}) {
+        "mesh:spot.obj", "scan:134345", "lattice:50"}) {
     const auto workload = std::make_shared<Workload>(name);
     Add("build", "hulld", BuildByHulld, workload);
     // What takes many seconds is measured once.
     const int repetitions = workload->name() == "sphere:1000000" ? 1 : 3;
     Add("build", "qhull", BuildByQhull, workload)->Repetitions(repetitions);
     Add("build", "cgal", BuildByCgal, workload)->Repetitions(repetitions);
+  }
+}
+
+void RegisterSnapshots() {
+  for (const char* name : {"sphere:64", "sphere:1000", "sphere:10000", "sphere:100000",
+                           "sphere:1000000", "mesh:stanford-bunny.obj", "lattice:50"}) {
+    const auto workload = std::make_shared<Workload>(name);
+    Add("snapshot", "hulld builds", BuildByHulld, workload);
+    Add("snapshot", "hulld makes a snapshot", MakeSnapshot, workload);
   }
 }
 
@@ -224,6 +242,7 @@ void RegisterCosts() {
 
 int main(int argc, char** argv) {
   hulld::bench::RegisterBuilds();
+  hulld::bench::RegisterSnapshots();
   hulld::bench::RegisterStreams();
   hulld::bench::RegisterCosts();
   return hulld::bench::RunBenchmarks(argc, argv);

@@ -4,16 +4,16 @@
 #   bash tests/bench/hulls/run_hull_benchmark.sh [MACHINE] [SUITE...]
 #
 # MACHINE names the files, as in hull_build_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. SUITEs are build, stream, cost and extremes; all by default, which takes some minutes.
-# Needs what docker/packages.txt lists under [build], [test] and [bench]. Nothing else should run on
-# the machine meanwhile.
+# default. SUITEs are build, snapshot, stream, cost and extremes; all by default, which takes some
+# minutes. Needs what docker/packages.txt lists under [build], [test] and [bench]. Nothing else
+# should run on the machine meanwhile.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 
 machine=${1:-epyc_gcc12}
 shift || true
 suites=("$@")
-((${#suites[@]})) || suites=(build stream cost extremes)
+((${#suites[@]})) || suites=(build snapshot stream cost extremes)
 results=tests/bench/results
 programs=build/release/bin
 
@@ -24,7 +24,7 @@ for suite in "${suites[@]}"; do
   out=$results/hull_${suite}_$machine.csv
   case $suite in
     # In turn with their peers, against drifts of the machine's speed.
-    build | stream | cost)
+    build | snapshot | stream | cost)
       "$programs/hull_benchmark" --benchmark_filter="^$suite/" --benchmark_out="$out" \
         --benchmark_enable_random_interleaving=true
       { head -1 "$out" && tail -n +2 "$out" | sort -t, -k1,1V -k2,2; } >"$out.sorted"

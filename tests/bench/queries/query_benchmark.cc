@@ -329,6 +329,9 @@ void Register() {
       RegisterSequences(set, regime, workload);
     }
   }
+  for (const char* set : {"mating:8", "mating:64"}) {
+    RegisterRelations(set, Regime::kContact, std::make_shared<Workload>(set, Regime::kContact));
+  }
   RegisterScenes();
 }
 

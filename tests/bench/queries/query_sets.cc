@@ -83,6 +83,65 @@ void AddHulls(const std::string& name, Random& random, QuerySet& set) {
   for (size_t i = 0; i < hulls; ++i) set.hulls.push_back(BuildHull(OnEllipsoid(random, count)));
 }
 
+// A multiple of 1/64: as the lengths of a model, of few bits.
+double Length(Random& random, double low, double high) {
+  return std::round(random.Between(low, high) * 64) / 64;
+}
+
+// A block of a length, a width and a height, its base on z = 0.
+std::vector<Vector> Block(Random& random) {
+  const Vector half(Length(random, 0.25, 1), Length(random, 0.25, 1), 0);
+  const double height = Length(random, 0.5, 2);
+  std::vector<Vector> points;
+  for (int i = 0; i < 8; ++i) {
+    points.emplace_back((i & 1) != 0 ? half.x() : -half.x(), (i & 2) != 0 ? half.y() : -half.y(),
+                        (i & 4) != 0 ? height : 0);
+  }
+  return points;
+}
+
+// A part: a flat base on z = 0 with a quarter of the points, and a rounded body above it.
+std::vector<Vector> Part(Random& random, size_t count) {
+  constexpr double kGrid = 4096;
+  std::vector<Vector> points;
+  const size_t base = count / 4;
+  for (size_t i = 0; i < base; ++i) {
+    const double angle = 2 * M_PI * static_cast<double>(i) / static_cast<double>(base);
+    points.emplace_back(std::round(std::cos(angle) * kGrid) / kGrid,
+                        std::round(std::sin(angle) * kGrid) / kGrid, 0);
+  }
+  while (points.size() < count) {
+    const Vector u = 1.5 * random.UnitVector() + Vector(0, 0, 1.625);
+    points.push_back((u * kGrid).array().round() / kGrid);
+  }
+  return points;
+}
+
+// Base on base, moved along it; B is A's kind of hull upside down. No rotation.
+void AddMatings(const std::string& name, Random& random, size_t count, QuerySet& set) {
+  const auto base_up = [](std::vector<Vector> points) {
+    for (Vector& p : points) p.z() = -p.z();
+    return points;
+  };
+  const size_t vertices = std::stoul(name.substr(name.find(':') + 1));
+  const auto shape = [&] { return vertices == 8 ? Block(random) : Part(random, vertices); };
+  for (size_t i = 0; i < kHullsPerSet; ++i) {
+    set.hulls.push_back(BuildHull(i % 2 == 0 ? base_up(shape()) : shape()));
+  }
+  for (const Hull& hull : set.hulls) set.query_hulls.emplace_back(hull);
+  for (size_t i = 0; i < count; ++i) {
+    const size_t hull_a = 2 * random.Below(kHullsPerSet / 2);
+    const size_t hull_b = 2 * random.Below(kHullsPerSet / 2) + 1;
+    Pose X_WA;
+    X_WA.t = Vector(Length(random, -2, 2), Length(random, -2, 2), Length(random, -2, 2));
+    Pose X_WB;
+    X_WB.t = X_WA.t + Vector(Length(random, -0.5, 0.5), Length(random, -0.5, 0.5), 0);
+    set.queries.push_back({hull_a, hull_b, X_WA, X_WB});
+    set.a.push_back(*PlacedHull::Make(set.query_hulls[hull_a], X_WA));
+    set.b.push_back(*PlacedHull::Make(set.query_hulls[hull_b], X_WB));
+  }
+}
+
 // The pose of B at which its farthest vertex against `direction` is A's farthest along it: they
 // touch there, the plane across `direction` between them. Requires snapped hulls and exact
 // rotations.
@@ -159,6 +218,10 @@ QuerySet MakeQuerySet(const std::string& name, Regime regime, size_t count) {
   QuerySet set;
   set.name = name + "/" + Name(regime);
   Random random(20261121 + static_cast<uint64_t>(regime));
+  if (name.starts_with("mating:")) {
+    if (regime == Regime::kContact) AddMatings(name, random, count, set);
+    return set;
+  }
   AddHulls(name, random, set);
   if (set.hulls.empty()) return set;
   const bool exact = regime == Regime::kContact;

@@ -44,7 +44,9 @@ struct QuerySet {
 
 // Hulls by name: "sphere:V" (V random points on an ellipsoid with axes between 0.5 and 1.5), or
 // "ur5" (the links of the robot arm in HULLD_DATA, by default ../shared/data; no queries when it is
-// not there). Poses are random. Fixed seeds: the same name and regime give the same questions.
+// not there). "mating:V" has kContact alone: face on face without a rotation, as boxes are stacked
+// and parts assembled; blocks of 8 vertices, or parts of about V. Poses are random. Fixed seeds:
+// the same name and regime give the same questions.
 //
 // In kContact coordinates are multiples of 2^-40 and rotations map the axes onto each other, so
 // that every library receives the same geometry. Elsewhere a rotation matrix is rounded by those

@@ -4,7 +4,7 @@
 #   bash tests/bench/queries/run_query_benchmark.sh [MACHINE] [SUITE...]
 #
 # MACHINE names the files, as in query_relation_MACHINE.csv: a CPU and a compiler; epyc_gcc12 by
-# default. SUITEs are relation, contact, distance, motion, batch, scene, accuracy and trade; all by
+# default. SUITEs are relation, contact, distance, motion, batch, scene, live, accuracy and trade; all by
 # default. REPETITIONS (5) of which the median counts. HULLD_DATA: the folder of meshes. Needs what
 # docker/packages.txt lists under [build], [test] and [bench]. Nothing else should run on the
 # machine meanwhile.
@@ -14,14 +14,14 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 machine=${1:-epyc_gcc12}
 shift || true
 suites=("$@")
-((${#suites[@]})) || suites=(relation contact distance motion batch scene accuracy trade)
+((${#suites[@]})) || suites=(relation contact distance motion batch scene live accuracy trade)
 results=tests/bench/results
 programs=build/release/bin
 # Threads that wait leave the core to those that work, also where other programs run.
 export OMP_WAIT_POLICY=passive
 
 cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
-cmake --build --preset release --target query_benchmark query_accuracy hulld-bench
+cmake --build --preset release --target query_benchmark live_benchmark query_accuracy hulld-bench
 
 for suite in "${suites[@]}"; do
   out=$results/query_${suite}_$machine.csv
@@ -33,6 +33,10 @@ for suite in "${suites[@]}"; do
         --benchmark_report_aggregates_only=true
       { head -1 "$out" && tail -n +2 "$out" | sort -t, -k1,1V -k2,2; } >"$out.sorted"
       mv "$out.sorted" "$out"
+      ;;
+    live)
+      "$programs/live_benchmark" "${VERTICES:-1000000}" "${SECONDS_EACH:-3}" >"$out"
+      bash tests/bench/live/plot_live.sh "$machine"
       ;;
     # Counts, the same on every machine.
     accuracy) "$programs/query_accuracy" >$results/query_accuracy.csv ;;

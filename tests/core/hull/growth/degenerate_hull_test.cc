@@ -272,6 +272,32 @@ TEST(DegenerateHull, PowersOfTwoOnEachAxisKeepTheFacetsOfLargeSets) {
   }
 }
 
+// Canonical order however the x of the vertices lie: on a sphere, in two planes, near one end, on
+// either side of nothing, and so far apart that their distance is no double.
+TEST(DegenerateHull, SnapshotsAreCanonicalHoweverXIsSpread) {
+  Random random(209);
+  const std::vector<Vector> sphere = RandomOnSphere(random, 300, 1);
+  std::vector<Vector> prism;
+  for (const Vector& p : RandomOnSphere(random, 200, 1)) {
+    prism.emplace_back(p.x() < 0 ? -1 : 1, p.y() / std::hypot(p.y(), p.z()),
+                       p.z() / std::hypot(p.y(), p.z()));
+  }
+  std::vector<Vector> subnormal = sphere;
+  std::vector<Vector> widest = sphere;
+  for (size_t i = 0; i < sphere.size(); ++i) {
+    subnormal[i].x() *= 0x1p-1070;
+    widest[i].x() *= i % 2 == 0 ? 0x1.fp1023 : 1;
+  }
+  const std::vector<Vector> outlier = Concatenated(sphere, {Vector(1e300, 0, 0)});
+  for (const std::vector<Vector>& points : {sphere, prism, subnormal, widest, outlier}) {
+    const Hull hull = BuildHull(points);
+    EXPECT_EQ(hull.dimension(), 3);
+    EXPECT_GT(hull.vertices().size(), 100u);
+    EXPECT_TRUE(AuditHull(hull).ok());
+    EXPECT_TRUE(AuditContainment(hull, points).ok());
+  }
+}
+
 // Streams whose first blocks say little about the last: clusters far apart, growing shells, flat
 // starts. Any split into blocks gives the hull of one block.
 TEST(DegenerateHull, StreamsOfUnlikeBlocksEqualOneBlock) {

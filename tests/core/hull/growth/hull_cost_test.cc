@@ -74,7 +74,7 @@ TEST(HullCost, MemoryIsBoundedByTheVertices) {
       ASSERT_GE(vertices, 1000) << cloud.name;
       const Hull hull = b->Snapshot();
       EXPECT_LE(static_cast<double>(hull.MemoryBytes()) / vertices, 100) << cloud.name;
-      EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 300) << cloud.name;
+      EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 230) << cloud.name;
       const auto queried = static_cast<double>(hull.MemoryBytes() + QueryHull(hull).MemoryBytes());
       EXPECT_LE(queried / vertices, 350) << cloud.name;
       // What the server holds of a hull that grew and is asked about, at rest.

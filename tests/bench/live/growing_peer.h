@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_BENCH_QUERIES_GROWING_PEER_H_
-#define HULLD_TESTS_BENCH_QUERIES_GROWING_PEER_H_
+#ifndef HULLD_TESTS_BENCH_LIVE_GROWING_PEER_H_
+#define HULLD_TESTS_BENCH_LIVE_GROWING_PEER_H_
 
 #include <memory>
 #include <span>
@@ -14,6 +14,8 @@ class GrowingPeer {
  public:
   virtual ~GrowingPeer() = default;
   virtual void Add(const Vector& point) = 0;
+  // Brings its bounding box up to date, which no question needs.
+  virtual void UpdateBox() = 0;
   // Whether it collides with another, at the pose X_AB of that: by btGjkEpaSolver2, and by
   // btGjkPairDetector.
   virtual bool CollidesBySolver(const GrowingPeer& other, const Pose& X_AB) const = 0;
@@ -25,4 +27,4 @@ std::unique_ptr<GrowingPeer> MakeGrowingPeer(std::span<const Vector> points);
 
 }  // namespace hulld::bench
 
-#endif  // HULLD_TESTS_BENCH_QUERIES_GROWING_PEER_H_
+#endif  // HULLD_TESTS_BENCH_LIVE_GROWING_PEER_H_

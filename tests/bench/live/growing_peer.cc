@@ -1,4 +1,4 @@
-#include "tests/bench/queries/growing_peer.h"
+#include "tests/bench/live/growing_peer.h"
 
 #ifdef HULLD_HAVE_BULLET
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
@@ -30,6 +30,8 @@ class BulletHull : public GrowingPeer {
 
   // The box is not brought up to date, as neither GJK looks at it.
   void Add(const Vector& point) override { shape_.addPoint(ToBullet(point), false); }
+
+  void UpdateBox() override { shape_.recalcLocalAabb(); }
 
   bool CollidesBySolver(const GrowingPeer& other, const Pose& X_AB) const override {
     const auto& b = static_cast<const BulletHull&>(other);

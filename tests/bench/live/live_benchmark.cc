@@ -3,12 +3,14 @@
 //
 //   live_benchmark [MOST_VERTICES [SECONDS]]
 //
-// One row of CSV per workload, number of vertices and library. Both take the same points and the
-// same questions, in turn, step by step; a turn of Bullet that would take all the time is left out
-// of most steps. hulld prepares what questions paid for on a thread of its own, as the server does.
-// Bullet takes a point into its list of points and builds nothing; of its two GJKs the faster one
-// counts. The probe is a hull of 64 vertices near contact: its distance from touching, if the hull
-// were a sphere, is up to a tenth of the radius on either side.
+// with_box_us: the median of a step that also keeps the bounding box up to date; hulld's does so
+// anyway, Bullet's by addPoint's default. One row of CSV per workload, number of vertices and
+// library. Both take the same points and the same questions, in turn, step by step; a turn of
+// Bullet that would take all the time is left out of most steps. hulld prepares what questions paid
+// for on a thread of its own, as the server does. Bullet takes a point into its list of points and
+// builds nothing; of its two GJKs the faster one counts. The probe is a hull of 64 vertices near
+// contact: its distance from touching, if the hull were a sphere, is up to a tenth of the radius on
+// either side.
 
 #include <algorithm>
 #include <atomic>
@@ -31,7 +33,7 @@
 #include "core/query/placed/live_hull.h"
 #include "tests/bench/bench_random.h"
 #include "tests/bench/csv_reporter.h"
-#include "tests/bench/queries/growing_peer.h"
+#include "tests/bench/live/growing_peer.h"
 
 namespace hulld::bench {
 namespace {
@@ -114,6 +116,7 @@ struct Times {
   std::vector<double> step;
   std::vector<double> add;
   std::vector<double> ask;
+  std::vector<double> with_box;
 };
 
 class Run {
@@ -200,6 +203,7 @@ class Run {
     hulld_.step.push_back(Microseconds(end - start));
     hulld_.add.push_back(Microseconds(grown - start));
     hulld_.ask.push_back(Microseconds(end - grown));
+    hulld_.with_box.push_back(Microseconds(end - start));
     return colliding;
   }
 
@@ -224,15 +228,19 @@ class Run {
     peer_.step.push_back(add + ask);
     peer_.add.push_back(add);
     peer_.ask.push_back(ask);
+    const auto before_box = Clock::now();
+    peer.UpdateBox();
+    peer_.with_box.push_back(add + ask + Microseconds(Clock::now() - before_box));
     return colliding;
   }
 
   void Row(const char* library, Times& times, double moved) {
     const size_t steps = times.step.size();
-    std::printf("\"%s\",%s,%d,%.3f,%.3f,%.3f,%.3f,%.3f,%.2f,%zu,%d,\"%s\",\"%s\"\n", workload_.name,
-                library, vertices_, Quantile(times.step, 0.5), Quantile(times.step, 0.99),
-                Quantile(times.step, 1), Quantile(times.add, 0.5), Quantile(times.ask, 0.5), moved,
-                steps, disagreements_, CompilerName().c_str(), CpuName().c_str());
+    std::printf("\"%s\",%s,%d,%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%.2f,%zu,%d,\"%s\",\"%s\"\n",
+                workload_.name, library, vertices_, Quantile(times.step, 0.5),
+                Quantile(times.step, 0.99), Quantile(times.step, 1), Quantile(times.add, 0.5),
+                Quantile(times.ask, 0.5), Quantile(times.with_box, 0.5), moved, steps,
+                disagreements_, CompilerName().c_str(), CpuName().c_str());
   }
 
   const Workload& workload_;
@@ -256,7 +264,8 @@ int main(int argc, char** argv) {
   const int most = argc > 1 ? std::atoi(argv[1]) : 1000000;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 3;
   std::printf(
-      "workload,library,vertices,step_us,p99_us,max_us,add_us,ask_us,moved,steps,disagree,"
+      "workload,library,vertices,step_us,p99_us,max_us,add_us,ask_us,with_box_us,moved,steps,"
+      "disagree,"
       "compiler,cpu\n");
   for (const hulld::bench::Workload& workload : hulld::bench::kWorkloads) {
     for (const int vertices : {64, 1000, 10000, 100000, 1000000}) {

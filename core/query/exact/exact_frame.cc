@@ -1,0 +1,132 @@
+#include "core/query/exact/exact_frame.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+
+#include "core/numeric/exponent_limits.h"
+#include "core/numeric/integer.h"
+
+namespace hulld {
+namespace {
+
+// Four squares of them, and sums of products as large, stay below 2^123.
+constexpr int kMostQuaternionBits = 60;
+
+int BitWidth(Int128 magnitude) {
+  const auto high = static_cast<uint64_t>(magnitude >> 64);
+  return high != 0 ? 64 + std::bit_width(high)
+                   : static_cast<int>(std::bit_width(static_cast<uint64_t>(magnitude)));
+}
+
+// |x| < 2^exponent. Requires x finite.
+int ExponentAbove(double x) {
+  const BinaryDouble d = Decompose(x);
+  return d.exponent + static_cast<int>(std::bit_width(d.magnitude));
+}
+
+// Divides by the least component that is not zero, where it divides all. A greatest common divisor
+// would find more, at the price of many divisions; common powers of two are left to the caller.
+void DivideByLeast(std::array<int64_t, 4>& q) {
+  int64_t least = INT64_MAX;
+  for (const int64_t c : q) {
+    if (c != 0) least = std::min(least, std::abs(c));
+  }
+  if (least == 1) return;
+  for (const int64_t c : q) {
+    // Equal magnitudes are the rule where this divides at all.
+    if (c != 0 && std::abs(c) != least && c % least != 0) return;
+  }
+  for (int64_t& c : q) c /= least;
+}
+
+// The bits of a hull's own coordinates once they are turned and in the pair's unit.
+int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
+  // |R p| = N |p| <= N sqrt(3) times the largest component.
+  return norm_bits + (side.exponent - exponent) + side.own_bits + 1;
+}
+
+}  // namespace
+
+bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) {
+  int exponent = kAboveAllExponents;
+  int above = -kAboveAllExponents - 60;
+  for (const double component : q) {
+    if (component == 0) continue;
+    exponent = std::min(exponent, LowestBitExponent(component));
+    above = std::max(above, ExponentAbove(component));
+  }
+  if (above - exponent > kMostQuaternionBits) return false;
+  std::array<int64_t, 4> integers;
+  for (int i = 0; i < 4; ++i) {
+    integers[i] = static_cast<int64_t>(WideIntegerOf<1>(q[i], exponent).word(0));
+  }
+  DivideByLeast(integers);
+  const Int128 w = integers[0];
+  const Int128 x = integers[1];
+  const Int128 y = integers[2];
+  const Int128 z = integers[3];
+  const Int128 ww = w * w;
+  const Int128 xx = x * x;
+  const Int128 yy = y * y;
+  const Int128 zz = z * z;
+  rotation.norm = ww + xx + yy + zz;
+  rotation.rows = {{{ww + xx - yy - zz, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+                    {2 * (x * y + w * z), ww - xx + yy - zz, 2 * (y * z - w * x)},
+                    {2 * (x * z - w * y), 2 * (y * z + w * x), ww - xx - yy + zz}}};
+  // With |q|^2 of 2 or 4 modulo 8 all entries may be even.
+  Int128 any = rotation.norm;
+  for (const auto& row : rotation.rows) any |= row[0] | row[1] | row[2];
+  const int even = std::countr_zero(static_cast<uint64_t>(any) | uint64_t{4});
+  if (even > 0) {
+    for (auto& row : rotation.rows) {
+      for (Int128& entry : row) entry >>= even;
+    }
+    rotation.norm >>= even;
+  }
+  return true;
+}
+
+bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame) {
+  const Pose& X_WA = pair.a().X_WH();
+  const Pose& X_WB = pair.b().X_WH();
+  if (!FindSmallRotation(X_WA.q, frame.a.rotation)) return false;
+  if (!FindSmallRotation(X_WB.q, frame.b.rotation)) return false;
+  const Int128 norm_a = frame.a.rotation.norm;
+  const Int128 norm_b = frame.b.rotation.norm;
+  const bool same_norm = norm_a == norm_b;
+  frame.a.times_other_norm = frame.b.times_other_norm = !same_norm;
+  const int norm_bits = same_norm ? BitWidth(norm_a) : BitWidth(norm_a) + BitWidth(norm_b);
+
+  frame.a.exponent = pair.a().query_hull().exponent();
+  frame.b.exponent = pair.b().query_hull().exponent();
+  frame.exponent =
+      std::min({frame.a.exponent, frame.b.exponent,
+                LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents))});
+  int translation_bits = 0;
+  for (int i = 0; i < 3; ++i) {
+    for (const double t : {X_WA.t[i], X_WB.t[i]}) {
+      if (t != 0) translation_bits = std::max(translation_bits, ExponentAbove(t) - frame.exponent);
+    }
+  }
+  const auto add_side = [&](const PlacedHull& placed, SmallFrame::Side& side) {
+    const double largest = placed.query_hull().max_abs_coordinate();
+    if (largest == 0) {
+      // Its one vertex is its origin, a multiple of every power of two.
+      side.exponent = frame.exponent;
+      side.own_bits = 0;
+    } else {
+      side.own_bits = ExponentAbove(largest) - side.exponent;
+    }
+    return RotatedBits(side, norm_bits, frame.exponent);
+  };
+  const int bits_a = add_side(pair.a(), frame.a);
+  const int bits_b = add_side(pair.b(), frame.b);
+  // The difference of two translations, then the sum of it and what is rotated.
+  frame.bits = std::max({bits_a, bits_b, norm_bits + translation_bits + 1}) + 1;
+  return true;
+}
+
+}  // namespace hulld

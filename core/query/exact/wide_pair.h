@@ -1,0 +1,224 @@
+#ifndef HULLD_CORE_QUERY_EXACT_WIDE_PAIR_H_
+#define HULLD_CORE_QUERY_EXACT_WIDE_PAIR_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/base/check.h"
+#include "core/hull/hull.h"
+#include "core/numeric/integer.h"
+#include "core/numeric/wide_integer.h"
+#include "core/query/exact/exact_frame.h"
+#include "core/query/floating/float_pair.h"
+#include "core/query/terms/vertex_pair.h"
+
+namespace hulld {
+
+// What ExactPair is, in integers of a fixed width: for the search of the relation alone, without
+// allocation. The coordinates are the same integers.
+//
+// Widths: let world coordinates be below 2^c, c = SmallFrame::bits <= 64 kWords - 9. Vertices of A
+// - B are below 2^(c + 1), thickened ones (portal_search.h) below 2^(c + 4), their differences
+// below 2^(c + 5). The ray, with sums of at most ten vertices times at most ten, is below 200 * 2^c
+// < 2^(c
+// + 8): kWords hold it. A cross product of the ray and a difference is below 2 * 2^(2 c + 13), one
+// of two differences below 2 * 2^(2 c + 10): 2 kWords hold them, 2 c + 14 <= 128 kWords - 4. A
+// product of such a direction with a difference of vertices is below 3 * 2^(3 c + 19) < 2^(3 c +
+// 21) <= 2^(192 kWords - 6): 3 kWords hold it. Proven.
+template <int kWords>
+class WidePair {
+ public:
+  using Number = WideInteger<kWords>;
+  using Coordinates = WideVector<kWords>;
+  using Direction = WideVector<2 * kWords>;
+
+  static bool Fits(const SmallFrame& frame) {
+    return WordsFor(frame.bits) <= kWords && frame.a.own_bits <= kMostOwnBits &&
+           frame.b.own_bits <= kMostOwnBits;
+  }
+
+  // `filter` must outlive the pair. Requires Fits(frame), and the frame to be that of the filter.
+  WidePair(const FloatPair& filter, const SmallFrame& frame)
+      : filter_(&filter), a_(filter.a(), frame.a), b_(filter.b(), frame.b) {
+    HULLD_DCHECK(Fits(frame));
+    const WideInteger<2> norm_a = WideOf(frame.a.rotation.norm);
+    const WideInteger<2> norm_b = WideOf(frame.b.rotation.norm);
+    SetRows(frame, frame.a, norm_b, a_);
+    SetRows(frame, frame.b, norm_a, b_);
+    Number norm(norm_a);
+    if (frame.a.times_other_norm) norm = LowProduct<kWords>(norm, norm_b);
+    const Vector& t_A = filter.a().X_WH().t;
+    const Vector& t_B = filter.b().X_WH().t;
+    for (int i = 0; i < 3; ++i) {
+      const Number step = WideIntegerOf<kWords>(t_B[i], frame.exponent) -
+                          WideIntegerOf<kWords>(t_A[i], frame.exponent);
+      a_.shift[i] = 0;
+      b_.shift[i] = LowProduct<kWords>(norm, step);
+    }
+  }
+
+  const FloatPair& filter() const { return *filter_; }
+  const QueryHull& a() const { return a_.placed->query_hull(); }
+  const QueryHull& b() const { return b_.placed->query_hull(); }
+
+  Coordinates VertexA(uint32_t i) { return a_.Vertex(i); }
+  Coordinates VertexB(uint32_t i) { return b_.Vertex(i); }
+  Coordinates Difference(VertexPair pair) { return VertexA(pair.a) - VertexB(pair.b); }
+
+  // The lowest of the vertices of A farthest along n, and of B farthest against it; of all, or when
+  // it is known to be among `candidates`, ascending.
+  uint32_t FarthestA(const Direction& n) {
+    CandidateBuffer buffer;
+    return a_.Farthest(n, CandidatesOf(a_, n, [&](const Vector& n_W, double error) {
+                         return filter_->CandidatesA(n_W, error, buffer);
+                       }));
+  }
+  uint32_t FarthestB(const Direction& n) {
+    CandidateBuffer buffer;
+    return b_.Farthest(-n, CandidatesOf(b_, n, [&](const Vector& n_W, double error) {
+      return filter_->CandidatesB(n_W, error, buffer);
+    }));
+  }
+  uint32_t FarthestA(const Direction& n, std::span<const uint32_t> candidates) {
+    return a_.Farthest(n, candidates);
+  }
+  uint32_t FarthestB(const Direction& n, std::span<const uint32_t> candidates) {
+    return b_.Farthest(-n, candidates);
+  }
+
+  // A positive multiple of a point in the relative interior of A - B (see ExactPair).
+  Coordinates CenterDifference() const {
+    Coordinates difference;
+    const Coordinates sum_a = a_.SumOfInnerVertices();
+    const Coordinates sum_b = b_.SumOfInnerVertices();
+    for (int i = 0; i < 3; ++i) {
+      difference[i] = LowProduct<kWords>(sum_a[i], b_.InnerCount()) -
+                      LowProduct<kWords>(sum_b[i], a_.InnerCount());
+    }
+    return difference;
+  }
+
+  static Direction ToDirection(const Coordinates& n) {
+    return {WideInteger<2 * kWords>(n.x), WideInteger<2 * kWords>(n.y),
+            WideInteger<2 * kWords>(n.z)};
+  }
+
+ private:
+  // Own coordinates of at most this many bits take one word, and sums of ten of them do.
+  static constexpr int kOneWordBits = 59;
+  static constexpr int kMostOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
+  // The first so many vertices are kept once they are multiplied out.
+  static constexpr uint32_t kKept = 32;
+
+  struct Side {
+    Side(const PlacedHull& hull, const SmallFrame::Side& frame)
+        : placed(&hull), exponent(frame.exponent), is_narrow(frame.own_bits <= kOneWordBits) {}
+
+    template <int kOwnWords>
+    Coordinates Rotated(const WideVector<kOwnWords>& own) const {
+      Coordinates result;
+      for (int i = 0; i < 3; ++i) {
+        result[i] = LowProduct<kWords>(rows[i].x, own.x) + LowProduct<kWords>(rows[i].y, own.y) +
+                    LowProduct<kWords>(rows[i].z, own.z);
+      }
+      return result;
+    }
+
+    template <int kOwnWords>
+    WideVector<kOwnWords> Own(uint32_t i) const {
+      const Vector v = placed->query_hull().point(i);
+      return {WideIntegerOf<kOwnWords>(v.x(), exponent), WideIntegerOf<kOwnWords>(v.y(), exponent),
+              WideIntegerOf<kOwnWords>(v.z(), exponent)};
+    }
+
+    Coordinates MakeVertex(uint32_t i) const {
+      return (is_narrow ? Rotated(Own<1>(i)) : Rotated(Own<2>(i))) + shift;
+    }
+
+    Coordinates Vertex(uint32_t i) {
+      if (i >= kKept) return MakeVertex(i);
+      if ((known >> i & 1) == 0) {
+        kept[i] = MakeVertex(i);
+        known |= uint32_t{1} << i;
+      }
+      return kept[i];
+    }
+
+    // None: all are candidates.
+    uint32_t Farthest(const Direction& n, std::span<const uint32_t> candidates) {
+      if (candidates.size() == 1) return candidates[0];
+      uint32_t best = candidates.empty() ? 0 : candidates[0];
+      auto largest = Dot(n, Vertex(best));
+      if (candidates.empty()) {
+        for (uint32_t i = 1; i < vertex_count(); ++i) Consider(n, i, best, largest);
+      } else {
+        for (const uint32_t i : candidates.subspan(1)) Consider(n, i, best, largest);
+      }
+      return best;
+    }
+    uint32_t vertex_count() const { return placed->query_hull().point_count(); }
+    void Consider(const Direction& n, uint32_t i, uint32_t& best,
+                  WideInteger<3 * kWords>& largest) {
+      const auto value = Dot(n, Vertex(i));
+      if (Sign(value - largest) <= 0) return;
+      best = i;
+      largest = value;
+    }
+
+    WideInteger<1> InnerCount() const {
+      return static_cast<int64_t>(placed->query_hull().inner_points().size());
+    }
+    template <int kOwnWords>
+    Coordinates RotatedSum() const {
+      WideVector<kOwnWords> own = {0, 0, 0};
+      for (const uint32_t i : placed->query_hull().inner_points()) own = own + Own<kOwnWords>(i);
+      return Rotated(own);
+    }
+    Coordinates SumOfInnerVertices() const {
+      Coordinates sum = is_narrow ? RotatedSum<1>() : RotatedSum<2>();
+      for (int i = 0; i < 3; ++i) sum[i] += LowProduct<kWords>(shift[i], InnerCount());
+      return sum;
+    }
+
+    const PlacedHull* placed;
+    int exponent;
+    bool is_narrow;
+    // world = rows * own + shift.
+    std::array<Coordinates, 3> rows;
+    Coordinates shift;
+    // Which of `kept` are set.
+    uint32_t known = 0;
+    std::array<Coordinates, kKept> kept;
+  };
+
+  // What floating point leaves of a large hull; of a small one nothing, which stands for all.
+  template <typename Candidates>
+  std::span<const uint32_t> CandidatesOf(const Side& side, const Direction& n,
+                                         Candidates candidates) const {
+    if (side.vertex_count() <= kKept || !filter_->usable() || IsZero(n)) return {};
+    const Vector n_W = ToScaledDoubles(ToInteger(n));
+    return candidates(n_W, kScaledDoublesError * LargestComponent(n_W));
+  }
+
+  static void SetRows(const SmallFrame& frame, const SmallFrame::Side& from,
+                      const WideInteger<2>& other_norm, Side& side) {
+    const int shift = from.exponent - frame.exponent;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        Number entry(WideOf(from.rotation.rows[i][j]));
+        if (from.times_other_norm) entry = LowProduct<kWords>(entry, other_norm);
+        side.rows[i][j] = shift == 0 ? entry : Shifted(entry, shift);
+      }
+    }
+  }
+
+  const FloatPair* filter_;
+  Side a_;
+  Side b_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_EXACT_WIDE_PAIR_H_

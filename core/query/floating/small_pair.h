@@ -1,0 +1,143 @@
+#ifndef HULLD_CORE_QUERY_FLOATING_SMALL_PAIR_H_
+#define HULLD_CORE_QUERY_FLOATING_SMALL_PAIR_H_
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <span>
+
+#include "core/base/check.h"
+#include "core/query/floating/float_pair.h"
+#include "core/query/placed/plain_vector.h"
+#include "core/query/terms/vertex_pair.h"
+
+namespace hulld {
+
+// A pair of small hulls, as most scenes hold them: what a search asks of a FloatPair, with all
+// vertices turned into the pair's frame beforehand. So a direction need not be turned, and a vertex
+// of A - B is a difference of two that are known. The farthest is found without a branch, as which
+// vertex it is cannot be predicted.
+//
+// kMostVertices: of either hull; more of them need bounds of their own (kSupportErrorFactor).
+// Positions are those of FloatPair, to the bit. Everything is inlined, so that it is compiled for
+// the registers of the function that searches.
+template <uint32_t kMostVertices>
+class SmallPair {
+  static_assert(kMostVertices == 8 || kMostVertices == 16);
+
+ public:
+  static bool Fits(const FloatPair& pair) {
+    const auto fits = [](const QueryHull& hull) {
+      const size_t count = hull.points_together().size();
+      return count > 0 && count <= kMostVertices;
+    };
+    return fits(pair.a().query_hull()) && fits(pair.b().query_hull());
+  }
+
+  // Requires Fits(pair).
+  [[gnu::always_inline]] explicit SmallPair(const FloatPair& pair) : size_(pair.size()) {
+    HULLD_DCHECK(Fits(pair));
+    a_.Fill(pair.a(), PlainVector(0, 0, 0), 1);
+    against_b_.Fill(pair.b(), pair.offset(), -1);
+  }
+
+  double size() const { return size_; }
+
+  // The farthest: its value is within FloatPair::SupportError of the largest (kSupportErrorFactor).
+  [[gnu::always_inline]] FloatPair::Support Farthest(const PlainVector& n) const {
+    const Lanes x = {n.x, n.x, n.x, n.x};
+    const Lanes y = {n.y, n.y, n.y, n.y};
+    const Lanes z = {n.z, n.z, n.z, n.z};
+    Lanes best_a, best_b;
+    a_.Best(x, y, z, best_a);
+    against_b_.Best(x, y, z, best_b);
+    // Both at once: A in the lower half, B in the upper.
+    Lanes best = __builtin_shuffle(best_a, best_b, LaneIds{0, 1, 4, 5});
+    const Lanes rest = __builtin_shuffle(best_a, best_b, LaneIds{2, 3, 6, 7});
+    best = best > rest ? best : rest;
+    const Lanes turned = __builtin_shuffle(best, LaneIds{1, 0, 3, 2});
+    best = best > turned ? best : turned;
+    const LaneIds ids = reinterpret_cast<LaneIds>(best);
+    const VertexPair found = {a_.VertexOf(ids[0]), against_b_.VertexOf(ids[2])};
+    return {found, Dot(n, Difference(found))};
+  }
+
+  [[gnu::always_inline]] PlainVector Difference(VertexPair pair) const {
+    return {a_.x[pair.a] + against_b_.x[pair.b], a_.y[pair.a] + against_b_.y[pair.b],
+            a_.z[pair.a] + against_b_.z[pair.b]};
+  }
+
+ private:
+  // Four doubles, and four integers as wide, in whatever registers the function is compiled for.
+  using Lanes = double __attribute__((vector_size(32)));
+  using LaneIds = int64_t __attribute__((vector_size(32)));
+  // The low bits of a value that number its vertex.
+  static constexpr int64_t kIdMask = kMostVertices - 1;
+
+  struct Side {
+    // The vertices in the pair's frame, times `sign`; the last one repeated where there are fewer.
+    [[gnu::always_inline]] void Fill(const PlacedHull& placed, const PlainVector& offset,
+                                     double sign) {
+      const std::span<const Vector> vertices = placed.query_hull().points_together();
+      last = static_cast<uint32_t>(vertices.size()) - 1;
+      const double* const R = placed.R_WH().data();  // column by column
+      for (uint32_t block = 0; block < kMostVertices; block += 4) {
+        const Vector& p0 = vertices[std::min(block, last)];
+        const Vector& p1 = vertices[std::min(block + 1, last)];
+        const Vector& p2 = vertices[std::min(block + 2, last)];
+        const Vector& p3 = vertices[std::min(block + 3, last)];
+        const Lanes own_x = {p0.x(), p1.x(), p2.x(), p3.x()};
+        const Lanes own_y = {p0.y(), p1.y(), p2.y(), p3.y()};
+        const Lanes own_z = {p0.z(), p1.z(), p2.z(), p3.z()};
+        const auto store = [&](int row, double shift, double* to) __attribute__((always_inline)) {
+          const Lanes position =
+              sign * (((R[row] * own_x + R[row + 3] * own_y) + R[row + 6] * own_z) + shift);
+          std::memcpy(to + block, &position, sizeof position);
+        };
+        store(0, offset.x, x);
+        store(1, offset.y, y);
+        store(2, offset.z, z);
+      }
+    }
+
+    // Values along a direction, of every fourth vertex the largest, the low bits numbering it.
+    [[gnu::always_inline]] void Best(const Lanes& n_x, const Lanes& n_y, const Lanes& n_z,
+                                     Lanes& best) const {
+      Number(0, n_x, n_y, n_z, best);
+#pragma GCC unroll 4
+      for (uint32_t block = 4; block < kMostVertices; block += 4) {
+        Lanes others;
+        Number(block, n_x, n_y, n_z, others);
+        best = best > others ? best : others;
+      }
+    }
+    [[gnu::always_inline]] void Number(uint32_t first, const Lanes& n_x, const Lanes& n_y,
+                                       const Lanes& n_z, Lanes& numbered) const {
+      Lanes px, py, pz;
+      std::memcpy(&px, x + first, sizeof px);
+      std::memcpy(&py, y + first, sizeof py);
+      std::memcpy(&pz, z + first, sizeof pz);
+      const LaneIds bits = reinterpret_cast<LaneIds>((n_x * px + n_y * py) + n_z * pz);
+      const int64_t id = first;
+      const LaneIds ids = {id, id + 1, id + 2, id + 3};
+      numbered = reinterpret_cast<Lanes>((bits & ~kIdMask) | ids);
+    }
+    [[gnu::always_inline]] uint32_t VertexOf(int64_t numbered) const {
+      return std::min(static_cast<uint32_t>(numbered & kIdMask), last);
+    }
+
+    alignas(32) double x[kMostVertices];
+    alignas(32) double y[kMostVertices];
+    alignas(32) double z[kMostVertices];
+    uint32_t last;
+  };
+
+  Side a_;
+  // The negated vertices of B.
+  Side against_b_;
+  double size_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_FLOATING_SMALL_PAIR_H_
