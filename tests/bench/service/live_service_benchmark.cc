@@ -5,7 +5,8 @@
 // For each number of vertices (64, 1000, 10000 and 100000 where none is given): starts a hulld of
 // its own on a durable store and asks single questions about a hull of so many vertices and a probe
 // near it: at rest; right after each acknowledged chunk of one outside point; while another
-// connection streams such chunks at full rate; and as the first question after a restart. One row
+// connection streams such chunks at full rate; about another hull meanwhile, which tells what the
+// machine's load alone costs; and as the first question after a restart. One row
 // of CSV per case: the questions' percentiles, their ratios to those at rest, and the writer's
 // rate, which the row "writer alone" has without any reader. The cases take turns, so that drifts
 // of the machine's speed meet all of them.
@@ -39,6 +40,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr char kHull[] = "live/ball";
+constexpr char kResting[] = "live/resting";
 constexpr char kProbe[] = "live/probe";
 constexpr int kRounds = 5;
 constexpr int kRestarts = 5;
@@ -133,9 +135,9 @@ double Microseconds(Clock::duration duration) {
 }
 
 // The time of one question, in microseconds.
-double Ask(v1::CollisionService::Stub& stub, int i) {
+double Ask(v1::CollisionService::Stub& stub, const char* hull_id, int i) {
   v1::CheckCollisionRequest request;
-  request.mutable_a()->set_hull_id(kHull);
+  request.mutable_a()->set_hull_id(hull_id);
   request.mutable_b()->set_hull_id(kProbe);
   v1::Vector3* const t = request.mutable_b()->mutable_pose()->mutable_translation();
   t->set_x(0.9 + 1e-3 * (i % 500));
@@ -156,11 +158,12 @@ struct Row {
 };
 
 // `before` is called before each question, and not timed.
-void MeasureTurn(v1::CollisionService::Stub& stub, const std::function<void()>& before, Row* row) {
+void MeasureTurn(v1::CollisionService::Stub& stub, const char* hull_id,
+                 const std::function<void()>& before, Row* row) {
   const auto start = Clock::now();
   for (int i = 0; i < kCallsPerTurn && Clock::now() - start < kMostPerTurn; ++i) {
     before();
-    row->times.push_back(Ask(stub, i));
+    row->times.push_back(Ask(stub, hull_id, i));
   }
 }
 
@@ -203,37 +206,36 @@ void Measure(const std::string& program, int vertices) {
   Row rest = {"at rest"};
   Row after = {"after an append"};
   Row beside = {"beside a writer"};
+  Row other = {"another hull beside a writer"};
   Row alone = {"writer alone"};
   Row cold = {"first after a restart"};
   {
     const ChildServer server(command);
     const auto hulls = v1::HullService::NewStub(Connect(server.address()));
     MakeBallHull(*hulls, kHull, vertices, 1);
+    MakeBallHull(*hulls, kResting, vertices, 1.1);
     MakeBallHull(*hulls, kProbe, 64, 0.5);
+    const auto nothing = [] {};
+    const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(500)); };
     const auto stub = v1::CollisionService::NewStub(Connect(server.address()));
-    for (int i = 0; i < 1000; ++i) Ask(*stub, i);  // warm up, and all is prepared that pays
+    for (int i = 0; i < 1000; ++i) Ask(*stub, kHull, i);  // warm up, and all is prepared that pays
     for (int round = 0; round < kRounds; ++round) {
       const std::string number = std::to_string(round);
-      MeasureTurn(
-          *stub, [] {}, &rest);
+      MeasureTurn(*stub, kHull, nothing, &rest);
       {
         Writer writer(server.address(), "after" + number);
         const auto append = [&] {
           writer.Send();
           writer.Receive();
         };
-        MeasureTurn(*stub, append, &after);
+        MeasureTurn(*stub, kHull, append, &after);
       }
       const StreamingWriter writer(server.address(), "beside" + number);
       Count(
-          writer,
-          [&] {
-            MeasureTurn(
-                *stub, [] {}, &beside);
-          },
-          &beside);
+          writer, [&] { MeasureTurn(*stub, kHull, nothing, &beside); }, &beside);
       Count(
-          writer, [] { std::this_thread::sleep_for(std::chrono::milliseconds(500)); }, &alone);
+          writer, [&] { MeasureTurn(*stub, kResting, nothing, &other); }, &other);
+      Count(writer, pause, &alone);
     }
   }
   for (int i = 0; i < kRestarts; ++i) {
@@ -244,9 +246,10 @@ void Measure(const std::string& program, int vertices) {
     context.set_wait_for_ready(true);
     v1::ListHullsResponse page;
     Require(v1::HullService::NewStub(channel)->ListHulls(&context, {}, &page), "ListHulls");
-    cold.times.push_back(Ask(*v1::CollisionService::NewStub(channel), 0));
+    cold.times.push_back(Ask(*v1::CollisionService::NewStub(channel), kHull, 0));
   }
-  for (Row* row : {&rest, &after, &beside, &alone, &cold}) Print(vertices, row, &rest.times);
+  for (Row* row : {&rest, &after, &beside, &other, &alone, &cold})
+    Print(vertices, row, &rest.times);
   std::filesystem::remove_all(directory);
 }
 
