@@ -42,7 +42,7 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       admission_(config.limits, metrics_),
       store_(std::move(store)),
       writers_(PoolThreads(), metrics_.AddPool("writers")),
-      registry_(*store_, config.limits, writers_),
+      registry_(*store_, config.limits, writers_, metrics_.AddPool("preparers")),
       readers_(PoolThreads(), metrics_.AddPool("readers")),
       long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),

@@ -67,8 +67,8 @@ class Server {
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::unique_ptr<Store> store_;
-  // Chunks and replacements, and what may wait for the store or for a writer. Three pools, so that
-  // readers never wait for writers, nor those of microseconds for those of seconds.
+  // Chunks and replacements, and what may wait for the store. Three pools, so that readers never wait
+  // for writers, nor those of microseconds for those of seconds.
   WorkerPool writers_;
   Registry registry_;
   WorkerPool readers_;

@@ -67,8 +67,9 @@ absl::Status BatchStream::Validate() {
 }
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
-  if (!may_wait) return table_.TryResolve(registry_);
-  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+  const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true};
+  if (!may_wait) return table_.TryResolve(registry_, options_, plan);
+  if (absl::Status s = table_.Resolve(registry_, options_, plan); !s.ok()) return s;
   return true;
 }
 
@@ -93,8 +94,7 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
 }
 
 bool BatchStream::IsForTeam(const PlacedPair& pair) const {
-  return IsTextbookForTeam(options_, table_.placed()[pair.a].hull(),
-                           table_.placed()[pair.b].hull());
+  return IsTextbookForTeam(options_, table_.placed()[pair.a], table_.placed()[pair.b]);
 }
 
 // A pair for the team makes a piece of its own.
@@ -143,7 +143,7 @@ absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* col
       answer = NameQueryLimit(answer.status());
       call().CountLimit(answer.status());
     }
-    columns->Add(answer, a.hull(), b.hull());
+    columns->Add(answer, a, b);
   }
   call().metrics().CountPairs(counts);
   return absl::OkStatus();

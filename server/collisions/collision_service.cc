@@ -41,9 +41,10 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
 }
 
 // Whether nothing is left to make before these hulls can be queried.
-bool AreReady(const Resolved& resolved) {
+bool AreReady(const Resolved& resolved, const QueryOptions& options) {
+  if (!options.WantsCanonical()) return true;
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
-    if (hull.ok() && !hull->served->has_query_hull()) return false;
+    if (hull.ok() && !hull->served->has_canonical_query_hull()) return false;
   }
   return true;
 }
@@ -58,21 +59,23 @@ struct CollisionService::PairQuery {
 
   // Takes the hulls that were found for it, and gives the response their versions. May make what
   // queries need of them.
-  absl::Status Place(const Registry& registry, absl::StatusOr<Resolved> resolved,
+  absl::Status Place(Registry& registry, absl::StatusOr<Resolved> resolved,
                      v1::CheckCollisionResponse* response);
 
   // Requires that Place succeeded.
-  bool IsQuick() const { return IsQuickToRelate(hull_a()) && IsQuickToRelate(hull_b()); }
-  bool IsForTeam() const { return IsTextbookForTeam(options, hull_a(), hull_b()); }
+  bool IsQuick() const {
+    return IsQuickToRelate(placed_a().query_hull()) && IsQuickToRelate(placed_b().query_hull());
+  }
+  bool IsForTeam() const { return IsTextbookForTeam(options, placed_a(), placed_b()); }
   absl::Status Answer(const v1::Wanted& wanted, Metrics& metrics,
                       v1::CheckCollisionResponse* response) const;
-  const Hull& hull_a() const {
+  const PlacedHull& placed_a() const {
     HULLD_CHECK(a.has_value());
-    return a->hull();
+    return *a;
   }
-  const Hull& hull_b() const {
+  const PlacedHull& placed_b() const {
     HULLD_CHECK(b.has_value());
-    return b->hull();
+    return *b;
   }
 
   Pose X_WA;
@@ -100,7 +103,7 @@ absl::StatusOr<CollisionService::PairQuery> CollisionService::PairQuery::Read(
   return query;
 }
 
-absl::Status CollisionService::PairQuery::Place(const Registry& registry,
+absl::Status CollisionService::PairQuery::Place(Registry& registry,
                                                 absl::StatusOr<Resolved> resolved,
                                                 v1::CheckCollisionResponse* response) {
   if (!resolved.ok()) return resolved.status();
@@ -108,8 +111,18 @@ absl::Status CollisionService::PairQuery::Place(const Registry& registry,
     if (!hull.ok()) return hull.status();
   }
   views = std::move(resolved->hulls);
-  a = PlacedHull(views[0]->served->query_hull(), X_WA);
-  b = PlacedHull(views[1]->served->query_hull(), X_WB);
+  const bool canonical = options.WantsCanonical();
+  if (canonical) {
+    for (const absl::StatusOr<HullView>& view : views) {
+      const auto made = registry.Canonical(*view, options.should_stop);
+      if (!made.ok()) return made.status();
+    }
+  }
+  const auto query_hull = [canonical](const HullView& view) -> const QueryHull& {
+    return canonical ? view.served->canonical_query_hull() : view.served->query_hull();
+  };
+  a = PlacedHull(query_hull(*views[0]), X_WA);
+  b = PlacedHull(query_hull(*views[1]), X_WB);
   EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
   EncodeVersion(registry.store().id(), views[0]->record, response->mutable_hull_a());
   EncodeVersion(registry.store().id(), views[1]->record, response->mutable_hull_b());
@@ -118,9 +131,7 @@ absl::Status CollisionService::PairQuery::Place(const Registry& registry,
 
 absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metrics& metrics,
                                                  v1::CheckCollisionResponse* response) const {
-  const Hull& of_a = hull_a();
-  const Hull& of_b = hull_b();
-  const auto answer = hulld::CheckCollision(*a, *b, options);
+  const auto answer = hulld::CheckCollision(placed_a(), placed_b(), options);
   if (!answer.ok()) return NameQueryLimit(answer.status());
   RungCounts counts;
   counts.Add(answer->rung);
@@ -128,16 +139,16 @@ absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metri
   response->set_relation(EncodeRelation(answer->relation));
   response->set_rung(EncodeRung(answer->rung));
   if (answer->analysis) {
-    EncodeAnalysis(*answer->analysis, of_a, of_b, response->mutable_analysis());
+    EncodeAnalysis(*answer->analysis, a->hull(), b->hull(), response->mutable_analysis());
   }
   if (answer->certificate) {
-    EncodeCertificate(*answer->certificate, of_a, of_b, response->mutable_certificate());
+    EncodeCertificate(*answer->certificate, a->hull(), b->hull(), response->mutable_certificate());
   }
   if (answer->separation) EncodeSeparation(*answer->separation, response->mutable_separation());
   if (answer->witness) EncodeWitness(*answer->witness, response->mutable_witness());
   if (answer->within_clearance) response->set_within_clearance(*answer->within_clearance);
   if (!wanted.axis() || !answer->axis.has_value()) return absl::OkStatus();
-  return EncodeAxis(*answer->axis, of_a, of_b, response->mutable_axis());
+  return EncodeAxis(*answer->axis, a->hull(), b->hull(), response->mutable_axis());
 }
 
 grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
@@ -148,12 +159,12 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
     absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), *request);
     if (!query.ok()) return call->End(query.status());
     std::optional<Resolved> ready = registry_.TryResolve(HullIds(*request));
-    if (ready.has_value() && AreReady(*ready)) {
+    if (ready.has_value() && AreReady(*ready, query->options)) {
       const absl::Status placed = query->Place(registry_, *std::move(ready), response);
       if (!placed.ok()) return call->End(placed);
       return Compute(*std::move(query), request->wanted(), call, response);
     }
-    // Waits for the store, for a writer, or for what queries need to be made.
+    // Waits for the store, or for canonical snapshots to be made.
     readers_.Submit([this, call, request, response, query = *std::move(query)]() mutable {
       const absl::Status placed = query.Place(
           registry_, registry_.Resolve(HullIds(*request), query.options.should_stop), response);

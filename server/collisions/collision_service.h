@@ -16,9 +16,9 @@ namespace hulld::server {
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
 // answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
 // of moderate size and ready. Everything else is computed by `pool`: single pairs and the steps of
-// streams ahead of slices of batches, scenes and long steps. What may wait for the store or a
-// writer runs on `readers`, hulls of one pair, or `long_readers`, hulls of many. Pairs for
-// TEXTBOOK_SAT whose loop over axes is worth a team of threads go to the executor.
+// streams ahead of slices of batches, scenes and long steps. What may wait for the store, and what
+// makes canonical snapshots, runs on `readers`, hulls of one pair, or `long_readers`, hulls of
+// many. Pairs for TEXTBOOK_SAT whose loop over axes is worth a team of threads go to the executor.
 class CollisionService : public v1::CollisionService::CallbackService {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,

@@ -22,6 +22,8 @@ constexpr size_t kPairsPerLook = 16;
 constexpr int kMostShortUpdate = 4096;
 // An update that concerns no more pairs is answered where it arrives.
 constexpr int kMostQuickPairs = 8;
+// A stream is opened for many updates; how many is a guess.
+constexpr uint64_t kExpectedUpdates = 256;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
 
@@ -70,7 +72,7 @@ bool CollisionStream::IsQuick() const {
       if (++pairs > kMostQuickPairs) return false;
       const PairState& pair = pairs_[pairs_of_[k]];
       for (const uint32_t part : {pair.a, pair.b}) {
-        if (!IsQuickToRelate(table_.placed()[part].hull())) return false;
+        if (!IsQuickToRelate(table_.placed()[part].query_hull())) return false;
       }
     }
   }
@@ -148,7 +150,9 @@ absl::Status CollisionStream::HandleOpen() {
   open_ = true;
   is_asked_.assign(pairs_.size(), false);
   for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
-  return Refresh();
+  // It is worth the wait: the hulls are used until the client refreshes them.
+  const uint64_t pairs_per_hull = 2 * pairs_.size() / std::max<size_t>(1, table_.hull_count());
+  return Refresh({kExpectedUpdates * pairs_per_hull, true});
 }
 
 // Counts what the stream is to hold against --memory-limit, before it is held. RESOURCE_EXHAUSTED:
@@ -187,7 +191,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
     poses.push_back(*pose);
   }
   if (update.refresh_hulls()) {
-    if (absl::Status s = Refresh(); !s.ok()) return s;
+    if (absl::Status s = Refresh({}); !s.ok()) return s;
   }
   for (int i = 0; i < moved; ++i) {
     table_.Move(update.placements(i), poses[i]);
@@ -196,13 +200,16 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   return absl::OkStatus();
 }
 
-absl::Status CollisionStream::Refresh() {
-  if (absl::Status s = table_.Resolve(registry_, options_.should_stop); !s.ok()) return s;
+absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
+  if (absl::Status s = table_.Resolve(registry_, options_, plan); !s.ok()) return s;
   for (size_t i = 0; i < table_.size(); ++i) {
-    if (!table_.hull_changed(i)) continue;
-    AskAboutPairsOf(i);
-    // The vertices that a cache names are those of the hull before.
-    for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) pairs_[pairs_of_[k]].cache = {};
+    if (table_.hull_changed(i)) AskAboutPairsOf(i);
+    if (!table_.query_hull_changed(i)) continue;
+    // The points that a cache names are those of the QueryHull before. Its axis is as good a guess
+    // as it was.
+    for (size_t k = pairs_begin_[i]; k < pairs_begin_[i + 1]; ++k) {
+      pairs_[pairs_of_[k]].cache.pair_count = 0;
+    }
   }
   next_row_ = 0;
   return absl::OkStatus();
@@ -242,8 +249,8 @@ void CollisionStream::AddAnswer(uint32_t index) {
     reply_bytes_ += AddUnanswered(wanted_, columns);
     return;
   }
-  reply_bytes_ += server::AddAnswer(answer, table_.placed()[pair.a].hull(),
-                                    table_.placed()[pair.b].hull(), wanted_, columns);
+  reply_bytes_ +=
+      server::AddAnswer(answer, table_.placed()[pair.a], table_.placed()[pair.b], wanted_, columns);
 }
 
 void CollisionStream::SendPart(bool last) {

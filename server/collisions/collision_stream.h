@@ -67,7 +67,7 @@ class CollisionStream
   absl::Status HandleOpen();
   absl::Status ChargeFor(size_t pairs);
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
-  absl::Status Refresh();
+  absl::Status Refresh(const ReadPlan& plan);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
   absl::StatusOr<Answer> AnswerPair(PairState& pair) const;

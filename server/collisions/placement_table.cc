@@ -133,33 +133,62 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
 size_t PlacementTable::MemoryBytes() const {
   size_t of_ids = 0;
   for (const std::string& id : ids_) of_ids += id.capacity();
-  return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull) + sizeof(char)) +
-         named_.size() * sizeof named_[0] +
-         ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>)) + of_ids;
+  return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull)) + named_.size() * sizeof named_[0] +
+         ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) +
+                        sizeof(const QueryHull*) + 2 * sizeof(char)) +
+         of_ids;
 }
 
-absl::Status PlacementTable::Resolve(Registry& registry, const std::function<bool()>& should_stop) {
-  absl::StatusOr<Resolved> resolved = registry.Resolve(ids_, should_stop);
+absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
+                                     const ReadPlan& plan) {
+  const bool canonical = options.WantsCanonical();
+  absl::StatusOr<Resolved> resolved =
+      registry.Resolve(ids_, options.should_stop, canonical ? ReadPlan() : plan);
   if (!resolved.ok()) return resolved.status();
-  Take(registry, *std::move(resolved));
+  if (canonical) {
+    for (absl::StatusOr<HullView>& hull : resolved->hulls) {
+      if (!hull.ok()) continue;
+      const absl::Status made = registry.Canonical(*hull, options.should_stop).status();
+      if (absl::IsCancelled(made)) return made;
+      if (!made.ok()) hull = made;
+    }
+  }
+  Take(registry, *std::move(resolved), canonical);
   return absl::OkStatus();
 }
 
-bool PlacementTable::TryResolve(Registry& registry) {
-  std::optional<Resolved> resolved = registry.TryResolve(ids_);
+bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
+                                const ReadPlan& plan) {
+  const bool canonical = options.WantsCanonical();
+  std::optional<Resolved> resolved = registry.TryResolve(ids_, canonical ? ReadPlan() : plan);
   if (!resolved.has_value()) return false;
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
-    if (hull.ok() && !hull->served->has_query_hull()) return false;
+    if (canonical && hull.ok() && !hull->served->has_canonical_query_hull()) return false;
   }
-  Take(registry, *std::move(resolved));
+  Take(registry, *std::move(resolved), canonical);
   return true;
 }
 
-void PlacementTable::Take(const Registry& registry, Resolved resolved) {
+// canonical: all that were found have a canonical snapshot, and that is asked.
+void PlacementTable::Take(const Registry& registry, Resolved resolved, bool canonical) {
+  std::vector<const QueryHull*> query_hulls;
+  query_hulls.reserve(ids_.size());
+  for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
+    const QueryHull* const of_hull = !hull.ok()  ? &NoHull()
+                                     : canonical ? &hull->served->canonical_query_hull()
+                                                 : &hull->served->query_hull();
+    query_hulls.push_back(of_hull);
+  }
   changed_.assign(ids_.size(), true);
-  for (size_t i = 0; i < hulls_.size(); ++i) changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
+  query_hull_changed_.assign(ids_.size(), true);
+  for (size_t i = 0; i < hulls_.size(); ++i) {
+    changed_[i] = !IsSame(hulls_[i], resolved.hulls[i]);
+    query_hull_changed_[i] = query_hulls_[i] != query_hulls[i];
+  }
+  // Those before end only now: an address tells them from their successors.
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
   hulls_ = std::move(resolved.hulls);
+  query_hulls_ = std::move(query_hulls);
   store_id_ = registry.store().id();
   store_revision_ = resolved.store_revision;
   placed_.clear();
@@ -170,7 +199,7 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved) {
 PlacedHull PlacementTable::Place(size_t i) const {
   if (!is_answerable(i)) return PlacedHull(NoHull(), Pose());
   const Entry& entry = entries_[i];
-  return PlacedHull(hulls_[*entry.hull]->served->query_hull(), entry.pose);
+  return PlacedHull(*query_hulls_[*entry.hull], entry.pose);
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {
@@ -180,6 +209,10 @@ const absl::Status& PlacementTable::problem(size_t i) const {
 
 bool PlacementTable::hull_changed(size_t i) const {
   return entries_[i].hull.has_value() && changed_[*entries_[i].hull];
+}
+
+bool PlacementTable::query_hull_changed(size_t i) const {
+  return entries_[i].hull.has_value() && query_hull_changed_[*entries_[i].hull];
 }
 
 void PlacementTable::Move(size_t i, const Pose& X_WH) {

@@ -7,7 +7,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,6 +14,7 @@
 
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/pose.h"
+#include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
 #include "server/registry/registry.h"
@@ -35,21 +35,25 @@ class PlacementTable {
       const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
-  // Resolves every hull once, all at one revision of the store. Not for gRPC's threads.
-  // CANCELLED: should_stop said so.
-  absl::Status Resolve(Registry& registry, const std::function<bool()>& should_stop);
+  // Resolves every hull once, all at one revision of the store, for queries that answer with
+  // `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
+  absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // The same, but false, at once, where it would have to wait or to make what queries need of a
-  // hull.
-  bool TryResolve(Registry& registry);
+  // The same, but false, at once, where it would have to wait or to make something.
+  bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return entries_.size(); }
+  // How many hulls there are for them.
+  size_t hull_count() const { return ids_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
   std::span<const PlacedHull> placed() const { return placed_; }
   bool is_answerable(size_t i) const { return problem(i).ok(); }
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
+  // Whether it gave it another QueryHull, perhaps of the same hull: what was found before must not
+  // name that one's points.
+  bool query_hull_changed(size_t i) const;
 
   // Requires a valid pose, which is checked where the hull is placed.
   void Move(size_t i, const Pose& X_WH);
@@ -76,7 +80,7 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
-  void Take(const Registry& registry, Resolved resolved);
+  void Take(const Registry& registry, Resolved resolved, bool canonical);
   const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 
@@ -88,7 +92,10 @@ class PlacementTable {
   std::vector<std::string> ids_;
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
+  // What is asked of each: its own, or NoHull's.
+  std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;
+  std::vector<char> query_hull_changed_;
   // Of the last Resolve.
   std::string store_id_;
   uint64_t store_revision_ = 0;

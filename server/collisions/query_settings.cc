@@ -45,15 +45,19 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   return options;
 }
 
-bool IsQuickToRelate(const Hull& hull) {
+bool IsQuickToRelate(const QueryHull& hull) {
   // Observed: exact contact of hulls of 10000 vertices takes 60 us
-  // (tests/bench/results/query_relation_*.csv).
-  constexpr size_t kMostVertices = 10000;
-  return hull.vertices().size() <= kMostVertices;
+  // (tests/bench/results/query_relation_*.csv). The first few questions about one that is not
+  // prepared look through all of its points.
+  constexpr size_t kMostPoints = 10000;
+  return hull.point_count() <= kMostPoints;
 }
 
-bool IsTextbookForTeam(const QueryOptions& options, const Hull& a, const Hull& b) {
+bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
+                       const PlacedHull& placed_b) {
   if (options.method != Method::kTextbookSat) return false;
+  const Hull& a = placed_a.hull();
+  const Hull& b = placed_b.hull();
   // Some 10 ms of one thread: far more than a team waits for its slowest thread, and not so much
   // that it matters to other calls when one thread of the pool is busy with it.
   constexpr double kTeamProjections = 1e7;

@@ -19,11 +19,12 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
 
 // Whether the relation of this hull and another such takes no longer than moving the bytes of the
 // question and of the answer does, so that one of gRPC's threads may find it.
-bool IsQuickToRelate(const Hull& hull);
+bool IsQuickToRelate(const QueryHull& hull);
 
 // Whether the textbook's axes of this pair are worth a team of threads (Executor); always false for
-// other methods. Cost: a few operations, whatever the size of the hulls.
-bool IsTextbookForTeam(const QueryOptions& options, const Hull& a, const Hull& b);
+// other methods. Requires canonical hulls for the textbook. Cost: a few operations, whatever the
+// size of the hulls.
+bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& a, const PlacedHull& b);
 
 // An error of core's query in the words of the server: RESOURCE_EXHAUSTED names the limit's flag.
 absl::Status NameQueryLimit(const absl::Status& status);

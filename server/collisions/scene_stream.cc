@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <memory>
 #include <set>
 #include <utility>
@@ -124,8 +125,10 @@ absl::Status SceneStream::Validate() {
 }
 
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
-  if (!may_wait) return table_.TryResolve(registry_);
-  if (absl::Status s = table_.Resolve(registry_, options_.query.should_stop); !s.ok()) return s;
+  // The box of each placement, and at least a pair of it.
+  const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true};
+  if (!may_wait) return table_.TryResolve(registry_, options_.query, plan);
+  if (absl::Status s = table_.Resolve(registry_, options_.query, plan); !s.ok()) return s;
   return true;
 }
 
@@ -187,8 +190,8 @@ size_t SceneStream::AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer
   const int position = reply->pairs_size() / 2;
   reply->add_pairs(a);
   reply->add_pairs(b);
-  const size_t bytes = AddAnswer(answer, table_.placed()[a].hull(), table_.placed()[b].hull(),
-                                 request_.wanted(), reply->mutable_columns());
+  const size_t bytes = AddAnswer(answer, table_.placed()[a], table_.placed()[b], request_.wanted(),
+                                 reply->mutable_columns());
   Count(reply->columns().relations(position), &piece.totals);
   return kPairBytes + bytes;
 }

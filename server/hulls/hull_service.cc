@@ -18,16 +18,10 @@
 namespace hulld::server {
 namespace {
 
-void EncodeBox(const Hull& hull, v1::GetHullResponse* response) {
+void EncodeBox(const ServedHull& hull, v1::GetHullResponse* response) {
   if (hull.empty()) return;
-  Vector low = hull.vertices().front();
-  Vector high = low;
-  for (const Vector& vertex : hull.vertices()) {
-    low = low.cwiseMin(vertex);
-    high = high.cwiseMax(vertex);
-  }
-  EncodeVector(low, response->mutable_box_min());
-  EncodeVector(high, response->mutable_box_max());
+  EncodeVector(hull.low(), response->mutable_box_min());
+  EncodeVector(hull.high(), response->mutable_box_max());
 }
 
 }  // namespace
@@ -107,16 +101,20 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   const auto& [revision, view] = *resolved;
   EncodeHeader(registry_.store(), revision, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
-  response->set_edge_count(view.served->hull().edges().size());
-  response->set_facet_count(view.served->hull().facet_count());
-  EncodeBox(view.served->hull(), response);
-  if (request.audit()) {
-    const absl::Status finding =
-        AuditHull(view.served->hull(), [&call] { return call.ShouldStop(); });
-    if (absl::IsCancelled(finding)) return finding;
-    response->mutable_audit()->set_ok(finding.ok());
-    if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
+  EncodeBox(*view.served, response);
+  if (request.without_facets() && !request.audit()) return absl::OkStatus();
+  const auto should_stop = [&call] { return call.ShouldStop(); };
+  const absl::StatusOr<const Hull*> hull = registry_.Canonical(view, should_stop);
+  if (!hull.ok()) return hull.status();
+  if (!request.without_facets()) {
+    response->set_edge_count((*hull)->edges().size());
+    response->set_facet_count((*hull)->facet_count());
   }
+  if (!request.audit()) return absl::OkStatus();
+  const absl::Status finding = AuditHull(**hull, should_stop);
+  if (absl::IsCancelled(finding)) return finding;
+  response->mutable_audit()->set_ok(finding.ok());
+  if (!finding.ok()) response->mutable_audit()->set_finding(std::string(finding.message()));
   return absl::OkStatus();
 }
 

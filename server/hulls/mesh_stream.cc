@@ -38,9 +38,12 @@ void MeshStream::Open() {
 absl::Status MeshStream::MakeHeader() {
   absl::Status valid = CheckHullId(call().caller(), request_.hull_id(), "hull_id");
   if (!valid.ok()) return valid;
-  auto resolved = registry_.Resolve(request_.hull_id(), [this] { return call().ShouldStop(); });
+  const auto should_stop = [this] { return call().ShouldStop(); };
+  const auto resolved = registry_.Resolve(request_.hull_id(), should_stop);
   if (!resolved.ok()) return resolved.status();
-  mesh_ = std::shared_ptr<const Hull>(resolved->second.served, &resolved->second.served->hull());
+  const absl::StatusOr<const Hull*> hull = registry_.Canonical(resolved->second, should_stop);
+  if (!hull.ok()) return hull.status();
+  mesh_ = std::shared_ptr<const Hull>(resolved->second.served, *hull);
   v1::MeshHeader* header = reply().mutable_header();
   if (request_.has_simplification()) {
     const absl::Status simplified = Simplify(request_.simplification(), header);

@@ -18,7 +18,7 @@ namespace hulld::server {
 
 // A few threads that run tasks in the order in which they came, at the priority of the process.
 // gRPC calls back on as few as two threads, which must stay free to move bytes. Work that may wait
-// for the store, for a writer or for a file runs here; work that only computes, on a TaskPool.
+// for the store or for a file runs here; work that only computes an answer, on a TaskPool.
 class WorkerPool {
  public:
   // metrics: where to report what waits. Requires threads > 0.

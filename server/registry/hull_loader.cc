@@ -3,23 +3,52 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <string>
-#include <vector>
 
+#include "core/numeric/orientation.h"
 #include "server/store/store_errors.h"
 
 namespace hulld::server {
+namespace {
 
-absl::StatusOr<std::unique_ptr<HullBuilder>> LoadBuilder(Store& store, const StoredHull& stored,
-                                                         const std::function<bool()>& should_stop) {
+// Whether a few of the points span space. May say false of points that do.
+bool SpanSpace(std::span<const Vector> points) {
+  const size_t third = points.size() / 3;
+  return third > 0 && std::ranges::any_of(points, [&](const Vector& point) {
+           return Orient3d(points[0], points[third], points[2 * third], point) != 0;
+         });
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& stored) {
+  absl::StatusOr<std::vector<Vector>> points = store.LoadVertices(stored);
+  if (!points.ok()) return points;
+  const std::string& id = stored.record.hull_id;
+  const uint64_t expected = stored.layout.base_vertices + stored.layout.delta_vertices;
+  if (points->size() != expected || expected < stored.record.vertex_count) {
+    return DamagedHull(
+        id, absl::StrCat("it has ", points->size(), " points of ", expected,
+                         ", and its record says ", stored.record.vertex_count, " vertices"));
+  }
+  if (!std::ranges::all_of(*points, [](const Vector& point) { return point.allFinite(); })) {
+    return DamagedHull(id, "one of its points is not finite");
+  }
+  // A LiveHull relies on the dimension.
+  if (stored.record.dimension == 3 && SpanSpace(*points)) return points;
+  const absl::Status built = BuildHull(stored.record, *points, {}).status();
+  if (!built.ok()) return built;
+  return points;
+}
+
+absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,
+                                                       std::span<const Vector> points,
+                                                       const std::function<bool()>& should_stop) {
   auto builder = std::make_unique<HullBuilder>();
-  const HullRecord& record = stored.record;
-  if (record.vertex_count == 0) return builder;
-  const absl::StatusOr<std::vector<Vector>> vertices = store.LoadVertices(stored);
-  if (!vertices.ok()) return vertices.status();
   AddLimits limits;
   limits.should_stop = should_stop;
-  const absl::StatusOr<PointCounts> added = builder->Add(*vertices, limits);
+  const absl::StatusOr<PointCounts> added = builder->Add(points, limits);
   if (absl::IsCancelled(added.status())) return added.status();
   if (added.ok() && builder->vertex_count() == record.vertex_count &&
       builder->dimension() == record.dimension) {

@@ -5,18 +5,26 @@
 
 #include <functional>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "core/hull/growth/hull_builder.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
-// The builder of a committed hull, from the vertices that the store keeps of it; the result is
-// never null. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read.
-// CANCELLED: should_stop, which may be empty, said so.
-// Cost: that of reading V vertices and adding them to a builder.
-absl::StatusOr<std::unique_ptr<HullBuilder>> LoadBuilder(Store& store, const StoredHull& stored,
-                                                         const std::function<bool()>& should_stop);
+// The points that the store keeps of a committed hull: at least its vertices, and none outside it.
+// Their number and dimension are checked; whether they make the hull that the record describes is
+// left to whatever builds it of them. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE:
+// it cannot be read. Cost: O(n), but that of building the hull where it is flat.
+absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& stored);
+
+// A builder that holds the hull of these points; the result is never null. DATA_LOSS naming the
+// hull: they do not make what the record says. CANCELLED: should_stop, which may be empty, said so.
+// Cost: that of adding n points to a builder.
+absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,
+                                                       std::span<const Vector> points,
+                                                       const std::function<bool()>& should_stop);
 
 }  // namespace hulld::server
 

@@ -21,12 +21,6 @@ void HullState::Submit() {
   ++in_flight_;
 }
 
-void HullState::StartReading() {
-  HULLD_CHECK(life_ == Life::kPresent && quiet());
-  HULLD_CHECK(pinned() && !damaged());
-  work_ = Work::kReading;
-}
-
 bool HullState::EndWork() {
   HULLD_CHECK(work_ != Work::kIdle);
   const bool kept = work_ != Work::kReverting;
@@ -75,16 +69,6 @@ void HullState::Refuse() {
       break;
   }
   HULLD_UNREACHABLE();  // nothing of it is in flight
-}
-
-void HullState::Pin() {
-  HULLD_CHECK(visible());
-  ++pins_;
-}
-
-bool HullState::Unpin() {
-  HULLD_CHECK(pins_ > 0);
-  return --pins_ == 0;
 }
 
 void HullState::Damage(const absl::Status& damage) {

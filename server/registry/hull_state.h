@@ -17,19 +17,15 @@ namespace hulld::server {
 // and the work on its builder, which one thread owns at a time:
 //
 //   kIdle --Schedule--> kScheduled --StartBuilding--> kBuilding --Refuse--> kReverting
-//   kIdle --StartReading--> kReading
-//   kScheduled, kBuilding, kReverting, kReading --EndWork--> kIdle
+//   kScheduled, kBuilding, kReverting --EndWork--> kIdle
 //
 // Beside them it counts the changes in flight (submitted to the store, neither committed nor
-// refused) and the pins of readers, and knows whether the hull is damaged. Steps are legal only
-// where these agree:
+// refused), and knows whether the hull is damaged. Readers take no part: they never touch the
+// builder, and find what is committed at any moment. Steps are legal only where these agree:
 //
-//   - Only a hull that is present and not damaged grows or is read. A creation and an end are one
-//     change in flight; only chunks overlap, kMaxInFlight of them at most.
+//   - Only a hull that is present and not damaged grows. A creation and an end are one change in
+//     flight; only chunks overlap, kMaxInFlight of them at most.
 //   - A hull ends only when it is quiet: idle, with nothing in flight. A hull that is gone is idle.
-//   - A reader works on a quiet hull that is pinned, and nothing joins what is in flight while it
-//     does: what it reads is what is committed.
-//   - No chunk is scheduled while the hull is pinned, so a pinned hull comes to rest.
 class HullState {
  public:
   enum class Life {
@@ -49,8 +45,6 @@ class HullState {
     kBuilding,
     // A chunk is being built on one that was refused since: the result must be dropped.
     kReverting,
-    // A reader derives what it needs: its thread owns the builder.
-    kReading,
   };
 
   // Enough chunks of one hull to keep a builder busy through the slowest sync.
@@ -72,11 +66,10 @@ class HullState {
   // Whether the hull is about to begin or to end: whatever depends on which has to wait.
   bool changing_life() const { return life_ == Life::kCreating || life_ == Life::kEnding; }
   bool damaged() const { return !damage_.ok(); }
-  bool pinned() const { return pins_ > 0; }
   bool quiet() const { return work_ == Work::kIdle && in_flight_ == 0; }
   // Whether Schedule is legal.
   bool can_schedule() const {
-    return life_ == Life::kPresent && work_ == Work::kIdle && !damaged() && !pinned() &&
+    return life_ == Life::kPresent && work_ == Work::kIdle && !damaged() &&
            in_flight_ < kMaxInFlight;
   }
 
@@ -86,10 +79,8 @@ class HullState {
   void StartBuilding();
   // The chunk that is being built is submitted.
   void Submit();
-  // A reader takes the builder.
-  void StartReading();
-  // The thread that was scheduled, built or read has put the builder back, if it had it. Returns
-  // false after kReverting: the builder holds points that were refused.
+  // The thread that was scheduled or built has put the builder back, if it had it. Returns false
+  // after kReverting: the builder holds points that were refused.
   bool EndWork();
 
   // A deletion or a replacement is submitted.
@@ -97,11 +88,6 @@ class HullState {
   // The oldest change in flight is committed, or refused.
   void Commit();
   void Refuse();
-
-  // A reader needs the builder: no further chunk starts until Unpin. Returns true once no pin is
-  // left.
-  void Pin();
-  bool Unpin();
 
   // The store cannot give back what it holds of the hull. damage: not OK.
   void Damage(const absl::Status& damage);
@@ -112,7 +98,6 @@ class HullState {
   Life life_;
   Work work_ = Work::kIdle;
   int in_flight_;
-  int pins_ = 0;
   absl::Status damage_;
 };
 

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "core/base/check.h"
 #include "server/contract/error_info.h"
 
 namespace hulld::server {
@@ -14,7 +15,6 @@ RegisteredHull::RegisteredHull(const StoredHull& stored, const HullState& initia
       readable_from_store(readable),
       committed(stored),
       head(stored),
-      served(stored.record.vertex_count == 0 ? EmptyServedHull() : nullptr),
       account(budget, [this](Locked& locked) { return DropUnused(locked); }) {}
 
 void RegisteredHull::DiscardBuilder(Locked& locked) {
@@ -28,24 +28,83 @@ uint64_t RegisteredHull::HeadSequence(const std::string& writer_id) const {
   return writer == writers.end() ? 0 : writer->second.head;
 }
 
+void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
+  HULLD_CHECK(live == nullptr && served == nullptr && builder == nullptr);
+  live = std::move(points);
+  committed_mark = live->Now();
+  live_is_ahead = false;
+  points_since_prepared = 0;
+}
+
+bool RegisteredHull::HoldsMuchElse() const {
+  constexpr uint64_t kFewPoints = 1 << 14;
+  return points_since_prepared > 2 * committed.record.vertex_count + kFewPoints;
+}
+
+// A mark may be the last to hold what was prepared before.
+void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark) {
+  locked.Afterwards([before = std::exchange(committed_mark, mark)] {});
+}
+
+std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
+  if (committed.record.vertex_count == 0) return EmptyServedHull();
+  if (served == nullptr && live != nullptr) {
+    if (canonical == nullptr) canonical = std::make_shared<CanonicalHull>();
+    served = std::make_shared<const ServedHull>(
+        live->VersionAt(committed_mark), committed_mark.low(), committed_mark.high(), canonical);
+  }
+  return served;
+}
+
+void RegisteredHull::DiscardServed(Locked& locked) {
+  locked.Discard(std::exchange(served, nullptr));
+}
+
+void RegisteredHull::RevertLive(Locked& locked) {
+  if (!std::exchange(live_is_ahead, false)) return;
+  HULLD_CHECK(live != nullptr);
+  // A thread that builds on what was refused goes on with the former one, which is its own now.
+  auto reverted = std::make_shared<LiveHull>(*live, committed_mark);
+  locked.Discard(std::exchange(live, std::move(reverted)));
+  DiscardServed(locked);
+}
+
+void RegisteredHull::DiscardAll(Locked& locked) {
+  DiscardBuilder(locked);
+  DiscardServed(locked);
+  locked.Discard(std::exchange(canonical, nullptr));
+  locked.Discard(std::exchange(live, nullptr));
+  SetCommittedMark(locked, {});
+}
+
 uint64_t RegisteredHull::MemoryBytes() const {
-  const bool counts = served != nullptr && served != EmptyServedHull();
-  return builder_bytes + (counts ? served->MemoryBytes() : 0);
+  return builder_bytes + (live == nullptr ? 0 : live->MemoryBytes()) +
+         (canonical == nullptr ? 0 : canonical->MemoryBytes());
 }
 
 uint64_t RegisteredHull::DropUnused(Locked& locked) {
-  if (state.quiet() && !state.pinned() && chunks.empty()) {
-    if (readable_from_store) DiscardBuilder(locked);
-    const bool can_make_again = readable_from_store || builder != nullptr;
-    if (can_make_again && served.use_count() == 1) locked.Discard(std::exchange(served, nullptr));
+  if (!state.quiet() || !chunks.empty()) return MemoryBytes();
+  // What a reader holds would not go, and be there twice after the next one.
+  const bool is_read = served.use_count() > 1 || live.use_count() > 1;
+  if (readable_from_store) {
+    DiscardBuilder(locked);
+    if (!is_read) DiscardAll(locked);
+  } else if (!is_read) {
+    DiscardServed(locked);
+    locked.Discard(std::exchange(canonical, nullptr));
   }
   return MemoryBytes();
 }
 
 const std::shared_ptr<const ServedHull>& EmptyServedHull() {
-  static const auto* const empty =
-      new std::shared_ptr<const ServedHull>(std::make_shared<const ServedHull>(Hull()));
-  return *empty;
+  static const auto* const served = [] {
+    const auto canonical = std::make_shared<CanonicalHull>(Hull());
+    const LiveHull::Mark nothing;
+    return new std::shared_ptr<const ServedHull>(std::make_shared<const ServedHull>(
+        std::shared_ptr<const QueryHull>(canonical, &canonical->query_hull()), nothing.low(),
+        nothing.high(), canonical));
+  }();
+  return *served;
 }
 
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/query/placed/live_hull.h"
 #include "server/registry/hull_state.h"
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
@@ -35,8 +36,12 @@ struct PendingChunk {
   MemoryCharge charge;
 };
 
-// One incarnation of a hull, guarded by the registry's mutex; the builder alone is used without it,
-// by the thread that HullState makes its owner.
+// One incarnation of a hull, guarded by the registry's mutex. The builder is used without it, by
+// the thread that HullState makes its owner; so is the LiveHull, which is thread-safe: that same
+// thread appends to it, while others prepare it.
+//
+// The hull's vertices are in `live` while anyone needs them, and can be read from the store
+// otherwise. Without `live` there is no builder and no change in flight.
 struct RegisteredHull {
   // The last sequence of a writer.
   struct Sequences {
@@ -49,10 +54,27 @@ struct RegisteredHull {
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                  MemoryBudget& budget);
 
+  // Whether most points of `live` are no vertices any more: preparing drops them, and keeps memory
+  // bounded where points take each other in and nobody asks. It costs a part of what appending
+  // those points did.
+  bool HoldsMuchElse() const;
   // Counts what the hull holds now, and that it was used just now.
   void NoteUse() { account.Set(MemoryBytes()); }
   // Drops the builder, unless a thread owns it.
   void DiscardBuilder(Locked& locked);
+  // The committed hull has these points from now on. Requires that nothing is in flight.
+  void SetLive(std::shared_ptr<LiveHull> points);
+  // Up to there `live` is committed.
+  void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);
+  // What readers are given of the committed hull; null when that is to be read from the store
+  // first. Cost: O(1).
+  std::shared_ptr<const ServedHull> Serve();
+  // What is served is made anew when the next reader asks; the canonical snapshot stays.
+  void DiscardServed(Locked& locked);
+  // The points beyond what is committed were refused.
+  void RevertLive(Locked& locked);
+  // The hull is gone.
+  void DiscardAll(Locked& locked);
   // The last sequence of a writer, chunks in flight included; 0 for a writer not in `writers`.
   uint64_t HeadSequence(const std::string& writer_id) const;
 
@@ -61,8 +83,23 @@ struct RegisteredHull {
   StoredHull committed;
   // With the changes in flight.
   StoredHull head;
-  // The hull at committed.record.revision; null until the first reader after a change asks.
+  // The points of the hull in the order in which they came, with those of the changes in flight and
+  // of the chunk that is being built.
+  std::shared_ptr<LiveHull> live;
+  // The moment of `live` that is committed.
+  LiveHull::Mark committed_mark;
+  // `live` may hold more than that.
+  bool live_is_ahead = false;
+  // A reader reads the points from the store.
+  bool loading = false;
+  // A thread prepares `live`, or is about to.
+  bool preparing = false;
+  // What was committed since that was done last, or since `live` was made.
+  uint64_t points_since_prepared = 0;
+  // The version of `live` at committed_mark; null until the first reader after a change asks.
   std::shared_ptr<const ServedHull> served;
+  // Its snapshot, shared by all that is served of committed.record.revision.
+  std::shared_ptr<CanonicalHull> canonical;
   // Those in use; the store has the others.
   std::unordered_map<std::string, Sequences> writers;
   // Threads that read a writer's sequence from the store, without the mutex. What is committed
@@ -71,13 +108,13 @@ struct RegisteredHull {
   // One per open session.
   std::map<uint64_t, std::function<void(const absl::Status&)>> watches;
 
-  // The hull with the changes in flight; null when it is to be read from the store, or when a
-  // thread owns it.
+  // The hull with the changes in flight; null when it is to be made of the points of `live`, or
+  // when a thread owns it.
   std::unique_ptr<HullBuilder> builder;
   // What it holds, also while a thread owns it.
   uint64_t builder_bytes = 0;
-  // Told of each step of `state`.
-  std::condition_variable released;
+  // Told of each step of `state`, and when points were read from the store.
+  std::condition_variable changed;
   std::list<PendingChunk> chunks;
   // What waits until the hull is quiet; goes before chunks.
   std::list<std::function<void(Locked&)>> exclusive;

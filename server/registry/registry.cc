@@ -31,14 +31,22 @@ absl::Status Gone(const std::string& id, const char* how) {
 
 }  // namespace
 
-Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers)
+Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
+                   std::optional<PoolMetrics> preparers)
     : store_(store),
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
       memory_(limits_.memory_limit, mutex_),
-      committer_(store, mutex_) {}
+      committer_(store, mutex_) {
+  preparers_.emplace(1, preparers);
+}
 
 Registry::~Registry() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  preparers_.reset();
   // Closed sessions may hold hulls for longer.
   const std::lock_guard lock(mutex_);
   for (const auto& [id, hull] : hulls_) hull->account.Close();
@@ -93,8 +101,7 @@ void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Statu
     locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
   }
   hull->watches.clear();
-  hull->DiscardBuilder(locked);
-  locked.Discard(std::exchange(hull->served, nullptr));
+  hull->DiscardAll(locked);
   hull->account.Close();
 }
 
@@ -201,7 +208,10 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
 
 void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
   HULLD_CHECK(replacement.builder != nullptr);
-  if (store_.keeps_hulls()) replacement.vertices = replacement.builder->Vertices();
+  std::vector<Vector> vertices = replacement.builder->Vertices();
+  if (store_.keeps_hulls()) replacement.vertices = vertices;
+  replacement.live =
+      std::make_shared<LiveHull>(std::move(vertices), replacement.builder->dimension());
   const auto shared = std::make_shared<Replacement>(std::move(replacement));
   Locked locked(mutex_);
   ReplaceLocked(locked, shared, done);
@@ -262,7 +272,7 @@ Change Registry::MakeChange(const RegisteredHull* former, Replacement& replaceme
   return change;
 }
 
-// former: null when there is none, else quiet. Takes the replacement's builder.
+// former: null when there is none, else quiet. Takes the replacement's builder and points.
 void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
                                  Replacement& replacement, const Reply<ReplaceResult>& done) {
   Change change = MakeChange(former.get(), replacement);
@@ -276,6 +286,7 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
                                             store_.keeps_hulls(), memory_);
     former->state.StartEnding();
   }
+  hull->SetLive(std::move(replacement.live));
   hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
   hull->builder_bytes = hull->builder->MemoryBytes();
   Submit(locked, former == nullptr ? hull : former, std::move(change),
@@ -331,7 +342,7 @@ void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
 
 // Lets whatever waits for the hull go on. Called after each step of its state.
 void Registry::Advance(Locked& locked, const HullPointer& hull) {
-  hull->released.notify_all();
+  hull->changed.notify_all();
   while (hull->state.quiet() && !hull->exclusive.empty()) {
     const auto next = std::move(hull->exclusive.front());
     hull->exclusive.pop_front();
@@ -352,7 +363,9 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   writers_.Submit([this, hull] { RunNextChunk(hull); });
 }
 
+// Several threads may find the same damage.
 void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
+  if (hull.state.damaged() || hull.state.life() != HullState::Life::kPresent) return;
   hull.state.Damage(damage);
   ++cache_.damaged;
 }

@@ -29,8 +29,8 @@ namespace hulld::server {
 struct PendingChunk;
 
 // Keeps hulls by ID: for each its record, and, while it is in use or memory allows, a builder and
-// what is served of it, which the first reader after a change asked for. What is not in memory is
-// read back from the store at first use.
+// its points as a LiveHull, of which readers are given versions. What is not in memory is read back
+// from the store at first use.
 //
 // The registry owns IDs, revisions and the rules of change: what may follow what, and what readers
 // see. HullState says what a hull can be in, the Committer brings changes to the store, and the
@@ -43,22 +43,31 @@ struct PendingChunk;
 // committed state. Creation, deletion, replacement and chunks with a condition on the revision wait
 // until no change of their hull is in flight, since what they find must be committed.
 //
-// One mutex guards all records and is held for moments only; a builder is owned, without the mutex,
-// by one thread: that of a chunk, or that of a reader. A reader takes what is served and current
-// without waiting; one that finds nothing pins the hull, so that no further chunk starts, and waits
-// for the chunk in progress and its commit at most. Chunks of one hull queue up and occupy no
-// thread meanwhile. Thread-safe.
+// Readers and writers never wait for each other. One mutex guards all records and is held for
+// moments only. A chunk is built without it, by the one thread that owns the builder, which then
+// appends what became vertices to the LiveHull. How far that is committed is a mark in the record;
+// the first reader after a commit makes the version at that mark, in O(1) under the mutex, and it
+// is served until the next commit. A reader waits for the store at most, when the hull is not in
+// memory, and then many read it once. A refused batch puts in its place a copy of the LiveHull up
+// to the mark; whoever still builds on the former one drops it. Chunks of one hull queue up and
+// occupy no thread meanwhile.
 //
-// Lock order: first the mutex of the records; then that of the committer's queue, of the budget or
-// of the pool. None of the latter is held while another lock is taken. Callbacks run without any.
-// The committer completes each batch under the mutex of the records (its header says why); the
-// budget evicts under it, since what it drops belongs to the records; a MemoryCharge takes the
-// budget's mutex alone.
+// Once questions about a hull have paid for preparing it (LiveHull::WantsPreparing), that is done
+// by a thread of its own, or by a reader that expects to ask that much. The same thread prepares
+// hulls that would otherwise come to hold many points that are no vertices any more. The canonical
+// snapshot of a version is made by the first reader that needs it, without the mutex. Thread-safe.
+//
+// Lock order: first the mutex of the records; then that of the committer's queue, of the budget, of
+// a pool or within a LiveHull. None of the latter is held while another lock is taken. Callbacks
+// run without any. The committer completes each batch under the mutex of the records (its header
+// says why); the budget evicts under it, since what it drops belongs to the records; a MemoryCharge
+// takes the budget's mutex alone.
 class Registry {
  public:
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
-  // no chunk be pending when it is destroyed.
-  Registry(Store& store, const Limits& limits, WorkerPool& writers);
+  // no chunk be pending when it is destroyed. preparers: where to report what waits to be prepared.
+  Registry(Store& store, const Limits& limits, WorkerPool& writers,
+           std::optional<PoolMetrics> preparers = std::nullopt);
   Registry(const Registry&) = delete;
   Registry& operator=(const Registry&) = delete;
   ~Registry();
@@ -100,16 +109,22 @@ class Registry {
   // RESOURCE_EXHAUSTED: --memory-limit, although all that can be dropped was.
   absl::Status CheckMemory();
 
-  // The hulls, ready to be served, all current at one revision of the store. May wait for chunks in
-  // progress, read from the store and make what is missing, hence not for gRPC's threads.
-  // CANCELLED when should_stop said so.
+  // The hulls, ready to be served, all current at one revision of the store. May read from the
+  // store and prepare, hence not for gRPC's threads. CANCELLED when should_stop said so.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
-                                   const std::function<bool()>& should_stop);
-  // The same, but nullopt, at once, where it would have to wait or to make what is missing.
-  std::optional<Resolved> TryResolve(std::span<const std::string> ids);
+                                   const std::function<bool()>& should_stop,
+                                   const ReadPlan& plan = {});
+  // The same, but nullopt, at once, where it would have to read from the store or to prepare.
+  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
   // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
   absl::StatusOr<std::pair<uint64_t, HullView>> Resolve(const std::string& id,
                                                         const std::function<bool()>& should_stop);
+
+  // The canonical snapshot of what was resolved, made if nobody needed it before; it lives as long
+  // as view.served. Not for gRPC's threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
+  // said so. Cost: that of building the hull.
+  absl::StatusOr<const Hull*> Canonical(const HullView& view,
+                                        const std::function<bool()>& should_stop);
 
   // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
   // thread, with the reason when the hull is deleted or replaced before the session is closed.
@@ -177,20 +192,23 @@ class Registry {
   absl::StatusOr<Verdict> CheckChunk(Locked& locked, RegisteredHull& hull,
                                      const PendingChunk& pending);
   absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
-  absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, Change& change,
-                                        std::unique_ptr<HullBuilder>& builder);
+  absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
+  absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, const LiveHull::Mark& committed,
+                                        LiveHull& live, std::unique_ptr<HullBuilder>& builder,
+                                        BuiltChunk& built);
   absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
   void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
   void SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
                    BuiltChunk built);
   void CommitChunk(Locked& locked, RegisteredHull& hull, const StoredHull& after,
-                   const std::string& writer_id, uint64_t sequence);
+                   const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
   void Revert(Locked& locked, RegisteredHull& hull);
 
-  absl::Status WaitUntilReadable(Locked& locked, RegisteredHull& hull,
-                                 const std::function<bool()>& should_stop);
-  absl::Status MakeServed(Locked& locked, const HullPointer& pinned,
-                          const std::function<bool()>& should_stop);
+  absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
+                              const std::function<bool()>& should_stop);
+  static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);
+  void Prepare(Locked& locked, RegisteredHull& hull);
+  void SchedulePreparing(const HullPointer& hull);
   void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
 
   Store& store_;
@@ -212,9 +230,13 @@ class Registry {
   uint64_t creating_ = 0;
   // Hits, misses, loads and damaged; the rest is the budget's.
   CacheStatistics cache_;
+  // Nothing more is prepared.
+  bool ending_ = false;
 
-  // Last, as its thread uses the rest.
+  // Last, as their threads use the rest.
   Committer committer_;
+  // One thread: what it does is in nobody's way, and nobody waits for it.
+  std::optional<WorkerPool> preparers_;
 };
 
 }  // namespace hulld::server

@@ -30,6 +30,8 @@ enum class Registry::Verdict { kNew, kAlreadyApplied };
 struct Registry::BuiltChunk {
   Change change;
   PointCounts counts;
+  // The moment of the LiveHull with this chunk.
+  LiveHull::Mark mark;
 };
 
 namespace {
@@ -255,21 +257,26 @@ absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, Registere
 // sequence include it.
 absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredHull& hull,
                                                      PendingChunk& pending) {
+  // A reader may have found that meanwhile.
+  if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
+  const absl::StatusOr<std::shared_ptr<LiveHull>> live = LiveForWriter(locked, hull);
+  if (!live.ok()) return WhyNotBuilt(hull, live.status());
+  hull.live_is_ahead = true;
   BuiltChunk built;
   Change& change = built.change;
   change.hull = hull.head;
   change.former_layout = hull.head.layout;
   std::unique_ptr<HullBuilder> builder = std::move(hull.builder);
-  const bool load = builder == nullptr;
+  HULLD_CHECK(builder != nullptr || hull.state.in_flight() == 0);
+  const LiveHull::Mark committed = hull.committed_mark;
 
   locked.Unlock();
-  const absl::StatusOr<PointCounts> added = AddPoints(pending, change, builder);
+  const absl::StatusOr<PointCounts> added = AddPoints(pending, committed, **live, builder, built);
   pending.chunk.points = {};
   const uint64_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
   locked.Lock();
 
-  if (load && builder != nullptr) ++cache_.loads;
   hull.builder = std::move(builder);
   hull.builder_bytes = builder_bytes;
   if (hull.state.work() == HullState::Work::kReverting) {
@@ -277,6 +284,10 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
     return absl::UnavailableError("a change before it could not be stored");
   }
   if (!added.ok()) return WhyNotBuilt(hull, added.status());
+  if (hull.state.damaged()) {
+    hull.DiscardBuilder(locked);
+    return hull.state.damage();
+  }
 
   built.counts = *added;
   FillChange(hull, *added, change);
@@ -288,15 +299,47 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   return built;
 }
 
-// The points of a chunk go into its hull's builder, which is read from the store where there is
-// none, and what the store is to keep of it into the change. Without the mutex.
-absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending, Change& change,
-                                                std::unique_ptr<HullBuilder>& builder) {
+// What a chunk is to be appended to. Releases the mutex to read it from the store where it is not
+// in memory: a writer does not wait for a reader that does the same, and whichever is first
+// decides.
+absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked,
+                                                                  RegisteredHull& hull) {
+  if (hull.live != nullptr) return hull.live;
+  HULLD_CHECK(hull.state.in_flight() == 0);
+  const StoredHull stored = hull.committed;
+  if (stored.record.vertex_count == 0) {
+    hull.SetLive(std::make_shared<LiveHull>());
+    return hull.live;
+  }
+  locked.Unlock();
+  absl::StatusOr<std::vector<Vector>> points = LoadPoints(store_, stored);
+  std::shared_ptr<LiveHull> loaded;
+  if (points.ok()) {
+    loaded = std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
+  }
+  locked.Lock();
+  if (hull.live != nullptr) return hull.live;
+  if (loaded == nullptr) return points.status();
+  hull.SetLive(std::move(loaded));
+  ++cache_.loads;
+  hull.NoteUse();
+  hull.changed.notify_all();
+  return hull.live;
+}
+
+// The points of a chunk go into its hull's builder, which is made of the committed points where
+// there is none; what became vertices goes into the LiveHull, and what the store is to keep of it
+// into the change. Without the mutex.
+absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending,
+                                                const LiveHull::Mark& committed, LiveHull& live,
+                                                std::unique_ptr<HullBuilder>& builder,
+                                                BuiltChunk& built) {
+  Change& change = built.change;
   if (builder == nullptr) {
-    absl::StatusOr<std::unique_ptr<HullBuilder>> loaded =
-        LoadBuilder(store_, change.hull, pending.should_stop);
-    if (!loaded.ok()) return loaded.status();
-    builder = *std::move(loaded);
+    absl::StatusOr<std::unique_ptr<HullBuilder>> made =
+        BuildHull(change.hull.record, live.PointsAt(committed), pending.should_stop);
+    if (!made.ok()) return made.status();
+    builder = *std::move(made);
   }
   if (pending.should_stop && pending.should_stop()) {
     return absl::CancelledError("the call was cancelled");
@@ -305,10 +348,17 @@ absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending, Change& c
   limits.max_vertices = static_cast<size_t>(limits_.max_vertices_per_hull);
   limits.should_stop = pending.should_stop;
   absl::StatusOr<PointCounts> added = builder->Add(pending.chunk.points, limits);
-  if (added.ok() && added->outside > 0 && store_.keeps_hulls()) {
+  if (!added.ok()) return added;
+  if (added->outside == 0) {
+    built.mark = live.Now();
+    return added;
+  }
+  std::vector<Vector> vertices = builder->NewVertices();
+  built.mark = live.Append(vertices, builder->dimension());
+  if (store_.keeps_hulls()) {
     const bool base = Store::WantsBase(change.hull.layout, added->outside);
     change.vertex_change = base ? VertexChange::kReplaced : VertexChange::kAdded;
-    change.vertices = base ? builder->Vertices() : builder->NewVertices();
+    change.vertices = base ? builder->Vertices() : std::move(vertices);
   }
   return added;
 }
@@ -342,15 +392,17 @@ void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, 
 
 void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
                            BuiltChunk built) {
-  const auto finish = [this, hull, after = built.change.hull, counts = built.counts,
-                       done = pending.done, writer_id = pending.session.writer_id,
-                       sequence = pending.chunk.sequence](Locked& later,
-                                                          const absl::Status& status) {
+  const auto finish = [this, hull, after = built.change.hull, mark = built.mark,
+                       counts = built.counts, done = pending.done,
+                       writer_id = pending.session.writer_id, sequence = pending.chunk.sequence](
+                          Locked& later, const absl::Status& status) {
     if (!status.ok()) {
       Revert(later, *hull);
       return AnswerChunk(later, done, sequence, status);
     }
-    CommitChunk(later, *hull, after, writer_id, sequence);
+    CommitChunk(later, *hull, after, mark, writer_id, sequence);
+    hull->points_since_prepared += counts.outside;
+    if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
     const HullRecord& record = after.record;
     AnswerChunk(later, done, sequence,
                 ChunkResult{revision_, false, record.revision, record.vertex_count, counts});
@@ -359,15 +411,18 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const Pendin
   Submit(locked, hull, std::move(built.change), finish);
 }
 
-// after: the hull with this chunk.
+// after, mark: the hull with this chunk.
 void Registry::CommitChunk(Locked& locked, RegisteredHull& hull, const StoredHull& after,
-                           const std::string& writer_id, uint64_t sequence) {
+                           const LiveHull::Mark& mark, const std::string& writer_id,
+                           uint64_t sequence) {
   if (after.record.revision != hull.committed.record.revision) {
     Publish(after.record.revision);
     vertex_count_ += after.record.vertex_count - hull.committed.record.vertex_count;
-    locked.Discard(std::exchange(hull.served, nullptr));
+    hull.DiscardServed(locked);
+    locked.Discard(std::exchange(hull.canonical, nullptr));
   }
   hull.committed = after;
+  hull.SetCommittedMark(locked, mark);
   RegisteredHull::Sequences& sequences = hull.writers[writer_id];
   HULLD_CHECK(sequence == sequences.committed + 1 && sequence <= sequences.head);
   sequences.committed = sequence;
@@ -381,6 +436,7 @@ void Registry::Revert(Locked& locked, RegisteredHull& hull) {
   hull.head = hull.committed;
   for (auto& [writer_id, sequences] : hull.writers) sequences.head = sequences.committed;
   hull.DiscardBuilder(locked);
+  hull.RevertLive(locked);
   hull.NoteUse();
 }
 

@@ -12,7 +12,7 @@
 namespace hulld::server {
 namespace {
 
-// How soon a reader that waits for a chunk notices that its call was cancelled.
+// How soon a reader that waits for the store notices that its call was cancelled.
 constexpr std::chrono::milliseconds kCancellationPoll(20);
 
 bool Stopped(const std::function<bool()>& should_stop) { return should_stop && should_stop(); }
@@ -24,68 +24,80 @@ absl::Status Cancelled() { return absl::CancelledError("the call was cancelled")
 // What one call of Resolve looks for. Used with the mutex held.
 class Registry::Lookup {
  public:
-  explicit Lookup(Registry& registry, std::span<const std::string> ids)
-      : registry_(registry), ids_(ids), wanted_(ids.size()) {}
+  Lookup(Registry& registry, std::span<const std::string> ids, const ReadPlan& plan)
+      : registry_(registry), ids_(ids), plan_(plan), wanted_(ids.size()) {}
 
-  // Finds each hull, and pins those that are not ready; `all`: the others too. Returns whether all
-  // are ready, or cannot be.
-  bool Find(bool all);
-  // Makes what is missing of those that are pinned. Returns false once should_stop said so.
-  bool MakeMissing(Locked& locked, const std::function<bool()>& should_stop);
+  // Finds each hull. Returns whether all are in memory, or cannot be.
+  bool Find();
+  // Reads from the store what is not in memory. Releases the mutex meanwhile. Returns false once
+  // should_stop said so.
+  bool LoadMissing(Locked& locked, const std::function<bool()>& should_stop);
+  // Prepares one hull that Find found, if the plan says so. Releases the mutex meanwhile. Returns
+  // whether there was one.
+  bool PrepareNext(Locked& locked);
   // What Find, which just said that all are ready, found.
-  Resolved Take() const;
-  void Unpin(Locked& locked);
+  Resolved Take();
 
  private:
   struct Wanted {
     HullPointer hull;
     absl::Status failure;
-    bool pinned = false;
+    // Stays in memory until all are there.
+    std::shared_ptr<LiveHull> held;
+    bool prepared = false;
   };
 
   Registry& registry_;
   const std::span<const std::string> ids_;
+  const ReadPlan plan_;
   std::vector<Wanted> wanted_;
-  // One for each pin.
-  std::vector<HullPointer> pinned_;
   bool counted_ = false;
 };
 
-bool Registry::Lookup::Find(bool all) {
+bool Registry::Lookup::Find() {
   bool ready = true;
   for (size_t i = 0; i < ids_.size(); ++i) {
     Wanted& wanted = wanted_[i];
     if (wanted.hull == nullptr || wanted.hull->state.gone()) {
+      wanted = {};
       wanted.hull = registry_.FindVisible(ids_[i]);
-      wanted.pinned = false;
-      wanted.failure = wanted.hull == nullptr ? HullNotFound(ids_[i]) : wanted.hull->state.damage();
+      if (wanted.hull == nullptr) wanted.failure = HullNotFound(ids_[i]);
+    }
+    if (wanted.hull != nullptr && wanted.hull->state.damaged()) {
+      wanted.failure = wanted.hull->state.damage();
     }
     if (!wanted.failure.ok()) continue;
-    const bool missing = wanted.hull->served == nullptr;
-    if ((missing || all) && !wanted.pinned) {
-      wanted.hull->state.Pin();
-      wanted.pinned = true;
-      pinned_.push_back(wanted.hull);
-    }
-    if (!counted_) ++(missing ? registry_.cache_.misses : registry_.cache_.hits);
-    ready = ready && !missing;
+    const bool found = wanted.hull->Serve() != nullptr;
+    wanted.held = wanted.hull->live;
+    if (!counted_) ++(found ? registry_.cache_.hits : registry_.cache_.misses);
+    ready = ready && found;
   }
   counted_ = true;
   return ready;
 }
 
-bool Registry::Lookup::MakeMissing(Locked& locked, const std::function<bool()>& should_stop) {
+bool Registry::Lookup::LoadMissing(Locked& locked, const std::function<bool()>& should_stop) {
   for (Wanted& wanted : wanted_) {
-    // What became stale since Find is not pinned, so nothing says when its writer pauses: that
-    // waits for the next Find.
-    if (!wanted.failure.ok() || !wanted.pinned || wanted.hull->served != nullptr) continue;
-    wanted.failure = registry_.MakeServed(locked, wanted.hull, should_stop);
+    if (!wanted.failure.ok() || wanted.hull->Serve() != nullptr) continue;
+    wanted.failure = registry_.LoadForReaders(locked, *wanted.hull, should_stop);
+    wanted.held = wanted.hull->live;
     if (Stopped(should_stop) || absl::IsCancelled(wanted.failure)) return false;
   }
   return true;
 }
 
-Resolved Registry::Lookup::Take() const {
+bool Registry::Lookup::PrepareNext(Locked& locked) {
+  if (!plan_.prepare_first) return false;
+  for (Wanted& wanted : wanted_) {
+    if (!wanted.failure.ok() || std::exchange(wanted.prepared, true)) continue;
+    if (!WantsPreparing(*wanted.hull, plan_.expected_questions)) continue;
+    registry_.Prepare(locked, *wanted.hull);
+    return true;
+  }
+  return false;
+}
+
+Resolved Registry::Lookup::Take() {
   Resolved resolved;
   resolved.store_revision = registry_.revision_;
   resolved.hulls.reserve(wanted_.size());
@@ -94,57 +106,63 @@ Resolved Registry::Lookup::Take() const {
       resolved.hulls.emplace_back(wanted.failure);
       continue;
     }
-    HULLD_CHECK(wanted.hull->served != nullptr);
-    resolved.hulls.emplace_back(HullView{wanted.hull->committed.record, wanted.hull->served});
+    std::shared_ptr<const ServedHull> served = wanted.hull->Serve();
+    HULLD_CHECK(served != nullptr);
+    resolved.hulls.emplace_back(HullView{wanted.hull->committed.record, std::move(served)});
     wanted.hull->NoteUse();
+    if (WantsPreparing(*wanted.hull, plan_.expected_questions)) {
+      registry_.SchedulePreparing(wanted.hull);
+    }
   }
   return resolved;
 }
 
-void Registry::Lookup::Unpin(Locked& locked) {
-  for (const HullPointer& hull : pinned_) {
-    if (hull->state.Unpin()) registry_.Advance(locked, hull);
-  }
-  pinned_.clear();
-}
-
-// Optimistic first: take what is ready, and make what is missing. If a writer changed one of the
-// hulls meanwhile, hold back the writers of all of them and try again: the chunks in progress then
-// are the last ones to wait for.
+// What is in memory is taken at once. Otherwise what is missing is read and all are looked for
+// again, since writers went on meanwhile; what was read stays, so that comes to an end.
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
-                                           const std::function<bool()>& should_stop) {
+                                           const std::function<bool()>& should_stop,
+                                           const ReadPlan& plan) {
   Locked locked(mutex_);
-  Lookup lookup(*this, ids);
-  bool ready = lookup.Find(/*all=*/false);
-  bool stopped = false;
-  while (!ready && !stopped) {
-    stopped = !lookup.MakeMissing(locked, should_stop);
-    if (!stopped) ready = lookup.Find(/*all=*/true);
+  Lookup lookup(*this, ids, plan);
+  while (true) {
+    if (!lookup.Find()) {
+      if (!lookup.LoadMissing(locked, should_stop)) return Cancelled();
+    } else if (lookup.PrepareNext(locked)) {
+      if (Stopped(should_stop)) return Cancelled();
+    } else {
+      break;
+    }
   }
-  absl::StatusOr<Resolved> resolved = Cancelled();
-  if (ready) resolved = lookup.Take();
-  lookup.Unpin(locked);
+  Resolved resolved = lookup.Take();
   memory_.Evict(locked);
   return resolved;
 }
 
-std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids) {
+std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
+                                             const ReadPlan& plan) {
   Resolved resolved;
   Locked locked(mutex_);
+  std::vector<HullPointer> found;
   for (const std::string& id : ids) {
     const HullPointer hull = FindVisible(id);
     if (hull == nullptr) {
       resolved.hulls.emplace_back(HullNotFound(id));
-    } else if (hull->state.damaged()) {
-      resolved.hulls.emplace_back(hull->state.damage());
-    } else if (hull->served == nullptr) {
-      return std::nullopt;
-    } else {
-      resolved.hulls.emplace_back(HullView{hull->committed.record, hull->served});
-      ++cache_.hits;
-      hull->NoteUse();
+      continue;
     }
+    if (hull->state.damaged()) {
+      resolved.hulls.emplace_back(hull->state.damage());
+      continue;
+    }
+    std::shared_ptr<const ServedHull> served = hull->Serve();
+    if (served == nullptr) return std::nullopt;
+    const bool wants_preparing = WantsPreparing(*hull, plan.expected_questions);
+    if (wants_preparing && plan.prepare_first) return std::nullopt;
+    if (wants_preparing) SchedulePreparing(hull);
+    resolved.hulls.emplace_back(HullView{hull->committed.record, std::move(served)});
+    found.push_back(hull);
   }
+  for (const HullPointer& hull : found) hull->NoteUse();
+  cache_.hits += found.size();
   resolved.store_revision = revision_;
   return resolved;
 }
@@ -158,64 +176,105 @@ absl::StatusOr<std::pair<uint64_t, HullView>> Registry::Resolve(
   return std::pair(resolved->store_revision, *std::move(hull));
 }
 
-// Until the hull is quiet, served or gone. It must be pinned: nothing else brings it to rest.
-absl::Status Registry::WaitUntilReadable(Locked& locked, RegisteredHull& hull,
-                                         const std::function<bool()>& should_stop) {
-  HULLD_CHECK(hull.state.pinned());
-  const auto readable = [&hull] {
-    return hull.state.quiet() || hull.state.gone() || hull.served != nullptr;
-  };
-  if (readable()) return absl::OkStatus();
-  // Answers that are due do not wait meanwhile.
-  locked.Unlock();
-  locked.Lock();
-  while (!hull.released.wait_for(locked.lock(), kCancellationPoll, readable)) {
-    if (Stopped(should_stop)) return Cancelled();
+absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
+                                                const std::function<bool()>& should_stop) {
+  if (const Hull* made = view.served->canonical(); made != nullptr) return made;
+  const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
+  Locked locked(mutex_);
+  const HullPointer hull = FindVisible(view.record.hull_id);
+  const bool is_current =
+      hull != nullptr && hull->committed.record.revision == view.record.revision;
+  if (is_current && absl::IsDataLoss(status)) MarkDamaged(*hull, status);
+  if (is_current) hull->NoteUse();
+  memory_.Evict(locked);
+  if (!status.ok()) return status;
+  return view.served->canonical();
+}
+
+// Reads a hull's points from the store, unless they are in memory or the hull is gone. Releases the
+// mutex meanwhile.
+absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
+                                      const std::function<bool()>& should_stop) {
+  bool failed = false;
+  while (hull.Serve() == nullptr && !hull.state.gone()) {
+    if (hull.state.damaged()) return hull.state.damage();
+    const bool is_ending = hull.state.life() == HullState::Life::kEnding;
+    if (hull.loading || (failed && is_ending)) {
+      // Answers that are due do not wait meanwhile.
+      locked.Unlock();
+      locked.Lock();
+      const auto may_go_on = [&] {
+        return !hull.loading && !(failed && hull.state.life() == HullState::Life::kEnding);
+      };
+      hull.changed.wait_for(locked.lock(), kCancellationPoll, may_go_on);
+      if (Stopped(should_stop)) return Cancelled();
+      continue;
+    }
+    hull.loading = true;
+    const StoredHull stored = hull.committed;
+    locked.Unlock();
+    absl::StatusOr<std::vector<Vector>> points = LoadPoints(store_, stored);
+    std::shared_ptr<LiveHull> loaded;
+    if (points.ok()) {
+      loaded = std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
+    }
+    locked.Lock();
+    hull.loading = false;
+    hull.changed.notify_all();
+    // A writer was faster. What was read, or not found, is of a state that was left since.
+    const bool is_current = hull.committed.record.revision == stored.record.revision;
+    if (hull.live != nullptr || hull.state.gone() || !is_current) continue;
+    if (loaded != nullptr) {
+      hull.SetLive(std::move(loaded));
+      ++cache_.loads;
+      hull.NoteUse();
+      return absl::OkStatus();
+    }
+    // The end of a hull that is on its way takes its points out of the store first: how that ends
+    // tells whether they are damaged.
+    failed = true;
+    if (hull.state.life() == HullState::Life::kEnding) continue;
+    if (absl::IsDataLoss(points.status())) MarkDamaged(hull, points.status());
+    return points.status();
   }
   return absl::OkStatus();
 }
 
-// Makes what is served of a pinned hull, unless that is there or the hull is gone. Releases the
-// mutex meanwhile.
-absl::Status Registry::MakeServed(Locked& locked, const HullPointer& pinned,
-                                  const std::function<bool()>& should_stop) {
-  RegisteredHull& hull = *pinned;
-  if (absl::Status s = WaitUntilReadable(locked, hull, should_stop); !s.ok()) return s;
-  if (hull.state.gone() || hull.served != nullptr) return absl::OkStatus();
-  if (hull.state.damaged()) return hull.state.damage();
-  hull.state.StartReading();
-  const StoredHull stored = hull.committed;
-  std::unique_ptr<HullBuilder> builder = std::move(hull.builder);
-  const bool load = builder == nullptr;
+// Whether questions have paid for preparing what they look through, and nobody does it yet.
+bool Registry::WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions) {
+  return !hull.preparing && hull.live != nullptr && hull.state.visible() &&
+         hull.live->WantsPreparing(hull.committed_mark, expected_questions);
+}
 
+// Prepares what is committed of a hull. Releases the mutex meanwhile.
+void Registry::Prepare(Locked& locked, RegisteredHull& hull) {
+  HULLD_CHECK(!hull.preparing && hull.live != nullptr);
+  hull.preparing = true;
+  hull.points_since_prepared = 0;
+  const std::shared_ptr<LiveHull> live = hull.live;
+  const LiveHull::Mark mark = hull.committed_mark;
   locked.Unlock();
-  absl::Status status;
-  std::shared_ptr<const ServedHull> served;
-  if (load) {
-    absl::StatusOr<std::unique_ptr<HullBuilder>> loaded = LoadBuilder(store_, stored, should_stop);
-    status = loaded.status();
-    if (loaded.ok()) builder = *std::move(loaded);
-  }
-  if (builder != nullptr) {
-    absl::StatusOr<Hull> made = builder->Snapshot(should_stop);
-    if (made.ok()) served = std::make_shared<const ServedHull>(*std::move(made));
-    status = made.status();
-  }
-  const uint64_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
+  live->Prepare(mark);
   locked.Lock();
-
-  if (load && builder != nullptr) ++cache_.loads;
-  hull.builder = std::move(builder);
-  hull.builder_bytes = builder_bytes;
-  // A hull that is only read needs no builder.
-  if (load && hull.watches.empty()) hull.DiscardBuilder(locked);
-  hull.served = std::move(served);
-  if (absl::IsDataLoss(status)) MarkDamaged(hull, status);
-  const bool kept = hull.state.EndWork();
-  HULLD_CHECK(kept);  // nothing of it was in flight
+  hull.preparing = false;
+  if (hull.live != live) return;
+  // Nothing came after: the mark lets go of what there was before.
+  if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
+  hull.DiscardServed(locked);
   hull.NoteUse();
-  Advance(locked, pinned);
-  return status;
+}
+
+// Has another thread do it.
+void Registry::SchedulePreparing(const HullPointer& hull) {
+  HULLD_CHECK(!hull->preparing);
+  hull->preparing = true;
+  preparers_->Submit([this, hull] {
+    Locked locked(mutex_);
+    hull->preparing = false;
+    if (ending_ || hull->live == nullptr) return;
+    Prepare(locked, *hull);
+    memory_.Evict(locked);
+  });
 }
 
 }  // namespace hulld::server

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/query/placed/live_hull.h"
 #include "server/registry/served_hull.h"
 #include "server/store/hull_record.h"
 
@@ -21,6 +22,15 @@ namespace hulld::server {
 struct HullView {
   HullRecord record;
   std::shared_ptr<const ServedHull> served;
+};
+
+// What a reader is about to do with the hulls that it asks for.
+struct ReadPlan {
+  // Questions that it will ask of each hull as it is now, if it knows.
+  uint64_t expected_questions = 0;
+  // It will wait while what these questions pay for is prepared (LiveHull). Otherwise another
+  // thread prepares it for later ones.
+  bool prepare_first = false;
 };
 
 // Hulls that all were current at one revision of the store.
@@ -52,8 +62,9 @@ struct Replacement {
   std::shared_ptr<HullBuilder> builder;
   // Sums over the points that the builder was given.
   PointCounts counts;
-  // The builder's, for the store; Registry::Replace fills it.
+  // The builder's, for the store and for readers; Registry::Replace fills them.
   std::vector<Vector> vertices = {};
+  std::shared_ptr<LiveHull> live = nullptr;
 };
 
 struct ListedHull {
@@ -76,13 +87,13 @@ struct RegistrySizes {
 
 // What the registry holds of hulls in memory, and how that served so far.
 struct CacheStatistics {
-  // Builders and served hulls; points that wait to be built, and vertices that wait for the store;
-  // and what calls hold for long (MemoryCharge).
+  // Builders, points and what is prepared of them, canonical snapshots; points that wait to be
+  // built, and vertices that wait for the store; and what calls hold for long (MemoryCharge).
   uint64_t bytes = 0;
   uint64_t limit_bytes = 0;
-  // Hulls that a reader asked for and that were ready to be served.
+  // Hulls that a reader asked for and that were in memory.
   uint64_t hits = 0;
-  // Those that had to be made ready.
+  // Those that had to be read from the store.
   uint64_t misses = 0;
   // Hulls read back from the store.
   uint64_t loads = 0;

@@ -1,48 +1,104 @@
 #ifndef HULLD_SERVER_REGISTRY_SERVED_HULL_H_
 #define HULLD_SERVER_REGISTRY_SERVED_HULL_H_
 
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
 #include <atomic>
+#include <condition_variable>
 #include <cstddef>
+#include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
-#include <utility>
 
 #include "core/hull/hull.h"
+#include "core/numeric/vector.h"
 #include "core/query/placed/query_hull.h"
+#include "server/store/hull_record.h"
 
 namespace hulld::server {
 
-// What readers of one version of a hull share: its canonical snapshot and what is derived from
-// that, made when the first request needs it and kept with it. Thread-safe.
-class ServedHull {
+// The canonical snapshot of one version of a hull and what queries that name its vertices need of
+// it: made by the first reader that needs it, and shared with those after it. Thread-safe.
+class CanonicalHull {
  public:
-  explicit ServedHull(Hull hull) : hull_(std::move(hull)) {}
+  CanonicalHull() = default;
+  // One that is made already.
+  explicit CanonicalHull(Hull hull);
 
-  // The canonical snapshot.
-  const Hull& hull() const { return hull_; }
+  // Null until it is made. Cost: O(1).
+  const Hull* hull() const { return is_made() ? &*hull_ : nullptr; }
 
-  // What collision queries need of the hull. The first call makes it.
-  const QueryHull& query_hull() const {
-    std::call_once(query_hull_once_, [this] {
-      query_hull_.emplace(hull_);
-      query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
-    });
-    return *query_hull_;
-  }
+  // Makes it of a version of the hull; waits while another thread does. DATA_LOSS naming the hull:
+  // the version's points do not make what `record` says. CANCELLED: should_stop, which may be
+  // empty, said so; the next call tries again. Cost: that of building the hull and of its snapshot.
+  absl::Status Make(const QueryHull& version, const HullRecord& record,
+                    const std::function<bool()>& should_stop);
+
+  // What queries need of it. The first call makes it. Requires hull() != nullptr.
+  const QueryHull& query_hull();
   // Whether query_hull() would only return.
   bool has_query_hull() const { return query_hull_bytes_.load(std::memory_order_acquire) > 0; }
 
-  // What it holds in memory by now. Bytes.
+  // What it holds by now. Bytes.
   size_t MemoryBytes() const {
-    return sizeof(*this) + hull_.MemoryBytes() + query_hull_bytes_.load(std::memory_order_relaxed);
+    return hull_bytes_.load(std::memory_order_relaxed) +
+           query_hull_bytes_.load(std::memory_order_relaxed);
   }
 
  private:
-  const Hull hull_;
-  mutable std::once_flag query_hull_once_;
-  mutable std::optional<QueryHull> query_hull_;
-  // Above 0 once it is made.
-  mutable std::atomic<size_t> query_hull_bytes_ = 0;
+  bool is_made() const { return hull_bytes_.load(std::memory_order_acquire) > 0; }
+  // Requires that is_made() is false, and that no other thread makes it.
+  void Keep(Hull hull);
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // Guarded by the mutex: a thread makes it.
+  bool making_ = false;
+  // Written once, before hull_bytes_ says so.
+  std::optional<Hull> hull_;
+  std::once_flag query_hull_once_;
+  std::optional<QueryHull> query_hull_;
+  // Above 0 once they are made.
+  std::atomic<size_t> hull_bytes_ = 0;
+  std::atomic<size_t> query_hull_bytes_ = 0;
+};
+
+// What readers of one version of a hull share. Immutable but for the canonical snapshot, which is
+// made when the first request needs it. Thread-safe.
+class ServedHull {
+ public:
+  // low, high: the corners of its bounding box; low exceeds high for the empty hull. canonical: of
+  // the same version of the hull, shared with whatever else is served of that.
+  ServedHull(std::shared_ptr<const QueryHull> version, const Vector& low, const Vector& high,
+             std::shared_ptr<CanonicalHull> canonical);
+
+  // For questions that name no vertex: relation, tolerance and clearance. The result lives as long
+  // as this. Later calls may return another.
+  const QueryHull& query_hull() const {
+    return canonical_->has_query_hull() ? canonical_->query_hull() : *version_;
+  }
+  bool empty() const { return low_[0] > high_[0]; }
+  const Vector& low() const { return low_; }
+  const Vector& high() const { return high_; }
+
+  // The canonical snapshot; null until it is made.
+  const Hull* canonical() const { return canonical_->hull(); }
+  // Makes that, unless it is there (CanonicalHull::Make). Not for gRPC's threads.
+  absl::Status MakeCanonical(const HullRecord& record,
+                             const std::function<bool()>& should_stop) const {
+    return canonical_->Make(*version_, record, should_stop);
+  }
+  // For every question. The first call makes it. Requires canonical() != nullptr.
+  const QueryHull& canonical_query_hull() const { return canonical_->query_hull(); }
+  bool has_canonical_query_hull() const { return canonical_->has_query_hull(); }
+
+ private:
+  const std::shared_ptr<const QueryHull> version_;
+  const Vector low_;
+  const Vector high_;
+  const std::shared_ptr<CanonicalHull> canonical_;
 };
 
 }  // namespace hulld::server

@@ -85,7 +85,7 @@ size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   return bytes + AddNumbers(nullptr, wanted, columns);
 }
 
-size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b,
+size_t AddAnswer(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   if (!answer.ok()) {
     const size_t bytes = AddUnanswered(wanted, columns);
@@ -96,17 +96,17 @@ size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull
   bytes += AddNumbers(&*answer, wanted, columns);
   if (wanted.analysis() && answer->analysis.has_value()) {
     v1::Analysis* const analysis = columns->mutable_analyses(columns->analyses_size() - 1);
-    EncodeAnalysis(*answer->analysis, a, b, analysis);
+    EncodeAnalysis(*answer->analysis, a.hull(), b.hull(), analysis);
     bytes += analysis->ByteSizeLong();
   }
   if (wanted.certificate() && answer->certificate.has_value()) {
     v1::Certificate* const certificate =
         columns->mutable_certificates(columns->certificates_size() - 1);
-    EncodeCertificate(*answer->certificate, a, b, certificate);
+    EncodeCertificate(*answer->certificate, a.hull(), b.hull(), certificate);
     bytes += certificate->ByteSizeLong();
   }
   if (wanted.axis() && answer->axis.has_value()) {
-    bytes += AddAxis(*answer->axis, a, b, columns);
+    bytes += AddAxis(*answer->axis, a.hull(), b.hull(), columns);
   }
   return bytes;
 }

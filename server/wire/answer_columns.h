@@ -5,8 +5,8 @@
 
 #include <cstddef>
 
-#include "core/hull/hull.h"
 #include "core/query/collision.h"
+#include "core/query/placed/placed_hull.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld::server {
@@ -14,8 +14,9 @@ namespace hulld::server {
 // Both functions add one row: an entry to each column that is wanted. They return the bytes that
 // the row adds to the message, estimated from above, framing counted.
 
-// The answer for hulls a and b, or why there is none.
-size_t AddAnswer(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b,
+// The answer for hulls a and b, or why there is none. Requires canonical hulls where the answer
+// names vertices.
+size_t AddAnswer(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
 // No answer; the reply gives the cause elsewhere, with the placement.

@@ -27,7 +27,8 @@ void BatchColumns::AddUnanswered() {
   ++next_pair_;
 }
 
-void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b) {
+void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const PlacedHull& a,
+                       const PlacedHull& b) {
   bytes_ += AddAnswer(answer, a, b, wanted_, ColumnsForNext());
   ++next_pair_;
 }

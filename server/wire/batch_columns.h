@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/hull/hull.h"
 #include "core/query/collision.h"
+#include "core/query/placed/placed_hull.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld::server {
@@ -20,8 +20,8 @@ class BatchColumns {
   BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                uint64_t first_pair);
 
-  // The answer for the next pair, of hulls a and b, or why there is none.
-  void Add(const absl::StatusOr<Answer>& answer, const Hull& a, const Hull& b);
+  // The answer for the next pair, of hulls a and b, or why there is none (AddAnswer).
+  void Add(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b);
   // The next pair has no answer; its placements give the cause.
   void AddUnanswered();
 

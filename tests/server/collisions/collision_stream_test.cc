@@ -252,6 +252,42 @@ TEST_F(StreamCollisionsCall, HullsChangeOnlyWhenRefreshed) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
+// Refreshed after each of many chunks: every answer is that of a single call.
+TEST_F(StreamCollisionsCall, AHullThatGrowsIsAskedAtEveryStep) {
+  Create("grows");
+  Put("ball", Sphere(300));
+  Appender appender(*hulls_, "grows", "w");
+  Stream stream(*collisions_);
+  const auto opened =
+      stream.Ask(Open({PlacementOf("grows", -2), PlacementOf("ball")}, {0, 1, 1, 0}));
+  EXPECT_THAT(opened.columns().relations(),
+              ElementsAre(v1::RELATION_SEPARATED, v1::RELATION_SEPARATED));
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> coordinate(-1, 1);
+  int overlapping = 0;
+  int separated = 0;
+  for (uint64_t i = 1; i <= 200; ++i) {
+    Coordinates xyz(30);
+    for (double& x : xyz) x = coordinate(random) * (0.5 + 0.01 * static_cast<double>(i));
+    ASSERT_TRUE(appender.Append(i, xyz).has_value());
+    // Both at once, and one after the other.
+    const double x = -2 - coordinate(random);
+    v1::StreamCollisionsRequest move = MoveX(0, x);
+    if (i % 2 == 0) stream.Ask(Refresh());
+    if (i % 2 == 1) move.mutable_update()->set_refresh_hulls(true);
+    const v1::StreamCollisionsResponse answer = stream.Ask(move);
+    v1::CheckCollisionRequest single;
+    *single.mutable_a() = PlacementOf("grows", x);
+    *single.mutable_b() = PlacementOf("ball");
+    const v1::Relation expected = Check(single).relation();
+    EXPECT_THAT(answer.columns().relations(), ElementsAre(expected, expected)) << i;
+    ++(expected == v1::RELATION_SEPARATED ? separated : overlapping);
+  }
+  EXPECT_GT(overlapping, 5);
+  EXPECT_GT(separated, 5);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
 TEST_F(StreamCollisionsCall, AMoveCuresAMalformedPose) {
   Put("cube", Cube());
   Stream stream(*collisions_);

@@ -3,7 +3,16 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/check.h"
+
 namespace hulld::server {
+
+const Hull& CanonicalOf(const HullView& view) {
+  const absl::Status made = view.served->MakeCanonical(view.record, {});
+  EXPECT_TRUE(made.ok()) << made;
+  HULLD_CHECK(made.ok());
+  return *view.served->canonical();
+}
 
 std::vector<Vector> CubeCorners(double low, double size) {
   std::vector<Vector> points;

@@ -125,6 +125,9 @@ class StoreTest : public ::testing::Test {
   std::unique_ptr<DurableRegistry> hulls_;
 };
 
+// The canonical snapshot of what was resolved, which must not be damaged; it lives as long as
+// view.served.
+const Hull& CanonicalOf(const HullView& view);
 // The corners of the cube [low, low + size]^3.
 std::vector<Vector> CubeCorners(double low = 0, double size = 1);
 // `count` points on the unit sphere, all of them extreme.

@@ -139,6 +139,25 @@ TEST_F(HullCalls, GetReportsSizeBoxAndAudit) {
   EXPECT_TRUE(response.audit().ok()) << response.audit().finding();
 }
 
+TEST_F(HullCalls, GetWithoutFacetsReportsAllElse) {
+  Put("cube", Cube(-1, 3));
+  for (const bool audit : {false, true}) {
+    grpc::ClientContext context;
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id("cube");
+    request.set_without_facets(true);
+    request.set_audit(audit);
+    ASSERT_TRUE(hulls_->GetHull(&context, request, &response).ok());
+    EXPECT_EQ(response.has_audit(), audit);
+    response.clear_audit();
+    v1::GetHullResponse expected = Get("cube");
+    expected.clear_edge_count();
+    expected.clear_facet_count();
+    EXPECT_EQ(response.DebugString(), expected.DebugString());
+  }
+}
+
 TEST_F(HullCalls, AnEmptyHullHasNoBox) {
   Create("empty");
   const v1::GetHullResponse response = Get("empty");

@@ -16,13 +16,6 @@ HullState Building() {
   return state;
 }
 
-HullState Reading() {
-  HullState state = HullState::Present();
-  state.Pin();
-  state.StartReading();
-  return state;
-}
-
 // With one chunk in flight.
 HullState Growing() {
   HullState state = Building();
@@ -127,21 +120,6 @@ TEST(HullState, AScheduledChunkMayEndWithoutBeingBuilt) {
   EXPECT_TRUE(state.quiet());
 }
 
-TEST(HullState, APinnedHullComesToRestAndIsRead) {
-  HullState state = Growing();
-  state.Pin();
-  state.Pin();
-  EXPECT_FALSE(state.can_schedule());
-  state.Commit();
-  state.StartReading();
-  EXPECT_FALSE(state.quiet());
-  EXPECT_TRUE(state.EndWork());
-  EXPECT_FALSE(state.Unpin());
-  EXPECT_FALSE(state.can_schedule());
-  EXPECT_TRUE(state.Unpin());
-  EXPECT_TRUE(state.can_schedule());
-}
-
 TEST(HullState, ADamagedHullCanOnlyEnd) {
   HullState state = Damaged();
   EXPECT_TRUE(state.visible());
@@ -161,16 +139,12 @@ TEST(HullState, DamageIsFoundByAThreadThatWorks) {
 
 using HullStateDeathTest = ::testing::Test;
 
-TEST(HullStateDeathTest, AChunkStartsOnlyInAHullThatIsIdleUnpinnedAndSound) {
+TEST(HullStateDeathTest, AChunkStartsOnlyInAHullThatIsIdleAndSound) {
   EXPECT_DEATH(HullState::Creating().Schedule(), "check failed");
   EXPECT_DEATH(Building().Schedule(), "check failed");
-  EXPECT_DEATH(Reading().Schedule(), "check failed");
   EXPECT_DEATH(Ending().Schedule(), "check failed");
   EXPECT_DEATH(Gone().Schedule(), "check failed");
   EXPECT_DEATH(Damaged().Schedule(), "check failed");
-  HullState pinned = HullState::Present();
-  pinned.Pin();
-  EXPECT_DEATH(pinned.Schedule(), "check failed");
   EXPECT_DEATH(HullState::Present().StartBuilding(), "check failed");
 }
 
@@ -181,27 +155,12 @@ TEST(HullStateDeathTest, OnlyWhatWasBuiltOnWhatStandsIsSubmitted) {
   reverting.StartBuilding();
   reverting.Refuse();
   EXPECT_DEATH(reverting.Submit(), "check failed");
-  EXPECT_DEATH(Reading().Submit(), "check failed");
-}
-
-TEST(HullStateDeathTest, AReaderWorksOnlyOnAQuietPinnedHull) {
-  EXPECT_DEATH(HullState::Present().StartReading(), "check failed");
-  HullState growing = Growing();
-  growing.Pin();
-  EXPECT_DEATH(growing.StartReading(), "check failed");
-  HullState damaged = Damaged();
-  damaged.Pin();
-  EXPECT_DEATH(damaged.StartReading(), "check failed");
-  EXPECT_DEATH(Gone().Pin(), "check failed");
-  EXPECT_DEATH(HullState::Creating().Pin(), "check failed");
-  EXPECT_DEATH(HullState::Present().Unpin(), "check failed");
 }
 
 TEST(HullStateDeathTest, OnlyAQuietHullEnds) {
   EXPECT_DEATH(HullState::Creating().StartEnding(), "check failed");
   EXPECT_DEATH(Growing().StartEnding(), "check failed");
   EXPECT_DEATH(Building().StartEnding(), "check failed");
-  EXPECT_DEATH(Reading().StartEnding(), "check failed");
   EXPECT_DEATH(Ending().StartEnding(), "check failed");
   EXPECT_DEATH(Gone().StartEnding(), "check failed");
 }

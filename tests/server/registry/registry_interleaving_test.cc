@@ -3,12 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <functional>
 #include <future>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <random>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -24,11 +28,33 @@ namespace {
 // waits for.
 class ScriptedStore : public MemoryStore {
  public:
+  // A call to a test, once, without a lock, by the next call of a kind.
+  template <typename Result>
+  class Hook {
+   public:
+    void Set(std::function<Result()> hook) {
+      const std::lock_guard lock(mutex_);
+      hook_ = std::move(hook);
+    }
+    std::function<Result()> Take() {
+      const std::lock_guard lock(mutex_);
+      return std::exchange(hook_, nullptr);
+    }
+
+   private:
+    std::mutex mutex_;
+    std::function<Result()> hook_;
+  };
+
   bool keeps_hulls() const override { return true; }
 
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override {
+    ++loads;
+    if (const auto hook = before_load.Take()) hook();
     const std::lock_guard lock(mutex_);
-    return vertices_[hull.record.create_revision];
+    const auto found = vertices_.find(hull.record.create_revision);
+    if (found == vertices_.end()) return absl::DataLossError("there is none");
+    return found->second;
   }
 
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
@@ -38,35 +64,88 @@ class ScriptedStore : public MemoryStore {
       const std::lock_guard lock(mutex_);
       sequence = sequences_[{hull.create_revision, writer_id}];
     }
-    if (after_load_sequence) std::exchange(after_load_sequence, nullptr)();
+    if (const auto hook = after_load_sequence.Take()) hook();
     return sequence;
   }
 
   absl::Status Commit(std::span<const Change* const> changes) override {
-    if (before_commit) {
-      const absl::Status status = std::exchange(before_commit, nullptr)();
+    if (const auto hook = before_commit.Take()) {
+      const absl::Status status = hook();
       if (!status.ok()) return status;
     }
-    const std::lock_guard lock(mutex_);
-    for (const Change* change : changes) {
-      const uint64_t incarnation = change->hull.record.create_revision;
-      std::vector<Vector>& vertices = vertices_[incarnation];
-      if (change->vertex_change == VertexChange::kReplaced) vertices.clear();
-      vertices.insert(vertices.end(), change->vertices.begin(), change->vertices.end());
-      if (!change->writer.has_value()) continue;
-      sequences_[{incarnation, change->writer->writer_id}] = change->writer->sequence;
+    if (refused_of_1000 > 0) {
+      const std::lock_guard lock(mutex_);
+      if (random_() % 1000 < refused_of_1000) return absl::UnavailableError("a moment");
     }
+    {
+      const std::lock_guard lock(mutex_);
+      for (const Change* change : changes) Apply(*change);
+    }
+    if (const auto hook = after_commit.Take()) hook();
     return absl::OkStatus();
   }
 
-  // Each is called once, without a lock, by the next call of its kind. Set while none is running.
-  std::function<void()> after_load_sequence;
-  std::function<absl::Status()> before_commit;
+  // Damage: there are no points of this incarnation; one of them is another, inside; all of them
+  // are in a plane.
+  void Lose(const HullRecord& hull) {
+    const std::lock_guard lock(mutex_);
+    vertices_.erase(hull.create_revision);
+  }
+  void Dent(const HullRecord& hull) {
+    const std::lock_guard lock(mutex_);
+    vertices_[hull.create_revision].back() = Vector(0.5, 0.5, 0.5);
+  }
+
+  void Flatten(const HullRecord& hull) {
+    const std::lock_guard lock(mutex_);
+    for (Vector& vertex : vertices_[hull.create_revision]) vertex.z() = 0;
+  }
+
+  // Before the points are looked for.
+  Hook<void> before_load;
+  Hook<void> after_load_sequence;
+  Hook<absl::Status> before_commit;
+  // The store has the change, and the registry does not know it yet.
+  Hook<void> after_commit;
+  std::atomic<uint64_t> refused_of_1000 = 0;
+  std::atomic<int> loads = 0;
 
  private:
+  void Apply(const Change& change) {
+    const uint64_t incarnation = change.hull.record.create_revision;
+    if (change.replaced.has_value()) vertices_.erase(change.replaced->record.create_revision);
+    if (change.deleted) {
+      vertices_.erase(incarnation);
+      return;
+    }
+    std::vector<Vector>& vertices = vertices_[incarnation];
+    if (change.vertex_change == VertexChange::kReplaced) vertices.clear();
+    vertices.insert(vertices.end(), change.vertices.begin(), change.vertices.end());
+    if (!change.writer.has_value()) return;
+    sequences_[{incarnation, change.writer->writer_id}] = change.writer->sequence;
+  }
+
   std::mutex mutex_;
   std::map<uint64_t, std::vector<Vector>> vertices_;
   std::map<std::pair<uint64_t, std::string>, uint64_t> sequences_;
+  std::mt19937_64 random_{811};
+};
+
+// A thread that stops somewhere until the test lets it go on.
+class Gate {
+ public:
+  // By the thread.
+  void Stop() {
+    reached_.set_value();
+    open_.get_future().wait();
+  }
+  // By the test.
+  void WaitUntilReached() { reached_.get_future().wait(); }
+  void Open() { open_.set_value(); }
+
+ private:
+  std::promise<void> reached_;
+  std::promise<void> open_;
 };
 
 class RegistryInterleaving : public ::testing::Test {
@@ -82,10 +161,11 @@ class RegistryInterleaving : public ::testing::Test {
   }
   std::future<absl::StatusOr<ChunkResult>> StartAppend(const AppendSession& session,
                                                        uint64_t sequence,
-                                                       std::vector<Vector> points) {
+                                                       std::vector<Vector> points,
+                                                       std::function<void()> on_built = {}) {
     const auto promise = std::make_shared<std::promise<absl::StatusOr<ChunkResult>>>();
     registry_.Append(
-        session, {sequence, std::move(points), std::nullopt}, {}, {},
+        session, {sequence, std::move(points), std::nullopt}, {}, std::move(on_built),
         [promise](absl::StatusOr<ChunkResult> result) { promise->set_value(std::move(result)); });
     return promise->get_future();
   }
@@ -94,61 +174,264 @@ class RegistryInterleaving : public ::testing::Test {
     return StartAppend(session, sequence, std::move(points)).get();
   }
 
+  absl::StatusOr<uint64_t> Delete(const std::string& id) {
+    return DurableRegistry::Wait<uint64_t>(
+        [&](Reply<uint64_t> done) { registry_.Delete(id, std::nullopt, std::move(done)); });
+  }
+  std::future<absl::StatusOr<Resolved>> StartResolve(std::vector<std::string> ids,
+                                                     std::function<bool()> should_stop) {
+    return std::async(std::launch::async,
+                      [this, ids = std::move(ids), should_stop = std::move(should_stop)] {
+                        return registry_.Resolve(ids, should_stop);
+                      });
+  }
+  // All hulls that nobody uses leave memory.
+  void DropAll() {
+    const MemoryCharge charge(registry_.memory(), registry_.Cache().limit_bytes);
+    EXPECT_TRUE(registry_.CheckMemory().ok());
+  }
+
   ScriptedStore store_;
   WorkerPool writers_{2};
   Registry registry_{store_, Limits(), writers_};
 };
 
-// Enough facets that making the canonical hull asks now and then whether to stop.
-std::vector<Vector> Paraboloid() {
-  std::vector<Vector> points;
-  for (int i = -30; i <= 30; ++i) {
-    for (int j = -30; j <= 30; ++j) points.emplace_back(i, j, i * i + j * j);
-  }
-  return points;
-}
-
-// The second hull is current when the reader starts, and changed while it makes the first.
+// A reader waits in the store for the points of one hull, and for those of another that a third
+// party reads, when it is cancelled. Neither has anything to do with what writers do.
 TEST_F(RegistryInterleaving, AReaderThatIsCancelledHoldsNoWriterBack) {
   const AppendSession a = Open("a", "w");
   const AppendSession b = Open("b", "w");
-  ASSERT_TRUE(Append(a, 1, Paraboloid()).ok());
-  ASSERT_TRUE(Append(b, 1, Paraboloid()).ok());
-  int polls_of_one = 0;
-  const auto count = [&] {
-    ++polls_of_one;
-    return false;
-  };
-  ASSERT_TRUE(registry_.Resolve("b", count).ok());
-  ASSERT_GT(polls_of_one, 1);
+  ASSERT_TRUE(Append(a, 1, CubeCorners()).ok());
+  ASSERT_TRUE(Append(b, 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  auto first = StartResolve({"a", "b"}, [] { return true; });
+  gate.WaitUntilReached();
+  EXPECT_TRUE(absl::IsCancelled(StartResolve({"a", "b"}, [] { return true; }).get().status()));
+  EXPECT_TRUE(Append(b, 2, {{0, 0, 5000}}).ok());
+  EXPECT_TRUE(Append(a, 2, {{0, 0, 5000}}).ok());
+  gate.Open();
+  EXPECT_TRUE(absl::IsCancelled(first.get().status()));
+  EXPECT_TRUE(Append(a, 3, {{0, 0, 6000}}).ok());
+  EXPECT_TRUE(Append(b, 3, {{0, 0, 6000}}).ok());
+  const auto resolved = StartResolve({"a", "b"}, {}).get();
+  ASSERT_TRUE(resolved.ok());
+  for (const auto& hull : resolved->hulls) EXPECT_EQ(hull->served->high().z(), 6000);
+  EXPECT_TRUE(Delete("a").ok());
+  EXPECT_TRUE(Delete("b").ok());
+}
 
-  const std::vector<std::string> ids = {"a", "b"};
-  std::future<absl::StatusOr<ChunkResult>> next;
-  int polls = 0;
-  const auto resolved = registry_.Resolve(ids, [&] {
-    ++polls;
-    if (polls == 1) {
-      EXPECT_TRUE(Append(b, 2, {{0, 0, 5000}}).ok());
+TEST_F(RegistryInterleaving, AReaderThatWaitsForAnotherCanBeCancelled) {
+  ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  auto first = StartResolve({"h"}, {});
+  gate.WaitUntilReached();
+  EXPECT_TRUE(absl::IsCancelled(registry_.Resolve("h", [] { return true; }).status()));
+  gate.Open();
+  EXPECT_TRUE(first.get()->hulls[0].ok());
+  EXPECT_EQ(store_.loads, 1);
+}
+
+TEST_F(RegistryInterleaving, ManyReadersOfOneHullReadItOnce) {
+  ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  std::vector<std::future<absl::StatusOr<Resolved>>> readers;
+  readers.push_back(StartResolve({"h"}, {}));
+  gate.WaitUntilReached();
+  for (int i = 0; i < 3; ++i) readers.push_back(StartResolve({"h", "h"}, {}));
+  EXPECT_FALSE(registry_.TryResolve(std::vector<std::string>{"h"}).has_value());
+  gate.Open();
+  for (auto& reader : readers) {
+    const auto resolved = reader.get();
+    ASSERT_TRUE(resolved.ok());
+    EXPECT_EQ(CanonicalOf(*resolved->hulls[0]).facet_count(), 6);
+  }
+  EXPECT_EQ(store_.loads, 1);
+  EXPECT_EQ(registry_.Cache().loads, 1);
+}
+
+// And what it read meanwhile is old.
+TEST_F(RegistryInterleaving, AWriterDoesNotWaitForAReader) {
+  const AppendSession session = Open("h", "w");
+  ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
+  for (const bool drop : {false, true}) {
+    DropAll();
+    Gate gate;
+    store_.before_load.Set([&] { gate.Stop(); });
+    auto reader = StartResolve({"h"}, {});
+    gate.WaitUntilReached();
+    const double x = drop ? 200 : 100;
+    const uint64_t sequence = drop ? 3 : 2;
+    ASSERT_TRUE(Append(session, sequence, {{x, 0, 0}}).ok());
+    // The hull is as cold as the reader found it, and another one.
+    if (drop) DropAll();
+    gate.Open();
+    const auto resolved = reader.get();
+    ASSERT_TRUE(resolved.ok());
+    EXPECT_EQ(resolved->hulls[0]->record.counts.received, 7 + sequence);
+    EXPECT_EQ(resolved->hulls[0]->served->high().x(), x);
+    EXPECT_EQ(CanonicalOf(*resolved->hulls[0]).vertices().size(),
+              resolved->hulls[0]->record.vertex_count);
+  }
+}
+
+TEST_F(RegistryInterleaving, AReaderDoesNotWaitForAWriterThatReads) {
+  const AppendSession session = Open("h", "w");
+  ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  auto chunk = StartAppend(session, 2, {{100, 0, 0}});
+  gate.WaitUntilReached();
+  const auto resolved = StartResolve({"h"}, {}).get();
+  ASSERT_TRUE(resolved.ok());
+  EXPECT_EQ(resolved->hulls[0]->served->high().x(), 1);
+  gate.Open();
+  ASSERT_TRUE(chunk.get().ok());
+  EXPECT_EQ(registry_.Resolve("h", {})->second.served->high().x(), 100);
+}
+
+TEST_F(RegistryInterleaving, WhatIsNotCommittedIsNotSeen) {
+  const AppendSession session = Open("h", "w");
+  ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
+  uint64_t sequence = 2;
+  for (const bool fails : {true, false, true, true, false}) {
+    const HullView before = registry_.Resolve("h", {})->second;
+    Gate gate;
+    store_.before_commit.Set([&]() -> absl::Status {
+      gate.Stop();
+      return fails ? absl::UnavailableError("the disk is gone for a moment") : absl::OkStatus();
+    });
+    const auto x = static_cast<double>(sequence);
+    // Two are in flight, the second built on the first.
+    auto first = StartAppend(session, sequence, {{x, 0, 0}});
+    gate.WaitUntilReached();
+    std::promise<void> built;
+    auto second = StartAppend(session, sequence + 1, {{x + 1, 0, 0}}, [&] { built.set_value(); });
+    built.get_future().wait();
+    for (const bool canonical : {false, true}) {
+      const HullView now = registry_.Resolve("h", {})->second;
+      EXPECT_EQ(now.record, before.record);
+      EXPECT_EQ(now.served->high(), before.served->high());
+      if (!canonical) continue;
+      EXPECT_EQ(CanonicalOf(now).vertices().size(), now.record.vertex_count);
     }
-    // The first time that it asks while it makes the second hull.
-    if (polls == polls_of_one + 1) next = StartAppend(b, 3, {{0, 0, 6000}});
-    return polls > polls_of_one;
-  });
-  EXPECT_TRUE(absl::IsCancelled(resolved.status())) << resolved.status();
-  ASSERT_TRUE(next.valid());
-  EXPECT_TRUE(next.get().ok());
+    gate.Open();
+    EXPECT_EQ(first.get().ok(), !fails);
+    EXPECT_EQ(second.get().ok(), !fails);
+    const HullView after = registry_.Resolve("h", {})->second;
+    EXPECT_EQ(after.served->high().x(), fails ? before.served->high().x() : x + 1);
+    EXPECT_EQ(CanonicalOf(after).vertices().size(), after.record.vertex_count);
+    if (!fails) sequence += 2;
+  }
+}
+
+TEST_F(RegistryInterleaving, AHullThatIsDeletedWhileItIsReadIsNotFound) {
+  ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  auto reader = StartResolve({"h"}, {});
+  gate.WaitUntilReached();
+  ASSERT_TRUE(Delete("h").ok());
+  gate.Open();
+  EXPECT_TRUE(absl::IsNotFound(reader.get()->hulls[0].status()));
+  EXPECT_EQ(registry_.Cache().damaged, 0);
+}
+
+// The store has let go of the points, and the registry does not know that yet.
+TEST_F(RegistryInterleaving, AHullWhoseEndIsOnItsWayIsNotTakenForDamaged) {
+  ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.after_commit.Set([&] { gate.Stop(); });
+  auto deleted = std::async(std::launch::async, [&] { return Delete("h"); });
+  gate.WaitUntilReached();
+  EXPECT_TRUE(absl::IsCancelled(registry_.Resolve("h", [] { return true; }).status()));
+  const int loads = store_.loads;
+  auto reader = StartResolve({"h"}, {});
+  while (store_.loads == loads) std::this_thread::yield();
+  gate.Open();
+  EXPECT_TRUE(deleted.get().ok());
+  EXPECT_TRUE(absl::IsNotFound(reader.get()->hulls[0].status()));
+  EXPECT_EQ(registry_.Cache().damaged, 0);
+}
+
+TEST_F(RegistryInterleaving, AHullThatIsReplacedWhileItIsReadIsTheNewOne) {
+  ASSERT_TRUE(Append(Open("h", "w"), 1, CubeCorners()).ok());
+  DropAll();
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  auto reader = StartResolve({"h"}, {});
+  gate.WaitUntilReached();
+  Replacement replacement;
+  replacement.hull_id = "h";
+  replacement.builder = std::make_shared<HullBuilder>();
+  replacement.counts = *replacement.builder->Add(CubeCorners(5, 1));
+  ASSERT_TRUE(DurableRegistry::Wait<ReplaceResult>([&](Reply<ReplaceResult> done) {
+                registry_.Replace(std::move(replacement), std::move(done));
+              }).ok());
+  gate.Open();
+  const auto resolved = reader.get();
+  ASSERT_TRUE(resolved->hulls[0].ok()) << resolved->hulls[0].status();
+  EXPECT_EQ(resolved->hulls[0]->served->low(), Vector(5, 5, 5));
+}
+
+TEST_F(RegistryInterleaving, PointsThatTheStoreLostAreDamageForReadersAndWriters) {
+  const AppendSession session = Open("h", "w");
+  ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
+  DropAll();
+  store_.Lose(registry_.List("", "", 1).hulls[0].record);
+  EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve("h", {}).status()));
+  EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
+  EXPECT_EQ(registry_.Cache().damaged, 1);
+  EXPECT_TRUE(Delete("h").ok());
+}
+
+// All are in one plane.
+TEST_F(RegistryInterleaving, PointsOfAnotherDimensionAreDamage) {
+  const AppendSession session = Open("h", "w");
+  ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
+  DropAll();
+  store_.Flatten(registry_.List("", "", 1).hulls[0].record);
+  EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve("h", {}).status()));
+  EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
+}
+
+// What was read makes another hull than the record says: who builds it finds out.
+TEST_F(RegistryInterleaving, PointsThatMakeAnotherHullAreDamage) {
+  for (const bool by_writer : {false, true}) {
+    const std::string id = by_writer ? "writer" : "reader";
+    const AppendSession session = Open(id, "w");
+    ASSERT_TRUE(Append(session, 1, CubeCorners()).ok());
+    DropAll();
+    store_.Dent(registry_.Resolve(id, {})->second.record);
+    DropAll();
+    const HullView view = registry_.Resolve(id, {})->second;
+    const absl::Status found = by_writer ? Append(session, 2, {{9, 9, 9}}).status()
+                                         : registry_.Canonical(view, {}).status();
+    EXPECT_TRUE(absl::IsDataLoss(found)) << found;
+    EXPECT_TRUE(absl::IsDataLoss(registry_.Resolve(id, {}).status()));
+    EXPECT_TRUE(absl::IsDataLoss(Append(session, 2, {{9, 9, 9}}).status()));
+    EXPECT_TRUE(Delete(id).ok());
+  }
 }
 
 TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewer) {
   const AppendSession first = Open("h", "w");
   ASSERT_TRUE(Append(first, 1, {{0, 0, 0}}).ok());
   registry_.CloseAppend(first);
-  store_.after_load_sequence = [this] {
+  store_.after_load_sequence.Set([this] {
     const OpenResult other = OpenResultOf("h", "w");
     EXPECT_EQ(other.last_sequence, 1);
     EXPECT_TRUE(Append(other.session, 2, {{1, 0, 0}}).ok());
     registry_.CloseAppend(other.session);
-  };
+  });
   const OpenResult opened = OpenResultOf("h", "w");
   EXPECT_EQ(opened.last_sequence, 2);
   const absl::StatusOr<ChunkResult> repeated = Append(opened.session, 2, {{1, 0, 0}});
@@ -163,11 +446,11 @@ TEST_F(RegistryInterleaving, AChunkIsNotBuiltOnOneThatWasRefused) {
   const AppendSession kept = Open("h", "kept");
   std::promise<void> committing;
   std::promise<void> fail;
-  store_.before_commit = [&] {
+  store_.before_commit.Set([&]() -> absl::Status {
     committing.set_value();
     fail.get_future().wait();
     return absl::UnavailableError("the disk is gone for a moment");
-  };
+  });
   auto first = StartAppend(refused, 1, {{0, 0, 0}});
   committing.get_future().wait();
   std::promise<void> go;
@@ -181,6 +464,102 @@ TEST_F(RegistryInterleaving, AChunkIsNotBuiltOnOneThatWasRefused) {
   ASSERT_TRUE(result.ok()) << result.status();
   EXPECT_EQ(result->vertex_count, 1);
   EXPECT_EQ(registry_.Resolve("h", {})->second.record.counts.received, 1);
+}
+
+// Chunk k of a hull is the point (k, k^2, k^3): how far the hull reaches along x tells which chunks
+// it holds, in whatever order writers, readers, refusals, evictions and ends come.
+TEST_F(RegistryInterleaving, EveryVersionHoldsWhatItsRecordSays) {
+#ifdef HULLD_SANITIZED
+  constexpr uint64_t kChunks = 300;
+#else
+  constexpr uint64_t kChunks = 1500;
+#endif
+  constexpr int kHulls = 3;
+  store_.refused_of_1000 = 100;
+  std::atomic<int> writing = kHulls;
+  std::vector<std::thread> threads;
+  for (int h = 0; h < kHulls; ++h) {
+    threads.emplace_back([&, h] {
+      const std::string id = std::to_string(h);
+      std::mt19937_64 random(h);
+      std::optional<AppendSession> session;
+      uint64_t sequence = 0;
+      for (uint64_t i = 0; i < kChunks; ++i) {
+        if (!session.has_value()) {
+          const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+            registry_.OpenAppend(
+                id, "w", true, [](const absl::Status&) {}, std::move(done));
+          });
+          if (!opened.ok()) continue;
+          session = opened->session;
+          sequence = opened->last_sequence;
+        }
+        // A few at a time, each built on those before.
+        std::vector<std::future<absl::StatusOr<ChunkResult>>> chunks;
+        for (uint64_t k = 1 + random() % 4; k > 0; --k) {
+          const auto x = static_cast<double>(sequence + chunks.size() + 1);
+          chunks.push_back(
+              StartAppend(*session, sequence + chunks.size() + 1, {{x, x * x, x * x * x}}));
+        }
+        bool ok = true;
+        for (auto& chunk : chunks) {
+          const bool applied = chunk.get().ok();
+          EXPECT_TRUE(ok || !applied);
+          ok = ok && applied;
+          if (ok) ++sequence;
+        }
+        const HullView view = registry_.Resolve(id, {})->second;
+        EXPECT_EQ(view.record.counts.received, sequence);
+        if (random() % 100 == 0 && Delete(id).ok()) {
+          registry_.CloseAppend(*session);
+          session.reset();
+        }
+      }
+      --writing;
+    });
+  }
+  std::atomic<uint64_t> seen = 0;
+  for (int r = 0; r < 2; ++r) {
+    threads.emplace_back([&, r] {
+      std::mt19937_64 random(100 + r);
+      const std::vector<std::string> ids = {"0", "1", "2"};
+      uint64_t store_revision = 0;
+      while (writing > 0) {
+        const ReadPlan plan = {random() % 20 == 0 ? 10'000U : 0U, random() % 2 == 0};
+        const auto resolved = registry_.Resolve(ids, {}, plan);
+        ASSERT_TRUE(resolved.ok());
+        EXPECT_GE(resolved->store_revision, store_revision);
+        store_revision = resolved->store_revision;
+        for (const auto& hull : resolved->hulls) {
+          if (!hull.ok()) {
+            EXPECT_TRUE(absl::IsNotFound(hull.status())) << hull.status();
+            continue;
+          }
+          EXPECT_LE(hull->record.revision, store_revision);
+          const uint64_t received = hull->record.counts.received;
+          EXPECT_EQ(hull->record.vertex_count, received);
+          if (received == 0) continue;
+          EXPECT_EQ(hull->served->high().x(), static_cast<double>(received));
+          EXPECT_EQ(hull->served->query_hull().dimension(), hull->record.dimension);
+          if (random() % 10 == 0) {
+            const auto canonical = registry_.Canonical(*hull, {});
+            ASSERT_TRUE(canonical.ok()) << canonical.status();
+            EXPECT_EQ((*canonical)->vertices().size(), received);
+            EXPECT_EQ((*canonical)->vertices().back(), hull->served->high());
+          }
+          ++seen;
+        }
+        if (random() % 5 > 0) continue;
+        // Whatever is quiet leaves memory, and chunks that come just now are refused.
+        const MemoryCharge charge(registry_.memory(), registry_.Cache().limit_bytes);
+        registry_.CheckMemory().IgnoreError();
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_GT(seen, 0);
+  EXPECT_EQ(registry_.Cache().damaged, 0);
+  EXPECT_GT(registry_.Commits().failed_batches, 0);
 }
 
 }  // namespace

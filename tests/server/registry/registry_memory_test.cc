@@ -31,6 +31,47 @@ TEST_F(RegistryMemory, HullsAreReadAtFirstUse) {
   EXPECT_EQ(hulls_->registry().Cache().hits, 1);
 }
 
+TEST_F(RegistryMemory, AHullThatIsOnlyReadNeedsNoBuilder) {
+  Start();
+  const std::vector<Vector> sphere = SpherePoints(2000);
+  ASSERT_TRUE(hulls_->Put("h", sphere).ok());
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(sphere).ok());
+  EXPECT_GT(hulls_->registry().Cache().bytes, builder.MemoryBytes());
+  Start();
+  const std::vector<std::string> ids = {"h"};
+  EXPECT_FALSE(hulls_->registry().TryResolve(ids).has_value());
+  EXPECT_EQ(hulls_->registry().Cache().hits, 0);
+  const HullView view = *hulls_->View("h");
+  EXPECT_EQ(view.served->canonical(), nullptr);
+  EXPECT_EQ(view.served->query_hull().point_count(), 2000);
+  EXPECT_LT(hulls_->registry().Cache().bytes, builder.MemoryBytes() / 2);
+  EXPECT_TRUE(hulls_->registry().TryResolve(ids).has_value());
+  // A writer goes on with what the reader read.
+  ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, 1);
+  EXPECT_EQ(hulls_->View("h")->served->high(),
+            Vector(2, view.served->high().y(), view.served->high().z()));
+}
+
+TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", SpherePoints(2000)).ok());
+  Start();
+  Registry& registry = hulls_->registry();
+  {
+    const HullView view = *hulls_->View("h");
+    const uint64_t before = registry.Cache().bytes;
+    ASSERT_TRUE(registry.Canonical(view, {}).ok());
+    EXPECT_GE(registry.Cache().bytes, before + view.served->canonical()->MemoryBytes());
+    MemoryCharge charge(registry.memory(), registry.Cache().limit_bytes);
+    EXPECT_EQ(registry.CheckMemory().code(), absl::StatusCode::kResourceExhausted);
+  }
+  const MemoryCharge charge(registry.memory(), registry.Cache().limit_bytes);
+  EXPECT_TRUE(registry.CheckMemory().ok());
+  EXPECT_EQ(registry.Cache().bytes, registry.Cache().limit_bytes);
+}
+
 TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
   Limits limits;
   limits.memory_limit = 3 << 20;
@@ -81,7 +122,7 @@ TEST_F(RegistryMemory, ReadersAndWritersGoOnUnderASmallLimit) {
           EXPECT_EQ(view.status().code(), absl::StatusCode::kNotFound) << view.status();
           continue;
         }
-        EXPECT_EQ(view->served->hull().vertices().size(), view->record.vertex_count);
+        EXPECT_EQ(CanonicalOf(*view).vertices().size(), view->record.vertex_count);
       }
     });
   }
@@ -121,7 +162,7 @@ TEST(RegistryOfMemoryStore, RefusesToGrowBeyondTheLimit) {
   const auto second = put("second");
   EXPECT_EQ(second.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("--memory-limit"));
-  EXPECT_EQ(registry.Resolve("first", {})->second.served->hull().vertices().size(), 1000);
+  EXPECT_EQ(CanonicalOf(registry.Resolve("first", {})->second).vertices().size(), 1000);
 }
 
 // Points that wait for their turn, and what they are once they are built.
@@ -155,11 +196,14 @@ TEST(RegistryOfMemoryStore, PointsThatWaitCount) {
   EXPECT_TRUE(first.ok());
   EXPECT_TRUE(asked);
   EXPECT_TRUE(next.get_future().get().ok());
-  // The builder is left, and nothing of the points.
+  // The builder is left, what became vertices, and nothing else of the points.
   HullBuilder builder;
-  ASSERT_TRUE(builder.Add(line).ok());
-  ASSERT_TRUE(builder.Add(waiting).ok());
-  EXPECT_EQ(registry.Cache().bytes, builder.MemoryBytes());
+  LiveHull live;
+  for (const std::vector<Vector>& points : {line, waiting}) {
+    ASSERT_TRUE(builder.Add(points).ok());
+    live.Append(builder.NewVertices(), builder.dimension());
+  }
+  EXPECT_EQ(registry.Cache().bytes, builder.MemoryBytes() + live.MemoryBytes());
 }
 
 TEST(RegistryOfMemoryStore, PointsThatAreRefusedCountNoMore) {
@@ -213,7 +257,8 @@ TEST_F(RegistryMemory, AReplacementCountsWhileItIsStoredAndAsAHullAfterwards) {
   replacement.create_if_absent = true;
   replacement.builder = std::make_shared<HullBuilder>();
   replacement.counts = *replacement.builder->Add(SpherePoints(1000));
-  const uint64_t bytes = replacement.builder->MemoryBytes();
+  const LiveHull live(replacement.builder->Vertices(), 3);
+  const uint64_t bytes = replacement.builder->MemoryBytes() + live.MemoryBytes();
   ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
   EXPECT_EQ(hulls_->registry().Cache().bytes, bytes);
 }

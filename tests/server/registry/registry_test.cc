@@ -3,10 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <future>
+#include <thread>
 
+#include "core/hull/growth/hull_builder.h"
 #include "server/store/memory_store.h"
+#include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
 namespace {
@@ -71,32 +75,37 @@ TEST_F(RegistryTest, WhatIsServedIsMadeOnceAndSharedUntilTheNextChange) {
   ASSERT_TRUE(Append(session, 3, {{2, 0, 0}}).ok());
   const auto third = registry_.Resolve("h", {});
   EXPECT_NE(first->second.served, third->second.served);
-  EXPECT_EQ(first->second.served->hull().vertices()[1], Vector(1, 0, 0));
-  EXPECT_EQ(third->second.served->hull().vertices()[1], Vector(2, 0, 0));
+  EXPECT_EQ(first->second.served->high(), Vector(1, 0, 0));
+  EXPECT_EQ(third->second.served->high(), Vector(2, 0, 0));
+  // In whatever order they are asked for.
+  EXPECT_EQ(CanonicalOf(third->second).vertices()[1], Vector(2, 0, 0));
+  EXPECT_EQ(CanonicalOf(first->second).vertices()[1], Vector(1, 0, 0));
 }
 
-TEST_F(RegistryTest, TryResolveGivesUpWhereAHullIsNotReady) {
+TEST_F(RegistryTest, AnAcknowledgedChunkIsSeenAtOnce) {
   const std::vector<std::string> ids = {"h", "none"};
   const AppendSession session = Open("h");
-  ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
-  EXPECT_FALSE(registry_.TryResolve(ids).has_value());
-  const auto waited = registry_.Resolve(ids, {});
-  const auto tried = registry_.TryResolve(ids);
-  ASSERT_TRUE(tried.has_value());
-  EXPECT_EQ(tried->store_revision, waited->store_revision);
-  ASSERT_EQ(tried->hulls.size(), 2);
-  EXPECT_EQ(tried->hulls[0]->served, waited->hulls[0]->served);
-  EXPECT_EQ(tried->hulls[0]->record.revision, waited->hulls[0]->record.revision);
-  EXPECT_EQ(tried->hulls[1].status(), waited->hulls[1].status());
-  ASSERT_TRUE(Append(session, 2, {{1, 0, 0}}).ok());
-  EXPECT_FALSE(registry_.TryResolve(ids).has_value());
+  for (uint64_t i = 1; i <= 100; ++i) {
+    ASSERT_TRUE(Append(session, i, {Vector(static_cast<double>(i), 0, 0)}).ok());
+    const auto tried = registry_.TryResolve(ids);
+    ASSERT_TRUE(tried.has_value());
+    ASSERT_EQ(tried->hulls.size(), 2);
+    EXPECT_EQ(tried->store_revision, registry_.Sizes().store_revision);
+    EXPECT_EQ(tried->hulls[0]->record.counts.received, i);
+    EXPECT_EQ(tried->hulls[0]->served->high(), Vector(static_cast<double>(i), 0, 0));
+    EXPECT_EQ(tried->hulls[1].status().code(), absl::StatusCode::kNotFound);
+    const auto waited = registry_.Resolve(ids, {});
+    EXPECT_EQ(tried->store_revision, waited->store_revision);
+    EXPECT_EQ(tried->hulls[0]->served, waited->hulls[0]->served);
+    EXPECT_EQ(tried->hulls[1].status(), waited->hulls[1].status());
+  }
 }
 
-TEST_F(RegistryTest, WhatIsServedIsReadWhileAChunkIsInProgress) {
+// Nothing is ready to be served, and the builder is busy with this very chunk.
+TEST_F(RegistryTest, AReaderDoesNotWaitForTheChunkInProgress) {
   const AppendSession session = Open("h");
   ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
-  ASSERT_TRUE(registry_.Resolve("h", {}).ok());
-  // The builder polls this in the midst of a large chunk; readers go on meanwhile.
+  // The builder polls this in the midst of a large chunk.
   int polls = 0;
   std::vector<Vector> points;
   for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
@@ -104,13 +113,14 @@ TEST_F(RegistryTest, WhatIsServedIsReadWhileAChunkIsInProgress) {
     ++polls;
     const auto view = registry_.Resolve("h", {});
     EXPECT_TRUE(view.ok());
-    EXPECT_EQ(view->second.served->hull().vertices().size(), 1);
+    EXPECT_EQ(view->second.served->query_hull().point_count(), 1);
+    EXPECT_EQ(CanonicalOf(view->second).vertices().size(), 1);
     EXPECT_EQ(registry_.List("", "", 10).hulls.size(), 1);
     return false;
   });
   EXPECT_TRUE(result.ok());
   EXPECT_GT(polls, 1);
-  EXPECT_EQ(registry_.Resolve("h", {})->second.served->hull().vertices().size(), 2);
+  EXPECT_EQ(CanonicalOf(registry_.Resolve("h", {})->second).vertices().size(), 2);
 }
 
 TEST_F(RegistryTest, ACancelledChunkChangesNothingAndMayBeSentAgain) {
@@ -122,40 +132,132 @@ TEST_F(RegistryTest, ACancelledChunkChangesNothingAndMayBeSentAgain) {
   EXPECT_TRUE(Append(session, 1, points).ok());
 }
 
-TEST_F(RegistryTest, AReaderThatWaitsForAChunkCanBeCancelled) {
-  const AppendSession session = Open("h");
-  ASSERT_TRUE(Append(session, 1, {{0, 0, 0}}).ok());
-  std::vector<Vector> points;
-  for (int i = 0; i < 20'000; ++i) points.emplace_back(i, 0, 0);
-  bool asked = false;
-  ASSERT_TRUE(Append(session, 2, std::move(points), [&] {
-                // Nothing is ready to be served, and the builder is busy with this very chunk.
-                if (!std::exchange(asked, true)) {
-                  EXPECT_EQ(registry_.Resolve("h", [] { return true; }).status().code(),
-                            absl::StatusCode::kCancelled);
-                }
-                return false;
-              }).ok());
-  EXPECT_TRUE(asked);
-}
-
-TEST_F(RegistryTest, AReaderThatMakesWhatIsServedCanBeCancelled) {
+std::vector<Vector> Paraboloid() {
   std::vector<Vector> points;
   for (int i = -50; i <= 50; ++i) {
     for (int j = -50; j <= 50; ++j) points.emplace_back(i, j, i * i + j * j);
   }
+  return points;
+}
+
+TEST_F(RegistryTest, AReaderThatMakesTheCanonicalSnapshotCanBeCancelled) {
+  const std::vector<Vector> points = Paraboloid();
   ASSERT_TRUE(Append(Open("h"), 1, points).ok());
-  int stopped = 0;
+  const HullView view = registry_.Resolve("h", {})->second;
   for (const int last : {1, 2, 20}) {
     int polls = 0;
-    stopped += absl::IsCancelled(registry_.Resolve("h", [&] { return ++polls >= last; }).status());
-    // Once more than it was told to stop, when the work has ended.
-    EXPECT_EQ(polls, last + 1);
+    EXPECT_TRUE(
+        absl::IsCancelled(registry_.Canonical(view, [&] { return ++polls >= last; }).status()));
+    EXPECT_EQ(polls, last);
+    EXPECT_EQ(view.served->canonical(), nullptr);
   }
-  EXPECT_EQ(stopped, 3);
-  const auto made = registry_.Resolve("h", {});
+  const auto made = registry_.Canonical(view, {});
   ASSERT_TRUE(made.ok()) << made.status();
-  EXPECT_EQ(made->second.served->hull().vertices().size(), points.size());
+  EXPECT_EQ((*made)->vertices().size(), points.size());
+}
+
+TEST_F(RegistryTest, TheCanonicalSnapshotIsMadeOnceAndOnDemand) {
+  ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
+  const HullView view = registry_.Resolve("h", {})->second;
+  EXPECT_EQ(view.served->canonical(), nullptr);
+  EXPECT_EQ(view.served->query_hull().canonical(), nullptr);
+  std::vector<const Hull*> made(4);
+  std::vector<std::thread> threads;
+  for (const Hull*& hull : made) {
+    threads.emplace_back([&] { hull = *registry_.Canonical(view, {}); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const Hull* hull : made) EXPECT_EQ(hull, view.served->canonical());
+  EXPECT_FALSE(view.served->has_canonical_query_hull());
+  EXPECT_EQ(view.served->canonical_query_hull().canonical(), made[0]);
+  // It serves all questions from now on.
+  EXPECT_EQ(&view.served->query_hull(), &view.served->canonical_query_hull());
+  ASSERT_TRUE(Append(OpenAppend("h", "other")->session, 1, {{0, 0, 9000}}).ok());
+  EXPECT_EQ(registry_.Resolve("h", {})->second.served->canonical(), nullptr);
+}
+
+TEST_F(RegistryTest, AReaderThatWaitsForTheCanonicalSnapshotCanBeCancelled) {
+  ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
+  const HullView view = registry_.Resolve("h", {})->second;
+  bool asked = false;
+  const auto made = registry_.Canonical(view, [&] {
+    if (!std::exchange(asked, true)) {
+      std::thread([&] {
+        EXPECT_TRUE(absl::IsCancelled(registry_.Canonical(view, [] { return true; }).status()));
+      }).join();
+    }
+    return false;
+  });
+  EXPECT_TRUE(made.ok());
+  EXPECT_TRUE(asked);
+}
+
+// The version is one that the hull left long ago, and what was prepared since holds later points.
+TEST_F(RegistryTest, ReadersKeepTheVersionThatTheyResolved) {
+  const AppendSession session = Open("h");
+  std::vector<HullView> views;
+  const std::vector<Vector> points = Paraboloid();
+  constexpr size_t kChunk = 500;
+  for (uint64_t i = 1; i * kChunk <= points.size(); ++i) {
+    const auto first = points.begin() + static_cast<ptrdiff_t>((i - 1) * kChunk);
+    ASSERT_TRUE(Append(session, i, {first, first + kChunk}).ok());
+    const std::vector<std::string> ids = {"h"};
+    const auto resolved = registry_.Resolve(ids, {}, {i % 3 == 0 ? 1'000'000U : 0U, true});
+    views.push_back(*resolved->hulls[0]);
+  }
+  for (size_t i = 0; i < views.size(); ++i) {
+    HullBuilder builder;
+    ASSERT_TRUE(builder.Add(std::span(points).first((i + 1) * kChunk)).ok());
+    const Hull expected = builder.Snapshot();
+    EXPECT_TRUE(std::ranges::equal(CanonicalOf(views[i]).vertices(), expected.vertices()));
+  }
+}
+
+TEST_F(RegistryTest, WhatQuestionsPayForIsPreparedFirstOnlyForWhoeverWaits) {
+  const std::vector<std::string> ids = {"h"};
+  ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
+  const ReadPlan many = {1'000'000, true};
+  EXPECT_FALSE(registry_.TryResolve(ids, many).has_value());
+  const auto before = registry_.TryResolve(ids);
+  ASSERT_TRUE(before.has_value());
+  const auto prepared = registry_.Resolve(ids, {}, many);
+  ASSERT_TRUE(prepared.ok());
+  EXPECT_NE(prepared->hulls[0]->served, before->hulls[0]->served);
+  const auto after = registry_.TryResolve(ids, many);
+  ASSERT_TRUE(after.has_value());
+  EXPECT_EQ(after->hulls[0]->served, prepared->hulls[0]->served);
+  // The snapshot is that of the revision, whatever is prepared.
+  EXPECT_EQ(&CanonicalOf(*before->hulls[0]), &CanonicalOf(*after->hulls[0]));
+}
+
+// Each chunk takes all points before it into the hull. Nobody asks.
+TEST_F(RegistryTest, PointsThatAreNoVerticesAnyMoreLeaveMemory) {
+  constexpr int kVertices = 100;
+  constexpr uint64_t kChunks = 1000;
+  const AppendSession session = Open("h");
+  for (uint64_t i = 1; i <= kChunks; ++i) {
+    const auto result = Append(session, i, SpherePoints(kVertices, static_cast<double>(i)));
+    ASSERT_EQ(result->counts.outside, kVertices);
+    ASSERT_EQ(result->vertex_count, kVertices);
+  }
+  // All of them would be 2.4 MB. Bounded by the time limit of the test alone.
+  while (registry_.Cache().bytes > 2'000'000) std::this_thread::yield();
+  const HullView view = registry_.Resolve("h", {})->second;
+  EXPECT_LT(view.served->query_hull().point_count(), 30'000);
+  EXPECT_EQ(CanonicalOf(view).vertices().size(), view.record.vertex_count);
+}
+
+// The thread that prepares does it after the reader has gone on.
+TEST_F(RegistryTest, WhatManyQuestionsPaidForIsPrepared) {
+  const std::vector<std::string> ids = {"h"};
+  ASSERT_TRUE(Append(Open("h"), 1, Paraboloid()).ok());
+  const auto first = registry_.TryResolve(ids, {1'000'000, false});
+  ASSERT_TRUE(first.has_value());
+  // Bounded by the time limit of the test alone.
+  while (registry_.TryResolve(ids)->hulls[0]->served == first->hulls[0]->served) {
+    std::this_thread::yield();
+  }
+  EXPECT_TRUE(registry_.TryResolve(ids, {1'000'000, true}).has_value());
 }
 
 TEST_F(RegistryTest, ADeletionWaitsForTheChunkInProgressAndRefusesTheNext) {
@@ -229,7 +331,7 @@ TEST_F(RegistryTest, ResolvesManyHullsAtOneRevision) {
   EXPECT_EQ(resolved->store_revision, registry_.Sizes().store_revision);
   EXPECT_EQ(resolved->hulls[0]->record.hull_id, "b");
   EXPECT_EQ(resolved->hulls[1].status().code(), absl::StatusCode::kNotFound);
-  EXPECT_EQ(resolved->hulls[2]->served->hull().vertices()[0], Vector(0, 0, 0));
+  EXPECT_EQ(resolved->hulls[2]->served->low(), Vector(0, 0, 0));
   EXPECT_EQ(resolved->hulls[0]->served, resolved->hulls[3]->served);
 }
 

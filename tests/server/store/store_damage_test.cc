@@ -191,7 +191,7 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
   for (int i = 0; i < 20; ++i) {
     ASSERT_TRUE(hulls_->Put(absl::StrCat("h", i), {sphere.begin() + i, sphere.end()}).ok());
   }
-  const Hull expected = hulls_->View("h7")->served->hull();
+  const Hull expected = CanonicalOf(*hulls_->View("h7"));
   ASSERT_TRUE(hulls_->store().db().Flush({}).ok());
   ASSERT_TRUE(hulls_->Put("late", CubeCorners()).ok());
   hulls_ = nullptr;
@@ -240,7 +240,7 @@ TEST_F(StoreDamage, FlippedBitsInItsFilesAreNeverServed) {
       }
       EXPECT_EQ(view->record.vertex_count, 300 - i);
       EXPECT_TRUE(
-          AuditContainment(view->served->hull(), {sphere.data() + i, sphere.size() - i}).ok());
+          AuditContainment(CanonicalOf(*view), {sphere.data() + i, sphere.size() - i}).ok());
     }
     ++(damage ? reported : harmless);
   }

@@ -45,7 +45,7 @@ class StoreFault : public StoreTest {
         EXPECT_FALSE(hulls_->Replace({"h", {}, false, std::make_shared<HullBuilder>(), {}}).ok());
         // Queries go on, on what is in memory and on what is not.
         EXPECT_EQ(hulls_->View("h")->record, before.record);
-        EXPECT_EQ(hulls_->View("h")->served->hull().vertices().size(), 8);
+        EXPECT_EQ(CanonicalOf(*hulls_->View("h")).vertices().size(), 8);
         EXPECT_EQ(hulls_->View("cold")->record.vertex_count, 8);
         EXPECT_EQ(hulls_->View("new").status().code(), absl::StatusCode::kNotFound);
         EXPECT_EQ(hulls_->registry().Sizes().store_revision, revision);
@@ -59,7 +59,7 @@ class StoreFault : public StoreTest {
     EXPECT_GT(accepted->hull_revision, revision);
     const HullView after = *hulls_->View("h");
     EXPECT_EQ(after.record.counts.received, 9);
-    EXPECT_TRUE(AuditHull(after.served->hull()).ok());
+    EXPECT_TRUE(AuditHull(CanonicalOf(after)).ok());
     Start();
     EXPECT_EQ(hulls_->View("h")->record, after.record);
   }
@@ -398,7 +398,7 @@ TEST_F(StoreFault, NoAckPrecedesItsSync) {
       EXPECT_GE(view->record.revision, told.revision);
       EXPECT_GE(view->record.revision, last_revision[id]);
       EXPECT_GE(view->record.counts.received, told.received);
-      EXPECT_TRUE(AuditHull(view->served->hull()).ok());
+      EXPECT_TRUE(AuditHull(CanonicalOf(*view)).ok());
       last_revision[id] = told.revision;
       chunks = std::max(chunks, told.sequence);
     }

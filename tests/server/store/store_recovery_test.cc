@@ -29,8 +29,8 @@ class StoreRecovery : public StoreTest {
 
 void ExpectSame(const HullView& a, const HullView& b) {
   EXPECT_EQ(a.record, b.record);
-  const Hull& x = a.served->hull();
-  const Hull& y = b.served->hull();
+  const Hull& x = CanonicalOf(a);
+  const Hull& y = CanonicalOf(b);
   EXPECT_TRUE(std::ranges::equal(x.vertices(), y.vertices()));
   EXPECT_TRUE(std::ranges::equal(x.edges(), y.edges()));
   ASSERT_EQ(x.facet_count(), y.facet_count());
@@ -81,7 +81,7 @@ TEST_F(StoreRecovery, AHullOfManyDeltasComesBackBitForBit) {
     ASSERT_TRUE(first.Append(session, ++sequence, chunk).ok());
   }
   const HullView before = *first.View("h");
-  EXPECT_TRUE(AuditHull(before.served->hull()).ok());
+  EXPECT_TRUE(AuditHull(CanonicalOf(before)).ok());
   // 144 kB of vertices: folded when the deltas reached 64 KiB, not with each chunk.
   const size_t deltas = CountKeys(kDeltaPrefix);
   EXPECT_GT(deltas, 0);

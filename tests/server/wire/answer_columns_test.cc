@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/query/placed/live_hull.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
@@ -84,16 +85,18 @@ TEST(EncodeCertificate, PairsCarryTheirVertices) {
 
 TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   const Hull hull = Tetrahedron();
+  const QueryHull query_hull(hull);
+  const PlacedHull placed(query_hull, Pose());
   const v1::Wanted wanted = Everything();
   Answer bare;
   bare.relation = Relation::kSeparated;
   bare.separation = Separation{kInfinity, kInfinity};
   bare.within_clearance = false;
   v1::AnswerColumns columns;
-  size_t bytes = AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, wanted, &columns);
+  size_t bytes = AddAnswer(absl::StatusOr<Answer>(FullAnswer()), placed, placed, wanted, &columns);
   bytes += AddUnanswered(wanted, &columns);
-  bytes += AddAnswer(absl::StatusOr<Answer>(bare), hull, hull, wanted, &columns);
-  bytes += AddAnswer(absl::StatusOr<Answer>(absl::ResourceExhaustedError("why")), hull, hull,
+  bytes += AddAnswer(absl::StatusOr<Answer>(bare), placed, placed, wanted, &columns);
+  bytes += AddAnswer(absl::StatusOr<Answer>(absl::ResourceExhaustedError("why")), placed, placed,
                      wanted, &columns);
   EXPECT_GE(bytes, columns.ByteSizeLong() - 64);
   EXPECT_THAT(columns.relations(), ElementsAre(v1::RELATION_OVERLAPPING, v1::RELATION_UNSPECIFIED,
@@ -122,10 +125,13 @@ TEST(AnswerColumns, EachColumnHoldsAnEntryPerPair) {
   EXPECT_EQ(columns.pair_problems(0).reason(), v1::ERROR_REASON_LIMIT_EXCEEDED);
 }
 
+// Then hulls without a canonical snapshot will do.
 TEST(AnswerColumns, WhatIsNotWantedIsNotSent) {
-  const Hull hull = Tetrahedron();
+  const LiveHull live({{0, 0, 0}, {0, 0, 4}, {0, 4, 0}, {4, 0, 0}}, 3);
+  const std::shared_ptr<const QueryHull> version = live.VersionAt(live.Now());
+  const PlacedHull placed(*version, Pose());
   v1::AnswerColumns columns;
-  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), hull, hull, v1::Wanted(), &columns);
+  AddAnswer(absl::StatusOr<Answer>(FullAnswer()), placed, placed, v1::Wanted(), &columns);
   AddUnanswered(v1::Wanted(), &columns);
   v1::AnswerColumns expected;
   expected.add_relations(v1::RELATION_OVERLAPPING);

@@ -1,0 +1,75 @@
+#include "server/registry/served_hull.h"
+
+#include <chrono>
+#include <utility>
+#include <vector>
+
+#include "core/base/check.h"
+#include "core/hull/growth/hull_builder.h"
+#include "server/registry/hull_loader.h"
+
+namespace hulld::server {
+namespace {
+
+// How soon a reader that waits for another notices that its call was cancelled.
+constexpr std::chrono::milliseconds kCancellationPoll(20);
+
+std::vector<Vector> PointsOf(const QueryHull& version) {
+  std::vector<Vector> points;
+  points.reserve(version.point_count());
+  for (uint32_t i = 0; i < version.point_count(); ++i) points.push_back(version.point(i));
+  return points;
+}
+
+absl::StatusOr<Hull> MakeSnapshot(const QueryHull& version, const HullRecord& record,
+                                  const std::function<bool()>& should_stop) {
+  const absl::StatusOr<std::unique_ptr<HullBuilder>> builder =
+      BuildHull(record, PointsOf(version), should_stop);
+  if (!builder.ok()) return builder.status();
+  return (*builder)->Snapshot(should_stop);
+}
+
+}  // namespace
+
+CanonicalHull::CanonicalHull(Hull hull) { Keep(std::move(hull)); }
+
+void CanonicalHull::Keep(Hull hull) {
+  hull_.emplace(std::move(hull));
+  hull_bytes_.store(hull_->MemoryBytes(), std::memory_order_release);
+}
+
+absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& record,
+                                 const std::function<bool()>& should_stop) {
+  std::unique_lock lock(mutex_);
+  while (making_) {
+    changed_.wait_for(lock, kCancellationPoll);
+    if (should_stop && should_stop()) return absl::CancelledError("the call was cancelled");
+  }
+  if (is_made()) return absl::OkStatus();
+  making_ = true;
+  lock.unlock();
+  absl::StatusOr<Hull> made = MakeSnapshot(version, record, should_stop);
+  lock.lock();
+  making_ = false;
+  if (made.ok()) Keep(*std::move(made));
+  lock.unlock();
+  changed_.notify_all();
+  return made.status();
+}
+
+const QueryHull& CanonicalHull::query_hull() {
+  std::call_once(query_hull_once_, [this] {
+    HULLD_CHECK(is_made());
+    query_hull_.emplace(*hull_);
+    query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
+  });
+  return *query_hull_;
+}
+
+ServedHull::ServedHull(std::shared_ptr<const QueryHull> version, const Vector& low,
+                       const Vector& high, std::shared_ptr<CanonicalHull> canonical)
+    : version_(std::move(version)), low_(low), high_(high), canonical_(std::move(canonical)) {
+  HULLD_CHECK(version_ != nullptr && canonical_ != nullptr);
+}
+
+}  // namespace hulld::server
