@@ -57,66 +57,77 @@ LiveHull::LiveHull() : scanned_(std::make_shared<std::atomic<uint64_t>>(0)) {
 }
 
 LiveHull::LiveHull(std::vector<Vector> points, int dimension) : LiveHull() {
-  if (!points.empty()) Begin(std::move(points), dimension);
+  if (!points.empty()) Begin(std::move(points), dimension, now_);
 }
 
 LiveHull::LiveHull(const LiveHull& other, const Mark& mark) : LiveHull() {
-  const std::lock_guard lock(other.mutex_);
   if (mark.count_ == 0) return;
-  const LiveParts& parts = *other.PartsFor(mark);
-  const size_t tail_count = mark.count_ - parts.covered;
+  Parts parts;
+  {
+    const std::lock_guard lock(other.mutex_);
+    parts = other.PartsFor(mark);
+  }
+  const size_t tail_count = mark.count_ - parts->covered;
   now_ = mark;
   now_.parts_ = std::make_shared<const LiveParts>(
-      LiveParts{parts.base, parts.levels, parts.covered,
-                CopyOf(parts.tail.get(), 0, tail_count, parts.base->center())});
+      LiveParts{parts->base, parts->levels, parts->covered,
+                CopyOf(parts->tail.get(), 0, tail_count, parts->base->center())});
 }
 
-// All points that there are so far become a base to be scanned. Requires the mutex, or nobody else.
-void LiveHull::Begin(std::vector<Vector> points, int dimension) {
+// All points that there are so far become a base to be scanned.
+void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
   for (const Vector& p : points) {
-    now_.low_ = now_.low_.cwiseMin(p);
-    now_.high_ = now_.high_.cwiseMax(p);
+    next.low_ = next.low_.cwiseMin(p);
+    next.high_ = next.high_.cwiseMax(p);
   }
-  now_.count_ = std::max<uint64_t>(now_.count_ + 1, points.size());
-  now_.dimension_ = dimension;
+  next.count_ = std::max<uint64_t>(next.count_ + 1, points.size());
+  next.dimension_ = dimension;
   auto base = std::make_shared<const HullBase>(std::move(points), dimension);
-  now_.exponent_ = base->exponent();
+  next.exponent_ = base->exponent();
   auto tail = std::make_shared<GrowthTail>(kFirstTailCapacity, base->center());
-  now_.parts_ = std::make_shared<const LiveParts>(
-      LiveParts{std::move(base), {}, now_.count_, std::move(tail)});
+  next.parts_ = std::make_shared<const LiveParts>(
+      LiveParts{std::move(base), {}, next.count_, std::move(tail)});
 }
 
 LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
-  const std::lock_guard lock(mutex_);
+  // Only who holds this changes now_ and the tail, so both can be read without the other mutex.
+  const std::lock_guard changing(changing_);
   if (points.empty()) return now_;
-  if (dimension == now_.dimension_) {
-    AppendToTail(points);
+  Mark next = now_;
+  if (dimension == next.dimension_) {
+    AppendToTail(points, next);
   } else {
-    std::vector<Vector> all = PointsOf(*now_.parts_, now_.count_);
+    std::vector<Vector> all = PointsOf(*next.parts_, next.count_);
     all.insert(all.end(), points.begin(), points.end());
-    Begin(std::move(all), dimension);
+    Begin(std::move(all), dimension, next);
   }
-  return now_;
+  Mark before = next;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(now_, before);
+  }
+  return next;
 }
 
-void LiveHull::AppendToTail(std::span<const Vector> points) {
-  const size_t tail_count = now_.count_ - now_.parts_->covered;
-  HULLD_CHECK(now_.parts_->tail->size() == tail_count);
-  if (tail_count + points.size() > now_.parts_->tail->capacity()) {
-    LiveParts parts = *now_.parts_;
+// Nobody reads a tail beyond what a mark says.
+void LiveHull::AppendToTail(std::span<const Vector> points, Mark& next) {
+  const size_t tail_count = next.count_ - next.parts_->covered;
+  HULLD_CHECK(next.parts_->tail->size() == tail_count);
+  if (tail_count + points.size() > next.parts_->tail->capacity()) {
+    LiveParts parts = *next.parts_;
     const size_t capacity = std::max(2 * parts.tail->capacity(), tail_count + points.size());
     auto tail = std::make_shared<GrowthTail>(capacity, parts.base->center());
     for (size_t i = 0; i < tail_count; ++i) tail->Append(parts.tail->point(i));
     parts.tail = std::move(tail);
-    now_.parts_ = std::make_shared<const LiveParts>(std::move(parts));
+    next.parts_ = std::make_shared<const LiveParts>(std::move(parts));
   }
   for (const Vector& p : points) {
-    now_.parts_->tail->Append(p);
-    now_.low_ = now_.low_.cwiseMin(p);
-    now_.high_ = now_.high_.cwiseMax(p);
-    now_.exponent_ = LowestBitExponent(p, now_.exponent_);
+    next.parts_->tail->Append(p);
+    next.low_ = next.low_.cwiseMin(p);
+    next.high_ = next.high_.cwiseMax(p);
+    next.exponent_ = LowestBitExponent(p, next.exponent_);
   }
-  now_.count_ += points.size();
+  next.count_ += points.size();
 }
 
 LiveHull::Mark LiveHull::Now() const {
@@ -222,14 +233,18 @@ void LiveHull::Prepare(const Mark& mark) {
     after.levels.push_back(std::make_shared<const PreparedLevel>(Map(std::move(points)), radius));
   }
 
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard changing(changing_);
   const LiveParts& current = *now_.parts_;
   // When the dimension grew meanwhile, all points are in a new base.
   if (current.covered > mark.count_) return;
   after.tail = CopyOf(current.tail.get(), mark.count_ - current.covered,
                       now_.count_ - current.covered, after.base->center());
-  now_.parts_ = std::make_shared<const LiveParts>(std::move(after));
-  scanned_ = std::make_shared<std::atomic<uint64_t>>(0);
+  Parts parts = std::make_shared<const LiveParts>(std::move(after));
+  auto scanned = std::make_shared<std::atomic<uint64_t>>(0);
+  const std::lock_guard lock(mutex_);
+  // What was before goes after the mutex is released.
+  std::swap(now_.parts_, parts);
+  std::swap(scanned_, scanned);
 }
 
 size_t LiveHull::MemoryBytes() const {

@@ -91,9 +91,13 @@ class LiveHull {
 
   // What serves a mark best. Requires the mutex.
   const Parts& PartsFor(const Mark& mark) const;
-  void Begin(std::vector<Vector> points, int dimension);
-  void AppendToTail(std::span<const Vector> points);
+  static void Begin(std::vector<Vector> points, int dimension, Mark& next);
+  static void AppendToTail(std::span<const Vector> points, Mark& next);
 
+  // Held by whoever appends and at the end of Prepare(), for as long as that copies points. Taken
+  // before the other.
+  std::mutex changing_;
+  // Held for moments only, so that no version waits for what is appended.
   mutable std::mutex mutex_;
   Mark now_;
   // Points scanned since the last Prepare().
