@@ -361,6 +361,20 @@ function live(   line, fields, row, key, order_of, i, n, part) {
   measured()
 }
 
+function live_service(   line, fields, row, reader) {
+  head("| vertices | question | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
+  while ((getline line < ("results/server_live_" machine ".csv")) > 0) {
+    split_row(line, fields)
+    if (row++ == 0) continue
+    reader = fields[4] != ""
+    printf "| %d | %s | %s | %s | %s | %s | %s |\n", fields[1], fields[2], (reader ? unit(1000 * fields[4]) : "-"),
+           (reader ? unit(1000 * fields[5]) : "-"), (reader ? sprintf("%.2f", fields[6]) : "-"),
+           (reader ? sprintf("%.2f", fields[7]) : "-"), (fields[8] > 0 ? sprintf("%.0f/s", fields[8]) : "-")
+  }
+  files = "[`server_live_" machine ".csv`](" results "server_live_" machine ".csv)"
+  measured()
+}
+
 function busy(   line, fields, row) {
   head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
   while ((getline line < ("results/server_busy_" machine ".csv")) > 0) {
@@ -436,6 +450,7 @@ BEGIN {
   else if (table == "overload") overload()
   else if (table == "busy") busy()
   else if (table == "live") live()
+  else if (table == "live-service") live_service()
   else if (table == "summary") summary()
   else {
     print "tables.awk: no table " table > "/dev/stderr"
