@@ -404,6 +404,17 @@ function pair(what, set,   peers, n, i, best) {
   compare(what, cell[set, "hulld", "ns"], named(best), cell[set, best, "ns"],
           cell[set, "hulld", "wrong"] " / " cell[set, best, "wrong"])
 }
+# One point and one question of a growing hull.
+function grown(vertices,   path, line, fields, step) {
+  path = "results/query_live_" machine ".csv"
+  while ((getline line < path) > 0) {
+    split_row(line, fields)
+    if (fields[1] == "1 point, 1 question" && fields[3] == vertices) step[fields[2]] = 1000 * fields[4]
+  }
+  close(path)
+  if (index(files, "query_live") == 0) files = files ", [`query_live_" machine ".csv`](" results "query_live_" machine ".csv)"
+  compare("one point more, then a question, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
+}
 function summary(   one) {
   read_rows("hull_build_" machine)
   read_rows("hull_stream_" machine)
@@ -418,6 +429,8 @@ function summary(   one) {
           10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
           cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \
           cell[one, "cgal delaunay one at a time", "vertices_missing_or_extra"])
+  grown(1000)
+  grown(100000)
   pair("pair of 64 vertices, far apart", "sphere:64 far")
   pair("pair of 64 vertices, 1 to 5 % apart", "sphere:64 close")
   pair("pair of 64 vertices, 1e-6 apart", "sphere:64 gap")

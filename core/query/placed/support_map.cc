@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "core/base/check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/simd_path.h"
 
@@ -289,6 +290,8 @@ class SupportMap::Filling {
     Cell& cell = map_.cells_[grid.first + range.i_begin * grid.side + range.j_begin];
     const bool divides = found.size > kMostListed && grid.width > kLeastWidth * kPartsASide &&
                          map_.cells_.size() < most_cells_;
+    // Beyond, ids would not tell points, lists and parts apart.
+    HULLD_CHECK(map_.cells_.size() < kDivided - kLong && map_.lists_.size() < kDivided - kLong);
     if (!divides) {
       cell.ids[3] = kLong + static_cast<uint32_t>(map_.lists_.size());
       map_.lists_.push_back(static_cast<uint32_t>(found.size));
@@ -336,6 +339,7 @@ SupportMap SupportMap::ForScanning(std::span<const Vector> points) {
 }
 
 SupportMap::SupportMap(std::span<const Vector> points) : points_(points) {
+  HULLD_CHECK(points_.size() < kLong);
   if (points_.size() <= kMostScanned) {
     BuildBlocks();
     return;
