@@ -52,10 +52,10 @@ class SmallPair {
     a_.Best(x, y, z, best_a);
     against_b_.Best(x, y, z, best_b);
     // Both at once: A in the lower half, B in the upper.
-    Lanes best = __builtin_shuffle(best_a, best_b, LaneIds{0, 1, 4, 5});
-    const Lanes rest = __builtin_shuffle(best_a, best_b, LaneIds{2, 3, 6, 7});
+    Lanes best = __builtin_shufflevector(best_a, best_b, 0, 1, 4, 5);
+    const Lanes rest = __builtin_shufflevector(best_a, best_b, 2, 3, 6, 7);
     best = best > rest ? best : rest;
-    const Lanes turned = __builtin_shuffle(best, LaneIds{1, 0, 3, 2});
+    const Lanes turned = __builtin_shufflevector(best, best, 1, 0, 3, 2);
     best = best > turned ? best : turned;
     const LaneIds ids = reinterpret_cast<LaneIds>(best);
     const VertexPair found = {a_.VertexOf(ids[0]), against_b_.VertexOf(ids[2])};

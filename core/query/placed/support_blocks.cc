@@ -53,16 +53,16 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
   }
   // Which lane wins cannot be foreseen, so no branch depends on it.
   Lanes largest = best;
-  Lanes other = __builtin_shuffle(largest, LaneIds{2, 3, 0, 1});
+  Lanes other = __builtin_shufflevector(largest, largest, 2, 3, 0, 1);
   largest = largest > other ? largest : other;
-  other = __builtin_shuffle(largest, LaneIds{1, 0, 3, 2});
+  other = __builtin_shufflevector(largest, largest, 1, 0, 3, 2);
   largest = largest > other ? largest : other;
   // Where nothing is equal to itself, as for a direction that is not a number, any point will do.
   const LaneIds none = {kNone, kNone, kNone, kNone};
   LaneIds first = best >= largest ? best_ids : none;
-  LaneIds other_ids = __builtin_shuffle(first, LaneIds{2, 3, 0, 1});
+  LaneIds other_ids = __builtin_shufflevector(first, first, 2, 3, 0, 1);
   first = first < other_ids ? first : other_ids;
-  other_ids = __builtin_shuffle(first, LaneIds{1, 0, 3, 2});
+  other_ids = __builtin_shufflevector(first, first, 1, 0, 3, 2);
   first = first < other_ids ? first : other_ids;
   return {first[0] == kNone ? 0 : static_cast<uint32_t>(first[0]), largest[0]};
 }

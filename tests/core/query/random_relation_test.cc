@@ -169,7 +169,6 @@ TEST(RandomRelation, NearlyDegenerateHullsMatchTheOracle) {
 TEST(RandomRelation, MixedMagnitudesMatchTheOracle) {
   const uint64_t seed = TestSeed(504);
   Random random(seed);
-  RelationCheck check;
   const double magnitudes[] = {0,      1,       -1,     1e-310, -5e-324, 1e300,
                                -1e300, 1.7e308, 1e-160, 1e160,  -3e-150, 0x1p-537};
   const auto any = [&] { return magnitudes[random.Below(std::size(magnitudes))]; };
