@@ -64,12 +64,12 @@ inline constexpr double kMinkowskiErrorFactor = 128 * kUnitRoundoff;
 // |n| per component (sqrt(3) * 16 * 3 u |n| M < 84 u |n| M more). Proven.
 //
 // The same for a small pair, whose vertices are turned instead (small_pair.h), to the same total. A
-// turned vertex errs by 57 u M per component, so its value by 171 u |n| M. Values are rounded by 16 u
-// |n| S, and the number of a vertex in the low 4 bits of a value, at most 3 |n| S in magnitude,
-// changes it by 16 units in the last place, 96 u |n| S: the largest so found is below the true one by
-// at most (171 + 16 + 96) u |n| S, and what its turned vertices give by (96 + 16) u |n| S more. The
-// value is then computed from their difference, at most 4 S: rounding the difference and moving B
-// take 3 * 7 u |n| S, the product 36 u |n| S. In total below 460 u |n| S. Proven.
+// turned vertex errs by 57 u M per component, so its value by 171 u |n| M. Values are rounded by 16
+// u |n| S, and the number of a vertex in the low 4 bits of a value, at most 3 |n| S in magnitude,
+// changes it by 16 units in the last place, 96 u |n| S: the largest so found is below the true one
+// by at most (171 + 16 + 96) u |n| S, and what its turned vertices give by (96 + 16) u |n| S more.
+// The value is then computed from their difference, at most 4 S: rounding the difference and moving
+// B take 3 * 7 u |n| S, the product 36 u |n| S. In total below 460 u |n| S. Proven.
 inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 
 // det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most
@@ -105,10 +105,10 @@ inline constexpr double kGapPositionFactor = 4;
 // times |n_W| M. Proven.
 inline constexpr double kSupportBlurFactor = 32 * kUnitRoundoff;
 
-// How much farther a point lies than another at the best corner of a square of directions (s, t, 1),
-// |s|, |t| at most 1 + 2^-20 (support_map.h): five terms of differences of at most E. The
-// differences err by u E each, the products by u E, the sums by 4 u * 5 E: below 32 u E in all; twice
-// that, as underflow adds less. Times E. Proven.
+// How much farther a point lies than another at the best corner of a square of directions (s, t,
+// 1), |s|, |t| at most 1 + 2^-20 (support_map.h): five terms of differences of at most E. The
+// differences err by u E each, the products by u E, the sums by 4 u * 5 E: below 32 u E in all;
+// twice that, as underflow adds less. Times E. Proven.
 inline constexpr double kLeadErrorFactor = 64 * kUnitRoundoff;
 
 // The distance of a vertex from the hull's centre: the difference errs by u of itself, the norm by

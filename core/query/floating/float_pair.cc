@@ -7,7 +7,7 @@ namespace hulld {
 
 std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
                                                   const PlainVector& n_own, double error,
-                                                   double slack, CandidateBuffer& buffer) {
+                                                  double slack, CandidateBuffer& buffer) {
   const std::span<const Vector> vertices = placed.query_hull().points_together();
   if (vertices.empty() || vertices.size() > CandidateBuffer::kMostFew) {
     buffer.many = placed.query_hull().Candidates(n_own, error, slack);
