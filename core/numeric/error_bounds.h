@@ -101,8 +101,8 @@ inline constexpr double kGapNormalFactor = 12.5;
 inline constexpr double kGapPositionFactor = 4;
 
 // A value n . v in a hull's own frame, n with components at most sqrt(3) |n_W|: products and sums
-// err by at most 3 u * 3 sqrt(3) |n_W| M < 16 u |n_W| M. Twice that, as the blur of a support map;
-// times |n_W| M. Proven.
+// err by at most 3 u * 3 sqrt(3) |n_W| M < 16 u |n_W| M. Twice that: two values that differ by more
+// are ordered rightly, which is what a support map promises. Times |n_W| M. Proven.
 inline constexpr double kSupportBlurFactor = 32 * kUnitRoundoff;
 
 // How much farther a point lies than another at the best corner of a square of directions (s, t,

@@ -88,6 +88,10 @@ inline constexpr double kQuaternionMax = 0x1p100;
 // threshold. Proven.
 inline constexpr double kGapMinBound = 0x1p-900;
 
+// The square of a length above this lost to underflow, 3 * 2^-1075, far less than a unit in its
+// last place. Proven.
+inline constexpr double kRadiusSquareMin = 0x1p-1000;
+
 // Distances of planes from the origin, in floating point, that differ by less than this may have
 // underflowed. Proven.
 inline constexpr double kDepthKeyMin = 0x1p-1000;

@@ -15,7 +15,7 @@ namespace hulld {
 double RadiusTo(const Vector& difference) {
   constexpr double kRootOfThree = 1.7320508075688774;
   const double square = difference.squaredNorm();
-  if (square > kDepthKeyMin && square < kLargestDouble) {
+  if (square > kRadiusSquareMin && square < kLargestDouble) {
     return std::sqrt(square) * kRadiusRoundUp + kLeastPositive;
   }
   return kRootOfThree * difference.cwiseAbs().maxCoeff() * kRadiusRoundUp + kLeastPositive;

@@ -77,7 +77,7 @@ class QueryHull {
   // than `slack`.
   std::vector<uint32_t> Candidates(const PlainVector& n, double error, double slack) const;
 
-  // About center(), of a part of the hull; `Reach` tells how far the rest reaches.
+  // About center(), of the base alone; BoundsAt tells of the whole hull.
   const CenterBounds& center_bounds() const { return base_->center_bounds(); }
   // Upper bounds as CenterBounds gives them, of the whole hull, along n at its place.
   CenterBounds::Bounds BoundsAt(const CenterBounds::Place& place, const PlainVector& n) const {
