@@ -41,8 +41,8 @@ class TaskPool {
   // Meanwhile a thread pauses so long after each slice: the system gives its core to the threads of
   // gRPC, and of clients on this machine, that wait for one, and would otherwise let this thread go
   // on until the next tick. Observed on two cores: single calls beside batches have a p99 of 2.2 to
-  // 2.5 times idle, without pauses 7 to 9 times; batches make 45 % fewer pairs meanwhile. Beside
-  // other programs nothing is lost, as a thread that paused is owed its share.
+  // 3.0 times idle, without pauses 7 to 9 times; batches make a third to a half fewer pairs
+  // meanwhile (tests/bench/results/server_overload_*.csv).
   static constexpr std::chrono::microseconds kPauseTime{80};
 
   // The slices of one long call. Destroyed with none of them waiting: let each hold its owner.

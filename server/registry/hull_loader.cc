@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "core/numeric/orientation.h"
 #include "server/store/store_errors.h"
@@ -19,8 +20,6 @@ bool SpanSpace(std::span<const Vector> points) {
            return Orient3d(points[0], points[third], points[2 * third], point) != 0;
          });
 }
-
-}  // namespace
 
 absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& stored) {
   absl::StatusOr<std::vector<Vector>> points = store.LoadVertices(stored);
@@ -40,6 +39,14 @@ absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& s
   const absl::Status built = BuildHull(stored.record, *points, {}).status();
   if (!built.ok()) return built;
   return points;
+}
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored) {
+  absl::StatusOr<std::vector<Vector>> points = LoadPoints(store, stored);
+  if (!points.ok()) return points.status();
+  return std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
 }
 
 absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,

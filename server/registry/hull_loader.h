@@ -9,15 +9,17 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/query/placed/live_hull.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
-// The points that the store keeps of a committed hull: at least its vertices, and none outside it.
-// Their number and dimension are checked; whether they make the hull that the record describes is
-// left to whatever builds it of them. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE:
-// it cannot be read. Cost: O(n), but that of building the hull where it is flat.
-absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& stored);
+// A committed hull, ready for questions and for growth, of the points that the store keeps of it:
+// at least its vertices, and none outside it. The result is never null. Their number and dimension
+// are checked; whether they make the hull that the record describes is left to whatever builds it
+// of them. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read. Cost:
+// O(n), but that of building the hull where it is flat.
+absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored);
 
 // A builder that holds the hull of these points; the result is never null. DATA_LOSS naming the
 // hull: they do not make what the record says. CANCELLED: should_stop, which may be empty, said so.

@@ -312,15 +312,11 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
     return hull.live;
   }
   locked.Unlock();
-  absl::StatusOr<std::vector<Vector>> points = LoadPoints(store_, stored);
-  std::shared_ptr<LiveHull> loaded;
-  if (points.ok()) {
-    loaded = std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
-  }
+  absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
   locked.Lock();
   if (hull.live != nullptr) return hull.live;
-  if (loaded == nullptr) return points.status();
-  hull.SetLive(std::move(loaded));
+  if (!loaded.ok()) return loaded.status();
+  hull.SetLive(*std::move(loaded));
   ++cache_.loads;
   hull.NoteUse();
   hull.changed.notify_all();

@@ -213,19 +213,15 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     hull.loading = true;
     const StoredHull stored = hull.committed;
     locked.Unlock();
-    absl::StatusOr<std::vector<Vector>> points = LoadPoints(store_, stored);
-    std::shared_ptr<LiveHull> loaded;
-    if (points.ok()) {
-      loaded = std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
-    }
+    absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
     locked.Lock();
     hull.loading = false;
     hull.changed.notify_all();
     // A writer was faster. What was read, or not found, is of a state that was left since.
     const bool is_current = hull.committed.record.revision == stored.record.revision;
     if (hull.live != nullptr || hull.state.gone() || !is_current) continue;
-    if (loaded != nullptr) {
-      hull.SetLive(std::move(loaded));
+    if (loaded.ok()) {
+      hull.SetLive(*std::move(loaded));
       ++cache_.loads;
       hull.NoteUse();
       return absl::OkStatus();
@@ -234,8 +230,8 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     // tells whether they are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
-    if (absl::IsDataLoss(points.status())) MarkDamaged(hull, points.status());
-    return points.status();
+    if (absl::IsDataLoss(loaded.status())) MarkDamaged(hull, loaded.status());
+    return loaded.status();
   }
   return absl::OkStatus();
 }

@@ -26,7 +26,8 @@ constexpr double kShrink[] = {1 - 0x1p-22, 1 - 0x1p-16, 1 - 0x1p-10};
 // A portal whose plane the hull exceeds by less than this, relative to its distance, is as good as
 // a facet: the bounds between corners are no closer.
 constexpr double kLeastGain = 0x1p-8;
-// Observed: portals are found in 3 steps and refined in 4 on average.
+// Far more than needed. Observed on points of a sphere, even with a gain of 2^-26: one step to find
+// a portal, 5 to 13 to refine it, for 64 to 10000 points.
 constexpr int kMostSteps = 64;
 
 float RoundedUp(double value) {

@@ -91,6 +91,7 @@ class LiveHull {
 
   // What serves a mark best. Requires the mutex.
   const Parts& PartsFor(const Mark& mark) const;
+  LiveParts Prepared(const LiveParts& before, const Mark& mark);
   static void Begin(std::vector<Vector> points, int dimension, Mark& next);
   static void AppendToTail(std::span<const Vector> points, Mark& next);
 

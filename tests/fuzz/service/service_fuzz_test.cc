@@ -14,7 +14,7 @@ namespace hulld::fuzz {
 namespace {
 
 // The fuzzer's target without the fuzzer: as many programs on every run, from a fixed seed.
-constexpr int kPrograms = 400;
+constexpr int kPrograms = 500;
 
 std::vector<uint8_t> RandomProgram(Random& random) {
   std::vector<uint8_t> bytes(static_cast<size_t>(random.Between(1, 500)));
@@ -28,7 +28,6 @@ struct Goal {
   int times;
 };
 
-// How often a call is cancelled before it ends depends on how fast both are: once will do.
 constexpr Goal kGoals[] = {
     {"CreateHull OK", 5},
     {"CreateHull INVALID_ARGUMENT", 5},
@@ -38,7 +37,7 @@ constexpr Goal kGoals[] = {
     {"AppendPoints NOT_FOUND", 1},
     {"AppendPoints FAILED_PRECONDITION", 1},
     {"AppendPoints ABORTED", 2},
-    {"AppendPoints CANCELLED", 1},
+    {"AppendPoints CANCELLED", 5},
     {"AppendPoints opened", 20},
     {"ReplaceHull OK", 40},
     {"ReplaceHull replaced", 40},
@@ -47,7 +46,7 @@ constexpr Goal kGoals[] = {
     {"ReplaceHull INVALID_ARGUMENT", 100},
     {"ReplaceHull NOT_FOUND", 2},
     {"ReplaceHull ABORTED", 1},
-    {"ReplaceHull CANCELLED", 1},
+    {"ReplaceHull CANCELLED", 5},
     {"GetHull OK", 10},
     {"GetHull NOT_FOUND", 2},
     {"GetHull INVALID_ARGUMENT", 5},
@@ -73,7 +72,7 @@ constexpr Goal kGoals[] = {
     {"BatchCheckCollisions not read", 1},
     {"StreamCollisions OK", 10},
     {"StreamCollisions INVALID_ARGUMENT", 10},
-    {"StreamCollisions CANCELLED", 1},
+    {"StreamCollisions CANCELLED", 3},
     {"StreamCollisions compared", 5},
     {"StreamCollisions compared after updates", 5},
     {"FindCollisions OK", 10},

@@ -76,12 +76,12 @@ TEST(HullCost, MemoryIsBoundedByTheVertices) {
       EXPECT_LE(static_cast<double>(hull.MemoryBytes()) / vertices, 100) << cloud.name;
       EXPECT_LE(static_cast<double>(b->MemoryBytes()) / vertices, 230) << cloud.name;
       const auto queried = static_cast<double>(hull.MemoryBytes() + QueryHull(hull).MemoryBytes());
-      EXPECT_LE(queried / vertices, 350) << cloud.name;
+      EXPECT_LE(queried / vertices, 150) << cloud.name;
       // What the server holds of a hull that grew and is asked about, at rest.
       LiveHull live(b->Vertices(), b->dimension());
       live.Prepare(live.Now());
       const auto asked = static_cast<double>(live.MemoryBytes() + b->MemoryBytes());
-      EXPECT_LE(asked / vertices, 350) << cloud.name;
+      EXPECT_LE(asked / vertices, 300) << cloud.name;
       std::printf(
           "%s, %s: %.0f vertices, bytes for each: snapshot %.0f, with queries %.0f, builder %.0f, "
           "with queries %.0f\n",
