@@ -72,8 +72,8 @@ std::vector<uint32_t> Enclosure::PlacesOf(const Hull& inside) const {
 Enclosure::Plane Enclosure::MakePlane(const Vector& normal, const Vector& on_plane,
                                       uint32_t start) const {
   const double offset = normal.dot(on_plane);
-  const double reach = vertices_[support_.FarthestAlong(normal, start)].dot(normal);
-  return {normal, offset, std::max(0.0, reach - offset)};
+  const uint32_t farthest = support_.FarthestAlong(normal, start);
+  return {normal, offset, std::max(0.0, vertices_[farthest].dot(normal) - offset), farthest};
 }
 
 std::optional<SimplifiedHull> Enclosure::ByPushing(const Hull& inside) {
@@ -141,46 +141,53 @@ std::optional<SimplifiedHull> Enclosure::ByPlanes(const Hull& inside) {
     const Vector normal = AreaNormal(points, facet).stableNormalized();
     planes.push_back(MakePlane(normal, points[facet[0]], places[facet[0]]));
   }
-  const std::vector<Vector> corners = CornersOf(planes, center);
-  uint32_t near = 0;
-  std::vector<uint32_t> nearest;
-  for (const Vector& corner : corners) {
-    near = support_.FarthestAlong(corner, near);
-    nearest.push_back(near);
-  }
+  const std::vector<Corner> corners = CornersOf(planes, center);
   for (int attempt = 0; attempt < kMostAttempts && !poll_.stopped(); ++attempt) {
     std::vector<Corner> inflated;
-    for (size_t i = 0; i < corners.size(); ++i) {
-      const Vector p = center + (1 + InflationOf(attempt)) * corners[i];
-      inflated.push_back(CornerAt(p, nearest[i]));
+    for (const Corner& corner : corners) {
+      const Vector p = center + (1 + InflationOf(attempt)) * corner.point;
+      inflated.push_back(CornerAt(p, corner.near));
     }
     if (std::optional<SimplifiedHull> hull = HullAround(inflated)) return hull;
   }
   return std::nullopt;
 }
 
-// The corners, from the centre, of the intersection of the half-spaces, by duality: a facet of the
-// hull of the points normal / reach is a corner. Rounded; none where that fails.
-std::vector<Vector> Enclosure::CornersOf(std::span<const Plane> planes,
-                                         const Vector& center) const {
-  std::vector<Vector> dual;
+// The corners, from the centre and at unit scale, of the intersection of the half-spaces, by
+// duality: a facet of the hull of the points normal / reach is a corner. Rounded; none where that
+// fails.
+std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> planes,
+                                                    const Vector& center) const {
+  // In the order of a hull's vertices, so that these lead back to the planes.
+  std::vector<Corner> dual;
   for (const Plane& plane : planes) {
     const double reach = plane.offset + plane.gap - plane.normal.dot(center);
     // Where the centre is so near to a plane, dual points are too far apart to tell corners.
     if (!(reach > 0x1p-300)) return {};
-    dual.push_back(plane.normal / reach);
+    dual.push_back({plane.normal / reach, plane.farthest});
   }
+  const auto less = [](const Vector& a, const Vector& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  };
+  std::sort(dual.begin(), dual.end(),
+            [&](const Corner& a, const Corner& b) { return less(a.point, b.point); });
+  std::vector<Vector> points;
+  for (const Corner& d : dual) points.push_back(d.point);
   HullBuilder builder;
-  if (!builder.Add(dual, {.should_stop = should_stop_}).ok()) return {};
-  const absl::StatusOr<Hull> dual_hull = builder.Snapshot(should_stop_);
-  if (!dual_hull.ok() || dual_hull->dimension() < 3) return {};
-  std::vector<Vector> corners;
-  for (size_t f = 0; f < dual_hull->facet_count(); ++f) {
-    const auto facet = dual_hull->facet(f);
-    const Vector normal = AreaNormal(dual_hull->vertices(), facet).stableNormalized();
-    corners.push_back(normal / normal.dot(dual_hull->vertices()[facet[0]]));
+  if (!builder.Add(points, {.should_stop = should_stop_}).ok()) return {};
+  const absl::StatusOr<Hull> hull = builder.Snapshot(should_stop_);
+  if (!hull.ok() || hull->dimension() < 3) return {};
+  std::vector<Corner> corners;
+  for (size_t f = 0; f < hull->facet_count(); ++f) {
+    const auto facet = hull->facet(f);
+    const Vector& on_facet = hull->vertices()[facet[0]];
+    const Vector normal = AreaNormal(hull->vertices(), facet).stableNormalized();
+    const Vector corner = normal / normal.dot(on_facet);
     // A facet of the dual through the origin has its corner at infinity.
-    if (!(LargestComponent(corners.back()) < 0x1p20)) return {};
+    if (!(LargestComponent(corner) < 0x1p20)) return {};
+    const size_t place =
+        std::lower_bound(points.begin(), points.end(), on_facet, less) - points.begin();
+    corners.push_back({corner, dual[place].near});
   }
   return corners;
 }
@@ -217,7 +224,8 @@ std::optional<SimplifiedHull> Enclosure::HullAround(std::span<const Corner> corn
   double error = 0;
   for (const Corner& corner : corners) {
     if (poll_.Step()) return std::nullopt;
-    error = std::max(error, support_.DistanceBound(scale_.ToUnit(corner.point), corner.near));
+    const Vector p = scale_.ToUnit(corner.point);
+    error = std::max(error, support_.DistanceBound(p, corner.near, error));
   }
   return SimplifiedHull{*std::move(hull), scale_.LengthFromUnit(error)};
 }

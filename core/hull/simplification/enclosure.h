@@ -41,14 +41,15 @@ class Enclosure {
 
  private:
   // A plane n . x = offset, n of unit length and outwards, of a facet of an inside hull, or of an
-  // edge of a polygon; and how far the full hull reaches beyond it.
+  // edge of a polygon; how far the full hull reaches beyond it, and at which vertex.
   struct Plane {
     Vector normal;
     double offset;
     double gap;
+    uint32_t farthest;
   };
-  // A point to enclose with, in the caller's unit, and a vertex of the full hull that is about
-  // nearest.
+  // A point to enclose with, mostly in the caller's unit, and a vertex of the full hull that is
+  // about nearest.
   struct Corner {
     Vector point;
     uint32_t near;
@@ -56,7 +57,7 @@ class Enclosure {
 
   std::vector<uint32_t> PlacesOf(const Hull& inside) const;
   Plane MakePlane(const Vector& normal, const Vector& on_plane, uint32_t start) const;
-  std::vector<Vector> CornersOf(std::span<const Plane> planes, const Vector& center) const;
+  std::vector<Corner> CornersOf(std::span<const Plane> planes, const Vector& center) const;
   Corner CornerAt(const Vector& unit_point, uint32_t near) const {
     return {scale_.FromUnit(unit_point), near};
   }

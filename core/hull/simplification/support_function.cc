@@ -18,7 +18,7 @@ constexpr size_t kMostNeighbours = 64;
 // Support points for one distance. Each makes the bound less, so it holds after any number.
 constexpr int kMostSupportPoints = 32;
 // A bound that is this near to the distance, relatively, is not worth another one.
-constexpr double kEnough = 1e-9;
+constexpr double kRelativeEnough = 1e-9;
 
 double ReachOf(const Vector& low, const Vector& high, const Vector& direction) {
   double reach = 0;
@@ -117,16 +117,16 @@ void SupportFunction::Search(uint32_t at, const Vector& direction, uint32_t& bes
   }
 }
 
-double SupportFunction::DistanceBound(const Vector& p, uint32_t start) const {
+double SupportFunction::DistanceBound(const Vector& p, uint32_t start, double enough) const {
   std::array<Vector, 3> corners = {points_[start], points_[start], points_[start]};
   TriangleDistance best = DistanceToTriangle(corners[0], corners[1], corners[2], p);
   uint32_t at = start;
-  for (int k = 0; k < kMostSupportPoints; ++k) {
+  for (int k = 0; k < kMostSupportPoints && best.bound > enough; ++k) {
     const Vector towards = (p - best.nearest).stableNormalized();
     at = FarthestAlong(towards, at);
     const Vector& support = points_[at];
     // The whole hull is behind the plane through the support point.
-    if (towards.dot(p - support) >= (1 - kEnough) * best.bound) break;
+    if (towards.dot(p - support) >= (1 - kRelativeEnough) * best.bound) break;
     TriangleDistance least = best;
     size_t goes = 3;
     for (size_t out = 0; out < 3; ++out) {

@@ -26,10 +26,11 @@ class SupportFunction {
   // The index of the vertex farthest along the direction. Any start is right; a near one is fast.
   uint32_t FarthestAlong(const Vector& direction, uint32_t start) const;
 
-  // Proven: p is not farther than this from the hull; mostly within one in 10^9. Idea: a triangle
-  // of vertices, one of which gives way to the support point towards p while that brings the
-  // triangle nearer. Source: Gilbert, Johnson and Keerthi 1988. Cost: some 5 support points.
-  double DistanceBound(const Vector& p, uint32_t start) const;
+  // Proven: p is not farther than this from the hull; mostly within one in 10^9, unless less than
+  // `enough`, which then did. Idea: a triangle of vertices, one of which gives way to the support
+  // point towards p while that brings the triangle nearer. Source: Gilbert, Johnson and Keerthi
+  // 1988. Cost: some 5 support points.
+  double DistanceBound(const Vector& p, uint32_t start, double enough) const;
 
  private:
   // A box of order_[first, end), and where its second half is; the first is the next node. 0: a
