@@ -112,7 +112,7 @@ class RoundsInsertion {
     members_.clear();
     if (!is_last) rounds_.AppendRound(round, members_);
     surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(), kMapFineness,
-                           kWalksPerPoint);
+                           kWalksPerPoint, poll_);
     const DirectionMap* directions = surface_.directions();
     if (is_last) ChooseLast(round, directions);
     chosen_.clear();
@@ -146,7 +146,7 @@ class RoundsInsertion {
 
   bool InsertChosen() {
     for (const Vector& point : chosen_) {
-      if (poll_.Step()) return false;
+      if (poll_.Step(1 + surface_.TakeSteps())) return false;
       surface_.Insert(vertices_, point);
     }
     return true;

@@ -140,6 +140,7 @@ void Surface::SetCenter(const VertexTable& vertices) {
   work_ += 2 * triangles_.size();
   const std::optional<Vector> interior = FindInterior(vertices);
   if (!interior) return;
+  KeepDirections();
   directions_.emplace(*interior);
   extent_ = 0;
   ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
@@ -169,7 +170,7 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
 bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
-                            double walks_per_point) {
+                            double walks_per_point, StopPoll& poll) {
   if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return false;
   // Six faces, and some two walks to measure a corner.
   const double affordable = std::sqrt(static_cast<double>(points) * walks_per_point / 12);
@@ -178,8 +179,10 @@ bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double f
   if (wanted < 4) return false;
   if (wanted <= directions_->resolution() && 4 * alive_ <= 5 * measured_at_) return false;
   StartMeasuring(vertices, wanted);
-  ContinueMeasuring(vertices, SIZE_MAX);
-  return true;
+  while (measuring_ && !poll.Step(kCornersPerInsertion)) {
+    ContinueMeasuring(vertices, kCornersPerInsertion);
+  }
+  return !measuring_;
 }
 
 void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
@@ -198,6 +201,7 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
   for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
   if (measuring_->face < 6) return;
   measuring_->map.Finish(measuring_->least, measuring_->largest);
+  KeepDirections();
   directions_ = std::move(measuring_->map);
   measuring_.reset();
 }
