@@ -1,3 +1,5 @@
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 #include <unistd.h>
 
 #include <memory>
@@ -16,6 +18,7 @@ struct ReplaceArguments {
   std::string hull_id;
   PointInput input;
   bool create = false;
+  bool allow_empty = false;
   std::optional<uint64_t> if_revision;
 };
 
@@ -33,6 +36,13 @@ void Print(const Invocation& run, const v1::ReplaceHullResponse& response) {
   table.Print(run.out);
 }
 
+absl::Status NoPoints(const ReplaceArguments& arguments) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("there are no points in ", absl::StrJoin(arguments.input.files, ", "),
+                   ", so nothing was changed; to put an empty hull in the place of ",
+                   arguments.hull_id, ", say --allow-empty"));
+}
+
 ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   uint64_t total_bytes = 0;
   auto plan = PlanReads(arguments.input, &total_bytes);
@@ -44,7 +54,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   ProgressBar bar(run.err, isatty(STDERR_FILENO) != 0, total_bytes);
   // A file that cannot be read ends the call, and the hull stays as it was.
   absl::Status file_error;
-  const auto feed = [&](const Client::PointSink& sink) {
+  const auto feed = [&](const Client::PointSink& sink) -> absl::Status {
     uint64_t bytes_before = 0;
     uint64_t points = 0;
     for (ReadRequest& request : *plan) {
@@ -63,7 +73,9 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
       if (!stream.ok()) return stream;
       if (!counts.ok()) return file_error = counts.status();
     }
-    return absl::OkStatus();
+    // What fed a pipe may have failed: nobody replaces a hull by nothing without saying so.
+    if (points == 0 && !arguments.allow_empty) file_error = NoPoints(arguments);
+    return file_error;
   };
   const auto response = run.MakeClient().ReplaceHull(open, feed, run.given_timeout);
   bar.Clear();
@@ -82,6 +94,8 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
   command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
   AddPointInput(command, &arguments->input);
   command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
+  command.AddFlag("--allow-empty", &arguments->allow_empty,
+                  "Accept files without a point: the hull becomes empty");
   command.AddNumber("--if-revision", 0, std::numeric_limits<uint64_t>::max(),
                     "Only if the hull is at this revision; 0: only if it does not exist",
                     [arguments](uint64_t number) { arguments->if_revision = number; });

@@ -11,11 +11,10 @@
 #include <thread>
 
 #include "client/client.h"
-#include "client/hullctl/hullctl.h"
 #include "client/hullctl/printing/json.h"
 #include "client/verify/certificate_check.h"
 #include "tests/client/formats/point_reading.h"
-#include "tests/server/harness/test_server.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
 namespace {
@@ -24,25 +23,8 @@ using ::google::protobuf::Struct;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-struct Ran {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-class HullctlOnServer : public server::ServerTest {
+class HullctlQuestions : public HullctlOnServer {
  protected:
-  Ran Ask(std::vector<std::string> arguments) {
-    arguments.insert(arguments.end(), {"--server", server_->address()});
-    std::ostringstream out;
-    std::ostringstream err;
-    Ran ran;
-    ran.code = RunHullctl(arguments, out, err);
-    ran.out = out.str();
-    ran.err = err.str();
-    return ran;
-  }
-
   // A recorded answer, as `check --certificate --output json` writes it.
   static std::string Recorded(const v1::CheckCollisionRequest& request,
                               const v1::CheckCollisionResponse& response) {
@@ -62,7 +44,7 @@ class HullctlOnServer : public server::ServerTest {
   }
 };
 
-TEST_F(HullctlOnServer, VerifyTellsValidInvalidAndUncheckableApart) {
+TEST_F(HullctlQuestions, VerifyTellsValidInvalidAndUncheckableApart) {
   Put("cube", server::Cube());
   auto [request, response] = TouchingCubes();
   const TempFile valid("valid.json", Recorded(request, response));
@@ -100,7 +82,7 @@ TEST_F(HullctlOnServer, VerifyTellsValidInvalidAndUncheckableApart) {
   EXPECT_THAT(ran.err, HasSubstr("was deleted"));
 }
 
-TEST_F(HullctlOnServer, VerifyRefusesWhatIsNoRecordedAnswer) {
+TEST_F(HullctlQuestions, VerifyRefusesWhatIsNoRecordedAnswer) {
   const TempFile no_json("no.json", "relation SEPARATED\n");
   EXPECT_EQ(Ask({"verify", no_json.path()}).code, 2);
   const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
@@ -110,7 +92,7 @@ TEST_F(HullctlOnServer, VerifyRefusesWhatIsNoRecordedAnswer) {
   EXPECT_EQ(Ask({"verify", "/no/such/file"}).code, 2);
 }
 
-TEST_F(HullctlOnServer, CheckVerifiesAtOnceAndRecordsForLater) {
+TEST_F(HullctlQuestions, CheckVerifiesAtOnceAndRecordsForLater) {
   Put("cube", server::Cube());
   for (const char* pose : {"0.5,0,0", "1,0,0", "1,1,1", "3,0,0", "1,1,0,0,0,0,1"}) {
     const Ran ran = Ask({"check", "cube", "cube", "--pose-b", pose, "--verify"});
@@ -141,7 +123,7 @@ std::string LatticeScene(uint32_t seed, int placements) {
   return text.str();
 }
 
-TEST_F(HullctlOnServer, EveryCertificateOfABatchIsValid) {
+TEST_F(HullctlQuestions, EveryCertificateOfABatchIsValid) {
   Put("cube", server::Cube());
   Put("ball", server::Sphere(40));
   Put("square", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
@@ -168,7 +150,7 @@ TEST_F(HullctlOnServer, EveryCertificateOfABatchIsValid) {
   }
 }
 
-TEST_F(HullctlOnServer, CertificatesOfCachedAnswersAreValid) {
+TEST_F(HullctlQuestions, CertificatesOfCachedAnswersAreValid) {
   Put("cube", server::Cube(-0.5, 1));
   Put("ball", server::Sphere(80));
   ClientOptions options;
@@ -209,7 +191,7 @@ TEST_F(HullctlOnServer, CertificatesOfCachedAnswersAreValid) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
+TEST_F(HullctlQuestions, SceneFindsWhatCollides) {
   Put("cube", server::Cube());
   const std::string placements =
       R"({"placements":[{"hullId":"cube"},{"hullId":"cube","pose":{"translation":{"x":1}}},
@@ -250,7 +232,7 @@ TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
   EXPECT_THAT(ran.err, HasSubstr("placement 0: hull \"nope\" not found"));
 }
 
-TEST_F(HullctlOnServer, StreamAnswersEachLineByALine) {
+TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
   Put("cube", server::Cube());
   const TempFile file("poses.jsonl",
                       R"({"placements":[{"hullId":"cube"},{"hullId":"cube"}],"pairs":[0,1]})"
@@ -277,7 +259,7 @@ TEST_F(HullctlOnServer, StreamAnswersEachLineByALine) {
   EXPECT_FALSE(std::getline(lines, rest));
 }
 
-TEST_F(HullctlOnServer, StreamErrorsNameTheLineOrTheField) {
+TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   Put("cube", server::Cube());
   const std::string open = R"({"placements":[{"hullId":"cube"},{"hullId":"nope"}],"pairs":[0,1]})"
                            "\n";
@@ -296,7 +278,7 @@ TEST_F(HullctlOnServer, StreamErrorsNameTheLineOrTheField) {
   EXPECT_THAT(ran.err, HasSubstr("the first line must say"));
 }
 
-TEST_F(HullctlOnServer, WishesThatExcludeEachOtherAreExplained) {
+TEST_F(HullctlQuestions, WishesThatExcludeEachOtherAreExplained) {
   Put("cube", server::Cube());
   Ran ran = Ask({"check", "cube", "cube", "--tolerance", "0.1", "--separation"});
   EXPECT_EQ(ran.code, 1);
@@ -310,7 +292,7 @@ TEST_F(HullctlOnServer, WishesThatExcludeEachOtherAreExplained) {
   }
 }
 
-TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
+TEST_F(HullctlQuestions, LoadReportsEveryModeAndLeavesNoHullBehind) {
   Put("cube", server::Cube());
   for (const char* mode : {"check", "batch", "append", "mixed"}) {
     const Ran ran = Ask({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
@@ -324,7 +306,7 @@ TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
   EXPECT_EQ(Ask({"list"}).out, Ask({"list", "cube"}).out);
 }
 
-TEST_F(HullctlOnServer, LoadCountsItemsInJson) {
+TEST_F(HullctlQuestions, LoadCountsItemsInJson) {
   const Ran ran = Ask({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
                        "--rate", "1000", "--json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -348,7 +330,7 @@ TEST_F(HullctlOnServer, LoadCountsItemsInJson) {
   EXPECT_EQ(counted, 5);
 }
 
-TEST_F(HullctlOnServer, LoadRefusesAPrefixThatIsInUse) {
+TEST_F(HullctlQuestions, LoadRefusesAPrefixThatIsInUse) {
   Put("mine/cube", server::Cube());
   const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
   EXPECT_EQ(ran.code, 1);
@@ -356,7 +338,7 @@ TEST_F(HullctlOnServer, LoadRefusesAPrefixThatIsInUse) {
   EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
 }
 
-TEST_F(HullctlOnServer, LoadShowsErrorsByCode) {
+TEST_F(HullctlQuestions, LoadShowsErrorsByCode) {
   const Ran ran = Ask({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
                        "--prefix", "a b"});
   EXPECT_EQ(ran.code, 1);
@@ -365,7 +347,7 @@ TEST_F(HullctlOnServer, LoadShowsErrorsByCode) {
 }
 
 // The signal comes once hulls of the load are there; the load itself would last for minutes.
-TEST_F(HullctlOnServer, AnInterruptedLoadReportsAndDeletesItsHulls) {
+TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
   std::thread interrupter([this] {
     v1::ListHullsRequest request;
     request.set_prefix("short/append-");
@@ -388,7 +370,7 @@ TEST_F(HullctlOnServer, AnInterruptedLoadReportsAndDeletesItsHulls) {
   EXPECT_EQ(left.hulls_size(), 0);
 }
 
-TEST_F(HullctlOnServer, LoadOptionsThatMakeNoSenseAreExplained) {
+TEST_F(HullctlQuestions, LoadOptionsThatMakeNoSenseAreExplained) {
   Ran ran = Ask({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests a second"));
