@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <memory>
 #include <optional>
 
@@ -20,14 +18,14 @@ struct AppendArguments {
   std::string writer;
 };
 
-// Sends files to one hull. The stream opens, and with --create the hull comes into being, once there
-// are points: files that cannot be read leave nothing behind.
+// Sends files to one hull. The stream opens, and with --create the hull comes into being, once
+// there are points: files that cannot be read leave nothing behind.
 class FileAppender {
  public:
   FileAppender(const Invocation& run, const AppendArguments& arguments, uint64_t total_bytes)
       : arguments_(arguments),
         client_(run.MakeClient()),
-        bar_(run.err, isatty(STDERR_FILENO) != 0, total_bytes) {}
+        bar_(run.err, run.shows_progress, "points", total_bytes) {}
 
   // Either the file or the stream fails; the other status is OK then.
   struct Outcome {
@@ -122,25 +120,29 @@ class FileAppender {
   uint64_t resumed_points_ = 0;
 };
 
+// What the server said: `opened`, then all acknowledgements as one, as they may come.
+void PrintJson(const Appender& appender, std::ostream& out) {
+  v1::AppendPointsResponse opened;
+  *opened.mutable_opened() = appender.opened();
+  out << MessageJson(opened) << "\n";
+  const AppendTotals& totals = appender.totals();
+  if (totals.last_ack.sequence() == 0) return;
+  v1::AppendPointsResponse acknowledged;
+  *acknowledged.mutable_ack() = totals.last_ack;
+  *acknowledged.mutable_ack()->mutable_counts() = totals.counts;
+  out << MessageJson(acknowledged) << "\n";
+}
+
 void Print(const Invocation& run, const std::string& hull_id, const FileAppender& files) {
   const Appender& appender = *files.appender();
   const AppendTotals& totals = appender.totals();
   const v1::PointCounts& counts = totals.counts;
-  if (run.json) {
-    run.out << JsonObject()
-                   .Add("hullId", hull_id)
-                   .Add("writerId", appender.writer_id())
-                   .Add("pointsSent", totals.points_sent)
-                   .Add("pointsAcknowledged", totals.points_acknowledged)
-                   .Add("pointsSkippedNonfinite", files.skipped())
-                   .Add("pointsCommittedBefore", files.resumed_points())
-                   .Add("chunks", totals.chunks_sent)
-                   .Add("reconnects", totals.reconnects)
-                   .AddJson("counts", MessageJson(counts))
-                   .Add("vertexCount", totals.vertex_count)
-                   .Add("hullRevision", totals.hull_revision)
-                   .Close()
-            << "\n";
+  if (files.skipped() > 0 && run.form != OutputForm::kTable && !run.wide()) {
+    run.err << "hullctl: " << files.skipped() << " points that are not finite were left out\n";
+  }
+  if (run.json()) return PrintJson(appender, run.out);
+  if (run.names()) {
+    run.out << hull_id << "\n";
     return;
   }
   Table table;
@@ -212,7 +214,9 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
 void AddAppendCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<AppendArguments>();
   Command command = program.AddCommand("append", "Add the points of files to a hull");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
+  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   AddPointInput(command, &arguments->input);
   command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
   const Option writer =
@@ -223,9 +227,16 @@ void AddAppendCommand(Command program, Invocation* invocation) {
                "The same command was interrupted: leave out the chunks that this writer has "
                "committed")
       .Needs(writer);
-  command.SetFooter(
+  command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf.\n"
+      "--create makes the hull when there are points for it; files that are refused leave none.\n"
       "--resume needs the same files, options and writer as before.");
+  command.SetExamples(
+      {{"A new hull of a file", "hullctl append spider spider.obj --create"},
+       {"Points as another program makes them", "scanner | hullctl append room - --create"},
+       {"One that can be carried on with after an interruption",
+        "hullctl append ball ball.xyz --create --writer lab"},
+       {"", "hullctl append ball ball.xyz --writer lab --resume"}});
   command.OnGiven([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
 }
 

@@ -1,6 +1,5 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
-#include <unistd.h>
 
 #include <memory>
 #include <optional>
@@ -23,11 +22,15 @@ struct ReplaceArguments {
 };
 
 void Print(const Invocation& run, const v1::ReplaceHullResponse& response) {
-  if (run.json) {
+  if (run.json()) {
     run.out << MessageJson(response) << "\n";
     return;
   }
   const v1::HullInfo& hull = response.hull();
+  if (run.names()) {
+    run.out << hull.hull_id() << "\n";
+    return;
+  }
   Table table;
   table.Row({"hull", hull.hull_id() + (response.created() ? " created" : " replaced")})
       .Row({"points", std::to_string(hull.counts().received())})
@@ -51,7 +54,7 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   open.set_hull_id(arguments.hull_id);
   open.set_create_if_absent(arguments.create);
   if (arguments.if_revision.has_value()) open.set_if_revision(*arguments.if_revision);
-  ProgressBar bar(run.err, isatty(STDERR_FILENO) != 0, total_bytes);
+  ProgressBar bar(run.err, run.shows_progress, "points", total_bytes);
   // A file that cannot be read ends the call, and the hull stays as it was.
   absl::Status file_error;
   const auto feed = [&](const Client::PointSink& sink) -> absl::Status {
@@ -91,7 +94,9 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ReplaceArguments>();
   Command command = program.AddCommand(
       "replace", "Put a hull of the points of files in the place of another, all at once");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
+  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   AddPointInput(command, &arguments->input);
   command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
   command.AddFlag("--allow-empty", &arguments->allow_empty,
@@ -99,10 +104,13 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
   command.AddNumber("--if-revision", 0, std::numeric_limits<uint64_t>::max(),
                     "Only if the hull is at this revision; 0: only if it does not exist",
                     [arguments](uint64_t number) { arguments->if_revision = number; });
-  command.SetFooter(
-      "However long that takes, unless --timeout is given, which then bounds all of it. A call "
-      "that\n"
-      "ends early leaves the hull as it was, or, when all points were sent, may have replaced it.");
+  command.SetDetails(
+      "It takes the time that it takes, unless --timeout is given, which then bounds all of it. A\n"
+      "call that ends early leaves the hull as it was, or, when all points were sent, may have\n"
+      "replaced it.");
+  command.SetExamples(
+      {{"", "hullctl replace arm arm-v2.stl"},
+       {"Only if nobody changed it meanwhile", "hullctl replace arm arm-v2.stl --if-revision 7"}});
   command.OnGiven([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
 }
 

@@ -5,6 +5,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -14,6 +15,9 @@
 
 namespace hulld {
 
+// Hides the contexts of whoever runs the tests.
+inline void UseNoContexts() { setenv("XDG_CONFIG_HOME", "/nonexistent", 1); }
+
 // What a run of hullctl ended with and printed.
 struct Ran {
   int code = -1;
@@ -22,6 +26,7 @@ struct Ran {
 };
 
 inline Ran RunTool(const std::vector<std::string>& arguments) {
+  if (std::getenv("XDG_CONFIG_HOME") == nullptr) UseNoContexts();
   std::ostringstream out;
   std::ostringstream err;
   Ran ran;

@@ -6,6 +6,8 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <map>
 #include <random>
 #include <sstream>
 #include <thread>
@@ -25,10 +27,10 @@ using ::testing::HasSubstr;
 
 class HullctlQuestions : public HullctlOnServer {
  protected:
-  // A recorded answer, as `check --certificate --output json` writes it.
+  // A recorded answer, as `check --record` writes it.
   static std::string Recorded(const v1::CheckCollisionRequest& request,
                               const v1::CheckCollisionResponse& response) {
-    return "{\"request\":" + MessageJson(request) + "," + MessageJson(response).substr(1);
+    return "{\"request\":" + MessageJson(request) + ",\"response\":" + MessageJson(response) + "}";
   }
 
   // Two cubes that share a face, with a certificate of that.
@@ -88,7 +90,7 @@ TEST_F(HullctlQuestions, VerifyRefusesWhatIsNoRecordedAnswer) {
   const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
   const Ran ran = Ask({"verify", no_request.path()});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("no member \"request\""), HasSubstr("--certificate")));
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("no member \"request\""), HasSubstr("--record")));
   EXPECT_EQ(Ask({"verify", "/no/such/file"}).code, 2);
 }
 
@@ -98,13 +100,21 @@ TEST_F(HullctlQuestions, CheckVerifiesAtOnceAndRecordsForLater) {
     const Ran ran = Ask({"check", "cube", "cube", "--pose-b", pose, "--verify"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("verified     valid\n"));
-    const Ran recorded =
-        Ask({"check", "cube", "cube", "--pose-b", pose, "--certificate", "--output", "json"});
+    const Ran recorded = Ask({"check", "cube", "cube", "--pose-b", pose, "--record", "-"});
     const TempFile file("answer.json", recorded.out);
     EXPECT_EQ(Ask({"verify", file.path()}).code, 0) << recorded.out;
+    const TempFile beside("beside.json", "");
+    const Ran both =
+        AskJson({"check", "cube", "cube", "--pose-b", pose, "--record", beside.path()});
+    EXPECT_EQ(Ask({"verify", beside.path()}).code, 0);
+    const auto answers = MessagesIn<v1::CheckCollisionResponse>(both.out);
+    ASSERT_EQ(answers.size(), 1U);
+    EXPECT_TRUE(answers[0].has_certificate());
   }
-  const Ran json = Ask({"check", "cube", "cube", "--verify", "--output", "json"});
-  EXPECT_THAT(json.out, HasSubstr("\"verification\":{\"verdict\":\"VALID\""));
+  for (const char* wish : {"--verify", "--certificate"}) {
+    const Ran json = AskJson({"check", "cube", "cube", wish});
+    EXPECT_EQ(MessagesIn<v1::CheckCollisionResponse>(json.out).size(), 1U) << wish;
+  }
 }
 
 // Hulls of every dimension on a lattice, turned by quaternions whose squares are 1, 2, 3 and 5.
@@ -133,20 +143,33 @@ TEST_F(HullctlQuestions, EveryCertificateOfABatchIsValid) {
   constexpr uint32_t kSeed = 11;
   const TempFile file("scene", LatticeScene(kSeed, 90));
   for (const char* method : {"--axis", "--textbook"}) {
-    const Ran ran = Ask({"batch", file.path(), "--verify", "--output", "json", method});
+    const Ran ran = Ask({"batch", file.path(), "--verify", method});
     ASSERT_EQ(ran.code, 0) << "seed " << kSeed << ": " << ran.err;
-    Struct json;
-    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok());
-    const auto& answers = json.fields().at("answers").list_value();
-    ASSERT_EQ(answers.values_size(), 90 * 89 / 2);
-    for (const auto& answer : answers.values()) {
-      const auto& verification = answer.struct_value().fields().at("verification");
-      EXPECT_EQ(verification.struct_value().fields().at("verdict").string_value(), "VALID");
+    std::istringstream lines(ran.out);
+    std::map<std::string, int> counts;
+    for (std::string line; std::getline(lines, line) && line[0] != '#';) {
+      EXPECT_THAT(line, testing::EndsWith("\tvalid"));
+      std::istringstream words(line);
+      std::string a, b, relation;
+      words >> a >> b >> relation;
+      ++counts[relation];
     }
-    const auto& summary = json.fields().at("summary").struct_value().fields();
-    for (const char* relation : {"separated", "touching", "overlapping"}) {
-      EXPECT_GT(std::stoi(summary.at(relation).string_value()), 40) << relation;
+    int total = 0;
+    for (const char* relation : {"SEPARATED", "TOUCHING", "OVERLAPPING"}) {
+      EXPECT_GT(counts[relation], 40) << relation;
+      total += counts[relation];
     }
+    EXPECT_EQ(total, 90 * 89 / 2);
+    // The same as messages of the contract.
+    const Ran json = AskJson({"batch", file.path(), "--verify", method});
+    ASSERT_EQ(json.code, 0) << json.err;
+    uint64_t next = 0;
+    for (const auto& part : MessagesIn<v1::BatchCheckCollisionsResponse>(json.out)) {
+      if (part.columns().relations_size() == 0) continue;
+      EXPECT_EQ(part.first_pair(), next);
+      next += static_cast<uint64_t>(part.columns().relations_size());
+    }
+    EXPECT_EQ(next, uint64_t{90 * 89 / 2});
   }
 }
 
@@ -202,10 +225,10 @@ TEST_F(HullctlQuestions, SceneFindsWhatCollides) {
   EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
   ran = Ask({"scene", file.path(), "--output", "json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  Struct json;
-  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok()) << ran.out;
-  EXPECT_EQ(json.fields().at("collisions").list_value().values_size(), 1);
-  EXPECT_TRUE(json.fields().at("complete").bool_value());
+  v1::FindCollisionsResponse all;
+  for (const auto& part : MessagesIn<v1::FindCollisionsResponse>(ran.out)) all.MergeFrom(part);
+  EXPECT_THAT(all.pairs(), testing::ElementsAre(0, 1));
+  EXPECT_EQ(all.totals().touching(), 1U);
   const TempFile clear("clear.json", placements + R"(,"wanted":{"clearance":0.25}})");
   ran = Ask({"scene", clear.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -229,7 +252,7 @@ TEST_F(HullctlQuestions, SceneFindsWhatCollides) {
   const TempFile lost("lost.json", R"({"placements":[{"hullId":"nope"}]})");
   ran = Ask({"scene", lost.path()});
   EXPECT_EQ(ran.code, 4);
-  EXPECT_THAT(ran.err, HasSubstr("placement 0: hull \"nope\" not found"));
+  EXPECT_THAT(ran.err, HasSubstr("placement 0:nope: hull \"nope\" not found"));
 }
 
 TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
@@ -241,22 +264,47 @@ TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
                       "\n"
                       R"({"placements":[1],"poses":[2,0,0,0,1.5,0,0],"refreshHulls":true})"
                       "\n");
-  const Ran ran = Ask({"stream", file.path()});
+  Ran ran = Ask({"stream", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  std::istringstream lines(ran.out);
-  for (const char* relation : {"RELATION_OVERLAPPING", "RELATION_TOUCHING", "RELATION_SEPARATED"}) {
-    std::string line;
-    ASSERT_TRUE(std::getline(lines, line));
-    Struct json;
-    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &json).ok()) << line;
-    const auto& answers = json.fields().at("answers").list_value();
-    ASSERT_EQ(answers.values_size(), 1);
-    const auto& answer = answers.values(0).struct_value().fields();
-    EXPECT_EQ(answer.at("pair").number_value(), 0);
-    EXPECT_EQ(answer.at("relation").string_value(), relation);
+  EXPECT_EQ(ran.out,
+            "0\t0:cube\t1:cube\tOVERLAPPING\n1\t0:cube\t1:cube\tTOUCHING\n"
+            "2\t0:cube\t1:cube\tSEPARATED\n");
+  ran = AskJson({"stream", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  const auto answers = MessagesIn<v1::StreamCollisionsResponse>(ran.out);
+  ASSERT_EQ(answers.size(), 3U);
+  for (size_t i = 0; i < answers.size(); ++i) {
+    EXPECT_EQ(answers[i].update(), i);
+    EXPECT_TRUE(answers[i].last());
+    EXPECT_THAT(answers[i].pairs(), testing::ElementsAre(0));
   }
-  std::string rest;
-  EXPECT_FALSE(std::getline(lines, rest));
+  EXPECT_EQ(answers[2].columns().relations(0), v1::RELATION_SEPARATED);
+}
+
+TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
+  Put("cube", server::Cube());
+  const TempFile text("text", "place a cube\nplace b cube 1 0 0\nplace c cube 1.5 0 0\n");
+  const TempFile json("json", R"({"placements":[{"hullId":"cube"},
+      {"hullId":"cube","pose":{"translation":{"x":1}}},
+      {"hullId":"cube","pose":{"translation":{"x":1.5}}}]})");
+  const TempFile packed("packed", R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0,0],
+      "poses":[1,0,0,0,0,0,0, 1,0,0,0,1,0,0, 1,0,0,0,1.5,0,0]}})");
+  for (const TempFile* file : {&text, &json, &packed}) {
+    Ran ran = Ask({"batch", file->path(), "--verify"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 1 overlapping 1 failed 0\n"));
+    EXPECT_EQ(AskJson({"batch", file->path(), "--verify"}).code, 0);
+    ran = Ask({"scene", file->path()});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("# touching 1 overlapping 1 failed 0\n"));
+    ran = Ask({"stream", file->path(), "--output", "name"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_EQ(std::count(ran.out.begin(), ran.out.end(), '\n'), 3);
+  }
+  const TempFile pairs("pairs", "place a cube\nplace b cube\npair a b\n");
+  const Ran ran = Ask({"scene", pairs.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("it names pairs, but 'scene' finds them itself"));
 }
 
 TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
@@ -267,7 +315,7 @@ TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   Ran ran = Ask({"stream", typo.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr(":2: "), HasSubstr("placement")));
-  EXPECT_THAT(ran.out, HasSubstr("hull \\\"nope\\\" not found"));
+  EXPECT_THAT(ran.out, HasSubstr("FAILED\thull \"nope\" not found\n"));
   const TempFile range("range.jsonl", open + R"({"placements":[7],"poses":[1,0,0,0,1,0,0]})");
   ran = Ask({"stream", range.path()});
   EXPECT_EQ(ran.code, 1);
@@ -275,7 +323,7 @@ TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   const TempFile empty("empty.jsonl", "\n");
   ran = Ask({"stream", empty.path()});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("the first line must say"));
+  EXPECT_THAT(ran.err, HasSubstr("there is no scene in it"));
 }
 
 TEST_F(HullctlQuestions, WishesThatExcludeEachOtherAreExplained) {
