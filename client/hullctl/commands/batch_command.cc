@@ -184,7 +184,8 @@ class BatchRun {
   }
 
   // The server's message, with rows that count on from the calls before.
-  void PrintMessage(const v1::BatchCheckCollisionsResponse& part, size_t begin) const {
+  void PrintMessage(const v1::BatchCheckCollisionsResponse& part, size_t begin) {
+    bar_.Clear();
     v1::BatchCheckCollisionsResponse message = part;
     message.set_first_pair(part.first_pair() + begin);
     run_.out << MessageJson(message) << "\n";

@@ -40,6 +40,7 @@ class SceneRun {
 
  private:
   absl::Status Take(const v1::FindCollisionsResponse& part) {
+    bar_.Clear();
     if (run_.json()) run_.out << MessageJson(part) << "\n";
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       ++placement_problems_;

@@ -8,11 +8,16 @@ namespace {
 constexpr char kBash[] =
     R"sh(# bash completion for hullctl. Read it with: source <(hullctl completion bash)
 _hullctl() {
-  local line=${COMP_LINE:0:COMP_POINT} words=() reply=() candidate directive last cut=
+  local line=${COMP_LINE:0:COMP_POINT} words=() reply=() program candidate directive last cut=
   read -ra words <<<"$line"
   [[ $line == *[[:space:]] ]] && words+=("")
+  # Assignments in front, as in "HULLCTL_CONTEXT=cell-3 hullctl list".
+  while [[ ${words[0]} == *=* ]]; do words=("${words[@]:1}"); done
+  # An alias is not known by its name.
+  program=${words[0]/#\~/$HOME}
+  type -P "$program" >/dev/null || program=hullctl
   last=${words[${#words[@]} - 1]}
-  mapfile -t reply < <("${words[0]}" __complete "${words[@]:1}" 2>/dev/null)
+  mapfile -t reply < <("$program" __complete "${words[@]:1}" 2>/dev/null)
   ((${#reply[@]} > 0)) || return 0
   directive=${reply[${#reply[@]} - 1]}
   unset "reply[${#reply[@]}-1]"
@@ -39,8 +44,10 @@ constexpr char kZsh[] = R"sh(#compdef hullctl
 # source <(hullctl completion zsh)
 _hullctl() {
   local -a reply described parts
-  local line directive text
-  reply=("${(@f)$("${words[1]}" __complete "${(@Q)words[2,CURRENT-1]}" "${(Q)PREFIX}" 2>/dev/null)}")
+  local line directive text program=${~words[1]}
+  # An alias is not known by its name.
+  whence -p -- "$program" >/dev/null || program=hullctl
+  reply=("${(@f)$("$program" __complete "${(@Q)words[2,CURRENT-1]}" "${(Q)PREFIX}" 2>/dev/null)}")
   directive=${reply[-1]}
   for line in "${(@)reply[1,-2]}"; do
     text=${line%%$'\t'*}
@@ -71,7 +78,10 @@ constexpr char kFish[] =
 function __hullctl_complete
     set -l words (commandline -opc)
     set -l last (commandline -ct)
-    set -l reply ($words[1] __complete $words[2..-1] "$last" 2>/dev/null)
+    set -l program $words[1]
+    # An alias is not known by its name.
+    command -q $program; or set program hullctl
+    set -l reply ($program __complete $words[2..-1] "$last" 2>/dev/null)
     test (count $reply) -gt 0; or return
     for line in $reply[1..-2]
         test -n "$line"; and echo $line

@@ -2,10 +2,12 @@
 
 #include <fcntl.h>
 #include <histedit.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <utility>
@@ -43,7 +45,19 @@ class LineEditor::Terminal {
 
   std::optional<std::string> Next() {
     int length = 0;
+    interrupted_ = 0;
+    struct sigaction note = {};
+    note.sa_handler = [](int) { interrupted_ = 1; };
+    struct sigaction before = {};
+    sigaction(SIGINT, &note, &before);
     const char* const line = el_gets(edit_, &length);
+    sigaction(SIGINT, &before, nullptr);
+    if (interrupted_ != 0) {
+      // Ctrl-C gives the line up, not the shell.
+      el_reset(edit_);
+      std::cout << "^C\n" << std::flush;
+      return "";
+    }
     if (line == nullptr || length <= 0) return std::nullopt;
     std::string text(line, static_cast<size_t>(length));
     while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
@@ -64,6 +78,7 @@ class LineEditor::Terminal {
 
  private:
   static constexpr int kKept = 1000;
+  static volatile std::sig_atomic_t interrupted_;
 
   static Terminal* Of(EditLine* edit) {
     void* self = nullptr;
@@ -106,6 +121,8 @@ class LineEditor::Terminal {
   History* const history_;
   EditLine* const edit_;
 };
+
+volatile std::sig_atomic_t LineEditor::Terminal::interrupted_ = 0;
 
 LineEditor::LineEditor(const std::string& program, const std::string& prompt,
                        const std::string& history_file, Completer complete) {

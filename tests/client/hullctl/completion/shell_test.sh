@@ -62,6 +62,9 @@ case $kind in
     cases
     # Bash replaces only what follows the "=" or ":".
     expect "hullctl list --output=w" "wide" "$(offers 'hullctl list --output=w')"
+    expect "an alias" "arm/left" "$(offers 'h get a')"
+    expect "an assignment in front" "arm/left" "$(offers 'HULLCTL_CONTEXT=here hullctl get a')"
+    expect "a program that is typed with its path" "check" "$(offers "$programs/hullctl che")"
     ;;
   fish)
     offers() {
