@@ -96,6 +96,8 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/printing",
     "client/hullctl/load",
     "client/hullctl/picture",
+    "client/hullctl/view/bridge",
+    "client/hullctl/view",
     "client/hullctl/commands",
     "client/hullctl",
 };

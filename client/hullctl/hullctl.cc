@@ -68,6 +68,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddBackupCommand(program, invocation);
   AddBenchCommand(program, invocation);
   AddPictureCommand(program, invocation);
+  AddViewCommand(program, invocation);
   AddTokenCommand(program, invocation);
   program.RequireCommand();
 }

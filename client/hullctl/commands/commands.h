@@ -26,6 +26,7 @@ void AddBackupCommand(Command program, Invocation* invocation);
 void AddBenchCommand(Command program, Invocation* invocation);
 void AddPictureCommand(Command program, Invocation* invocation);
 void AddTokenCommand(Command program, Invocation* invocation);
+void AddViewCommand(Command program, Invocation* invocation);
 
 }  // namespace hulld
 
