@@ -184,7 +184,12 @@ class Viewing {
     const absl::Status written =
         WriteOutput(arguments_.html_file, run_.out,
                     [&](std::ostream& out) { out << StandalonePage(*recording); });
-    return written.ok() ? ExitCode::kDone : run_.FailUsage(written);
+    if (!written.ok()) return run_.FailUsage(written);
+    if (arguments_.html_file == "-") return ExitCode::kDone;
+    const size_t count = program_.scenes.front().objects.size();
+    run_.out << arguments_.html_file << ": " << count << (count == 1 ? " object" : " objects")
+             << "; open it in a browser\n";
+    return ExitCode::kDone;
   }
 
   ExitCode Serve() {

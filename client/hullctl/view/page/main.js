@@ -82,6 +82,7 @@ class Viewer {
     model.on('visibility colour shown', () => {
       this.rebuildViews();
       this.gizmo.update();
+      this.marks.rebuild();
       this.labels.rebuild();
       this.tree.rebuild();
     });

@@ -26,8 +26,8 @@ export class Marks {
   rebuild() {
     this.clear();
     const {answer, pair} = this.model;
-    if (answer && !answer.problem && pair) {
-      const objects = pair.map((i) => this.model.objects[i]);
+    const objects = (pair || []).map((i) => this.model.objects[i]);
+    if (answer && !answer.problem && pair && objects.every((o) => this.model.isShown(o))) {
       this.size = Math.min(...objects.map((o) => this.model.radiusOf(o))) || 1;
       const witness = answer.witness && isFinite(answer.separation?.value) && [
         number(answer.witness.pointA), number(answer.witness.pointB)];
