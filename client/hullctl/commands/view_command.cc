@@ -140,7 +140,9 @@ class Viewing {
   ExitCode LoadThings() {
     ViewScene scene;
     std::vector<std::string> things = arguments_.things;
-    scene.title = things.empty() ? "All hulls" : things[0];
+    scene.title = things.empty()      ? "All hulls"
+                  : IsFile(things[0]) ? ShownName(things[0])
+                                      : things[0];
     if (things.size() > 1) absl::StrAppend(&scene.title, " and ", things.size() - 1, " more");
     if (things.empty()) things.emplace_back();
     for (const std::string& thing : things) {

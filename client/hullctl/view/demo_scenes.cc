@@ -184,23 +184,41 @@ absl::StatusOr<std::vector<ViewScene>> MakeDemoScenes(const Client& client, Temp
   return scenes;
 }
 
-void GrowingHull::Restart() {
-  Stop();
-  ended_ = false;
-  thread_ = std::thread([this] { Grow(); });
-}
+GrowingHull::GrowingHull(const Client& client, std::string hull_id)
+    : client_(client), hull_id_(std::move(hull_id)), thread_([this] { Run(); }) {}
 
-void GrowingHull::Stop() {
+GrowingHull::~GrowingHull() {
   {
     const std::lock_guard lock(mutex_);
     ended_ = true;
   }
   changed_.notify_all();
-  if (thread_.joinable()) thread_.join();
+  thread_.join();
+}
+
+void GrowingHull::Restart() {
+  {
+    const std::lock_guard lock(mutex_);
+    ++starts_;
+  }
+  changed_.notify_all();
+}
+
+void GrowingHull::Run() {
+  uint64_t started = 0;
+  while (true) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [&] { return starts_ != started || ended_; });
+      if (ended_) return;
+      started = starts_;
+    }
+    Grow(started);
+  }
 }
 
 // A failure, as when the server goes, ends the growth; the viewer shows what there is.
-void GrowingHull::Grow() {
+void GrowingHull::Grow(uint64_t start) {
   v1::ReplaceOpen open;
   open.set_hull_id(hull_id_);
   if (!client_.ReplaceHull(open, SendGrowth).ok()) return;
@@ -212,7 +230,7 @@ void GrowingHull::Grow() {
   for (int step = 2; step <= kGrowthSteps; ++step) {
     if (!(*appender)->Append(GrowthOf(step)).ok()) return;
     std::unique_lock lock(mutex_);
-    if (changed_.wait_for(lock, kGrowthPause, [this] { return ended_; })) return;
+    if (changed_.wait_for(lock, kGrowthPause, [&] { return starts_ != start || ended_; })) return;
   }
   static_cast<void>((*appender)->Finish());
 }

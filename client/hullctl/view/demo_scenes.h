@@ -3,8 +3,8 @@
 
 #include <absl/status/statusor.h>
 
-#include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -20,23 +20,25 @@ namespace hulld {
 // A hull that grows while it is looked at: ever larger balls of points are streamed into it.
 class GrowingHull {
  public:
-  // `hull_id` is there already.
-  GrowingHull(const Client& client, std::string hull_id)
-      : client_(client), hull_id_(std::move(hull_id)) {}
+  // `hull_id` is there already; it waits for Restart.
+  GrowingHull(const Client& client, std::string hull_id);
   // Stops growing.
-  ~GrowingHull() { Stop(); }
+  ~GrowingHull();
 
-  // Grows from the start, in place of what there was.
+  // Grows from the start, in place of what there was. Does not wait.
   void Restart();
 
  private:
-  void Stop();
-  void Grow();
+  void Run();
+  // Until it is grown, or another start is wanted.
+  void Grow(uint64_t start);
 
   const Client& client_;
   const std::string hull_id_;
   std::mutex mutex_;
   std::condition_variable changed_;
+  // Guarded by the mutex: counts calls of Restart.
+  uint64_t starts_ = 0;
   bool ended_ = false;
   std::thread thread_;
 };

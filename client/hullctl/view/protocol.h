@@ -20,8 +20,8 @@ namespace hulld {
 // What the page and the bridge tell each other over one WebSocket. The page's side is
 // page/connection.js. Small messages are JSON objects with a member "type"; members that come from
 // the contract follow the JSON mapping of proto3 (64-bit integers are strings, "Infinity" is a
-// string). Doubles are written so that they read back as the same numbers; JSON has no sign of zero.
-// Geometry is binary.
+// string). Doubles are written so that they read back as the same numbers; JSON has no sign of
+// zero. Geometry is binary.
 //
 // The page to the bridge:
 //   show       {key}: shows a scene of `hello`. The bridge answers with `scene`.

@@ -64,11 +64,37 @@ absl::Status ReadPointShape(const std::string& path, PointFormat format, FileSha
 
 }  // namespace
 
+// Source: the table of well-formed sequences of the Unicode Standard, section 3.9.
+std::string ShownName(const std::string& path) {
+  std::string name = std::filesystem::path(path).filename().string();
+  for (size_t i = 0; i < name.size();) {
+    const auto byte = [&](size_t at) {
+      return at < name.size() ? static_cast<unsigned char>(name[at]) : 0u;
+    };
+    const unsigned lead = byte(i);
+    const size_t length = lead < 0x80   ? 1
+                          : lead < 0xc2 ? 0
+                          : lead < 0xe0 ? 2
+                          : lead < 0xf0 ? 3
+                          : lead < 0xf5 ? 4
+                                        : 0;
+    bool good = length > 0;
+    for (size_t k = 1; k < length; ++k) good = good && (byte(i + k) & 0xc0) == 0x80;
+    if (lead == 0xe0) good = good && byte(i + 1) >= 0xa0;
+    if (lead == 0xed) good = good && byte(i + 1) < 0xa0;
+    if (lead == 0xf0) good = good && byte(i + 1) >= 0x90;
+    if (lead == 0xf4) good = good && byte(i + 1) < 0x90;
+    if (!good) name[i] = '?';
+    i += good ? length : 1;
+  }
+  return name;
+}
+
 absl::StatusOr<FileShape> ReadShape(const std::string& path) {
   const auto format = PointFormatOfPath(path);
   if (!format.ok()) return format.status();
   FileShape shape;
-  shape.name = std::filesystem::path(path).filename().string();
+  shape.name = ShownName(path);
   const absl::Status read =
       HasTriangles(*format) ? ReadMeshShape(path, &shape) : ReadPointShape(path, *format, &shape);
   if (!read.ok()) return read;

@@ -56,6 +56,10 @@ struct ViewScene {
 // are left out. INVALID_ARGUMENT names the file and the place.
 absl::StatusOr<FileShape> ReadShape(const std::string& path);
 
+// The name of a file without its folders; bytes that are not UTF-8 become question marks, as they
+// would end the connection to the page.
+std::string ShownName(const std::string& path);
+
 // Whether the argument names a file that is there, rather than a hull.
 bool IsFile(const std::string& argument);
 

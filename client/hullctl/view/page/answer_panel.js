@@ -19,8 +19,9 @@ export class AnswerPanel {
     this.marks = marks;
     this.live = live;
     this.root = document.getElementById('answer');
+    // Beside the objects, as it is about all of them.
     this.list = document.getElementById('collisions');
-    this.body = element('div', {'aria-live': 'polite'});
+    this.body = element('div', {'aria-live': 'polite', 'aria-busy': 'false'});
   }
 
   // The pair changed.
@@ -70,6 +71,8 @@ export class AnswerPanel {
       this.body.replaceChildren(element('p', {}, answer.problem));
       return;
     }
+    // Read aloud once it is at rest.
+    this.body.setAttribute('aria-busy', String(!answer.rest));
     const open = this.body.querySelector('details')?.open;
     this.body.replaceChildren(this.verdict(answer), this.table(answer), this.toggles(), this.command(answer, open));
   }

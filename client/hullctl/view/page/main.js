@@ -86,12 +86,13 @@ class Viewer {
       this.labels.rebuild();
       this.tree.rebuild();
     });
-    model.on('collisions', () => {
+    model.on('collisions', (changed) => {
+      this.answerPanel.updateCollisions();
+      if (!changed.size) return;
       if (model.isCrowd) this.crowd?.recolour();
-      for (const view of this.views.values()) view.rebuild();
+      for (const index of changed) this.views.get(index)?.rebuild();
       this.tree.rebuild();
       this.labels.rebuild();
-      this.answerPanel.updateCollisions();
       this.stage.draw();
     });
     model.on('tolerance', () => {
@@ -134,7 +135,7 @@ class Viewer {
     this.shell.clear();
     this.syncShown();
     model.tell('selection');
-    model.tell('collisions');
+    this.answerPanel.updateCollisions();
     this.connection.send({type: 'geometry', files: model.files.map((_, i) => i), hullIds: []});
     this.fetchHulls(new Set(model.objects.map(({hullId}) => hullId).filter(Boolean)));
     this.updateStatus();

@@ -1,9 +1,12 @@
 // What is looked at and what the user chose, without any drawing. Parts of the page listen to it.
-import {OBJECT_COLOURS} from 'hulld/palette.js';
+import {CROWD_COLOUR, OBJECT_COLOURS} from 'hulld/palette.js';
 import {samePose, toWorld} from 'hulld/pose.js';
 
 // At most so many objects are each drawn and labelled on their own; more are drawn as a crowd.
 export const MOST_SINGLE_OBJECTS = 200;
+
+// Of larger shapes the box stands for them.
+const MOST_CORNERS = 100;
 
 export class Model extends EventTarget {
   constructor() {
@@ -45,6 +48,7 @@ export class Model extends EventTarget {
   }
 
   addObjects(objects) {
+    const many = this.objects.length + objects.length > MOST_SINGLE_OBJECTS;
     for (const object of objects) {
       const index = this.objects.length;
       this.objects.push({
@@ -53,7 +57,7 @@ export class Model extends EventTarget {
         start: object.pose,
         visible: true,
         gone: false,
-        colour: OBJECT_COLOURS[index % OBJECT_COLOURS.length],
+        colour: many ? CROWD_COLOUR : OBJECT_COLOURS[index % OBJECT_COLOURS.length],
       });
     }
   }
@@ -88,9 +92,13 @@ export class Model extends EventTarget {
     return this.shapeOf(object)?.radius || 0;
   }
 
-  // The corners of an object's box, in the world.
+  // Points of the world that are about an object: its vertices where they are few, else the corners
+  // of its box.
   cornersOf(object) {
-    const {low, high} = this.shapeOf(object);
+    const {low, high, xyz, vertexCount} = this.shapeOf(object);
+    if (vertexCount <= MOST_CORNERS) {
+      return Array.from({length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
+    }
     const corners = [];
     for (let i = 0; i < 8; ++i) {
       corners.push(toWorld(object.pose, [0, 1, 2].map((k) => (i >> k & 1 ? high[k] : low[k]))));
@@ -166,6 +174,7 @@ export class Model extends EventTarget {
   }
 
   setCollisions(collisions) {
+    const before = this.relationOf;
     this.collisions = collisions;
     this.relationOf = new Map();
     for (const [a, b, relation] of collisions.pairs) {
@@ -175,6 +184,10 @@ export class Model extends EventTarget {
         }
       }
     }
-    this.tell('collisions');
+    const changed = new Set();
+    for (const index of [...before.keys(), ...this.relationOf.keys()]) {
+      if (before.get(index) !== this.relationOf.get(index)) changed.add(index);
+    }
+    this.tell('collisions', changed);
   }
 }

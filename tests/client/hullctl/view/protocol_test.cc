@@ -129,6 +129,18 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
       json, HasSubstr(R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0]})"));
 }
 
+// Bytes that are not UTF-8 would end the connection of the page.
+TEST(Protocol, NamesOfFilesAreUtf8) {
+  EXPECT_EQ(ShownName("/a/b/h\xc3\xbclle \xe2\x82\xac \xf0\x9f\x95\xb7.obj"),
+            "h\xc3\xbclle \xe2\x82\xac \xf0\x9f\x95\xb7.obj");
+  EXPECT_EQ(ShownName("h\xfclle.obj"), "h?lle.obj");
+  // Too long for its value, half of a pair, beyond the last, cut off.
+  EXPECT_EQ(ShownName("\xc0\xaf"), "??");
+  EXPECT_EQ(ShownName("\xed\xa0\x80"), "???");
+  EXPECT_EQ(ShownName("\xf5\x80\x80\x80"), "????");
+  EXPECT_EQ(ShownName("\xe2\x82"), "??");
+}
+
 TEST(Protocol, NumbersThatJsonHasNotBecomeNull) {
   const double numbers[] = {std::numeric_limits<double>::infinity(), std::nan(""), 2};
   EXPECT_EQ(NumbersJson(numbers, 3), "[null,null,2]");
