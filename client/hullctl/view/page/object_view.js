@@ -27,6 +27,9 @@ const surface = (colour, options) => new THREE.MeshPhongMaterial({
   polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, ...options,
 });
 
+// The lines of a larger hull would cover all of it, and both of its sides cost twice.
+const isHuge = (hull) => hull.facetCount > 200000;
+
 // Many lines hide what they stand on.
 const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
 
@@ -67,7 +70,7 @@ export class ObjectView {
       this.addPoints(cloud);
     }
     if (hull && show.hull && !hull.isEmpty) this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
-    if (hull && show.edges && !hull.isEmpty && (show.hull || !(mesh && show.mesh))) {
+    if (hull && show.edges && !hull.isEmpty && !isHuge(hull) && (show.hull || !(mesh && show.mesh))) {
       this.addEdges(hull);
     }
     this.place();
@@ -97,10 +100,11 @@ export class ObjectView {
   // Far sides first, then near ones: right for anything convex.
   addHull(hull, isBeside) {
     const flat = hull.info.dimension < 3;
-    const sides = flat ? [THREE.DoubleSide] : [THREE.BackSide, THREE.FrontSide];
+    const sides = flat ? [THREE.DoubleSide] :
+        isHuge(hull) ? [THREE.FrontSide] : [THREE.BackSide, THREE.FrontSide];
     for (const side of sides) {
-      const opacity = isBeside ? 0.16 : 0.5;
-      const material = surface(this.object.colour, {side, transparent: true, opacity, depthWrite: false});
+      const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
+      const material = surface(this.object.colour, {side, ...(isHuge(hull) && !isBeside ? {} : glass)});
       const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
       part.renderOrder = side === THREE.FrontSide ? 4 : 3;
       this.shift(part, hull);
