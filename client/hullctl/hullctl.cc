@@ -76,6 +76,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddListCommand(program, invocation);
   AddGetCommand(program, invocation);
   AddMeshCommand(program, invocation);
+  AddViewCommand(program, invocation);
   AddPictureCommand(program, invocation);
   program.BeginGroup("Ask what collides");
   AddCheckCommand(program, invocation);

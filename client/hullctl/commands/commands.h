@@ -15,6 +15,7 @@ void AddDeleteCommand(Command program, Invocation* invocation);
 void AddListCommand(Command program, Invocation* invocation);
 void AddGetCommand(Command program, Invocation* invocation);
 void AddMeshCommand(Command program, Invocation* invocation);
+void AddViewCommand(Command program, Invocation* invocation);
 void AddPictureCommand(Command program, Invocation* invocation);
 void AddCheckCommand(Command program, Invocation* invocation);
 void AddBatchCommand(Command program, Invocation* invocation);
