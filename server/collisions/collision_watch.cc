@@ -104,6 +104,7 @@ void CollisionWatch::EndWork(const absl::Status& error) {
 void CollisionWatch::TakeMessage() {
   const absl::Status status = HandleMessage();
   if (!status.ok()) return EndWork(status);
+  request().Clear();
   answers_message_ = true;
   Tell();
 }

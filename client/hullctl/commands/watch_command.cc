@@ -64,7 +64,7 @@ void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
 template <typename Watch>
 class Ending {
  public:
-  // `start` starts the watch, whose threads do not take the signal.
+  // `start` starts the watch.
   explicit Ending(const std::function<std::unique_ptr<Watch>()>& start)
       : interrupt_([this] { End(); }), watch_(start()) {
     const std::lock_guard lock(mutex_);
