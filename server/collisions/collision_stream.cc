@@ -29,10 +29,9 @@ constexpr size_t kIndexBytes = 5;
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
-CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                       Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
-                       TaskPool& pool) {
+BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                    Registry& registry, WorkerPool& readers,
+                                    WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionStream>(
       new CollisionStream(context, admission, registry, readers, long_readers, pool)));
 }
