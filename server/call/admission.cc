@@ -39,6 +39,7 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kReplaceHull:
     case Rpc::kStreamCollisions:
     case Rpc::kSaveBackup:
+    case Rpc::kServerReflectionInfo:
       return CallKind::kStream;
   }
   HULLD_UNREACHABLE();

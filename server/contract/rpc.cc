@@ -32,6 +32,8 @@ const char* RpcName(Rpc rpc) {
       return "ReplaceHull";
     case Rpc::kSaveBackup:
       return "SaveBackup";
+    case Rpc::kServerReflectionInfo:
+      return "ServerReflectionInfo";
   }
   HULLD_UNREACHABLE();
 }

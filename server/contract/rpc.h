@@ -20,9 +20,11 @@ enum class Rpc {
   kGetStatus,
   kReplaceHull,
   kSaveBackup,
+  // Of gRPC's own protocol.
+  kServerReflectionInfo,
 };
 
-inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kSaveBackup) + 1;
+inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kServerReflectionInfo) + 1;
 
 // As in the contract: "CheckCollision".
 const char* RpcName(Rpc rpc);

@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "tests/server/harness/hulld_process.h"
 #include "tests/server/harness/test_certificates.h"
@@ -103,6 +104,44 @@ TEST_F(HostileRequest, OfCallersWithoutATokenTakesLittleMemory) {
 
 TEST_F(HostileRequest, OfCallersWhoMayCallTakesLittleMemory) {
   ExpectLittleMemory({}, grpc::RESOURCE_EXHAUSTED);
+}
+
+// gRPC's own service took a thread for each stream, without a token.
+TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
+  using grpc::reflection::v1alpha::ServerReflection;
+  using grpc::reflection::v1alpha::ServerReflectionRequest;
+  using grpc::reflection::v1alpha::ServerReflectionResponse;
+  constexpr int kStreams = 200;
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0", "--log-format", "json",
+                 "--max-streams-per-client", std::to_string(kStreams)});
+  const auto stub = ServerReflection::NewStub(grpc::CreateChannel(
+      AddressIn(hulld.ReadLineWith("listening on ")), grpc::InsecureChannelCredentials()));
+  struct Stream {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReaderWriter<ServerReflectionRequest, ServerReflectionResponse>>
+        call;
+  };
+  const auto open = [&stub](Stream& stream) {
+    stream.call = stub->ServerReflectionInfo(&stream.context);
+    ServerReflectionRequest request;
+    request.set_file_containing_symbol("hulld.v1.HullService.GetHull");
+    ServerReflectionResponse response;
+    if (!stream.call->Write(request) || !stream.call->Read(&response)) return 0;
+    return response.file_descriptor_response().file_descriptor_proto_size();
+  };
+  std::vector<std::unique_ptr<Stream>> streams;
+  streams.push_back(std::make_unique<Stream>());
+  EXPECT_EQ(open(*streams.back()), 2);  // hull.proto, and geometry.proto, which it needs
+  const long before = StatusField(hulld.pid(), "Threads");
+  while (streams.size() < kStreams) {
+    streams.push_back(std::make_unique<Stream>());
+    EXPECT_EQ(open(*streams.back()), 2);
+  }
+  EXPECT_LT(StatusField(hulld.pid(), "Threads") - before, 20);
+  Stream one_more;
+  EXPECT_EQ(open(one_more), 0);
+  EXPECT_EQ(one_more.call->Finish().error_code(), grpc::RESOURCE_EXHAUSTED);
+  for (const auto& stream : streams) stream->context.TryCancel();
 }
 
 }  // namespace
