@@ -152,9 +152,14 @@ absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* col
 
 void BatchStream::Deliver(PairsPiece& piece) {
   if (has_head_ && !piece.replies.empty()) {
-    Append(piece.replies.front(), &head_);
-    piece.replies.front() = std::move(head_);
-    piece.reply_bytes.front() = piece.replies.front().ByteSizeLong();
+    const size_t bytes = head_.ByteSizeLong();
+    if (bytes + piece.reply_bytes.front() > Config::kReplyMessageBytes) {
+      Queue(std::move(head_), bytes);
+    } else {
+      Append(piece.replies.front(), &head_);
+      piece.replies.front() = std::move(head_);
+      piece.reply_bytes.front() = piece.replies.front().ByteSizeLong();
+    }
     has_head_ = false;
   }
   DeliverReplies(piece);

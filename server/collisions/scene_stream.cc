@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "server/collisions/query_settings.h"
-#include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 
 namespace hulld::server {
@@ -178,7 +177,7 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
     if (answer.ok()) piece.rungs.Add(answer->rung);
     if (answer.ok() && !search_->IsFound(*answer)) continue;
     reply_bytes += AddFound(a, b, answer, piece, &reply);
-    if (reply_bytes < Config::kReplyMessageBytes) continue;
+    if (reply_bytes < FullMessageBytes(request().wanted())) continue;
     piece.Add(std::exchange(reply, {}));
     reply_bytes = 0;
   }
