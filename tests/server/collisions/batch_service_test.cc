@@ -518,7 +518,7 @@ TEST_F(BatchCall, BatchesTakeTurns) {
 // An axis across wide facets came in one message with the answers before it, and with the table of
 // hulls, and no client could read it.
 TEST_F(BatchCall, MessagesStayBelowFourMebibytesWhateverTheAnswers) {
-  constexpr int kCorners = 60'000;
+  constexpr int kCorners = Config::kMaxFeatureVertices;
   Create("wide");
   Appender writer(*hulls_, "wide", "w");
   Coordinates parabola;
