@@ -19,7 +19,8 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
     v1::CollisionService::WithRawCallbackMethod_BatchCheckCollisions<
         v1::CollisionService::WithRawCallbackMethod_StreamCollisions<
             v1::CollisionService::WithRawCallbackMethod_FindCollisions<
-                v1::CollisionService::Service>>>>;
+                v1::CollisionService::WithRawCallbackMethod_WatchCollisions<
+                    v1::CollisionService::Service>>>>>;
 
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
 // answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
@@ -46,6 +47,7 @@ class CollisionService : public CollisionServiceOfBytes {
   BidiReactor* StreamCollisions(grpc::CallbackServerContext* context) override;
   WriteReactor* FindCollisions(grpc::CallbackServerContext* context,
                                const grpc::ByteBuffer* request) override;
+  BidiReactor* WatchCollisions(grpc::CallbackServerContext* context) override;
 
  private:
   using CheckCall = UnaryCall<v1::CheckCollisionRequest, v1::CheckCollisionResponse>;

@@ -20,6 +20,8 @@ enum class Rpc {
   kGetStatus,
   kReplaceHull,
   kSaveBackup,
+  kWatchHulls,
+  kWatchCollisions,
   // Of gRPC's own protocol.
   kServerReflectionInfo,
 };

@@ -11,6 +11,7 @@
 #include "server/hulls/append_stream.h"
 #include "server/hulls/mesh_stream.h"
 #include "server/hulls/replace_stream.h"
+#include "server/hulls/watch_stream.h"
 #include "server/settings/config.h"
 #include "server/wire/encode.h"
 #include "server/wire/page_token.h"
@@ -72,6 +73,11 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
                                                   grpc::ByteBuffer* response) {
   return DeleteCall::Start(*context, admission_, Rpc::kDeleteHull, {request, response},
                            [this](DeleteCall* call) { Delete(call); });
+}
+
+WriteReactor* HullService::WatchHulls(grpc::CallbackServerContext* context,
+                                      const grpc::ByteBuffer* request) {
+  return WatchStream::Start(*context, admission_, registry_, readers_, *request);
 }
 
 void HullService::Create(CreateCall* call) {

@@ -21,12 +21,15 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
                 v1::HullService::WithRawCallbackMethod_GetHullMesh<
                     v1::HullService::WithRawCallbackMethod_ListHulls<
                         v1::HullService::WithRawCallbackMethod_DeleteHull<
-                            v1::HullService::Service>>>>>>>;
+                            v1::HullService::WithRawCallbackMethod_WatchHulls<
+                                v1::HullService::Service>>>>>>>>;
 
 // hulld.v1.HullService: the contract in hull.proto over the registry. Calls that only look into
 // records are answered where they arrive; those that need a snapshot, on `readers`,
 // meshes and audits, which may take long, on `long_readers`, and replacements are built on
 // `writers`, as the registry builds chunks.
+// Watches look into records where they are told of changes, and read boxes from the store on
+// `readers`.
 class HullService : public HullServiceOfBytes {
  public:
   HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
@@ -54,6 +57,8 @@ class HullService : public HullServiceOfBytes {
   grpc::ServerUnaryReactor* DeleteHull(grpc::CallbackServerContext* context,
                                        const grpc::ByteBuffer* request,
                                        grpc::ByteBuffer* response) override;
+  WriteReactor* WatchHulls(grpc::CallbackServerContext* context,
+                           const grpc::ByteBuffer* request) override;
 
  private:
   using CreateCall = UnaryCall<v1::CreateHullRequest, v1::CreateHullResponse>;
