@@ -103,6 +103,7 @@ void CollisionWatch::EndWork(const absl::Status& error) {
 void CollisionWatch::TakeMessage() {
   const absl::Status status = HandleMessage();
   if (!status.ok()) return EndWork(status);
+  request().Clear();
   answers_message_ = true;
   Tell();
 }
@@ -221,9 +222,9 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
     const auto [begin, end] = hulls_of_.equal_range(change.record.hull_id);
     for (auto hull = begin; hull != end; ++hull) hulls.push_back(hull->second);
   }
-  if (hulls.empty()) return absl::OkStatus();
+  if (hulls.empty() && piece.revision <= revision_) return absl::OkStatus();
   if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
-  revision_ = piece.revision;
+  revision_ = std::max(revision_, piece.revision);
   std::vector<uint32_t> changed;
   for (const size_t k : hulls) {
     const std::span<const uint32_t> placements = table_.placements_of(k);
@@ -236,7 +237,8 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
       pairs_.ForgetPoints(i);
     }
   }
-  return changed.empty() ? absl::OkStatus() : AskAbout(changed);
+  // Where nothing changed any more, the revision moved on, which is told.
+  return AskAbout(changed);
 }
 
 absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {

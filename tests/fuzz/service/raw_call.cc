@@ -97,6 +97,8 @@ bool Wait(grpc::CompletionQueue& queue) {
 
 }  // namespace
 
+bool LastsUntilCancelled(server::Rpc rpc) { return rpc == server::Rpc::kWatchHulls; }
+
 RawCall DecodeRawCall(ByteReader& in, const MessageHints& hints) {
   RawCall call;
   call.rpc = static_cast<server::Rpc>(in.Below(server::kRpcCount));
@@ -131,6 +133,7 @@ grpc::Status MakeRawCall(grpc::GenericStub& stub, grpc::ClientContext& context,
     grpc::ByteBuffer reply;
     stream->Read(&reply, nullptr);
     more = Wait(queue);
+    if (more && LastsUntilCancelled(call.rpc)) context.TryCancel();
   }
   grpc::Status status;
   stream->Finish(&status, nullptr);
