@@ -67,7 +67,8 @@ class Watch {
   }
   std::vector<std::string> Events() {
     std::vector<std::string> texts;
-    for (const v1::CollisionEvent& event : Round().events()) texts.push_back(Text(event));
+    const v1::WatchCollisionsResponse round = Round();
+    for (const v1::CollisionEvent& event : round.events()) texts.push_back(Text(event));
     return texts;
   }
 

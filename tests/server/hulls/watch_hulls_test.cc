@@ -214,7 +214,8 @@ TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
   std::map<std::string, uint64_t> received;
   size_t events = 0;
   while (received.size() < kHulls || received.begin()->second < kRounds) {
-    for (const v1::HullEvent& event : watch.Next().events()) {
+    const v1::WatchHullsResponse message = watch.Next();
+    for (const v1::HullEvent& event : message.events()) {
       ++events;
       received[event.hull().hull_id()] = event.hull().counts().received();
     }
