@@ -182,7 +182,8 @@ absl::Status CollisionWatch::WatchHulls() {
     if (!hulls_of_.contains(id)) target.ids.push_back(id);
     hulls_of_.emplace(id, k);
   }
-  if (target.ids.empty()) return registry_.CheckMemory();
+  // No hull has this ID; the watch ends when the server drains, like any other.
+  if (target.ids.empty()) target.ids.emplace_back();
   absl::StatusOr<std::shared_ptr<ChangeWatch>> watch = registry_.OpenWatch(
       target, {}, [this, self = shared_from_this()] { Locked([this] { are_hulls_due_ = true; }); });
   if (!watch.ok()) return watch.status();
@@ -197,8 +198,12 @@ absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update
   std::vector<uint32_t> changed;
   changed.reserve(moves->size());
   for (const auto& [placement, pose] : *moves) {
+    const absl::Status before = table_.problem(placement);
     table_.Move(placement, pose);
     changed.push_back(placement);
+    // It may lack a hull, too.
+    const absl::Status& now = table_.problem(placement);
+    if (!now.ok() && now != before) problems_to_tell_.push_back(placement);
   }
   return AskAbout(changed);
 }
@@ -218,7 +223,13 @@ void CollisionWatch::TakeChanges() {
 
 absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
   std::vector<size_t> hulls;
-  for (const HullChange& change : piece.changes) {
+  if (piece.anew) {
+    // Which of them changed is not known.
+    hulls.resize(table_.hull_ids().size());
+    std::iota(hulls.begin(), hulls.end(), size_t{0});
+  }
+  for (size_t n = 0; n < piece.changes.size() && !piece.anew; ++n) {
+    const HullChange& change = piece.changes[n];
     const auto [begin, end] = hulls_of_.equal_range(change.record.hull_id);
     for (auto hull = begin; hull != end; ++hull) hulls.push_back(hull->second);
   }
@@ -228,13 +239,16 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
   std::vector<uint32_t> changed;
   for (const size_t k : hulls) {
     const std::span<const uint32_t> placements = table_.placements_of(k);
-    if (placements.empty() || !table_.hull_changed(placements.front())) continue;
+    if (placements.empty()) continue;
+    if (table_.query_hull_changed(placements.front())) {
+      for (const uint32_t i : placements) pairs_.ForgetPoints(i);
+    }
+    if (!table_.hull_changed(placements.front())) continue;
     const bool is_there = table_.hull(k).ok();
     if (is_there) hulls_to_tell_.push_back(k);
     for (const uint32_t i : placements) {
       changed.push_back(i);
       if (!is_there) problems_to_tell_.push_back(i);
-      pairs_.ForgetPoints(i);
     }
   }
   // Where nothing changed any more, the revision moved on, which is told.

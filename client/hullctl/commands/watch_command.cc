@@ -2,12 +2,11 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
 
-#include <functional>
+#include <atomic>
+#include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
@@ -60,48 +59,35 @@ void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
   if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
 }
 
-// Ends a watch at Ctrl-C.
+// A watch that ends at Ctrl-C.
 template <typename Watch>
 class Ending {
  public:
-  // `start` starts the watch.
-  explicit Ending(const std::function<std::unique_ptr<Watch>()>& start)
-      : interrupt_([this] { End(); }), watch_(start()) {
-    const std::lock_guard lock(mutex_);
-    is_started_ = true;
-    if (is_ended_) watch_->Cancel();
-  }
+  explicit Ending(std::unique_ptr<Watch> watch)
+      : watch_(std::move(watch)), interrupt_([this] {
+          is_ended_ = true;
+          watch_->Cancel();
+        }) {}
 
   Watch& watch() { return *watch_; }
-  bool is_ended() {
-    const std::lock_guard lock(mutex_);
-    return is_ended_;
-  }
+  bool is_ended() const { return is_ended_; }
 
  private:
-  void End() {
-    const std::lock_guard lock(mutex_);
-    is_ended_ = true;
-    if (is_started_) watch_->Cancel();
-  }
-
-  std::mutex mutex_;
-  bool is_started_ = false;
-  bool is_ended_ = false;
-  const Interrupt interrupt_;
   const std::unique_ptr<Watch> watch_;
+  std::atomic<bool> is_ended_ = false;
+  // Last, so that nothing is called when the watch goes.
+  const Interrupt interrupt_;
 };
 
-// Prints what comes until the watch ends, `print` says that it is enough, or Ctrl-C.
-template <typename Watch, typename Print>
-ExitCode PrintAll(const Invocation& run, Ending<Watch>& ending, const Print& print) {
+// Tells of what comes until the watch ends, `tell` says that it is enough, or Ctrl-C.
+template <typename Watch, typename Tell>
+ExitCode TellAll(const Invocation& run, std::unique_ptr<Watch> watch, const Tell& tell) {
+  Ending<Watch> ending(std::move(watch));
   while (true) {
     const auto message = ending.watch().Next();
     if (!message.ok()) return ending.is_ended() ? ExitCode::kDone : run.Fail(message.status());
-    if (run.json()) {
-      run.out << MessageJson(*message) << "\n";
-    }
-    const bool is_enough = print(*message);
+    if (run.json()) run.out << MessageJson(*message) << "\n";
+    const bool is_enough = tell(*message);
     run.out << std::flush;
     if (is_enough) return ExitCode::kDone;
   }
@@ -110,14 +96,14 @@ ExitCode PrintAll(const Invocation& run, Ending<Watch>& ending, const Print& pri
 ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
   v1::WatchHullsRequest request;
   (options.exact ? request.mutable_hull_id() : request.mutable_prefix())->assign(options.prefix);
-  Ending<HullWatch> ending([&] { return run.MakeClient().WatchHulls(request); });
   uint64_t events = 0;
-  return PrintAll(run, ending, [&](const v1::WatchHullsResponse& message) {
-    if (!run.json()) Print(message, run.out);
+  const auto tell = [&](const v1::WatchHullsResponse& message) {
+    if (!run.json()) Print(message, run);
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) ||
            (options.until_synced && message.synced());
-  });
+  };
+  return TellAll(run, run.MakeClient().WatchHulls(request), tell);
 }
 
 // What is watched of a scene: its poses stay.
@@ -149,10 +135,9 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   const auto name = [&](uint32_t placement) {
     return scene->HullOf(placement) == nullptr ? absl::StrCat(placement) : scene->NameOf(placement);
   };
-  Ending<CollisionWatch> ending([&] { return run.MakeClient().WatchCollisions(OpenOf(*scene)); });
   uint64_t events = 0;
   bool is_synced = false;
-  return PrintAll(run, ending, [&](const v1::WatchCollisionsResponse& message) {
+  const auto tell = [&](const v1::WatchCollisionsResponse& message) {
     for (const v1::PlacementProblem& problem : message.placement_problems()) {
       run.err << "hullctl: placement " << name(problem.placement()) << ": " << problem.message()
               << "\n";
@@ -166,14 +151,14 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
       }
       run.out << "\n";
     }
-    const bool is_first =
-        message.synced() && !std::exchange(is_synced, is_synced || message.synced());
-    if (is_first && !run.json()) {
+    const bool was_synced = std::exchange(is_synced, is_synced || message.synced());
+    if (is_synced && !was_synced && !run.json()) {
       run.out << "# synced at revision " << message.header().revision() << "\n";
     }
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);
-  });
+  };
+  return TellAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), tell);
 }
 
 }  // namespace
