@@ -101,6 +101,8 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/load",
     "client/hullctl/picture",
     "client/hullctl/shell",
+    "client/hullctl/view/bridge",
+    "client/hullctl/view",
     "client/hullctl/commands",
     "client/hullctl",
 };

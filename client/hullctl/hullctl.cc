@@ -76,6 +76,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddListCommand(program, invocation);
   AddGetCommand(program, invocation);
   AddMeshCommand(program, invocation);
+  AddViewCommand(program, invocation);
   AddPictureCommand(program, invocation);
   program.BeginGroup("Ask what collides");
   AddCheckCommand(program, invocation);
@@ -83,6 +84,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddSceneCommand(program, invocation);
   AddStreamCommand(program, invocation);
   AddVerifyCommand(program, invocation);
+  AddWatchCommand(program, invocation);
   program.BeginGroup("Run a server");
   AddStatusCommand(program, invocation);
   AddHealthCommand(program, invocation);
