@@ -25,9 +25,10 @@ class AnswerFeed {
   // Waits for the answer that is under way.
   ~AnswerFeed();
 
-  // Another scene: forgets objects and questions.
-  void Show(const ViewScene& scene);
+  // Another scene, by its number: forgets objects and questions.
+  void Show(const ViewScene& scene, uint64_t number);
   void AddObjects(const std::vector<ViewObject>& objects);
+  // Passed over when it is about another scene.
   void Ask(const ViewQuestion& question);
   // Some hull changed: the last question is answered anew.
   void HullsChanged();
@@ -64,6 +65,7 @@ class AnswerFeed {
   std::condition_variable changed_;
   // The rest is guarded by the mutex.
   Question question_;
+  uint64_t scene_ = 0;
   bool asked_ = false;
   bool ended_ = false;
   std::thread thread_;

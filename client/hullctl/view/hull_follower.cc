@@ -21,16 +21,23 @@ HullFollower::HullFollower(const Client& client, v1::WatchHullsRequest request, 
       request_(std::move(request)),
       receive_(std::move(receive)),
       complain_(std::move(complain)),
-      thread_([this] { Run(); }) {}
+      thread_([this] {
+        Run();
+        finished_ = true;
+      }) {}
 
 HullFollower::~HullFollower() {
+  Cancel();
+  thread_.join();
+}
+
+void HullFollower::Cancel() {
   {
     const std::lock_guard lock(mutex_);
     ended_ = true;
     if (context_ != nullptr) context_->TryCancel();
   }
   changed_.notify_all();
-  thread_.join();
 }
 
 void HullFollower::Run() {

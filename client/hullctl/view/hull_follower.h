@@ -3,6 +3,7 @@
 
 #include <grpcpp/client_context.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -27,8 +28,13 @@ class HullFollower {
 
   HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
                Complaint complain);
-  // Ends the call and waits for the thread.
+  // Cancels and waits for the thread, which may be within a call of the receiver.
   ~HullFollower();
+
+  // Has the thread end soon; does not wait.
+  void Cancel();
+  // Whether the thread has ended, so that the destructor does not wait.
+  bool finished() const { return finished_; }
 
  private:
   void Run();
@@ -50,6 +56,7 @@ class HullFollower {
   // Guarded by the mutex. The context of the call under way, if any.
   grpc::ClientContext* context_ = nullptr;
   bool ended_ = false;
+  std::atomic<bool> finished_ = false;
   std::thread thread_;
 };
 

@@ -298,6 +298,7 @@ class Viewer {
     this.moved.clear();
     this.connection.send({
       type: 'question',
+      scene: model.number,
       update: ++this.update,
       objects,
       poses: objects.flatMap((index) => model.objects[index].pose),
