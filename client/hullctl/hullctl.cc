@@ -63,6 +63,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddSceneCommand(program, invocation);
   AddStreamCommand(program, invocation);
   AddVerifyCommand(program, invocation);
+  AddWatchCommand(program, invocation);
   AddGenerateCommand(program, invocation);
   AddStatusCommand(program, invocation);
   AddBackupCommand(program, invocation);

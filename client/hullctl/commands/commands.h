@@ -20,6 +20,7 @@ void AddBatchCommand(Command program, Invocation* invocation);
 void AddSceneCommand(Command program, Invocation* invocation);
 void AddStreamCommand(Command program, Invocation* invocation);
 void AddVerifyCommand(Command program, Invocation* invocation);
+void AddWatchCommand(Command program, Invocation* invocation);
 void AddGenerateCommand(Command program, Invocation* invocation);
 void AddStatusCommand(Command program, Invocation* invocation);
 void AddBackupCommand(Command program, Invocation* invocation);

@@ -35,8 +35,8 @@ namespace hulld {
 //
 // The bridge to the page:
 //   hello      {server, version, up, scenes: [{key, title}]}, first.
-//   scene      {number, key, title, note, files: [{name}], objects: [OBJECT]}: forget what was there.
-//   OBJECT
+//   scene      {number, key, title, note, files: [{name}], objects: [OBJECT]}: forget what was
+//   there. OBJECT
 //              is {name, hullId, file, pose}: hullId is "" and file -1 where there is none. Other
 //              messages name objects and files by their index here.
 //   objects    {objects}: more objects, behind those that are there.
