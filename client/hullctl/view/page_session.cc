@@ -123,8 +123,7 @@ void PageSession::TakeHull(uint64_t scene, const v1::HullEvent& event, bool sync
     answers_.AddObjects(objects);
     page_->SendText(TextMessage("objects", {{"objects", ObjectsJson(objects)}}));
   }
-  page_->SendText(
-      TextMessage("hull", {{"event", MessageJson(event)}, {"synced", synced ? "true" : "false"}}));
+  page_->SendText(TextMessage("hull", {{"event", MessageJson(event)}}));
   // What is there at the start, the page knows already.
   if (synced || is_new) answers_.HullsChanged();
 }

@@ -40,7 +40,7 @@ namespace hulld {
 //              is {name, hullId, file, pose}: hullId is "" and file -1 where there is none. Other
 //              messages name objects and files by their index here.
 //   objects    {objects}: more objects, behind those that are there.
-//   hull       {event, synced}: a HullEvent of the contract: a hull changed, appeared or went.
+//   hull       {event}: a HullEvent of the contract: a hull changed, appeared or went.
 //   answer     {update, rest, pair, poses, hullA, hullB, relation, rung, axis, certificate,
 //              separation, witness} or {update, pair, problem}: of the pair that was asked for. At
 //              rest this is what CheckCollision says, and else what StreamCollisions says.
