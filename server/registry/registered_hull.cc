@@ -130,9 +130,8 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull() {
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
 
 absl::Status HullNotFound(const std::string& id) {
-  return WithReason(
-      absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first")),
-      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
+  return WithReason(absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found")),
+                    v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {

@@ -218,9 +218,11 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
 void AddViewCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ViewArguments>();
   Command command = program.AddCommand("view", "Look at hulls and files in a browser");
-  command.AddTexts("ID|PREFIX|FILE", &arguments->things,
-                   "Hulls, hulls whose IDs start so, meshes, points, or a scene (.json); default: "
-                   "all hulls");
+  command
+      .AddTexts("ID|PREFIX|FILE", &arguments->things,
+                "Hulls, hulls whose IDs start so, meshes, points, or a scene (.json); default: "
+                "all hulls")
+      .Completes(ValueKind::kHull);
   command.AddFlag("--demo", &arguments->demo,
                   "Show the textbook's scenes, keys 0 to 7, with hulls made for them");
   command.AddText("--scene", &arguments->scene_key, "The scene of --demo to start with")
@@ -235,17 +237,17 @@ void AddViewCommand(Command program, Invocation* invocation) {
   command.AddText("--up", &arguments->up, "The axis that points up (default y)")
       .ValueName("x|y|z")
       .OneOf({"x", "y", "z"});
-  command.SetFooter(
+  command.SetDetails(
       "The page asks hulld through hullctl: it never sees your token, and it changes nothing on\n"
       "the server. The hull of a FILE is made by the server, under view/, and deleted at the end;\n"
       "without the right to write, the file is shown without its hull. Press ? on the page for\n"
-      "its keys. For example:\n"
-      "  hullctl view                      all hulls of the server\n"
-      "  hullctl view cell-3/              those whose IDs start so, and those to come\n"
-      "  hullctl view arm part.stl         a hull beside the points, mesh and hull of a file\n"
-      "  hullctl view scene.json           placements, as for 'hullctl scene'\n"
-      "  hullctl view arm --html arm.html  one file to send to someone\n"
-      "'hullctl picture' draws without a browser.");
+      "its keys. 'hullctl picture' draws without a browser.");
+  command.SetExamples(
+      {{"All hulls of the server", "hullctl view"},
+       {"Those whose IDs start so, and those to come", "hullctl view cell-3/"},
+       {"A hull beside the points, mesh and hull of a file", "hullctl view arm part.stl"},
+       {"Placements, as for 'hullctl scene'", "hullctl view scene.json"},
+       {"One file to send to someone", "hullctl view arm --html arm.html"}});
   command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });
 }
 

@@ -41,12 +41,14 @@ std::string EventText(const v1::HullEvent& event) {
 }
 
 void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
-  if (run.json) {
+  if (run.json()) {
     run.out << MessageJson(message) << "\n" << std::flush;
     return;
   }
   if (message.anew()) run.out << "# anew: forget what is above\n";
-  for (const v1::HullEvent& event : message.events()) run.out << EventText(event) << "\n";
+  for (const v1::HullEvent& event : message.events()) {
+    run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
+  }
   if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
   run.out << std::flush;
 }
@@ -86,17 +88,21 @@ ExitCode Watch(const Invocation& run, const WatchOptions& options) {
 void AddWatchCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<WatchOptions>();
   Command command = program.AddCommand("watch", "Tell of hulls as they come, change and go");
-  command.AddText("PREFIX", &options->prefix, "Only names that start with it");
+  command.AddText("PREFIX", &options->prefix, "Only names that start with it")
+      .Completes(ValueKind::kHull);
   command.AddFlag("--exact", &options->exact, "Only the hull of this very name");
   command.AddFlag("--until-synced", &options->until_synced, "End once what is there has been told");
   command.AddNumber("--events", 1, kAnyNumber, "End after N events, or a few more at once",
                     [options](uint64_t number) { options->events = number; });
-  command.SetFooter(
+  command.SetDetails(
       "Prints a line for each event: what happened, name, revision, vertices and points, box.\n"
       "First come all hulls (PRESENT) and a line '# synced'; then what is CREATED, CHANGED,\n"
       "REPLACED and DELETED, the last state of each hull where many changes come at once.\n"
       "With --output json each message of the contract is one line. Ctrl-C ends it. A watch\n"
       "that loses the server looks for it during --timeout and goes on where it was.");
+  command.SetExamples(
+      {{"Those of one cell", "hullctl watch cell-3/"},
+       {"What is there, for a script", "hullctl watch --until-synced --output json"}});
   command.OnGiven([=] { invocation->action = [=] { return Watch(*invocation, *options); }; });
 }
 

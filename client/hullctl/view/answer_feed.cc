@@ -204,8 +204,9 @@ void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   asked_ = false;
 }
 
-void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects) {
+void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects, uint64_t scene) {
   const std::lock_guard lock(mutex_);
+  if (scene != scene_) return;
   question_.objects.insert(question_.objects.end(), objects.begin(), objects.end());
 }
 

@@ -27,7 +27,8 @@ class AnswerFeed {
 
   // Another scene, by its number: forgets objects and questions.
   void Show(const ViewScene& scene, uint64_t number);
-  void AddObjects(const std::vector<ViewObject>& objects);
+  // Passed over when they are of another scene.
+  void AddObjects(const std::vector<ViewObject>& objects, uint64_t scene);
   // Passed over when it is about another scene.
   void Ask(const ViewQuestion& question);
   // Some hull changed: the last question is answered anew.

@@ -46,14 +46,18 @@ void HullFollower::Run() {
       watch_ = client_.WatchHulls(request_);
     }
     const absl::Status status = Follow(watch_.get());
-    std::unique_lock lock(mutex_);
-    if (ended_) return;
     const bool is_unknown = absl::IsUnimplemented(status);
     const std::string complaint =
         absl::StrCat("Changes of hulls are not followed at present: ",
                      is_unknown ? "this hulld does not know WatchHulls" : status.message());
+    {
+      const std::lock_guard lock(mutex_);
+      if (ended_) return;
+    }
+    // May wait, and so must not hold up Cancel.
     if (complaint != std::exchange(last_complaint, complaint)) complain_(complaint);
     if (is_unknown) return;
+    std::unique_lock lock(mutex_);
     if (changed_.wait_for(lock, kPauseBetweenWatches, [this] { return ended_; })) return;
   }
 }

@@ -120,8 +120,9 @@ void PageSession::TakeHull(uint64_t scene, const v1::HullEvent& event, bool sync
   }
   if (is_new) {
     const std::vector<ViewObject> objects = {{hull_id, hull_id, -1, kIdentityPose}};
-    answers_.AddObjects(objects);
-    page_->SendText(TextMessage("objects", {{"objects", ObjectsJson(objects)}}));
+    answers_.AddObjects(objects, scene);
+    page_->SendText(TextMessage(
+        "objects", {{"scene", std::to_string(scene)}, {"objects", ObjectsJson(objects)}}));
   }
   page_->SendText(TextMessage("hull", {{"event", MessageJson(event)}}));
   // What is there at the start, the page knows already.

@@ -39,7 +39,7 @@ namespace hulld {
 //   there. OBJECT
 //              is {name, hullId, file, pose}: hullId is "" and file -1 where there is none. Other
 //              messages name objects and files by their index here.
-//   objects    {objects}: more objects, behind those that are there.
+//   objects    {scene, objects}: more objects of that scene, behind those that are there.
 //   hull       {event}: a HullEvent of the contract: a hull changed, appeared or went.
 //   answer     {update, rest, pair, poses, hullA, hullB, relation, rung, axis, certificate,
 //              separation, witness} or {update, pair, problem}: of the pair that was asked for. At

@@ -39,7 +39,7 @@ class Viewer {
     this.connection = connect({
       hello: (message) => this.hello(message),
       scene: (message) => this.scene(message),
-      objects: (message) => this.moreObjects(message.objects),
+      objects: (message) => this.moreObjects(message),
       hull: (message) => this.hullChanged(message.event),
       answer: (message) => this.answer(message),
       collisions: (message) => this.collisions(message),
@@ -133,6 +133,8 @@ class Viewer {
     this.moved = new Set(model.objects.map(({index}) => index));
     this.awaited.clear();
     this.fitted = false;
+    // Answers to earlier questions are about another scene.
+    this.firstUpdate = this.connection.live ? this.update + 1 : 0;
     this.clearViews();
     this.shell.clear();
     this.syncShown();
@@ -143,8 +145,9 @@ class Viewer {
     this.updateStatus();
   }
 
-  moreObjects(objects) {
+  moreObjects({scene, objects}) {
     const {model} = this;
+    if (scene !== model.number) return;
     const before = model.objects.length;
     const wasCrowd = model.isCrowd;
     model.addObjects(objects);
@@ -273,14 +276,14 @@ class Viewer {
 
   answer(message) {
     const {pair} = this.model;
-    if (!pair || message.pair[0] !== pair[0] || message.pair[1] !== pair[1]) return;
+    if (!pair || message.update < this.firstUpdate || message.pair[0] !== pair[0] || message.pair[1] !== pair[1]) return;
     this.model.answer = message;
     this.marks.rebuild();
     this.answerPanel.update();
   }
 
   collisions(message) {
-    if (!this.model.objects.length) return;
+    if (message.update < this.firstUpdate) return;
     if (message.revision !== '0') this.updateStatus(message.revision);
     this.model.setCollisions(message);
   }

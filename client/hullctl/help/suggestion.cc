@@ -1,4 +1,7 @@
-#include "client/hullctl/command_line/unknown_command.h"
+#include "client/hullctl/help/suggestion.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -25,29 +28,30 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 }
 
 // Empty when none is near.
-std::string NearestCommand(const std::string& word, const std::vector<std::string>& commands) {
-  for (const std::string& command : commands) {
-    if (word.size() > 1 && command.rfind(word, 0) == 0) return command;
+std::string Nearest(const std::string& word, const std::vector<std::string>& known) {
+  const std::string letters = absl::AsciiStrToLower(word);
+  const size_t first = letters.find_first_not_of('-');
+  const bool is_prefix = first != std::string::npos && first + 1 < letters.size();
+  for (const std::string& candidate : known) {
+    const std::string start = absl::AsciiStrToLower(candidate.substr(0, letters.size()));
+    if (is_prefix && start == letters) return candidate;
   }
   std::string nearest;
-  size_t least = std::max<size_t>(1, word.size() / 3) + 1;
-  for (const std::string& command : commands) {
-    const size_t distance = EditDistance(word, command);
+  size_t least = std::max<size_t>(1, letters.size() / 3) + 1;
+  for (const std::string& candidate : known) {
+    const size_t distance = EditDistance(letters, absl::AsciiStrToLower(candidate));
     if (distance >= least) continue;
     least = distance;
-    nearest = command;
+    nearest = candidate;
   }
   return nearest;
 }
 
 }  // namespace
 
-std::string ExplainUnknownCommand(const std::string& word,
-                                  const std::vector<std::string>& commands) {
-  const std::string nearest = NearestCommand(word, commands);
-  std::string text = "Unknown command \"" + word + "\".";
-  if (!nearest.empty()) text += " Did you mean \"" + nearest + "\"?";
-  return text;
+std::string Suggestion(const std::string& word, const std::vector<std::string>& known) {
+  const std::string nearest = Nearest(word, known);
+  return nearest.empty() ? "" : absl::StrCat("; did you mean \"", nearest, "\"?");
 }
 
 }  // namespace hulld
