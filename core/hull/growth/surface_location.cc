@@ -72,8 +72,8 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
   return 3;
 }
 
-// How far the direction is within the triangle's cone, less than zero outside, in no unit: the least
-// of what EdgeTowards compares.
+// How far the direction is within the triangle's cone, less than zero outside, in no unit: the
+// least of what EdgeTowards compares.
 double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
                           const Vector& direction) const {
   const Vector& center = directions_->center();

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <vector>
 
+#include "core/hull/audit.h"
 #include "core/hull/growth/hull_builder.h"
+#include "core/numeric/orientation.h"
 #include "core/query/placed/live_hull.h"
 #include "core/query/placed/query_hull.h"
 #include "tests/core/checks/oracle_bridge.h"
@@ -50,6 +53,85 @@ TEST(HullCost, NoSinglePointStalls) {
     }
     // The counter counts.
     EXPECT_GT(before, builder.vertex_count()) << stream.name;
+  }
+}
+
+// What a block keeps so as to be undone depends on what it changes, not on the hull that it meets.
+TEST(HullCost, UndoingCostsWhatChanges) {
+  const uint64_t seed = TestSeed(507);
+  Random random(seed);
+  const std::vector<Vector> inside = RandomInBall(random, 2000, 0.9);
+  std::vector<size_t> of_inside;
+  std::vector<size_t> of_outside;
+  for (const int vertices : {2000, 20000, 200000}) {
+    const std::vector<Vector> sphere = RandomOnSphere(random, vertices, 1);
+    HullBuilder builder;
+    ASSERT_TRUE(builder.Add(sphere).ok());
+    EXPECT_EQ(builder.undo_bytes(), 0u);
+    AddLimits limits;
+    limits.should_stop = [] { return false; };
+    limits.max_vertices = static_cast<size_t>(vertices);
+    ASSERT_TRUE(builder.Add(inside, limits).ok());
+    of_inside.push_back(builder.undo_bytes());
+    // Each equals a vertex.
+    ASSERT_TRUE(builder.Add(std::span(sphere).first(2000), limits).ok());
+    EXPECT_LE(builder.undo_bytes(), 2000 * 48u) << "seed " << seed;
+    // Refused in the end, after all were added.
+    const std::vector<Vector> outside = RandomOnSphere(random, 2000, 1.0 + 0.1 / vertices);
+    EXPECT_TRUE(absl::IsResourceExhausted(builder.Add(outside, limits).status()));
+    of_outside.push_back(builder.undo_bytes());
+    EXPECT_EQ(builder.vertex_count(), sphere.size());
+  }
+  for (const size_t bytes : of_inside) EXPECT_LE(bytes, 10000u) << "seed " << seed;
+  // Six triangles round each, and as many beyond them.
+  for (const size_t bytes : of_outside) {
+    EXPECT_GT(bytes, 2000 * 100u) << "seed " << seed;
+    EXPECT_LE(bytes, 2000 * 16 * 80u) << "seed " << seed;
+  }
+}
+
+// Exact signs of all stages that one thread has decided.
+uint64_t SignsSoFar() {
+  const OrientationCounts counts = ThreadOrientationCounts();
+  return counts.filter + counts.fixed_point + counts.expansion + counts.integer;
+}
+
+// Two polygons of n corners in parallel planes, which are tilted, exactly: n from -n/2 to n/2 on a
+// parabola.
+std::vector<Vector> ParabolaPrism(int n) {
+  std::vector<Vector> points;
+  for (double i = -n / 2; i < n - n / 2; ++i) {  // NOLINT: exact
+    for (const double side : {0., 1.}) {
+      points.push_back(i * n * Vector(1, 2, -1) + i * i * Vector(2, -1, 3) +
+                       side * n * n * Vector(1, 1, 5));
+    }
+  }
+  return points;
+}
+
+// Facets of many corners grow at one side: no point costs as much as its facet has corners.
+TEST(HullCost, FacetsOfManyCornersTakeNoQuadraticTime) {
+  const uint64_t seed = TestSeed(508);
+  for (const bool one_by_one : {false, true}) {
+    std::vector<double> signs;
+    for (const int n : {500, 2000, 8000}) {
+      Random random(seed);
+      std::vector<Vector> points = ParabolaPrism(n);
+      Shuffle(random, points);
+      HullBuilder builder;
+      const uint64_t before = SignsSoFar();
+      for (size_t i = 0; i < points.size(); i += one_by_one ? 1 : points.size()) {
+        ASSERT_TRUE(builder.Add(std::span(points).subspan(i, one_by_one ? 1 : points.size())).ok());
+      }
+      const Hull hull = builder.Snapshot();
+      signs.push_back(static_cast<double>(SignsSoFar() - before));
+      EXPECT_EQ(hull.vertices().size(), points.size());
+      EXPECT_EQ(hull.facet_count(), static_cast<size_t>(n) + 2);
+      EXPECT_TRUE(n > 500 || AuditHull(hull).ok());
+    }
+    // Four times as many corners; n log n is 5 times as much, n^2 16 times.
+    EXPECT_LT(signs[1], 8 * signs[0]) << one_by_one << " seed " << seed;
+    EXPECT_LT(signs[2], 8 * signs[1]) << one_by_one << " seed " << seed;
   }
 }
 
