@@ -201,6 +201,7 @@ absl::Status Appender::TakeResponse(const v1::AppendPointsResponse& response) {
   counts.set_outside(counts.outside() + ack.counts().outside());
   counts.set_duplicate(counts.duplicate() + ack.counts().duplicate());
   counts.set_inside(counts.inside() + ack.counts().inside());
+  totals_.last_ack = ack;
   totals_.hull_revision = ack.hull_revision();
   totals_.vertex_count = ack.vertex_count();
   return absl::OkStatus();

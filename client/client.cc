@@ -249,6 +249,10 @@ absl::StatusOr<v1::DeleteHullResponse> Client::DeleteHull(
   return Call(hulls_.get(), &v1::HullService::Stub::DeleteHull, request, false);
 }
 
+std::unique_ptr<HullWatch> Client::WatchHulls(const v1::WatchHullsRequest& request) const {
+  return std::make_unique<HullWatch>(hulls_, request, options_.retry, options_.timeout);
+}
+
 absl::StatusOr<v1::CheckCollisionResponse> Client::CheckCollision(
     const v1::CheckCollisionRequest& request) const {
   return Call(collisions_.get(), &v1::CollisionService::Stub::CheckCollision, request, true);

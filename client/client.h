@@ -17,6 +17,7 @@
 #include "client/collision_stream.h"
 #include "client/connection_security.h"
 #include "client/retry.h"
+#include "client/watch/hull_watch.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/maintenance.grpc.pb.h"
@@ -102,6 +103,10 @@ class Client {
   // Never retried: a repeated delete could remove a hull that someone has created anew.
   absl::StatusOr<v1::DeleteHullResponse> DeleteHull(const std::string& hull_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
+
+  // Tells of hulls as they come, change and go. The timeout bounds the search for a server that was
+  // lost.
+  std::unique_ptr<HullWatch> WatchHulls(const v1::WatchHullsRequest& request) const;
 
   absl::StatusOr<v1::CheckCollisionResponse> CheckCollision(
       const v1::CheckCollisionRequest& request) const;

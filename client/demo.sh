@@ -216,3 +216,8 @@ if ((wrong > 0)); then
   exit 1
 fi
 heading "All answers are as expected"
+cat <<END
+  To look at these scenes in a browser, drag things and see the answers change:
+    $build/bin/hulld &
+    $build/bin/hullctl view --demo
+END

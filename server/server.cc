@@ -132,6 +132,7 @@ absl::Status Server::Listen(const Config& config) {
 void Server::BeginDrain() {
   grpc_server_->GetHealthCheckService()->SetServingStatus(false);
   admission_.BeginDrain();
+  registry_.EndWatches();
 }
 
 bool Server::WaitIdle(std::chrono::milliseconds timeout) {
@@ -141,6 +142,7 @@ bool Server::WaitIdle(std::chrono::milliseconds timeout) {
 Server::~Server() {
   if (grpc_server_ == nullptr) return;
   admission_.BeginDrain();
+  registry_.EndWatches();
   // Cancels what still runs; core polls for that, so the calls end soon.
   grpc_server_->Shutdown(std::chrono::system_clock::now());
   admission_.WaitIdle(std::chrono::steady_clock::time_point::max());

@@ -1,29 +1,53 @@
 #include "client/hullctl/hullctl.h"
 
+#include <unistd.h>
+
+#include <iostream>
 #include <optional>
+#include <sstream>
 
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/command.h"
-#include "client/hullctl/command_line/connection_options.h"
+#include "client/hullctl/command_line/connection.h"
 #include "client/hullctl/command_line/exit_code.h"
 #include "client/hullctl/command_line/invocation.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/completion/completion.h"
+#include "client/hullctl/completion/completion_script.h"
+#include "client/hullctl/completion/completion_values.h"
 
 namespace hulld {
 namespace {
 
-void AddGlobalOptions(Command program, Invocation* invocation) {
+void AddOutputOptions(Command program, Invocation* invocation) {
   program
       .AddParsed(
-          "-s,--server",
-          [invocation](const std::string& server) {
-            const absl::Status status = ValidateServer(server);
-            if (status.ok()) invocation->server = server;
-            return status;
+          "--output",
+          [invocation](const std::string& form) {
+            invocation->form = form == "json"   ? OutputForm::kJson
+                               : form == "name" ? OutputForm::kName
+                               : form == "wide" ? OutputForm::kWide
+                                                : OutputForm::kTable;
+            return absl::OkStatus();
           },
-          std::string("Where hulld listens (default ") + kDefaultServer + ")")
-      .ValueName("HOST:PORT")
-      .Environment("HULLCTL_SERVER");
+          "How answers are printed (default table)")
+      .ValueName("FORM")
+      .OneOf({"table", "wide", "name", "json"});
+  program
+      .AddParsed(
+          "--color",
+          [invocation](const std::string& when) {
+            const bool terminal = &invocation->out == &std::cout && isatty(STDOUT_FILENO) != 0;
+            invocation->paint = Painter(WantsColour(when, terminal));
+            return absl::OkStatus();
+          },
+          "Whether to use colours (default auto: on a terminal, unless $NO_COLOR is set)")
+      .ValueName("WHEN")
+      .OneOf({"auto", "always", "never"});
+}
+
+void AddGlobalOptions(Command program, Invocation* invocation) {
+  AddConnectionOptions(program, invocation);
   program
       .AddParsed(
           "--timeout",
@@ -37,39 +61,106 @@ void AddGlobalOptions(Command program, Invocation* invocation) {
           "How long to wait for an answer, such as 500ms or 2m (default 30s; 'replace' and "
           "'backup save' take the time that they need unless it is given)")
       .ValueName("TIME");
-  program
-      .AddParsed(
-          "--output",
-          [invocation](const std::string& kind) {
-            invocation->json = kind == "json";
-            return absl::OkStatus();
-          },
-          "How answers are printed (default table)")
-      .ValueName("table|json")
-      .OneOf({"table", "json"});
-  AddConnectionOptions(program, invocation);
+  AddOutputOptions(program, invocation);
 }
 
+// The groups of the help, and the commands in them. A new command has its line here, its
+// declaration in commands/commands.h, and all else in its own file.
 void AddCommands(Command program, Invocation* invocation) {
+  program.BeginGroup("Build hulls");
   AddCreateCommand(program, invocation);
   AddAppendCommand(program, invocation);
   AddReplaceCommand(program, invocation);
-  AddGetCommand(program, invocation);
-  AddListCommand(program, invocation);
   AddDeleteCommand(program, invocation);
+  program.BeginGroup("Look at hulls");
+  AddListCommand(program, invocation);
+  AddGetCommand(program, invocation);
   AddMeshCommand(program, invocation);
+  AddViewCommand(program, invocation);
+  AddPictureCommand(program, invocation);
+  program.BeginGroup("Ask what collides");
   AddCheckCommand(program, invocation);
   AddBatchCommand(program, invocation);
   AddSceneCommand(program, invocation);
   AddStreamCommand(program, invocation);
   AddVerifyCommand(program, invocation);
-  AddGenerateCommand(program, invocation);
+  AddWatchCommand(program, invocation);
+  program.BeginGroup("Run a server");
   AddStatusCommand(program, invocation);
+  AddHealthCommand(program, invocation);
   AddBackupCommand(program, invocation);
-  AddBenchCommand(program, invocation);
-  AddPictureCommand(program, invocation);
   AddTokenCommand(program, invocation);
+  AddBenchCommand(program, invocation);
+  program.BeginGroup("Work with hullctl");
+  AddContextCommand(program, invocation);
+  AddShellCommand(program, invocation);
+  AddCompletionCommand(program, invocation);
+  AddGenerateCommand(program, invocation);
+  AddManCommand(program, invocation);
   program.RequireCommand();
+}
+
+// "help check" is "check --help".
+std::vector<std::string> WithoutHelpCommand(std::vector<std::string> arguments) {
+  if (arguments.empty() || arguments.front() != "help") return arguments;
+  arguments.erase(arguments.begin());
+  arguments.emplace_back("--help");
+  return arguments;
+}
+
+void AddProgram(Command program, Invocation* invocation) {
+  program.SetDetails(std::string(kExitCodeHelp) +
+                     "\nJSON follows the mapping of proto3: 64-bit integers are strings.");
+  program.SetExamples({{"A server, a hull, a question", "hulld --data-dir hulls &"},
+                       {"", "hullctl generate lattice 27 | hullctl append cube - --create"},
+                       {"", "hullctl check cube cube --pose-b 2,0,0"}});
+  AddGlobalOptions(program, invocation);
+  AddCommands(program, invocation);
+}
+
+// Answers a shell that asks what can stand for the last of the words.
+int CompleteWords(const std::vector<std::string>& words, CommandLine* command_line,
+                  Invocation* invocation) {
+  // Options that tell the server; where they make no sense, there are no IDs to offer.
+  std::vector<std::string> options = ProgramOptionsIn(command_line->description(), words);
+  options.emplace_back("health");
+  std::ostringstream ignored;
+  const bool understood = !command_line->Parse(options, ignored, ignored).has_value();
+  const ValueSource values =
+      understood
+          ? ValuesFor(invocation)
+          : ValueSource([](ValueKind, const std::string&) { return std::vector<Candidate>(); });
+  const Completion completion = Complete(command_line->description(), words, values);
+  for (const Candidate& candidate : completion.candidates) {
+    invocation->out << candidate.text;
+    if (!candidate.help.empty()) invocation->out << "\t" << candidate.help;
+    invocation->out << "\n";
+  }
+  invocation->out << (completion.files         ? ":files"
+                      : completion.directories ? ":directories"
+                                               : ":")
+                  << "\n";
+  return static_cast<int>(ExitCode::kDone);
+}
+
+int Run(const CommandLine& command_line, Invocation* invocation) {
+  invocation->program = &command_line.description();
+  invocation->run_line = [invocation](const std::vector<std::string>& arguments) {
+    return RunHullctl(arguments, invocation->out, invocation->err);
+  };
+  if (invocation->needs_server) {
+    const absl::Status resolved = ResolveConnection(invocation);
+    if (!resolved.ok()) return static_cast<int>(invocation->FailUsage(resolved));
+  }
+  // What is for other programs has no colours.
+  if (invocation->json() || invocation->names()) invocation->paint = Painter();
+  const ExitCode code = invocation->action();
+  invocation->out.flush();
+  if (!invocation->out) {
+    invocation->err << "hullctl: cannot write the answer; is the disk full or the pipe closed?\n";
+    return static_cast<int>(ExitCode::kUsage);
+  }
+  return static_cast<int>(code);
 }
 
 }  // namespace
@@ -78,23 +169,15 @@ int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std
   CommandLine command_line(
       "hullctl", HULLD_VERSION,
       "Keeps convex hulls on a hulld server and asks it whether they collide.");
-  Command program = command_line.root();
-  program.SetFooter(std::string(kExitCodeHelp) +
-                    "\nJSON output follows the mapping of proto3: 64-bit integers are strings.");
   Invocation invocation(out, err);
-  AddGlobalOptions(program, &invocation);
-  AddCommands(program, &invocation);
-  const std::optional<ExitCode> ended = command_line.Parse(arguments, out, err);
-  if (ended.has_value()) return static_cast<int>(*ended);
-  const absl::Status completed = CompleteConnectionOptions(&invocation);
-  if (!completed.ok()) return static_cast<int>(invocation.FailUsage(completed));
-  const ExitCode code = invocation.action();
-  out.flush();
-  if (!out) {
-    err << "hullctl: cannot write the answer; is the disk full or the pipe closed?\n";
-    return static_cast<int>(ExitCode::kUsage);
+  invocation.paint = Painter(WantsColour("auto", &out == &std::cout && isatty(STDOUT_FILENO) != 0));
+  invocation.shows_progress = &err == &std::cerr && isatty(STDERR_FILENO) != 0;
+  AddProgram(command_line.root(), &invocation);
+  if (!arguments.empty() && arguments.front() == kCompleteCommand) {
+    return CompleteWords({arguments.begin() + 1, arguments.end()}, &command_line, &invocation);
   }
-  return static_cast<int>(code);
+  const std::optional<ExitCode> ended = command_line.Parse(WithoutHelpCommand(arguments), out, err);
+  return ended.has_value() ? static_cast<int>(*ended) : Run(command_line, &invocation);
 }
 
 }  // namespace hulld

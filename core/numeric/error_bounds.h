@@ -34,10 +34,11 @@ inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
 // DirectionMap::Finish).
 inline constexpr double kDirectionMapMargin = 0x1p-20;
 
-// The distance |p - s e - t f| for differences p, e, f of doubles and s, t in [0, 1] with rounded
-// sum at most 1 (exact sum at most 1 + u): components err by at most (1 + 3 + 3 + 2) u (|p| + |e| +
-// |f|), the norm by sqrt(3) of that and 8 u of itself; a sum of s and t above 1 by u moves the
-// point by at most 2 u (|e| + |f|). 32 u covers it; kLeastPositive what underflow adds. Proven.
+// The distance |p - (s e + t f)| for differences p, e, f of doubles and s, t in [0, 1] with rounded
+// sum at most 1 (exact sum at most 1 + u): components err by at most 4 u (|p| + |e| + |f|), the
+// norm by sqrt(3) of that and 8 u of itself; a sum of s and t above 1 by u moves the point by at
+// most 2 u (|e| + |f|). 32 u covers it; kLeastPositive what underflow adds, here and where the
+// coordinates were scaled. Proven.
 inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 
 // Queries in floating point: S is the size of a pair, |.| the largest absolute component, and all

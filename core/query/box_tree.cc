@@ -18,6 +18,20 @@ constexpr uint32_t kLeafBoxes = 8;
 
 }  // namespace
 
+Box GrownBy(const Box& box, double clearance) {
+  if (clearance == 0) return box;
+  // Rounded up, one unit in the last place being the most that the sums err.
+  const auto grown = [&](double x, double towards) {
+    return std::nextafter(x + std::copysign(clearance, towards), towards);
+  };
+  Box result = box;
+  for (int axis = 0; axis < 3; ++axis) {
+    result.low[axis] = grown(box.low[axis], -kInfinity);
+    result.high[axis] = grown(box.high[axis], kInfinity);
+  }
+  return result;
+}
+
 Box BoundingBox(const PlacedHull& placed) {
   if (placed.empty()) {
     return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};

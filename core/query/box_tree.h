@@ -24,6 +24,9 @@ struct Box {
 // Empty for an empty hull.
 Box BoundingBox(const PlacedHull& placed);
 
+// A box that holds all points within `clearance` >= 0 of this one: rounded outwards.
+Box GrownBy(const Box& box, double clearance);
+
 // A hierarchy of boxes that finds those which meet a given one. Immutable once built.
 class BoxTree {
  public:

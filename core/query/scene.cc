@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -149,18 +148,7 @@ uint64_t SceneSearch::CountPairs() const {
 
 void SceneSearch::Candidates(uint32_t a, std::vector<uint32_t>& candidates) const {
   HULLD_DCHECK(a < size_);
-  Box box = boxes_[a];
-  if (const double clearance = options_->query.clearance.value_or(0); clearance > 0) {
-    // Rounded up, one unit in the last place being the most that the sums err.
-    const auto grown = [&](double x, double towards) {
-      return std::nextafter(x + std::copysign(clearance, towards), towards);
-    };
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    for (int axis = 0; axis < 3; ++axis) {
-      box.low[axis] = grown(box.low[axis], -kInfinity);
-      box.high[axis] = grown(box.high[axis], kInfinity);
-    }
-  }
+  const Box box = GrownBy(boxes_[a], options_->query.clearance.value_or(0));
   candidates.clear();
   tree_.AppendMeeting(box, a + 1, candidates);
   std::erase_if(candidates, [&](uint32_t b) { return IsIgnored(a, b); });

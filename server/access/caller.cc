@@ -44,6 +44,8 @@ Permission PermissionFor(Rpc rpc) {
     case Rpc::kStreamCollisions:
     case Rpc::kFindCollisions:
     case Rpc::kGetStatus:
+    case Rpc::kWatchHulls:
+    case Rpc::kWatchCollisions:
       return Permission::kRead;
     case Rpc::kCreateHull:
     case Rpc::kAppendPoints:

@@ -39,6 +39,8 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kReplaceHull:
     case Rpc::kStreamCollisions:
     case Rpc::kSaveBackup:
+    case Rpc::kWatchHulls:
+    case Rpc::kWatchCollisions:
       return CallKind::kStream;
   }
   HULLD_UNREACHABLE();
@@ -101,11 +103,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(Rpc rpc,
   Ticket ticket(nullptr, KindOf(rpc));
   if (ticket.kind_ == CallKind::kStream) ticket.client_ = client();
   const std::lock_guard lock(mutex_);
-  if (draining_) {
-    return WithReason(
-        absl::UnavailableError("hulld is draining and ends soon; retry when it is back"),
-        v1::ERROR_REASON_DRAINING);
-  }
+  if (draining_) return Draining();
   // What tells the operator how the server is must work when it is full, too.
   if (rpc != Rpc::kGetStatus) {
     if (absl::Status s = CheckRoom(ticket.kind_, ticket.client_); !s.ok()) return s;

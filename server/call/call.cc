@@ -21,6 +21,11 @@ double Milliseconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double, std::milli>(duration).count();
 }
 
+// Whether --max-request-time limits each message of the client, rather than the call.
+bool IsTimedByMessage(Rpc rpc) {
+  return rpc == Rpc::kStreamCollisions || rpc == Rpc::kWatchCollisions;
+}
+
 // Whether the server itself is to blame.
 bool IsFault(absl::StatusCode code) {
   return code == absl::StatusCode::kInternal || code == absl::StatusCode::kUnknown ||
@@ -73,13 +78,13 @@ std::string Call::Client() const {
 
 void Call::BeginMessage() {
   message_arrival_ = Clock::now();
-  if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(admission_.limits().max_request_time);
+  if (IsTimedByMessage(rpc_)) lifetime_.LimitTime(admission_.limits().max_request_time);
 }
 
 void Call::EndMessage(Clock::time_point arrival) {
   const Clock::duration duration = Clock::now() - arrival;
   metrics().CountMessage(rpc_, duration);
-  if (rpc_ == Rpc::kStreamCollisions) lifetime_.LimitTime(std::chrono::milliseconds::zero());
+  if (IsTimedByMessage(rpc_)) lifetime_.LimitTime(std::chrono::milliseconds::zero());
   LogSlow(duration, absl::OkStatus(), "slow message");
 }
 

@@ -14,6 +14,7 @@
 #include "server/call/unary_call.h"
 #include "server/collisions/batch_stream.h"
 #include "server/collisions/collision_stream.h"
+#include "server/collisions/collision_watch.h"
 #include "server/collisions/query_settings.h"
 #include "server/collisions/scene_stream.h"
 #include "server/contract/status_map.h"
@@ -203,6 +204,11 @@ CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
 grpc::ServerWriteReactor<v1::FindCollisionsResponse>* CollisionService::FindCollisions(
     grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) {
   return SceneStream::Start(*context, admission_, registry_, long_readers_, pool_, *request);
+}
+
+grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>*
+CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
+  return CollisionWatch::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
 }
 
 }  // namespace hulld::server

@@ -40,6 +40,8 @@ class CollisionService : public v1::CollisionService::CallbackService {
   StreamCollisions(grpc::CallbackServerContext* context) override;
   grpc::ServerWriteReactor<v1::FindCollisionsResponse>* FindCollisions(
       grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) override;
+  grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>* WatchCollisions(
+      grpc::CallbackServerContext* context) override;
 
  private:
   struct PairQuery;

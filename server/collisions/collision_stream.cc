@@ -166,36 +166,14 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
 
 // Checks all of the update before it applies any.
 absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& update) {
-  const int moved = update.placements_size();
-  if (update.poses_size() != kPoseNumbers * moved) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("poses holds ", update.poses_size(), " numbers for ", moved,
-                     " placements; each needs seven: w x y z and x y z"));
-  }
-  std::vector<char> named(table_.size());
-  std::vector<Pose> poses;
-  for (int i = 0; i < moved; ++i) {
-    const uint32_t placement = update.placements(i);
-    if (placement >= table_.size()) {
-      return absl::InvalidArgumentError(absl::StrCat("placements[", i, "] is ", placement,
-                                                     ", but the stream has ", table_.size(),
-                                                     "; indices start at 0"));
-    }
-    if (named[placement]) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
-    }
-    named[placement] = true;
-    const absl::StatusOr<Pose> pose = DecodePoseAt(update.poses(), i);
-    if (!pose.ok()) return Prefixed(absl::StrCat("poses[", i, "]."), pose.status());
-    poses.push_back(*pose);
-  }
+  const absl::StatusOr<Moves> moves = ReadMoves(update.placements(), update.poses(), table_.size());
+  if (!moves.ok()) return moves.status();
   if (update.refresh_hulls()) {
     if (absl::Status s = Refresh({}); !s.ok()) return s;
   }
-  for (int i = 0; i < moved; ++i) {
-    table_.Move(update.placements(i), poses[i]);
-    AskAboutPairsOf(update.placements(i));
+  for (const auto& [placement, pose] : *moves) {
+    table_.Move(placement, pose);
+    AskAboutPairsOf(placement);
   }
   return absl::OkStatus();
 }

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <unordered_map>
 #include <utility>
 
@@ -29,6 +30,28 @@ bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b
   if (!a.ok() || !b.ok()) return a.ok() == b.ok();
   return a->record.revision == b->record.revision &&
          a->record.create_revision == b->record.create_revision;
+}
+
+// What is asked of a hull, or stands in for it.
+const QueryHull& QueryHullOf(const absl::StatusOr<HullView>& hull, bool canonical) {
+  if (!hull.ok()) return NoHull();
+  return canonical ? hull->served->canonical_query_hull() : hull->served->query_hull();
+}
+
+// Hulls that queries with these options can be asked of. CANCELLED: options.should_stop said so.
+absl::StatusOr<Resolved> ResolveFor(Registry& registry, std::span<const std::string> ids,
+                                    const QueryOptions& options, const ReadPlan& plan) {
+  const bool canonical = options.WantsCanonical();
+  absl::StatusOr<Resolved> resolved =
+      registry.Resolve(ids, options.should_stop, canonical ? ReadPlan() : plan);
+  if (!resolved.ok() || !canonical) return resolved;
+  for (absl::StatusOr<HullView>& hull : resolved->hulls) {
+    if (!hull.ok()) continue;
+    const absl::Status made = registry.Canonical(*hull, options.should_stop).status();
+    if (absl::IsCancelled(made)) return made;
+    if (!made.ok()) hull = made;
+  }
+  return resolved;
 }
 
 absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
@@ -135,25 +158,37 @@ size_t PlacementTable::MemoryBytes() const {
   for (const std::string& id : ids_) of_ids += id.capacity();
   return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull)) + named_.size() * sizeof named_[0] +
          ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) +
-                        sizeof(const QueryHull*) + 2 * sizeof(char)) +
-         of_ids;
+                        sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
+         entries_.size() * sizeof(uint32_t) + of_ids;
 }
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
                                      const ReadPlan& plan) {
-  const bool canonical = options.WantsCanonical();
-  absl::StatusOr<Resolved> resolved =
-      registry.Resolve(ids_, options.should_stop, canonical ? ReadPlan() : plan);
+  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids_, options, plan);
   if (!resolved.ok()) return resolved.status();
-  if (canonical) {
-    for (absl::StatusOr<HullView>& hull : resolved->hulls) {
-      if (!hull.ok()) continue;
-      const absl::Status made = registry.Canonical(*hull, options.should_stop).status();
-      if (absl::IsCancelled(made)) return made;
-      if (!made.ok()) hull = made;
-    }
+  Take(registry, *std::move(resolved), options.WantsCanonical());
+  return absl::OkStatus();
+}
+
+absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions& options,
+                                         std::span<const size_t> hulls) {
+  std::vector<std::string> ids;
+  ids.reserve(hulls.size());
+  for (const size_t k : hulls) ids.push_back(ids_[k]);
+  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids, options, {});
+  if (!resolved.ok()) return resolved.status();
+  std::fill(changed_.begin(), changed_.end(), false);
+  std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
+  for (size_t n = 0; n < hulls.size(); ++n) {
+    const size_t k = hulls[n];
+    // The one before ends only when nothing is placed of it any more.
+    const absl::StatusOr<HullView> before = std::exchange(hulls_[k], std::move(resolved->hulls[n]));
+    const QueryHull& query_hull = QueryHullOf(hulls_[k], options.WantsCanonical());
+    changed_[k] = !IsSame(before, hulls_[k]);
+    query_hull_changed_[k] = std::exchange(query_hulls_[k], &query_hull) != &query_hull;
+    for (const uint32_t i : placements_of(k)) placed_[i] = Place(i);
   }
-  Take(registry, *std::move(resolved), canonical);
+  store_revision_ = resolved->store_revision;
   return absl::OkStatus();
 }
 
@@ -174,10 +209,7 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved, bool cano
   std::vector<const QueryHull*> query_hulls;
   query_hulls.reserve(ids_.size());
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
-    const QueryHull* const of_hull = !hull.ok()  ? &NoHull()
-                                     : canonical ? &hull->served->canonical_query_hull()
-                                                 : &hull->served->query_hull();
-    query_hulls.push_back(of_hull);
+    query_hulls.push_back(&QueryHullOf(hull, canonical));
   }
   changed_.assign(ids_.size(), true);
   query_hull_changed_.assign(ids_.size(), true);
@@ -194,6 +226,21 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved, bool cano
   placed_.clear();
   placed_.reserve(entries_.size());
   for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
+  if (by_hull_begin_.empty()) SortByHull();
+}
+
+void PlacementTable::SortByHull() {
+  by_hull_begin_.assign(ids_.size() + 1, 0);
+  for (const Entry& entry : entries_) {
+    if (entry.hull.has_value()) ++by_hull_begin_[*entry.hull];
+  }
+  size_t sum = 0;
+  for (size_t& begin : by_hull_begin_) begin = sum += begin;
+  by_hull_.resize(sum);
+  for (size_t i = entries_.size(); i-- > 0;) {
+    if (!entries_[i].hull.has_value()) continue;
+    by_hull_[--by_hull_begin_[*entries_[i].hull]] = static_cast<uint32_t>(i);
+  }
 }
 
 PlacedHull PlacementTable::Place(size_t i) const {
@@ -240,18 +287,59 @@ size_t PlacementTable::EncodeHulls(
       v1::HullVersion* const version = hulls->Add();
       const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
       const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
-      if (known) EncodeVersion(store_id_, hulls_[*hull]->record, version);
+      if (known) EncodeHull(*hull, version);
       bytes += version->ByteSizeLong();
     }
     if (is_name || problem(i).ok()) continue;
     v1::PlacementProblem* const encoded = problems->Add();
-    encoded->set_placement(static_cast<uint32_t>(i));
-    encoded->set_code(ToGrpc(problem(i).code()));
-    encoded->set_message(std::string(problem(i).message()));
-    encoded->set_reason(ReasonOf(problem(i)));
+    EncodeProblem(i, encoded);
     bytes += kEntryBytes + encoded->ByteSizeLong();
   }
   return row;
+}
+
+void PlacementTable::EncodeHull(size_t k, v1::HullVersion* version) const {
+  EncodeVersion(store_id_, hulls_[k]->record, version);
+}
+
+void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) const {
+  const absl::Status& status = problem(i);
+  message->set_placement(static_cast<uint32_t>(i));
+  message->set_code(ToGrpc(status.code()));
+  message->set_message(std::string(status.message()));
+  message->set_reason(ReasonOf(status));
+}
+
+absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
+                                const google::protobuf::RepeatedField<double>& poses,
+                                size_t count) {
+  const int moved = placements.size();
+  if (poses.size() != kPoseNumbers * moved) {
+    return absl::InvalidArgumentError(absl::StrCat("poses holds ", poses.size(), " numbers for ",
+                                                   moved,
+                                                   " placements; each needs seven: w x y z and x "
+                                                   "y z"));
+  }
+  std::vector<char> named(count);
+  Moves moves;
+  moves.reserve(moved);
+  for (int i = 0; i < moved; ++i) {
+    const uint32_t placement = placements[i];
+    if (placement >= count) {
+      return absl::InvalidArgumentError(absl::StrCat("placements[", i, "] is ", placement,
+                                                     ", but the stream has ", count,
+                                                     "; indices start at 0"));
+    }
+    if (named[placement]) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
+    }
+    named[placement] = true;
+    const absl::StatusOr<Pose> pose = DecodePoseAt(poses, i);
+    if (!pose.ok()) return Prefixed(absl::StrCat("poses[", i, "]."), pose.status());
+    moves.emplace_back(placement, *pose);
+  }
+  return moves;
 }
 
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/query/placed/placed_hull.h"
@@ -55,8 +56,25 @@ class PlacementTable {
   // name that one's points.
   bool query_hull_changed(size_t i) const;
 
+  // The same as Resolve for a few of hull_ids(), by index; the others stay as they are.
+  absl::Status ResolveSome(Registry& registry, const QueryOptions& options,
+                           std::span<const size_t> hulls);
+
   // Requires a valid pose, which is checked where the hull is placed.
   void Move(size_t i, const Pose& X_WH);
+
+  // The hulls; each once, but one that packed placements name several times.
+  std::span<const std::string> hull_ids() const { return ids_; }
+  // What hull k is, or why there is none. Requires that it was resolved.
+  const absl::StatusOr<HullView>& hull(size_t k) const { return hulls_[k]; }
+  // The placements of hull k. Requires that it was resolved.
+  std::span<const uint32_t> placements_of(size_t k) const {
+    return std::span(by_hull_).subspan(by_hull_begin_[k],
+                                       by_hull_begin_[k + 1] - by_hull_begin_[k]);
+  }
+  // The hull of a placement; none when the ID is malformed or not the caller's.
+  std::optional<size_t> hull_of(size_t i) const { return entries_[i].hull; }
+  uint64_t store_revision() const { return store_revision_; }
 
   // The store's revision of the last Resolve.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
@@ -66,6 +84,9 @@ class PlacementTable {
   size_t EncodeHulls(size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
                      google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
   size_t table_rows() const { return named_.size() + entries_.size(); }
+  void EncodeHull(size_t k, v1::HullVersion* version) const;
+  // Requires that the placement is not answerable.
+  void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
 
  private:
   struct Entry {
@@ -81,6 +102,7 @@ class PlacementTable {
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
   void Take(const Registry& registry, Resolved resolved, bool canonical);
+  void SortByHull();
   const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 
@@ -96,11 +118,23 @@ class PlacementTable {
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;
   std::vector<char> query_hull_changed_;
+  // The placements of hull k: by_hull_[by_hull_begin_[k]] up to by_hull_begin_[k + 1].
+  std::vector<uint32_t> by_hull_;
+  std::vector<size_t> by_hull_begin_;
   // Of the last Resolve.
   std::string store_id_;
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
 };
+
+// Placements that move, each with its new pose.
+using Moves = std::vector<std::pair<uint32_t, Pose>>;
+
+// Reads an update of a stream with so many placements, poses as seven numbers each.
+// INVALID_ARGUMENT: numbers that do not fit the placements, an index out of range or named twice, a
+// malformed pose.
+absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
+                                const google::protobuf::RepeatedField<double>& poses, size_t count);
 
 // INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
 // max_pairs (--max-pairs-per-batch).

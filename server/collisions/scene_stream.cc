@@ -1,13 +1,11 @@
 #include "server/collisions/scene_stream.h"
 
-#include <absl/strings/str_cat.h>
-
 #include <algorithm>
 #include <memory>
-#include <set>
 #include <utility>
 
 #include "server/collisions/query_settings.h"
+#include "server/collisions/scene_groups.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 
@@ -24,43 +22,6 @@ constexpr int kMostShortPlacements = 512;
 constexpr uint64_t kStepsPerLook = 16;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
-
-// INVALID_ARGUMENT: groups that do not fit the placements.
-absl::Status ValidateGroups(const v1::FindCollisionsRequest& request, size_t placements) {
-  if (!request.groups().empty() && static_cast<size_t>(request.groups_size()) != placements) {
-    return absl::InvalidArgumentError(absl::StrCat("groups holds ", request.groups_size(),
-                                                   " groups for ", placements,
-                                                   " placements; give one for each or none"));
-  }
-  if (request.ignored_group_pairs_size() % 2 != 0) {
-    return absl::InvalidArgumentError(absl::StrCat("ignored_group_pairs holds ",
-                                                   request.ignored_group_pairs_size(),
-                                                   " groups; each pair needs two"));
-  }
-  if (request.groups().empty() &&
-      (request.ignore_same_group() || !request.ignored_group_pairs().empty())) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(request.ignore_same_group() ? "ignore_same_group" : "ignored_group_pairs",
-                     " needs groups; give one for each placement"));
-  }
-  if (request.movers() > placements) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("movers is ", request.movers(), ", but placements holds ", placements));
-  }
-  return absl::OkStatus();
-}
-
-std::vector<GroupPair> IgnoredGroups(const v1::FindCollisionsRequest& request) {
-  std::vector<GroupPair> ignored;
-  for (int i = 0; i < request.ignored_group_pairs_size(); i += 2) {
-    ignored.push_back({request.ignored_group_pairs(i), request.ignored_group_pairs(i + 1)});
-  }
-  if (request.ignore_same_group()) {
-    const std::set<uint32_t> groups(request.groups().begin(), request.groups().end());
-    for (const uint32_t group : groups) ignored.push_back({group, group});
-  }
-  return ignored;
-}
 
 void Count(v1::Relation relation, v1::SceneTotals* totals) {
   switch (relation) {

@@ -52,6 +52,12 @@ absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
   return status;
 }
 
+absl::Status Draining() {
+  return WithReason(
+      absl::UnavailableError("hulld is draining and ends soon; retry when it is back"),
+      v1::ERROR_REASON_DRAINING);
+}
+
 v1::ErrorReason ReasonOf(const absl::Status& status) {
   v1::ErrorReason reason = v1::ERROR_REASON_UNSPECIFIED;
   if (const std::optional<rpc::ErrorInfo> info = GivenInfo(status); info.has_value()) {

@@ -29,6 +29,9 @@ struct MetadataEntry {
 absl::Status WithReason(absl::Status status, v1::ErrorReason reason,
                         std::initializer_list<MetadataEntry> metadata = {});
 
+// UNAVAILABLE: the server drains, so that no call begins and no watch goes on.
+absl::Status Draining();
+
 // The reason of an error; where none was given, the one that its code implies, if any.
 v1::ErrorReason ReasonOf(const absl::Status& status);
 

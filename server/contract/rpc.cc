@@ -32,6 +32,10 @@ const char* RpcName(Rpc rpc) {
       return "ReplaceHull";
     case Rpc::kSaveBackup:
       return "SaveBackup";
+    case Rpc::kWatchHulls:
+      return "WatchHulls";
+    case Rpc::kWatchCollisions:
+      return "WatchCollisions";
   }
   HULLD_UNREACHABLE();
 }

@@ -20,9 +20,11 @@ enum class Rpc {
   kGetStatus,
   kReplaceHull,
   kSaveBackup,
+  kWatchHulls,
+  kWatchCollisions,
 };
 
-inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kSaveBackup) + 1;
+inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kWatchCollisions) + 1;
 
 // As in the contract: "CheckCollision".
 const char* RpcName(Rpc rpc);

@@ -11,6 +11,7 @@
 #include "server/hulls/append_stream.h"
 #include "server/hulls/mesh_stream.h"
 #include "server/hulls/replace_stream.h"
+#include "server/hulls/watch_stream.h"
 #include "server/settings/config.h"
 #include "server/wire/encode.h"
 #include "server/wire/page_token.h"
@@ -69,6 +70,11 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
                                                   v1::DeleteHullResponse* response) {
   return UnaryCall::Start(*context, admission_, Rpc::kDeleteHull,
                           [&](UnaryCall* call) { Delete(*request, response, call); });
+}
+
+grpc::ServerWriteReactor<v1::WatchHullsResponse>* HullService::WatchHulls(
+    grpc::CallbackServerContext* context, const v1::WatchHullsRequest* request) {
+  return WatchStream::Start(*context, admission_, registry_, readers_, *request);
 }
 
 void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,

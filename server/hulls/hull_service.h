@@ -16,6 +16,8 @@ namespace hulld::server {
 // records are answered where they arrive; those that need a snapshot, on `readers`,
 // meshes and audits, which may take long, on `long_readers`, and replacements are built on
 // `writers`, as the registry builds chunks.
+// Watches look into records where they are told of changes, and read boxes from the store on
+// `readers`.
 class HullService : public v1::HullService::CallbackService {
  public:
   HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
@@ -44,6 +46,8 @@ class HullService : public v1::HullService::CallbackService {
   grpc::ServerUnaryReactor* DeleteHull(grpc::CallbackServerContext* context,
                                        const v1::DeleteHullRequest* request,
                                        v1::DeleteHullResponse* response) override;
+  grpc::ServerWriteReactor<v1::WatchHullsResponse>* WatchHulls(
+      grpc::CallbackServerContext* context, const v1::WatchHullsRequest* request) override;
 
  private:
   // Create and Delete end the call once the change is committed.

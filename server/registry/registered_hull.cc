@@ -34,6 +34,25 @@ void RegisteredHull::SetLive(std::shared_ptr<LiveHull> points) {
   committed_mark = live->Now();
   live_is_ahead = false;
   points_since_prepared = 0;
+  KeepBox();
+}
+
+// Notes the box at the mark, if there is one.
+void RegisteredHull::KeepBox() {
+  if (committed_mark.low()[0] > committed_mark.high()[0]) return;
+  has_box = true;
+  low = committed_mark.low();
+  high = committed_mark.high();
+}
+
+HullChange RegisteredHull::Describe() const {
+  HullChange change;
+  change.record = committed.record;
+  change.damaged = state.damaged();
+  change.has_box = has_box && !change.damaged;
+  change.low = low;
+  change.high = high;
+  return change;
 }
 
 bool RegisteredHull::HoldsMuchElse() const {
@@ -44,6 +63,7 @@ bool RegisteredHull::HoldsMuchElse() const {
 // A mark may be the last to hold what was prepared before.
 void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark) {
   locked.Afterwards([before = std::exchange(committed_mark, mark)] {});
+  KeepBox();
 }
 
 std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
@@ -110,9 +130,8 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull() {
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
 
 absl::Status HullNotFound(const std::string& id) {
-  return WithReason(
-      absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found; create it first")),
-      v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
+  return WithReason(absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found")),
+                    v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision) {

@@ -75,6 +75,8 @@ struct RegisteredHull {
   void RevertLive(Locked& locked);
   // The hull is gone.
   void DiscardAll(Locked& locked);
+  // The committed hull, as watches are told of it.
+  HullChange Describe() const;
   // The last sequence of a writer, chunks in flight included; 0 for a writer not in `writers`.
   uint64_t HeadSequence(const std::string& writer_id) const;
 
@@ -88,6 +90,10 @@ struct RegisteredHull {
   std::shared_ptr<LiveHull> live;
   // The moment of `live` that is committed.
   LiveHull::Mark committed_mark;
+  // The bounding box of the committed hull; stays when `live` goes.
+  bool has_box = false;
+  Vector low;
+  Vector high;
   // `live` may hold more than that.
   bool live_is_ahead = false;
   // A reader reads the points from the store.
@@ -123,6 +129,7 @@ struct RegisteredHull {
   MemoryBudget::Account account;
 
  private:
+  void KeepBox();
   // What the hull holds and can make again.
   uint64_t MemoryBytes() const;
   // Drops what is not in use, if it can be made again.

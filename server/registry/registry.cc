@@ -37,6 +37,7 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
       memory_(limits_.memory_limit, mutex_),
+      feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
   preparers_.emplace(1, preparers);
 }
@@ -56,6 +57,7 @@ absl::Status Registry::Load() {
   const std::lock_guard lock(mutex_);
   HULLD_CHECK(hulls_.empty() && assigned_revision_ == 0);
   revision_ = assigned_revision_ = store_.revision();
+  feed_.Begin(revision_);
   const absl::Status status =
       store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
         if (stored.ok()) {
@@ -166,6 +168,7 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
              return done(later, status);
            }
            Publish(hull->committed.record.revision);
+           feed_.NoteCreated(later, hull);
            done(later, hull);
          });
 }
@@ -201,6 +204,7 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
         if (!status.ok()) return Answer<uint64_t>(later, done, status);
         Publish(revision);
         vertex_count_ -= hull->committed.record.vertex_count;
+        feed_.NoteDeleted(later, hull->committed.record, revision);
         Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
         Answer<uint64_t>(later, done, revision);
       });
@@ -312,6 +316,11 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
   if (!status.ok()) return status;
   vertex_count_ += record.vertex_count;
   Publish(record.revision);
+  if (former == nullptr) {
+    feed_.NoteCreated(locked, hull);
+  } else {
+    feed_.NoteReplaced(locked, hull);
+  }
   hull->NoteUse();
   memory_.Evict(locked);
   return ReplaceResult{revision_, record, former == nullptr};

@@ -16,6 +16,7 @@
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
+#include "server/registry/change_feed.h"
 #include "server/registry/committer.h"
 #include "server/registry/hull_state.h"
 #include "server/registry/locked.h"
@@ -147,6 +148,21 @@ class Registry {
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
               std::function<void()> on_built, Reply<ChunkResult> done);
 
+  // Begins to tell of changes (ChangeFeed). `on_ready` is called on the feed's thread, once after
+  // each piece that waits. RESOURCE_EXHAUSTED: --memory-limit.
+  absl::StatusOr<std::shared_ptr<ChangeWatch>> OpenWatch(const WatchTarget& target,
+                                                         const WatchStart& start,
+                                                         std::function<void()> on_ready);
+  // What is to be told next; may be nothing. UNAVAILABLE once EndWatches was called. Requires that
+  // the watch does not wait. Cost: O(kMostPerPiece).
+  absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch);
+  // The watch waits no more than until its on_ready is called, although nothing changed.
+  void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch);
+  // An on_ready that is due by then still comes.
+  void CloseWatch(const std::shared_ptr<ChangeWatch>& watch);
+  // Every watch is to end: nudges them all.
+  void EndWatches();
+
  private:
   struct OpenRequest;
   struct BuiltChunk;
@@ -200,7 +216,7 @@ class Registry {
   void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
   void SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
                    BuiltChunk built);
-  void CommitChunk(Locked& locked, RegisteredHull& hull, const StoredHull& after,
+  void CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
                    const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
   void Revert(Locked& locked, RegisteredHull& hull);
 
@@ -210,6 +226,8 @@ class Registry {
   void Prepare(Locked& locked, RegisteredHull& hull);
   void SchedulePreparing(const HullPointer& hull);
   void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
+
+  void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
   Store& store_;
   // With the memory limit in force.
@@ -232,6 +250,7 @@ class Registry {
   CacheStatistics cache_;
   // Nothing more is prepared.
   bool ending_ = false;
+  ChangeFeed feed_;
 
   // Last, as their threads use the rest.
   Committer committer_;

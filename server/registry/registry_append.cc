@@ -396,7 +396,7 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const Pendin
       Revert(later, *hull);
       return AnswerChunk(later, done, sequence, status);
     }
-    CommitChunk(later, *hull, after, mark, writer_id, sequence);
+    CommitChunk(later, hull, after, mark, writer_id, sequence);
     hull->points_since_prepared += counts.outside;
     if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
     const HullRecord& record = after.record;
@@ -408,21 +408,22 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const Pendin
 }
 
 // after, mark: the hull with this chunk.
-void Registry::CommitChunk(Locked& locked, RegisteredHull& hull, const StoredHull& after,
+void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
                            const LiveHull::Mark& mark, const std::string& writer_id,
                            uint64_t sequence) {
-  if (after.record.revision != hull.committed.record.revision) {
+  const HullRecord before = std::exchange(hull->committed, after).record;
+  hull->SetCommittedMark(locked, mark);
+  if (after.record.revision != before.revision) {
     Publish(after.record.revision);
-    vertex_count_ += after.record.vertex_count - hull.committed.record.vertex_count;
-    hull.DiscardServed(locked);
-    locked.Discard(std::exchange(hull.canonical, nullptr));
+    vertex_count_ += after.record.vertex_count - before.vertex_count;
+    hull->DiscardServed(locked);
+    locked.Discard(std::exchange(hull->canonical, nullptr));
+    feed_.NoteChanged(locked, hull);
   }
-  hull.committed = after;
-  hull.SetCommittedMark(locked, mark);
-  RegisteredHull::Sequences& sequences = hull.writers[writer_id];
+  RegisteredHull::Sequences& sequences = hull->writers[writer_id];
   HULLD_CHECK(sequence == sequences.committed + 1 && sequence <= sequences.head);
   sequences.committed = sequence;
-  hull.NoteUse();
+  hull->NoteUse();
 }
 
 // A chunk in flight was refused, and with it all that follow: the hull returns to what is

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
+#include "core/numeric/vector.h"
 #include "core/query/placed/live_hull.h"
 #include "server/registry/served_hull.h"
 #include "server/store/hull_record.h"
@@ -136,6 +137,53 @@ struct OpenResult {
   AppendSession session;
   HullRecord hull;
   uint64_t last_sequence = 0;
+};
+
+// What a watch is about: hulls whose IDs start with a prefix, or hulls by ID.
+struct WatchTarget {
+  // The second form where `ids` holds any.
+  std::string prefix;
+  std::vector<std::string> ids;
+
+  bool operator==(const WatchTarget&) const = default;
+};
+
+// What became of a hull, as v1::HullEventKind says.
+enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
+
+// All that happened to a hull since a watch was told of it, as one change.
+struct HullChange {
+  ChangeKind kind = ChangeKind::kPresent;
+  // kDeleted: the ID alone, and in `revision` that of the deletion.
+  HullRecord record;
+  // The store cannot read it.
+  bool damaged = false;
+  // Whether `low` and `high` are the corners of its bounding box. Not so for a hull without
+  // vertices, and for one that was not in memory since the server started.
+  bool has_box = false;
+  Vector low;
+  Vector high;
+};
+
+// What a watch is told next.
+struct WatchPiece {
+  // There is nothing to tell; the watch's on_ready is called, once, when there is.
+  bool waits = false;
+  // Every change up to this revision was told, or is in `changes`, unless it was superseded.
+  uint64_t revision = 0;
+  std::vector<HullChange> changes;
+  // As in v1::WatchHullsResponse.
+  bool synced = false;
+  bool anew = false;
+};
+
+// Where a watch begins.
+struct WatchStart {
+  // From what is there; otherwise from what changes.
+  bool tell_present = false;
+  // Resumes a watch that was told everything up to this revision of that store; 0: does not.
+  uint64_t after_revision = 0;
+  std::string store_id = {};
 };
 
 // Called once with the answer.

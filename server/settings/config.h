@@ -39,8 +39,8 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull, StreamCollisions and SaveBackup. A client is a token or,
-  // without tokens, a peer address.
+  // Of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and watches. A client is a token
+  // or, without tokens, a peer address.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns.
   uint64_t max_concurrent_batches = 32;
@@ -92,6 +92,9 @@ struct Config {
   // How often the files of certificates and tokens are looked at.
   static constexpr std::chrono::milliseconds kReloadInterval{1000};
   static constexpr std::chrono::milliseconds kRelaxedSyncInterval{500};
+  // How often a watch is told that the store's revision moved on, while nothing changes that it
+  // watches.
+  static constexpr std::chrono::milliseconds kWatchMarkInterval{1000};
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;

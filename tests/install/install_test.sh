@@ -12,6 +12,10 @@ trap '[[ -z $server ]] || { kill "$server"; wait "$server" || true; }' EXIT
 rm -rf "$work"
 mkdir -p "$work"
 cmake --install "$build" --prefix "$work/prefix" >"$work/install.log"
+for file in man/man1/hullctl.1 man/man1/hullctl-check.1 bash-completion/completions/hullctl \
+  zsh/site-functions/_hullctl fish/vendor_completions.d/hullctl.fish; do
+  [[ -s $work/prefix/share/$file ]] || { echo "share/$file is not installed"; exit 1; }
+done
 cmake -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
 cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }

@@ -85,7 +85,7 @@ while read -r reason; do
   grep -qw "$reason" server/README.md || problem "server/README.md: the errors lack the reason $reason"
 done < <(sed -nE 's/^ *ERROR_REASON_([A-Z_]+) = [1-9][0-9]*;$/\1/p' proto/hulld/v1/error.proto)
 
-mapfile -t commands < <("$programs/hullctl" --help | sed -n '/^Subcommands:/,$p' | sed -nE 's/^  ([a-z]+) .*/\1/p')
+mapfile -t commands < <("$programs/hullctl" --help | sed '/^Options/,$d' | sed -nE 's/^  ([a-z]+) .*/\1/p')
 ((${#commands[@]} > 10)) || problem "hullctl --help names no commands"
 check_complete client/README.md command "${commands[@]}"
 

@@ -33,7 +33,7 @@ cd "$work/home" || exit 2
 
 export LC_ALL=C HOME=$work/home XDG_STATE_HOME=$work/home/state PATH=$programs:$PATH
 export HULLD_LISTEN=127.0.0.1:0
-unset HULLCTL_SERVER HULLD_TOKEN
+unset HULLCTL_SERVER HULLCTL_CONTEXT HULLD_TOKEN XDG_CONFIG_HOME
 
 server=
 failures=0

@@ -1,13 +1,17 @@
 #include "client/hullctl/command_line/command.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <absl/strings/str_split.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/unknown_command.h"
+#include "client/hullctl/help/help_text.h"
+#include "client/hullctl/help/suggestion.h"
 
 namespace hulld {
 namespace {
@@ -15,24 +19,25 @@ namespace {
 // "-o,--out" -> "--out".
 std::string LongName(const std::string& names) { return names.substr(names.rfind(',') + 1); }
 
-// The last of the commands that were given.
-const CLI::App& LastGiven(const CLI::App& app) {
+const CLI::App& LastApp(const CLI::App& app) {
   const std::vector<CLI::App*> given = app.get_subcommands();
-  return given.empty() ? app : LastGiven(*given.back());
+  return given.empty() ? app : LastApp(*given.back());
 }
 
-// What stands where a command must, if anything does.
-std::optional<std::string> UnknownCommand(const CLI::App& app) {
-  if (LastGiven(app).get_require_subcommand_min() == 0) return std::nullopt;
-  const std::vector<std::string> rest = app.remaining(/*recurse=*/true);
-  if (rest.empty() || rest.front().empty() || rest.front()[0] == '-') return std::nullopt;
-  return rest.front();
-}
+bool IsOption(const std::string& word) { return word.size() > 1 && word[0] == '-' && word != "--"; }
 
-std::vector<std::string> CommandsBelow(const CLI::App& app) {
+std::vector<std::string> OptionNames(const CommandDescription& command) {
   std::vector<std::string> names;
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    names.push_back(command->get_name());
+  for (const OptionDescription& option : command.options) {
+    if (!option.is_argument() && !option.hidden) names.push_back(option.long_name());
+  }
+  return names;
+}
+
+std::vector<std::string> CommandNames(const CommandDescription& command) {
+  std::vector<std::string> names;
+  for (const auto& below : command.commands) {
+    if (!below->hidden) names.push_back(below->name);
   }
   return names;
 }
@@ -41,28 +46,38 @@ std::vector<std::string> CommandsBelow(const CLI::App& app) {
 
 Option& Option::Required() {
   option_->required();
+  description_->required = true;
   return *this;
 }
 
 Option& Option::ValueName(const std::string& name) {
-  option_->type_name(name);
+  description_->value_name = name;
+  if (name == "FILE") description_->value_kind = ValueKind::kFile;
   return *this;
 }
 
-Option& Option::Environment(const std::string& variable) {
-  option_->envname(variable);
+Option& Option::Completes(ValueKind kind) {
+  description_->value_kind = kind;
+  return *this;
+}
+
+Option& Option::Variable(const std::string& variable) {
+  description_->variable = variable;
   return *this;
 }
 
 Option& Option::OneOf(const std::vector<std::string>& values) {
-  option_->check(CLI::IsMember(values));
-  return *this;
+  description_->choices = values;
+  return Check([values](const std::string& value) -> std::string {
+    if (std::find(values.begin(), values.end(), value) != values.end()) return "";
+    return absl::StrCat(Quoted(value), " is none of ", absl::StrJoin(values, ", "),
+                        Suggestion(value, values));
+  });
 }
 
-Option& Option::Check(const std::string& name,
-                      std::function<std::string(const std::string&)> check) {
+Option& Option::Check(std::function<std::string(const std::string&)> check) {
   option_->check(CLI::Validator(
-      [check = std::move(check)](const std::string& value) { return check(value); }, name));
+      [check = std::move(check)](const std::string& value) { return check(value); }, ""));
   return *this;
 }
 
@@ -71,21 +86,46 @@ Option& Option::Needs(const Option& other) {
   return *this;
 }
 
+Option& Option::Excludes(const Option& other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+OptionDescription* Command::Describe(const std::string& names, const std::string& help) {
+  OptionDescription& option = description_->options.emplace_back();
+  option.names = absl::StrSplit(names, ',');
+  option.help = help;
+  if (names == "FILE") option.value_kind = ValueKind::kFile;
+  return &option;
+}
+
+void Command::BeginGroup(const std::string& title) { group_ = title; }
+
 Command Command::AddCommand(const std::string& name, const std::string& help) {
   CLI::App* const command = app_->add_subcommand(name, help);
   command->fallthrough();
-  return Command(command);
+  auto description = std::make_unique<CommandDescription>();
+  description->path = description_->path + " " + name;
+  description->name = name;
+  description->help = help;
+  description->group = group_;
+  description_->commands.push_back(std::move(description));
+  return Command(command, description_->commands.back().get());
 }
 
 void Command::RequireCommand() { app_->require_subcommand(1); }
 
 Option Command::AddText(const std::string& name, std::string* value, const std::string& help) {
-  return Option(app_->add_option(name, *value, help));
+  OptionDescription* const description = Describe(name, help);
+  if (!description->is_argument()) description->value_name = "TEXT";
+  return Option(app_->add_option(name, *value, help), description);
 }
 
 Option Command::AddTexts(const std::string& name, std::vector<std::string>* values,
                          const std::string& help) {
-  return Option(app_->add_option(name, *values, help));
+  OptionDescription* const description = Describe(name, help);
+  description->repeated = true;
+  return Option(app_->add_option(name, *values, help), description);
 }
 
 Option Command::AddParsed(const std::string& name,
@@ -95,7 +135,9 @@ Option Command::AddParsed(const std::string& name,
     const absl::Status parsed = parse(text);
     if (!parsed.ok()) throw CLI::ValidationError(name, std::string(parsed.message()));
   };
-  return Option(app_->add_option_function<std::string>(name, take, help));
+  OptionDescription* const description = Describe(name, help);
+  if (!description->is_argument()) description->value_name = "TEXT";
+  return Option(app_->add_option_function<std::string>(name, take, help), description);
 }
 
 Option Command::AddNumber(const std::string& name, uint64_t least, uint64_t most,
@@ -128,15 +170,21 @@ Option Command::AddLength(const std::string& name, const std::string& help,
 }
 
 Option Command::AddFlag(const std::string& name, bool* value, const std::string& help) {
-  return Option(app_->add_flag(name, *value, help));
+  return Option(app_->add_flag(name, *value, help), Describe(name, help));
 }
 
 Option Command::AddFlag(const std::string& name, std::function<void()> set,
                         const std::string& help) {
-  return Option(app_->add_flag_callback(name, std::move(set), help));
+  return Option(app_->add_flag_callback(name, std::move(set), help), Describe(name, help));
 }
 
-void Command::SetFooter(const std::string& text) { app_->footer(text); }
+void Command::SetDetails(const std::string& text) { description_->details = text; }
+
+void Command::SetExamples(std::vector<Example> examples) {
+  description_->examples = std::move(examples);
+}
+
+void Command::Hide() { description_->hidden = true; }
 
 void Command::OnGiven(std::function<void()> callback) { app_->callback(std::move(callback)); }
 
@@ -144,32 +192,94 @@ CommandLine::CommandLine(const std::string& name, const std::string& version,
                          const std::string& help)
     : app_(std::make_unique<CLI::App>(help, name)) {
   app_->set_version_flag("--version", name + " " + version);
+  description_.path = name;
+  description_.name = name;
+  description_.help = help;
+  for (const auto& [names, does] :
+       {std::pair<const char*, const char*>{"-h,--help", "Show what the command does, and end"},
+        {"--version", "Show the version, and end"}}) {
+    OptionDescription& option = description_.options.emplace_back();
+    option.names = absl::StrSplit(names, ',');
+    option.help = does;
+  }
 }
 
 CommandLine::~CommandLine() = default;
 
-Command CommandLine::root() { return Command(app_.get()); }
+Command CommandLine::root() { return Command(app_.get(), &description_); }
+
+const CommandDescription& CommandLine::LastGiven() const {
+  const CLI::App* app = &LastApp(*app_);
+  std::vector<std::string> words;
+  for (; app != app_.get(); app = app->get_parent()) words.insert(words.begin(), app->get_name());
+  return *FindCommand(description_, words);
+}
+
+std::string CommandLine::Explain(const std::string& text) const {
+  const CommandDescription& command = LastGiven();
+  const std::vector<std::string> rest = app_->remaining(/*recurse=*/true);
+  // CLI11 says that a command is missing also when there is one that it does not know.
+  const bool needs_command = LastApp(*app_).get_require_subcommand_min() > 0;
+  if (needs_command && !rest.empty() && !IsOption(rest.front())) {
+    const std::vector<std::string> known = CommandNames(command);
+    std::string hint = Suggestion(rest.front(), known);
+    const bool few = command.path != command.name && known.size() < 8;
+    if (hint.empty() && few) hint = absl::StrCat("; there are ", absl::StrJoin(known, ", "));
+    return absl::StrCat("'", command.path, "' has no command ", Quoted(rest.front()), hint);
+  }
+  for (const std::string& word : rest) {
+    if (!IsOption(word)) continue;
+    const std::string name = word.substr(0, word.find('='));
+    std::vector<std::string> known = OptionNames(command);
+    for (const std::string& global : OptionNames(description_)) known.push_back(global);
+    return absl::StrCat("'", command.path, "' has no option ", Quoted(name),
+                        Suggestion(name, known));
+  }
+  if (needs_command) {
+    return absl::StrCat("which command? ", UsageText(command));
+  }
+  if (!rest.empty()) {
+    return absl::StrCat("unexpected argument ", Quoted(rest.front()),
+                        "; usage: ", UsageText(command));
+  }
+  return text;
+}
 
 std::optional<ExitCode> CommandLine::Parse(const std::vector<std::string>& arguments,
                                            std::ostream& out, std::ostream& err) {
   // CLI11 takes the arguments from the back.
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  std::string problem;
   try {
     app_->parse(reversed);
     return std::nullopt;
-  } catch (const CLI::RequiredError& error) {
-    // CLI11 says that a command is missing also when there is one that it does not know.
-    const std::optional<std::string> word = UnknownCommand(*app_);
-    if (!word.has_value()) {
-      app_->exit(error, out, err);
-    } else {
-      err << ExplainUnknownCommand(*word, CommandsBelow(LastGiven(*app_)))
-          << "\nRun with --help for more information.\n";
+  } catch (const CLI::CallForHelp&) {
+    const std::vector<std::string> rest = app_->remaining(/*recurse=*/true);
+    const bool unknown = LastApp(*app_).get_require_subcommand_min() > 0 && !rest.empty();
+    if (!unknown) {
+      out << HelpText(LastGiven());
+      return ExitCode::kDone;
     }
-    return ExitCode::kUsage;
+  } catch (const CLI::CallForVersion& version) {
+    out << version.what() << "\n";
+    return ExitCode::kDone;
+  } catch (const CLI::RequiredError& error) {
+    problem = absl::StrCat(error.what(), "; usage: ", UsageText(LastGiven()));
+  } catch (const CLI::ArgumentMismatch& error) {
+    // "--out: 1 required TEXT missing"
+    const std::string text = error.what();
+    const std::string name = text.substr(0, text.find(':'));
+    const OptionDescription* option = FindOption(LastGiven(), name);
+    if (option == nullptr) option = FindOption(description_, name);
+    problem = option == nullptr || !option->takes_value()
+                  ? text
+                  : absl::StrCat(name, " needs a value: ", name, " ", option->value_name);
   } catch (const CLI::ParseError& error) {
-    return app_->exit(error, out, err) == 0 ? ExitCode::kDone : ExitCode::kUsage;
+    problem = error.what();
   }
+  err << description_.name << ": " << Explain(problem) << "\n"
+      << "'" << LastGiven().path << " --help' tells more.\n";
+  return ExitCode::kUsage;
 }
 
 }  // namespace hulld

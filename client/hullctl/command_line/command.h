@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/hullctl/command_line/exit_code.h"
+#include "client/hullctl/help/command_description.h"
 
 // CLI11 parses; command.cc alone includes its header, which takes 20 s to compile.
 namespace CLI {
@@ -24,35 +25,43 @@ namespace hulld {
 
 inline constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
 
-// A declared option or positional argument, for further properties.
+// A declared option or argument, for further properties.
 class Option {
  public:
   Option& Required();
   // How the help names the value.
   Option& ValueName(const std::string& name);
-  // The environment variable that is read where the option is not given.
-  Option& Environment(const std::string& variable);
+  // What completion offers for the value.
+  Option& Completes(ValueKind kind);
+  // The environment variable that the help names; who declares the option reads it.
+  Option& Variable(const std::string& variable);
   // Only these values are allowed.
   Option& OneOf(const std::vector<std::string>& values);
-  // Refuses values for which `check` returns a text, which says why. The help shows `name`.
-  Option& Check(const std::string& name, std::function<std::string(const std::string&)> check);
+  // Refuses values for which `check` returns a text, which says why.
+  Option& Check(std::function<std::string(const std::string&)> check);
   // Allowed only together with `other`.
   Option& Needs(const Option& other);
+  // Not together with `other`.
+  Option& Excludes(const Option& other);
 
  private:
   friend class Command;
-  explicit Option(CLI::Option* option) : option_(option) {}
+  Option(CLI::Option* option, OptionDescription* description)
+      : option_(option), description_(description) {}
 
   CLI::Option* option_;
+  OptionDescription* description_;
 };
 
 // hullctl or one of its commands, while it is declared. A handle: copies stand for the same
 // command.
 //
-// Names of options are as in "--out" and "-o,--out"; a name without a dash is a positional
-// argument. The variables that values go to must outlive the parsing.
+// Names of options are as in "--out" and "-o,--out"; a name without a dash is an argument. The
+// variables that values go to must outlive the parsing.
 class Command {
  public:
+  // Commands that are added from here on stand under this heading in the help.
+  void BeginGroup(const std::string& title);
   // A command below this one. Options of this one may stand behind it, too.
   Command AddCommand(const std::string& name, const std::string& help);
   // One of the commands below must be given.
@@ -73,16 +82,24 @@ class Command {
   Option AddFlag(const std::string& name, bool* value, const std::string& help);
   Option AddFlag(const std::string& name, std::function<void()> set, const std::string& help);
 
-  // The last words of the help.
-  void SetFooter(const std::string& text);
+  // What the help says behind the options.
+  void SetDetails(const std::string& text);
+  void SetExamples(std::vector<Example> examples);
+  // Neither help nor completion names it.
+  void Hide();
   // Called at the end of the parsing when this command was given.
   void OnGiven(std::function<void()> callback);
 
  private:
   friend class CommandLine;
-  explicit Command(CLI::App* app) : app_(app) {}
+  Command(CLI::App* app, CommandDescription* description) : app_(app), description_(description) {}
+
+  // The description of an option that is being added.
+  OptionDescription* Describe(const std::string& names, const std::string& help);
 
   CLI::App* app_;
+  CommandDescription* description_;
+  std::string group_;
 };
 
 // The command line of a program.
@@ -94,6 +111,9 @@ class CommandLine {
   // The program itself.
   Command root();
 
+  // All that was declared.
+  const CommandDescription& description() const { return description_; }
+
   // Parses the arguments that follow the program's name and calls what is to be called. Prints
   // help, version and errors; then the program is to end with the code that it returns, and else to
   // go on.
@@ -101,7 +121,13 @@ class CommandLine {
                                 std::ostream& err);
 
  private:
+  // The last of the commands that were given.
+  const CommandDescription& LastGiven() const;
+  // What is wrong with the arguments; CLI11's words where nothing better is known.
+  std::string Explain(const std::string& text) const;
+
   std::unique_ptr<CLI::App> app_;
+  CommandDescription description_;
 };
 
 }  // namespace hulld

@@ -16,7 +16,8 @@ enum class ExitCode {
   kSomeFailed = 4,
   // A certificate does not prove its answer.
   kInvalidCertificate = 5,
-  // A certificate could not be checked, as its hulls have changed or there is none.
+  // A certificate could not be checked, as its hulls have changed or are gone, or the answer is one
+  // that has none.
   kCannotCheck = 6,
 };
 
@@ -28,7 +29,8 @@ inline constexpr char kExitCodeHelp[] =
     "  3  no answer: the server cannot be reached, is draining, or took longer than --timeout\n"
     "  4  some items of a batch have no answer\n"
     "  5  a certificate does not prove its answer\n"
-    "  6  a certificate cannot be checked: there is none, or its hulls have changed\n";
+    "  6  a certificate cannot be checked: its hulls have changed or are gone, or it is for an\n"
+    "     answer that has none; what is no record of an answer at all is 2\n";
 
 }  // namespace hulld
 

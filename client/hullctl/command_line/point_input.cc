@@ -13,8 +13,8 @@ void AddPointInput(Command command, PointInput* input) {
   command
       .AddText("--format", &input->format,
                "Format of the files (default: by extension; standard input: xyz)")
-      .OneOf(PointFormatNames())
-      .ValueName("FORMAT");
+      .ValueName("FORMAT")
+      .OneOf(PointFormatNames());
   command.AddNumber("--chunk-points", 1, uint64_t{100} << 20,
                     "Points per message (default: about 1 MiB)",
                     [input](uint64_t number) { input->chunk_points = number; });

@@ -2,11 +2,13 @@
 
 namespace hulld {
 
-void AddQueryOptions(Command command, QueryWishes* wishes) {
+void QueryWishes::Apply(v1::Wanted* file_wanted, double* file_tolerance) const {
+  file_wanted->MergeFrom(wanted);
+  if (tolerance.has_value()) *file_tolerance = *tolerance;
+}
+
+void AddWantedOptions(Command command, QueryWishes* wishes) {
   v1::Wanted* const wanted = &wishes->wanted;
-  command.AddFlag(
-      "--textbook", [wishes] { wishes->method = v1::METHOD_TEXTBOOK_SAT; },
-      "Use the textbook's separating-axis test instead of the certified search");
   command.AddFlag(
       "--axis", [wanted] { wanted->set_axis(true); },
       "Also show the separating or touching axis and the features on it");
@@ -33,6 +35,13 @@ void AddQueryOptions(Command command, QueryWishes* wishes) {
                     "Allow the answer WITHIN_TOLERANCE where the separation is at most this, for "
                     "speed (default 0: exact)",
                     [wishes](double length) { wishes->tolerance = length; });
+}
+
+void AddQueryOptions(Command command, QueryWishes* wishes) {
+  AddWantedOptions(command, wishes);
+  command.AddFlag(
+      "--textbook", [wishes] { wishes->method = v1::METHOD_TEXTBOOK_SAT; },
+      "Use the textbook's separating-axis test instead of the certified search");
   command.AddFlag(
       "--verify",
       [wishes] {

@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <memory>
 #include <optional>
 
@@ -20,14 +18,14 @@ struct AppendArguments {
   std::string writer;
 };
 
-// Reads files into one stream.
+// Sends files to one hull. The stream opens, and with --create the hull comes into being, once
+// there are points: files that cannot be read leave nothing behind.
 class FileAppender {
  public:
-  FileAppender(const Invocation& run, Appender* appender, uint64_t resume_after,
-               uint64_t total_bytes)
-      : appender_(appender),
-        to_skip_(resume_after),
-        bar_(run.err, isatty(STDERR_FILENO) != 0, total_bytes) {}
+  FileAppender(const Invocation& run, const AppendArguments& arguments, uint64_t total_bytes)
+      : arguments_(arguments),
+        client_(run.MakeClient()),
+        bar_(run.err, run.shows_progress, "points", total_bytes) {}
 
   // Either the file or the stream fails; the other status is OK then.
   struct Outcome {
@@ -41,15 +39,10 @@ class FileAppender {
     uint64_t file_bytes = 0;
     request.progress = [&](uint64_t bytes) {
       file_bytes = bytes;
-      bar_.Update(bytes_before_ + bytes, appender_->totals().points_sent);
+      bar_.Update(bytes_before_ + bytes, appender_ ? appender_->totals().points_sent : 0);
     };
     const auto counts = ReadPoints(request, [&](const PointBlock& block) {
-      if (to_skip_ > 0) {
-        --to_skip_;
-        resumed_points_ += block.size();
-        return absl::OkStatus();
-      }
-      outcome.stream = appender_->Append(ToProto(block));
+      outcome.stream = Take(block);
       return outcome.stream;
     });
     bytes_before_ += file_bytes;
@@ -61,44 +54,95 @@ class FileAppender {
     return outcome;
   }
 
+  // Waits for the last acknowledgement. Files without a point still ask whether there is such a
+  // hull.
   absl::Status Finish() {
-    absl::Status status = appender_->Finish();
+    absl::Status status;
+    if (appender_ == nullptr) status = Open();
+    if (status.ok()) status = appender_->Finish();
     bar_.Clear();
     return status;
   }
 
   void Clear() { bar_.Clear(); }
+
+  // Removes the hull if this command created it and nothing was committed to it since.
+  absl::Status RemoveIfEmpty() const {
+    if (!created_.has_value()) return absl::OkStatus();
+    const absl::Status status =
+        client_.DeleteHull(arguments_.hull_id, created_->create_revision()).status();
+    // Points that arrived although their acknowledgement did not keep the hull.
+    return absl::IsAborted(status) || absl::IsNotFound(status) ? absl::OkStatus() : status;
+  }
+
+  // Null until there are points.
+  const Appender* appender() const { return appender_.get(); }
   uint64_t skipped() const { return skipped_; }
   uint64_t resumed_points() const { return resumed_points_; }
 
  private:
-  Appender* appender_;
-  uint64_t to_skip_;
+  absl::Status Take(const PointBlock& block) {
+    if (appender_ == nullptr) {
+      if (absl::Status status = Create(); !status.ok()) return status;
+      if (absl::Status status = Open(); !status.ok()) return status;
+      to_skip_ = arguments_.resume ? appender_->opened().last_sequence() : 0;
+    }
+    if (to_skip_ == 0) return appender_->Append(ToProto(block));
+    --to_skip_;
+    resumed_points_ += block.size();
+    return absl::OkStatus();
+  }
+
+  absl::Status Create() {
+    if (!arguments_.create) return absl::OkStatus();
+    const auto response = client_.CreateHull(arguments_.hull_id, /*if_absent=*/true);
+    if (response.ok() && response->created()) created_ = response->hull();
+    return response.status();
+  }
+
+  absl::Status Open() {
+    AppendOptions options;
+    options.writer_id = arguments_.writer;
+    auto opened = client_.OpenAppend(arguments_.hull_id, options);
+    if (opened.ok()) appender_ = *std::move(opened);
+    return opened.status();
+  }
+
+  const AppendArguments& arguments_;
+  const Client client_;
+  std::unique_ptr<Appender> appender_;
+  // The hull, when this command created it.
+  std::optional<v1::HullInfo> created_;
+  uint64_t to_skip_ = 0;
   ProgressBar bar_;
   uint64_t bytes_before_ = 0;
   uint64_t skipped_ = 0;
   uint64_t resumed_points_ = 0;
 };
 
-void Print(const Invocation& run, const std::string& hull_id, const Appender& appender,
-           const FileAppender& files) {
+// What the server said: `opened`, then all acknowledgements as one, as they may come.
+void PrintJson(const Appender& appender, std::ostream& out) {
+  v1::AppendPointsResponse opened;
+  *opened.mutable_opened() = appender.opened();
+  out << MessageJson(opened) << "\n";
+  const AppendTotals& totals = appender.totals();
+  if (totals.last_ack.sequence() == 0) return;
+  v1::AppendPointsResponse acknowledged;
+  *acknowledged.mutable_ack() = totals.last_ack;
+  *acknowledged.mutable_ack()->mutable_counts() = totals.counts;
+  out << MessageJson(acknowledged) << "\n";
+}
+
+void Print(const Invocation& run, const std::string& hull_id, const FileAppender& files) {
+  const Appender& appender = *files.appender();
   const AppendTotals& totals = appender.totals();
   const v1::PointCounts& counts = totals.counts;
-  if (run.json) {
-    run.out << JsonObject()
-                   .Add("hullId", hull_id)
-                   .Add("writerId", appender.writer_id())
-                   .Add("pointsSent", totals.points_sent)
-                   .Add("pointsAcknowledged", totals.points_acknowledged)
-                   .Add("pointsSkippedNonfinite", files.skipped())
-                   .Add("pointsCommittedBefore", files.resumed_points())
-                   .Add("chunks", totals.chunks_sent)
-                   .Add("reconnects", totals.reconnects)
-                   .AddJson("counts", MessageJson(counts))
-                   .Add("vertexCount", totals.vertex_count)
-                   .Add("hullRevision", totals.hull_revision)
-                   .Close()
-            << "\n";
+  if (files.skipped() > 0 && run.form != OutputForm::kTable && !run.wide()) {
+    run.err << "hullctl: " << files.skipped() << " points that are not finite were left out\n";
+  }
+  if (run.json()) return PrintJson(appender, run.out);
+  if (run.names()) {
+    run.out << hull_id << "\n";
     return;
   }
   Table table;
@@ -124,47 +168,45 @@ void Print(const Invocation& run, const std::string& hull_id, const Appender& ap
   table.Print(run.out);
 }
 
-// Says, before an error is reported, which points stand in spite of it.
-void PrintAppendedBefore(const Invocation& run, const Appender& appender) {
-  const uint64_t points = appender.totals().points_acknowledged;
-  if (points == 0) return;
-  run.err << "hullctl: " << points << " points were appended before this error\n";
+ExitCode FailAppend(const Invocation& run, const AppendArguments& arguments,
+                    const FileAppender& files, const FileAppender::Outcome& outcome) {
+  const Appender* const appender = files.appender();
+  const uint64_t points = appender == nullptr ? 0 : appender->totals().points_acknowledged;
+  if (points > 0) {
+    run.err << "hullctl: " << points << " points were appended before this error\n";
+  } else if (const absl::Status removed = files.RemoveIfEmpty(); !removed.ok()) {
+    run.err << "hullctl: the hull " << arguments.hull_id
+            << ", which this command created, may be left without points\n";
+  }
+  if (outcome.stream.ok()) return run.FailUsage(outcome.file);
+  if (!absl::IsNotFound(outcome.stream)) return run.Fail(outcome.stream);
+  const std::string message(outcome.stream.message().data(), outcome.stream.message().size());
+  const char* const advice =
+      arguments.create ? "the files hold no points to create it of; 'hullctl create' makes an "
+                         "empty one"
+                       : "create it with --create, or see 'hullctl list'";
+  run.err << "hullctl: " << message << " (" << advice << ")\n";
+  return arguments.create ? ExitCode::kUsage : ExitCode::kRequestFailed;
 }
 
 ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
   uint64_t total_bytes = 0;
   auto plan = PlanReads(arguments.input, &total_bytes);
   if (!plan.ok()) return run.FailUsage(plan.status());
-  AppendOptions options;
-  options.writer_id = arguments.writer;
-  options.create_if_absent = arguments.create;
-  auto opened = run.MakeClient().OpenAppend(arguments.hull_id, options);
-  if (absl::IsNotFound(opened.status()) && !arguments.create) {
-    const std::string message(opened.status().message().data(), opened.status().message().size());
-    run.err << "hullctl: " << message << " (create it with --create, or see 'hullctl list')\n";
-    return ExitCode::kRequestFailed;
-  }
-  if (!opened.ok()) return run.Fail(opened.status());
-  Appender& appender = **opened;
-  const uint64_t resume_after = arguments.resume ? appender.opened().last_sequence() : 0;
-  FileAppender files(run, &appender, resume_after, total_bytes);
+  FileAppender files(run, arguments, total_bytes);
   FileAppender::Outcome outcome;
   for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
     outcome = files.Read(std::move(*request));
   }
   // Points read before a file's error are sent already: wait for them, so that the summary is true.
-  if (outcome.stream.ok()) outcome.stream = files.Finish();
+  const bool sent = files.appender() != nullptr;
+  if (outcome.ok() || (sent && outcome.stream.ok())) outcome.stream = files.Finish();
   files.Clear();
-  if (!outcome.stream.ok()) {
-    PrintAppendedBefore(run, appender);
-    return run.Fail(outcome.stream);
+  if (!outcome.stream.ok()) return FailAppend(run, arguments, files, outcome);
+  if (outcome.file.ok() || (sent && files.appender()->totals().points_acknowledged > 0)) {
+    Print(run, arguments.hull_id, files);
   }
-  if (outcome.file.ok() || appender.totals().points_acknowledged > 0) {
-    Print(run, arguments.hull_id, appender, files);
-  }
-  if (outcome.file.ok()) return ExitCode::kDone;
-  PrintAppendedBefore(run, appender);
-  return run.FailUsage(outcome.file);
+  return outcome.file.ok() ? ExitCode::kDone : FailAppend(run, arguments, files, outcome);
 }
 
 }  // namespace
@@ -172,7 +214,9 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
 void AddAppendCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<AppendArguments>();
   Command command = program.AddCommand("append", "Add the points of files to a hull");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
+  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   AddPointInput(command, &arguments->input);
   command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
   const Option writer =
@@ -183,9 +227,16 @@ void AddAppendCommand(Command program, Invocation* invocation) {
                "The same command was interrupted: leave out the chunks that this writer has "
                "committed")
       .Needs(writer);
-  command.SetFooter(
+  command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf.\n"
+      "--create makes the hull when there are points for it; files that are refused leave none.\n"
       "--resume needs the same files, options and writer as before.");
+  command.SetExamples(
+      {{"A new hull of a file", "hullctl append spider spider.obj --create"},
+       {"Points as another program makes them", "scanner | hullctl append room - --create"},
+       {"One that can be carried on with after an interruption",
+        "hullctl append ball ball.xyz --create --writer lab"},
+       {"", "hullctl append ball ball.xyz --writer lab --resume"}});
   command.OnGiven([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
 }
 

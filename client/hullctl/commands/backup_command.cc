@@ -4,6 +4,7 @@
 #include "client/backup_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
 
 namespace hulld {
@@ -17,7 +18,11 @@ struct BackupArguments {
 void Print(const Invocation& run, const std::string& what, const BackupCheck& backup) {
   const v1::ResponseHeader& header = backup.begin().header();
   const v1::BackupEnd& totals = backup.totals();
-  if (run.json) {
+  if (run.names()) {
+    run.out << header.store_id() << "\n";
+    return;
+  }
+  if (run.json()) {
     run.out << JsonObject()
                    .Add("storeId", header.store_id())
                    .Add("revision", header.revision())
@@ -38,14 +43,19 @@ void Print(const Invocation& run, const std::string& what, const BackupCheck& ba
 
 ExitCode Save(const Invocation& run, const BackupArguments& arguments) {
   BackupWriter writer(arguments.file);
+  ProgressBar bar(run.err, run.shows_progress, "B", 0);
+  uint64_t bytes = 0;
   if (absl::Status s = writer.Open(); !s.ok()) return run.FailUsage(s);
   absl::Status file_error;
   const absl::Status called = run.MakeClient().SaveBackup(
       [&](const v1::SaveBackupResponse& part) {
         file_error = writer.Write(part);
+        bytes += part.ByteSizeLong();
+        bar.Update(bytes);
         return file_error;
       },
       run.given_timeout);
+  bar.Clear();
   if (!file_error.ok()) return run.FailUsage(file_error);
   if (!called.ok()) return run.Fail(called);
   if (absl::Status s = writer.Finish(); !s.ok()) return run.FailUsage(s);
@@ -68,16 +78,24 @@ void AddBackupCommand(Command program, Invocation* invocation) {
   command.RequireCommand();
   Command save = command.AddCommand("save", "Save a backup while hulld goes on serving");
   save.AddText("FILE", &arguments->file, "File to make").Required();
-  save.SetFooter(
+  save.SetDetails(
       "However long that takes, unless --timeout is given, which then bounds all of it. What ends\n"
       "early leaves no file.");
+  save.SetExamples({{"", "hullctl backup save hulls.backup"}});
   save.OnGiven([=] { invocation->action = [=] { return Save(*invocation, *arguments); }; });
   Command restore =
       command.AddCommand("restore", "Make a data directory of a backup, for a new hulld");
   restore.AddText("FILE", &arguments->file, "File that 'backup save' made").Required();
   restore.AddText("--data-dir", &arguments->data_dir, "Directory to make; must be new or empty")
+      .ValueName("DIRECTORY")
+      .Completes(ValueKind::kDirectory)
       .Required();
-  restore.OnGiven([=] { invocation->action = [=] { return Restore(*invocation, *arguments); }; });
+  restore.SetExamples({{"", "hullctl backup restore hulls.backup --data-dir restored"},
+                       {"", "hulld --data-dir restored"}});
+  restore.OnGiven([=] {
+    invocation->needs_server = false;
+    invocation->action = [=] { return Restore(*invocation, *arguments); };
+  });
 }
 
 }  // namespace hulld

@@ -4,12 +4,13 @@
 #include <optional>
 #include <unordered_map>
 
-#include "client/hullctl/command_line/batch_file.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/scene/scene_file.h"
 #include "client/verify/answer_check.h"
 
 namespace hulld {
@@ -21,30 +22,42 @@ struct BatchArguments {
   bool colliding = false;
 };
 
-struct Problem {
-  int code = 0;
-  std::string message;
-  v1::ErrorReason reason = v1::ERROR_REASON_UNSPECIFIED;
-};
-
-// Asks in calls of bounded size, each with only the placements that its pairs need, and prints
-// answers as they come.
+// Asks in calls of bounded size, and prints answers as they come. A table needs of each call only
+// the placements of its pairs; the contract's messages name placements by their index, so for JSON
+// each call has all of them, and the rows count on from call to call.
 class BatchRun {
  public:
-  BatchRun(const Invocation& run, const BatchArguments& arguments, const BatchScene& scene)
+  BatchRun(const Invocation& run, const BatchArguments& arguments, const Scene& scene,
+           const std::vector<uint32_t>& pairs)
       : run_(run),
         arguments_(arguments),
         scene_(scene),
+        pairs_(pairs),
         client_(run.MakeClient()),
-        checker_(client_) {}
+        checker_(client_),
+        bar_(run.err, run.shows_progress, "pairs", pairs.size() / 2) {
+    v1::Wanted wanted = scene.request.wanted();
+    tolerance_ = scene.request.tolerance();
+    arguments.wishes.Apply(&wanted, &tolerance_);
+    base_.set_tolerance(tolerance_);
+    *base_.mutable_wanted() = std::move(wanted);
+    const bool textbook = arguments.wishes.method != v1::METHOD_UNSPECIFIED;
+    base_.set_method(textbook ? arguments.wishes.method : scene.method);
+    if (!run.json()) return;
+    *base_.mutable_placements() = scene.request.placements();
+    if (scene.request.has_packed_placements()) {
+      *base_.mutable_packed_placements() = scene.request.packed_placements();
+    }
+  }
 
   absl::Status Run() {
-    if (run_.json) run_.out << "{\"answers\":[";
     absl::Status status;
-    for (size_t begin = 0; begin < scene_.pairs.size() && status.ok(); begin += kPairsPerCall) {
-      status = Call(begin, std::min(begin + kPairsPerCall, scene_.pairs.size()));
+    const size_t count = pairs_.size() / 2;
+    for (size_t begin = 0; begin < count && status.ok(); begin += kPairsPerCall) {
+      status = Call(begin, std::min(begin + kPairsPerCall, count));
     }
-    PrintEnd(status);
+    bar_.Clear();
+    if (!run_.json() && !run_.names()) PrintTotals();
     return status;
   }
 
@@ -55,23 +68,30 @@ class BatchRun {
 
  private:
   static constexpr size_t kPairsPerCall = 100000;
+  // Causes, by placement or by pair.
+  using Problems = std::unordered_map<uint64_t, std::string>;
+
+  // The request for pairs [begin, end).
+  v1::BatchCheckCollisionsRequest RequestFor(size_t begin, size_t end) const {
+    v1::BatchCheckCollisionsRequest request = base_;
+    if (run_.json()) {
+      request.mutable_pairs()->Add(pairs_.begin() + static_cast<ptrdiff_t>(2 * begin),
+                                   pairs_.begin() + static_cast<ptrdiff_t>(2 * end));
+      return request;
+    }
+    std::unordered_map<uint32_t, uint32_t> local;
+    for (size_t i = 2 * begin; i < 2 * end; ++i) {
+      const auto [entry, added] = local.emplace(pairs_[i], request.placements_size());
+      if (added) *request.add_placements() = scene_.PlacementOf(pairs_[i]);
+      request.add_pairs(entry->second);
+    }
+    return request;
+  }
 
   absl::Status Call(size_t begin, size_t end) {
-    v1::BatchCheckCollisionsRequest request;
-    std::unordered_map<uint32_t, uint32_t> local;
-    const auto use = [&](uint32_t placement) {
-      const auto [entry, added] = local.emplace(placement, request.placements_size());
-      if (added) *request.add_placements() = scene_.placements[placement];
-      request.add_pairs(entry->second);
-    };
-    for (size_t i = begin; i < end; ++i) {
-      use(scene_.pairs[i].first);
-      use(scene_.pairs[i].second);
-    }
-    request.set_method(arguments_.wishes.method);
-    request.set_tolerance(arguments_.wishes.tolerance);
-    *request.mutable_wanted() = arguments_.wishes.wanted;
+    const v1::BatchCheckCollisionsRequest request = RequestFor(begin, end);
     request_ = &request;
+    first_ = begin;
     placement_problems_.clear();
     head_.Clear();
     size_t next = begin;
@@ -90,23 +110,25 @@ class BatchRun {
     if (part.has_header()) *head_.mutable_header() = part.header();
     head_.mutable_hulls()->MergeFrom(part.hulls());
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
-      placement_problems_[problem.placement()] = {problem.code(), problem.message(),
-                                                  problem.reason()};
+      placement_problems_[problem.placement()] = problem.message();
     }
-    std::unordered_map<uint64_t, Problem> pair_problems;
+    Problems pair_problems;
     for (const v1::PairProblem& problem : part.columns().pair_problems()) {
-      pair_problems[part.first_pair() + problem.row()] = {problem.code(), problem.message(),
-                                                          problem.reason()};
+      pair_problems[part.first_pair() + problem.row()] = problem.message();
     }
     const size_t count = static_cast<size_t>(part.columns().relations_size());
-    if (count == 0) return absl::OkStatus();
+    if (count == 0) {
+      if (run_.json()) PrintMessage(part, begin);
+      return absl::OkStatus();
+    }
     if (begin + part.first_pair() != *next || count > end - *next ||
         !AreParallel(part.columns(), count)) {
       return absl::InternalError("the answers do not follow one another");
     }
+    if (run_.json()) PrintMessage(part, begin);
     for (size_t i = 0; i < count; ++i, ++*next) {
       const AnswerRow row = RowAt(part.columns(), static_cast<int>(i));
-      const Problem* problem = nullptr;
+      const std::string* problem = nullptr;
       std::optional<Verification> verification;
       if (row.relation == v1::RELATION_UNSPECIFIED) {
         problem = FindProblem(pair_problems, *next - begin);
@@ -116,15 +138,14 @@ class BatchRun {
         if (!verified.ok()) return verified.status();
         verification = *std::move(verified);
       }
-      Print(row, scene_.pairs[*next], problem, verification);
+      Print(row, *next, problem, verification);
     }
+    bar_.Update(*next);
     return absl::OkStatus();
   }
 
-  const Problem* FindProblem(const std::unordered_map<uint64_t, Problem>& pair_problems,
-                             size_t pair) const {
-    static const Problem* const kUnknown =
-        new Problem{0, "the server gave no cause", v1::ERROR_REASON_UNSPECIFIED};
+  const std::string* FindProblem(const Problems& pair_problems, size_t pair) const {
+    static const auto* const kUnknown = new std::string("the server gave no cause");
     if (const auto found = pair_problems.find(pair); found != pair_problems.end()) {
       return &found->second;
     }
@@ -136,16 +157,15 @@ class BatchRun {
   }
 
   absl::StatusOr<Verification> Verify(const AnswerRow& row, size_t pair) {
-    const uint32_t a = request_->pairs(static_cast<int>(2 * pair));
-    const uint32_t b = request_->pairs(static_cast<int>(2 * pair + 1));
-    const auto hulls = static_cast<uint32_t>(head_.hulls_size());
-    if (a >= hulls || b >= hulls || row.certificate == nullptr) {
+    const v1::HullVersion* const a = VersionOf(request_->pairs(static_cast<int>(2 * pair)));
+    const v1::HullVersion* const b = VersionOf(request_->pairs(static_cast<int>(2 * pair + 1)));
+    if (a == nullptr || b == nullptr || row.certificate == nullptr) {
       return absl::InternalError("the answers lack the hulls or the certificates they are about");
     }
-    auto verification =
-        checker_.Check({request_->placements(static_cast<int>(a)),
-                        request_->placements(static_cast<int>(b)), row.relation, *row.certificate,
-                        head_.hulls(static_cast<int>(a)), head_.hulls(static_cast<int>(b))});
+    const size_t global = first_ + pair;
+    auto verification = checker_.Check({scene_.PlacementOf(pairs_[2 * global]),
+                                        scene_.PlacementOf(pairs_[2 * global + 1]), row.relation,
+                                        *row.certificate, *a, *b});
     if (!verification.ok()) return verification;
     if (verification->verdict == Verdict::kInvalid) {
       ++invalid_;
@@ -155,53 +175,53 @@ class BatchRun {
     return verification;
   }
 
-  void Print(const AnswerRow& row, const std::pair<uint32_t, uint32_t>& pair,
-             const Problem* problem, const std::optional<Verification>& verification) {
+  // The hull of a placement of the request; null where the answer lacks it.
+  const v1::HullVersion* VersionOf(uint32_t placement) const {
+    const v1::PackedPlacements& packed = request_->packed_placements();
+    if (packed.hulls_size() > 0) placement = packed.hulls(static_cast<int>(placement));
+    const auto hulls = static_cast<uint32_t>(head_.hulls_size());
+    return placement < hulls ? &head_.hulls(static_cast<int>(placement)) : nullptr;
+  }
+
+  // The server's message, with rows that count on from the calls before.
+  void PrintMessage(const v1::BatchCheckCollisionsResponse& part, size_t begin) {
+    bar_.Clear();
+    v1::BatchCheckCollisionsResponse message = part;
+    message.set_first_pair(part.first_pair() + begin);
+    run_.out << MessageJson(message) << "\n";
+  }
+
+  void Print(const AnswerRow& row, size_t pair, const std::string* problem,
+             const std::optional<Verification>& verification) {
     ++counts_[row.relation];
     const bool as_expected = !verification || verification->verdict == Verdict::kValid;
+    const std::string names =
+        absl::StrCat(scene_.NameOf(pairs_[2 * pair]), "\t", scene_.NameOf(pairs_[2 * pair + 1]));
+    if (run_.json()) {
+      // The contract has no word for it.
+      if (!as_expected) {
+        run_.err << "hullctl: " << names << "\t" << VerificationText(*verification, Painter())
+                 << "\n";
+      }
+      return;
+    }
     if (arguments_.colliding && row.relation == v1::RELATION_SEPARATED && as_expected) return;
-    const std::string& a = scene_.names[pair.first];
-    const std::string& b = scene_.names[pair.second];
-    if (run_.json) {
-      run_.out << (printed_++ > 0 ? ",\n" : "\n") << Json(row, a, b, problem, verification);
-      return;
-    }
-    run_.out << a << "\t" << b << "\t";
+    bar_.Clear();
+    run_.out << names << "\t";
     if (problem != nullptr) {
-      run_.out << "FAILED\t" << problem->message << "\n";
+      run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + *problem) << "\n";
       return;
     }
-    run_.out << RowText(row);
-    if (verification) run_.out << "\t" << VerificationText(*verification);
+    if (run_.names()) {
+      run_.out << RelationText(row.relation) << "\n";
+      return;
+    }
+    run_.out << RowText(row, run_.paint);
+    if (verification) run_.out << "\t" << VerificationText(*verification, run_.paint);
     run_.out << "\n";
   }
 
-  static std::string Json(const AnswerRow& row, const std::string& a, const std::string& b,
-                          const Problem* problem, const std::optional<Verification>& verification) {
-    JsonObject object;
-    object.Add("a", a).Add("b", b);
-    AddRow(row, &object);
-    if (verification) object.AddJson("verification", VerificationJson(*verification));
-    if (problem != nullptr) {
-      object.AddJson("problem", JsonObject()
-                                    .AddJson("code", std::to_string(problem->code))
-                                    .Add("message", problem->message)
-                                    .Add("reason", v1::ErrorReason_Name(problem->reason))
-                                    .Close());
-    }
-    return object.Close();
-  }
-
-  void PrintEnd(const absl::Status& status) {
-    if (run_.json) {
-      JsonObject summary;
-      for (const SummaryEntry& entry : kSummary) {
-        if (IsSummed(entry)) summary.Add(entry.name, counts_[entry.relation]);
-      }
-      run_.out << "],\n\"complete\":" << (status.ok() ? "true" : "false")
-               << ",\n\"summary\":" << summary.Close() << "}\n";
-      return;
-    }
+  void PrintTotals() {
     run_.out << "#";
     for (const SummaryEntry& entry : kSummary) {
       if (IsSummed(entry)) run_.out << " " << entry.name << " " << counts_[entry.relation];
@@ -220,39 +240,51 @@ class BatchRun {
                                               {"failed", v1::RELATION_UNSPECIFIED}};
   // A tolerance of 0 leaves no pair within it.
   bool IsSummed(const SummaryEntry& entry) const {
-    return entry.relation != v1::RELATION_WITHIN_TOLERANCE || arguments_.wishes.tolerance > 0;
+    return entry.relation != v1::RELATION_WITHIN_TOLERANCE || tolerance_ > 0;
   }
 
   const Invocation& run_;
   const BatchArguments& arguments_;
-  const BatchScene& scene_;
+  const Scene& scene_;
+  const std::vector<uint32_t>& pairs_;
   const Client client_;
   AnswerChecker checker_;
+  ProgressBar bar_;
+  // What all calls have in common.
+  v1::BatchCheckCollisionsRequest base_;
+  double tolerance_ = 0;
   // The header and the hulls of the call that runs.
   v1::BatchCheckCollisionsResponse head_;
   const v1::BatchCheckCollisionsRequest* request_ = nullptr;
-  std::unordered_map<uint32_t, Problem> placement_problems_;
+  // Its first pair.
+  size_t first_ = 0;
+  Problems placement_problems_;
   std::unordered_map<int, uint64_t> counts_;
-  uint64_t printed_ = 0;
   uint64_t failed_ = 0;
   uint64_t invalid_ = 0;
   uint64_t unchecked_ = 0;
 };
 
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
+  if (arguments.colliding && run.json()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--colliding leaves out pairs, but the messages of --output json answer each; 'hullctl "
+        "scene' finds those that collide"));
+  }
   const auto source = ByteSource::Open(arguments.file);
   if (!source.ok()) return run.FailUsage(source.status());
-  const auto scene = ReadBatchFile(source->get());
+  const auto scene = ReadScene(source->get());
   if (!scene.ok()) return run.FailUsage(scene.status());
-  if (scene->pairs.empty()) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat(arguments.file, ": no pair is asked for; add `pair NAME NAME` or `all`")));
+  if (absl::Status rest = RefuseUpdates(source->get(), "batch"); !rest.ok()) {
+    return run.FailUsage(rest);
   }
-  BatchRun batch(run, arguments, *scene);
+  const auto pairs = PairsOf(*scene, arguments.file);
+  if (!pairs.ok()) return run.FailUsage(pairs.status());
+  BatchRun batch(run, arguments, *scene, *pairs);
   if (absl::Status status = batch.Run(); !status.ok()) return run.Fail(status);
   const auto report = [&](uint64_t count, const char* what) {
     if (count == 0) return false;
-    run.err << "hullctl: " << count << " of " << scene->pairs.size() << " pairs " << what << "\n";
+    run.err << "hullctl: " << count << " of " << pairs->size() / 2 << " pairs " << what << "\n";
     return true;
   };
   const bool failed = report(batch.failed(), "have no answer; each names its cause");
@@ -269,10 +301,14 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
 void AddBatchCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BatchArguments>();
   Command command = program.AddCommand("batch", "Ask about many pairs from a file");
-  command.AddText("FILE", &arguments->file, "Placements and pairs; - is standard input").Required();
+  command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddQueryOptions(command, &arguments->wishes);
   command.AddFlag("--colliding", &arguments->colliding, "Leave out the pairs that are separated");
-  command.SetFooter(kBatchFileHelp);
+  command.SetDetails(kSceneFileHelp);
+  command.SetExamples(
+      {{"A scene as text", "hullctl batch scene.txt"},
+       {"Only what collides, proven", "hullctl batch scene.txt --colliding --verify"},
+       {"The contract's messages, one a line", "hullctl batch scene.json --output json"}});
   command.OnGiven([=] { invocation->action = [=] { return Batch(*invocation, *arguments); }; });
 }
 

@@ -2,7 +2,6 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_format.h>
 #include <signal.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -219,10 +218,11 @@ std::string ModeName(LoadMode mode) {
 }
 
 LoadResult Drive(const Invocation& run, const LoadArguments& arguments, LoadSubjects* subjects) {
-  ProgressBar bar(run.err, isatty(STDERR_FILENO) != 0, 0);
+  constexpr uint64_t kWhole = 1000000;
+  ProgressBar bar(run.err, run.shows_progress, "requests", kWhole);
   return RunLoad(arguments.plan, subjects->MakeClients(), InterruptWatch::interrupted(),
                  [&bar](double share, uint64_t requests) {
-                   bar.Show(absl::StrCat(BarText(share), requests, " requests"));
+                   bar.Update(static_cast<uint64_t>(share * static_cast<double>(kWhole)), requests);
                  });
 }
 
@@ -254,7 +254,7 @@ ExitCode Load(const Invocation& run, LoadArguments arguments) {
   if (created.ok()) result = Drive(run, arguments, &subjects);
   const bool interrupted = InterruptWatch::interrupted();
   const absl::Status deleted = subjects.Delete();
-  if (created.ok() && run.json) {
+  if (created.ok() && run.json()) {
     PrintJson(arguments, ModeName(arguments.settings.mode), interrupted, result, run.out);
   } else if (created.ok()) {
     PrintTable(arguments, result, run.out);
@@ -338,13 +338,16 @@ void AddBenchCommand(Command program, Invocation* invocation) {
   AddSettingOptions(load, &arguments->settings);
   AddPlanOptions(load, &arguments->plan);
   load.AddFlag(
-      "--json", [invocation] { invocation->json = true; }, "The same as --output json");
-  load.SetFooter(
+      "--json", [invocation] { invocation->form = OutputForm::kJson; },
+      "The same as --output json");
+  load.SetDetails(
       "Creates hulls of its own and deletes them at the end, also after Ctrl-C.\n"
       "Without --rate each client asks again when it is answered. With --rate requests are due at\n"
       "fixed times and latencies count from then, so that waiting behind a slow one is not "
       "hidden.\n"
       "Nothing is retried; latencies are those of requests that succeeded.");
+  load.SetExamples({{"As fast as four clients go", "hullctl bench load --clients 4 --duration 30s"},
+                    {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"}});
   load.OnGiven([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
 }
 

@@ -2,6 +2,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_text.h"
@@ -15,6 +16,7 @@ namespace {
 struct CheckArguments {
   v1::CheckCollisionRequest request;
   QueryWishes wishes;
+  std::string record;
 };
 
 std::string VersionText(const v1::HullVersion& hull) {
@@ -72,11 +74,10 @@ void AddMeasures(const v1::CheckCollisionRequest& request,
   }
 }
 
-void PrintTable(const v1::CheckCollisionRequest& request,
-                const v1::CheckCollisionResponse& response, const Verification* verification,
-                std::ostream& out) {
+void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
+                const v1::CheckCollisionResponse& response, const Verification* verification) {
   Table table;
-  table.Row({"relation", RelationText(response.relation())})
+  table.Row({"relation", PaintedRelation(response.relation(), run.paint)})
       .Row({"A", VersionText(response.hull_a())})
       .Row({"B", VersionText(response.hull_b())})
       .Row({"decided by", RungText(response.rung())});
@@ -85,33 +86,45 @@ void PrintTable(const v1::CheckCollisionRequest& request,
   if (request.wanted().certificate()) {
     table.Row({"certificate", CertificateText(response.certificate())});
   }
-  if (verification != nullptr) table.Row({"verified", VerificationText(*verification)});
+  if (verification != nullptr) table.Row({"verified", VerificationText(*verification, run.paint)});
   if (response.has_analysis()) {
     const bool textbook = request.method() == v1::METHOD_TEXTBOOK_SAT;
     table.Row({"method", textbook ? "textbook SAT" : "certified search"});
     AddAnalysis(response.analysis(), &table);
   }
-  table.Print(out);
+  if (run.wide()) {
+    table.Row({"store", response.header().store_id()})
+        .Row({"store revision", std::to_string(response.header().revision())});
+  }
+  table.Print(run.out);
 }
 
-// An answer with a certificate includes the question, so that `hullctl verify` has all it needs.
-std::string ResponseJson(const v1::CheckCollisionRequest& request,
-                         const v1::CheckCollisionResponse& response,
-                         const Verification* verification) {
-  const std::string json = MessageJson(response);
-  if (!request.wanted().certificate()) return json;
-  JsonObject object;
-  object.AddJson("request", MessageJson(request));
-  if (verification != nullptr) object.AddJson("verification", VerificationJson(*verification));
-  const std::string front = object.Close();
-  return front.substr(0, front.size() - 1) + "," + json.substr(1);
+// Question and answer, so that `hullctl verify` has all it needs.
+std::string RecordJson(const v1::CheckCollisionRequest& request,
+                       const v1::CheckCollisionResponse& response) {
+  return JsonObject()
+      .AddJson("request", MessageJson(request))
+      .AddJson("response", MessageJson(response))
+      .Close();
+}
+
+void Print(const Invocation& run, const v1::CheckCollisionRequest& request,
+           const v1::CheckCollisionResponse& response, const Verification* verification) {
+  if (run.json()) {
+    run.out << MessageJson(response) << "\n";
+  } else if (run.names()) {
+    run.out << RelationText(response.relation()) << "\n";
+  } else {
+    PrintTable(run, request, response, verification);
+  }
 }
 
 ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
   v1::CheckCollisionRequest request = arguments.request;
-  *request.mutable_wanted() = arguments.wishes.wanted;
+  double tolerance = 0;
+  arguments.wishes.Apply(request.mutable_wanted(), &tolerance);
+  request.set_tolerance(tolerance);
   request.set_method(arguments.wishes.method);
-  request.set_tolerance(arguments.wishes.tolerance);
   const Client client = run.MakeClient();
   VerifiedResponse answer;
   const Verification* const verification = arguments.wishes.verify ? &answer.verification : nullptr;
@@ -124,10 +137,13 @@ ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
     if (!response.ok()) return run.Fail(response.status());
     answer.response = *std::move(response);
   }
-  if (run.json) {
-    run.out << ResponseJson(request, answer.response, verification) << "\n";
-  } else {
-    PrintTable(request, answer.response, verification, run.out);
+  // A record on standard output takes the answer's place.
+  if (arguments.record != "-") Print(run, request, answer.response, verification);
+  if (!arguments.record.empty()) {
+    const absl::Status written = WriteOutput(arguments.record, run.out, [&](std::ostream& out) {
+      out << RecordJson(request, answer.response) << "\n";
+    });
+    if (!written.ok()) return run.FailUsage(written);
   }
   return verification == nullptr ? ExitCode::kDone : run.Judge(*verification);
 }
@@ -151,18 +167,36 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CheckArguments>();
   v1::CheckCollisionRequest* const request = &arguments->request;
   Command command = program.AddCommand("check", "Ask whether two hulls collide");
-  command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull").Required();
-  command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull").Required();
+  command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull")
+      .Required()
+      .Completes(ValueKind::kHull);
+  command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
   AddQueryOptions(command, &arguments->wishes);
-  command.SetFooter(
-      "Lengths are in the unit of the points. For example:\n"
-      "  hullctl check arm box --pose-b 0.2,0,0 --separation --witness\n"
-      "  hullctl check arm box --clearance 0.01\n"
-      "  hullctl check arm box --verify\n"
-      "  hullctl check arm box --certificate --output json > answer.json; hullctl verify "
-      "answer.json");
+  CheckArguments* const checked = arguments.get();
+  command
+      .AddParsed(
+          "--record",
+          [checked](const std::string& path) {
+            checked->record = path;
+            checked->wishes.wanted.set_certificate(true);
+            return absl::OkStatus();
+          },
+          "Write question and answer, with its certificate, for 'hullctl verify'; - is standard "
+          "output, in place of the answer")
+      .ValueName("FILE");
+  command.SetDetails("Lengths are in the unit of the points.");
+  command.SetExamples(
+      {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
+       {"How far apart are they, and where?",
+        "hullctl check arm box --pose-b 0.2,0,0 --separation --witness"},
+       {"Are they within a centimetre?", "hullctl check arm box --clearance 0.01"},
+       {"Prove it", "hullctl check arm box --verify"},
+       {"Record it, and prove it later", "hullctl check arm box --record answer.json"},
+       {"", "hullctl verify answer.json"}});
   command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
 }
 

@@ -11,21 +11,29 @@ namespace hulld {
 void AddCreateCommand(Command program, Invocation* invocation);
 void AddAppendCommand(Command program, Invocation* invocation);
 void AddReplaceCommand(Command program, Invocation* invocation);
-void AddGetCommand(Command program, Invocation* invocation);
-void AddListCommand(Command program, Invocation* invocation);
 void AddDeleteCommand(Command program, Invocation* invocation);
+void AddListCommand(Command program, Invocation* invocation);
+void AddGetCommand(Command program, Invocation* invocation);
 void AddMeshCommand(Command program, Invocation* invocation);
+void AddViewCommand(Command program, Invocation* invocation);
+void AddPictureCommand(Command program, Invocation* invocation);
 void AddCheckCommand(Command program, Invocation* invocation);
 void AddBatchCommand(Command program, Invocation* invocation);
 void AddSceneCommand(Command program, Invocation* invocation);
 void AddStreamCommand(Command program, Invocation* invocation);
 void AddVerifyCommand(Command program, Invocation* invocation);
-void AddGenerateCommand(Command program, Invocation* invocation);
+void AddWatchCommand(Command program, Invocation* invocation);
 void AddStatusCommand(Command program, Invocation* invocation);
+void AddHealthCommand(Command program, Invocation* invocation);
 void AddBackupCommand(Command program, Invocation* invocation);
-void AddBenchCommand(Command program, Invocation* invocation);
-void AddPictureCommand(Command program, Invocation* invocation);
 void AddTokenCommand(Command program, Invocation* invocation);
+void AddBenchCommand(Command program, Invocation* invocation);
+void AddContextCommand(Command program, Invocation* invocation);
+void AddShellCommand(Command program, Invocation* invocation);
+void AddCompletionCommand(Command program, Invocation* invocation);
+void AddGenerateCommand(Command program, Invocation* invocation);
+// Hidden: writes man pages, for the build.
+void AddManCommand(Command program, Invocation* invocation);
 
 }  // namespace hulld
 

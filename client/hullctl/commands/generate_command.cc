@@ -9,6 +9,7 @@
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/load/point_generator.h"
+#include "client/hullctl/printing/progress_bar.h"
 
 namespace hulld {
 namespace {
@@ -48,11 +49,16 @@ ExitCode Generate(const Invocation& run, const GenerateArguments& arguments) {
         "some points would lie beyond the largest double; choose a smaller --radius, --size or "
         "--center"));
   }
+  const bool to_file = !arguments.file.empty() && arguments.file != "-";
+  ProgressBar bar(run.err, run.shows_progress && to_file, "points", cloud.count);
+  uint64_t done = 0;
   const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
-    GenerateCloud(cloud, [&out](const std::array<double, 3>& p) {
+    GenerateCloud(cloud, [&](const std::array<double, 3>& p) {
+      if (++done % 4096 == 0) bar.Update(done);
       out << ShortestText(p[0]) << ' ' << ShortestText(p[1]) << ' ' << ShortestText(p[2]) << '\n';
     });
   });
+  bar.Clear();
   return written.ok() ? ExitCode::kDone : run.FailUsage(written);
 }
 
@@ -64,9 +70,7 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("generate", "Write points as XYZ text; needs no server");
   std::vector<std::string> names;
   for (const auto& [name, shape] : ShapeNames()) names.push_back(name);
-  command.AddText("SHAPE", &arguments->shape, "ball, sphere, cube or lattice")
-      .Required()
-      .OneOf(names);
+  command.AddText("SHAPE", &arguments->shape, "What the points fill").Required().OneOf(names);
   command
       .AddNumber("N", 0, uint64_t{1} << 40, "How many points",
                  [cloud](uint64_t number) { cloud->count = number; })
@@ -89,10 +93,16 @@ void AddGenerateCommand(Command program, Invocation* invocation) {
       .ValueName("x,y,z");
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
-  command.SetFooter(
+  command.SetDetails(
       "The same options give the same bytes on every machine. A lattice of N points is the first\n"
       "N of the smallest cube of k*k*k points; take N = k*k*k for a whole one.");
-  command.OnGiven([=] { invocation->action = [=] { return Generate(*invocation, *arguments); }; });
+  command.SetExamples(
+      {{"A cube of edge 2", "hullctl generate lattice 27 | hullctl append cube - --create"},
+       {"A hundred thousand points in a ball", "hullctl generate ball 100000 -o ball.xyz"}});
+  command.OnGiven([=] {
+    invocation->needs_server = false;
+    invocation->action = [=] { return Generate(*invocation, *arguments); };
+  });
 }
 
 }  // namespace hulld

@@ -1,6 +1,5 @@
-// create, get, list and delete: one hull, or the list of all.
+// create and get: one hull.
 #include <memory>
-#include <optional>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/commands/commands.h"
@@ -23,8 +22,10 @@ std::string CountsText(const v1::PointCounts& counts) {
 ExitCode Create(const Invocation& run, const std::string& hull_id, bool if_absent) {
   const auto response = run.MakeClient().CreateHull(hull_id, if_absent);
   if (!response.ok()) return run.Fail(response.status());
-  if (run.json) {
+  if (run.json()) {
     run.out << MessageJson(*response) << "\n";
+  } else if (run.names()) {
+    run.out << hull_id << "\n";
   } else {
     run.out << hull_id << (response->created() ? " created" : " exists already") << " at revision "
             << response->hull().create_revision() << "\n";
@@ -32,7 +33,7 @@ ExitCode Create(const Invocation& run, const std::string& hull_id, bool if_absen
   return ExitCode::kDone;
 }
 
-void PrintHull(const v1::GetHullResponse& response, std::ostream& out) {
+void PrintHull(const Invocation& run, const v1::GetHullResponse& response) {
   const v1::HullInfo& hull = response.hull();
   Table table;
   table.Row({"hull", hull.hull_id()})
@@ -47,19 +48,27 @@ void PrintHull(const v1::GetHullResponse& response, std::ostream& out) {
   }
   table.Row({"revision", std::to_string(hull.revision())})
       .Row({"created at", std::to_string(hull.create_revision())});
-  if (response.has_audit()) {
-    table.Row({"audit", response.audit().ok() ? "ok" : response.audit().finding()});
+  if (run.wide()) {
+    table.Row({"store", response.header().store_id()})
+        .Row({"store revision", std::to_string(response.header().revision())});
   }
-  table.Print(out);
+  if (response.has_audit()) {
+    const bool ok = response.audit().ok();
+    table.Row({"audit", ok ? run.paint(Hue::kGood, "ok")
+                           : run.paint(Hue::kBad, response.audit().finding())});
+  }
+  table.Print(run.out);
 }
 
 ExitCode Get(const Invocation& run, const std::string& hull_id, bool audit) {
   const auto response = run.MakeClient().GetHull(hull_id, audit);
   if (!response.ok()) return run.Fail(response.status());
-  if (run.json) {
+  if (run.json()) {
     run.out << MessageJson(*response) << "\n";
+  } else if (run.names()) {
+    run.out << hull_id << "\n";
   } else {
-    PrintHull(*response, run.out);
+    PrintHull(run, *response);
   }
   if (audit && !response->audit().ok()) {
     run.err << "hullctl: the audit of " << hull_id << " found: " << response->audit().finding()
@@ -69,44 +78,9 @@ ExitCode Get(const Invocation& run, const std::string& hull_id, bool audit) {
   return ExitCode::kDone;
 }
 
-ExitCode List(const Invocation& run, const std::string& prefix, uint64_t limit) {
-  const auto response = run.MakeClient().ListAllHulls(prefix, limit);
-  if (!response.ok()) return run.Fail(response.status());
-  if (run.json) {
-    run.out << MessageJson(*response) << "\n";
-    return ExitCode::kDone;
-  }
-  Table table;
-  table.Row({"HULL", "DIMENSION", "VERTICES", "POINTS", "REVISION"});
-  for (const v1::HullInfo& hull : response->hulls()) {
-    table.Row({hull.hull_id(), std::to_string(hull.dimension()),
-               std::to_string(hull.vertex_count()), std::to_string(hull.counts().received()),
-               std::to_string(hull.revision())});
-  }
-  table.Print(run.out);
-  if (!response->next_page_token().empty()) {
-    run.err << "hullctl: there are more hulls; raise --limit to see them\n";
-  }
-  return ExitCode::kDone;
-}
-
-ExitCode Delete(const Invocation& run, const std::string& hull_id,
-                std::optional<uint64_t> if_revision) {
-  const auto response = run.MakeClient().DeleteHull(hull_id, if_revision);
-  if (!response.ok()) return run.Fail(response.status());
-  if (run.json) {
-    run.out << MessageJson(*response) << "\n";
-  } else {
-    run.out << hull_id << " deleted at revision " << response->header().revision() << "\n";
-  }
-  return ExitCode::kDone;
-}
-
 struct HullOptions {
   std::string hull_id;
   bool flag = false;
-  uint64_t limit = 0;
-  std::optional<uint64_t> if_revision;
 };
 
 }  // namespace
@@ -116,6 +90,8 @@ void AddCreateCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("create", "Register an empty hull");
   command.AddText("ID", &options->hull_id, "Name of the hull, such as arm/3").Required();
   command.AddFlag("--if-absent", &options->flag, "Accept a hull that exists already");
+  command.SetExamples({{"", "hullctl create arm/3"},
+                       {"In a script that may run twice", "hullctl create arm/3 --if-absent"}});
   command.OnGiven([=] {
     invocation->action = [=] { return Create(*invocation, options->hull_id, options->flag); };
   });
@@ -124,35 +100,15 @@ void AddCreateCommand(Command program, Invocation* invocation) {
 void AddGetCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<HullOptions>();
   Command command = program.AddCommand("get", "Show size, counts and box of a hull");
-  command.AddText("ID", &options->hull_id, "Name of the hull").Required();
+  command.AddText("ID", &options->hull_id, "Name of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   command.AddFlag("--audit", &options->flag,
                   "Also let the server check the hull by other means than it was built by");
+  command.SetExamples(
+      {{"", "hullctl get arm/3"}, {"As JSON, for a script", "hullctl get arm/3 --output json"}});
   command.OnGiven([=] {
     invocation->action = [=] { return Get(*invocation, options->hull_id, options->flag); };
-  });
-}
-
-void AddListCommand(Command program, Invocation* invocation) {
-  auto options = std::make_shared<HullOptions>();
-  Command command = program.AddCommand("list", "List the hulls by name");
-  command.AddText("PREFIX", &options->hull_id, "Only names that start with it");
-  command.AddNumber("--limit", 1, kAnyNumber, "Stop after N hulls (default: all)",
-                    [options](uint64_t number) { options->limit = number; });
-  command.OnGiven([=] {
-    invocation->action = [=] { return List(*invocation, options->hull_id, options->limit); };
-  });
-}
-
-void AddDeleteCommand(Command program, Invocation* invocation) {
-  auto options = std::make_shared<HullOptions>();
-  Command command = program.AddCommand("delete", "Remove a hull");
-  command.AddText("ID", &options->hull_id, "Name of the hull").Required();
-  command.AddNumber("--if-revision", 0, kAnyNumber, "Only if its revision is this one",
-                    [options](uint64_t number) { options->if_revision = number; });
-  command.OnGiven([=] {
-    invocation->action = [=] {
-      return Delete(*invocation, options->hull_id, options->if_revision);
-    };
   });
 }
 

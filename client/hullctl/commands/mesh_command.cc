@@ -4,6 +4,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/mesh_obj.h"
 
 namespace hulld {
@@ -29,6 +30,22 @@ v1::GetHullMeshRequest RequestFor(const MeshArguments& arguments) {
   return request;
 }
 
+// The messages that the mesh came in, put together: header, vertices, facets.
+void WriteMessages(const HullMesh& mesh, std::ostream& out) {
+  v1::GetHullMeshResponse header;
+  *header.mutable_header() = mesh.header;
+  out << MessageJson(header) << "\n";
+  v1::GetHullMeshResponse vertices;
+  vertices.mutable_vertices()->mutable_xyz()->Add(mesh.xyz.begin(), mesh.xyz.end());
+  out << MessageJson(vertices) << "\n";
+  if (mesh.facet_sizes.empty()) return;
+  v1::GetHullMeshResponse facets;
+  facets.mutable_facets()->mutable_sizes()->Add(mesh.facet_sizes.begin(), mesh.facet_sizes.end());
+  facets.mutable_facets()->mutable_indices()->Add(mesh.facet_indices.begin(),
+                                                  mesh.facet_indices.end());
+  out << MessageJson(facets) << "\n";
+}
+
 ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
   if (arguments.outside && arguments.max_vertices == 0 && arguments.max_error == 0) {
     return run.FailUsage(absl::InvalidArgumentError(
@@ -36,8 +53,9 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
   }
   const auto mesh = run.MakeClient().GetHullMesh(RequestFor(arguments));
   if (!mesh.ok()) return run.Fail(mesh.status());
-  const absl::Status written =
-      WriteOutput(arguments.file, run.out, [&](std::ostream& out) { WriteObj(*mesh, out); });
+  const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
+    run.json() ? WriteMessages(*mesh, out) : WriteObj(*mesh, out);
+  });
   if (!written.ok()) return run.FailUsage(written);
   if (!arguments.file.empty() && arguments.file != "-") {
     run.err << arguments.file << ": " << mesh->vertex_count() << " vertices, "
@@ -52,7 +70,9 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
 void AddMeshCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<MeshArguments>();
   Command command = program.AddCommand("mesh", "Write a hull as OBJ");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
+  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.AddNumber("--max-vertices", 1, kAnyNumber, "Simplify to at most N vertices",
@@ -69,9 +89,12 @@ void AddMeshCommand(Command program, Invocation* invocation) {
       .ValueName("LENGTH");
   command.AddFlag("--outside", &arguments->outside,
                   "Simplify to a hull that encloses this one, instead of one inside it");
-  command.SetFooter(
+  command.SetDetails(
       "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
       "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.");
+  command.SetExamples({{"", "hullctl mesh spider -o spider-hull.obj"},
+                       {"At most 16 vertices, all of the hull within",
+                        "hullctl mesh spider --max-vertices 16 --outside -o simple.obj"}});
   command.OnGiven([=] { invocation->action = [=] { return Mesh(*invocation, *arguments); }; });
 }
 

@@ -130,16 +130,23 @@ void AddPictureCommand(Command program, Invocation* invocation) {
       .ValueName("FILE");
   command.AddText("--mesh", &arguments->mesh, "Mesh to draw with shading: obj, off, stl or gltf")
       .ValueName("FILE");
-  command.AddText("--hull", &arguments->hull_id, "Hull of the server to draw").ValueName("ID");
+  command.AddText("--hull", &arguments->hull_id, "Hull of the server to draw")
+      .ValueName("ID")
+      .Completes(ValueKind::kHull);
   command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
       .ValueName("FILE");
   command.AddText("--up", &arguments->up, "The axis that points up (default y)")
-      .ValueName("x|y|z")
+      .ValueName("AXIS")
       .OneOf({"x", "y", "z"});
-  command.SetFooter(
+  command.SetDetails(
       "All panels show one view at one scale. Many points or triangles are thinned out;\n"
       "the captions count all of them.");
-  command.OnGiven([=] { invocation->action = [=] { return Picture(*invocation, *arguments); }; });
+  command.SetExamples({{"A file and the hull of it",
+                        "hullctl picture --points spider.obj --hull spider -o spider.svg"}});
+  command.OnGiven([=] {
+    invocation->needs_server = !arguments->hull_id.empty();
+    invocation->action = [=] { return Picture(*invocation, *arguments); };
+  });
 }
 
 }  // namespace hulld

@@ -1,4 +1,5 @@
-#include <unistd.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <memory>
 #include <optional>
@@ -16,21 +17,33 @@ struct ReplaceArguments {
   std::string hull_id;
   PointInput input;
   bool create = false;
+  bool allow_empty = false;
   std::optional<uint64_t> if_revision;
 };
 
 void Print(const Invocation& run, const v1::ReplaceHullResponse& response) {
-  if (run.json) {
+  if (run.json()) {
     run.out << MessageJson(response) << "\n";
     return;
   }
   const v1::HullInfo& hull = response.hull();
+  if (run.names()) {
+    run.out << hull.hull_id() << "\n";
+    return;
+  }
   Table table;
   table.Row({"hull", hull.hull_id() + (response.created() ? " created" : " replaced")})
       .Row({"points", std::to_string(hull.counts().received())})
       .Row({"vertices", std::to_string(hull.vertex_count())})
       .Row({"revision", std::to_string(hull.revision())});
   table.Print(run.out);
+}
+
+absl::Status NoPoints(const ReplaceArguments& arguments) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("there are no points in ", absl::StrJoin(arguments.input.files, ", "),
+                   ", so nothing was changed; to put an empty hull in the place of ",
+                   arguments.hull_id, ", say --allow-empty"));
 }
 
 ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
@@ -41,10 +54,10 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
   open.set_hull_id(arguments.hull_id);
   open.set_create_if_absent(arguments.create);
   if (arguments.if_revision.has_value()) open.set_if_revision(*arguments.if_revision);
-  ProgressBar bar(run.err, isatty(STDERR_FILENO) != 0, total_bytes);
+  ProgressBar bar(run.err, run.shows_progress, "points", total_bytes);
   // A file that cannot be read ends the call, and the hull stays as it was.
   absl::Status file_error;
-  const auto feed = [&](const Client::PointSink& sink) {
+  const auto feed = [&](const Client::PointSink& sink) -> absl::Status {
     uint64_t bytes_before = 0;
     uint64_t points = 0;
     for (ReadRequest& request : *plan) {
@@ -63,7 +76,9 @@ ExitCode Replace(const Invocation& run, const ReplaceArguments& arguments) {
       if (!stream.ok()) return stream;
       if (!counts.ok()) return file_error = counts.status();
     }
-    return absl::OkStatus();
+    // What fed a pipe may have failed: nobody replaces a hull by nothing without saying so.
+    if (points == 0 && !arguments.allow_empty) file_error = NoPoints(arguments);
+    return file_error;
   };
   const auto response = run.MakeClient().ReplaceHull(open, feed, run.given_timeout);
   bar.Clear();
@@ -79,16 +94,23 @@ void AddReplaceCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ReplaceArguments>();
   Command command = program.AddCommand(
       "replace", "Put a hull of the points of files in the place of another, all at once");
-  command.AddText("ID", &arguments->hull_id, "Name of the hull").Required();
+  command.AddText("ID", &arguments->hull_id, "Name of the hull")
+      .Required()
+      .Completes(ValueKind::kHull);
   AddPointInput(command, &arguments->input);
   command.AddFlag("--create", &arguments->create, "Create the hull when it does not exist");
+  command.AddFlag("--allow-empty", &arguments->allow_empty,
+                  "Accept files without a point: the hull becomes empty");
   command.AddNumber("--if-revision", 0, std::numeric_limits<uint64_t>::max(),
                     "Only if the hull is at this revision; 0: only if it does not exist",
                     [arguments](uint64_t number) { arguments->if_revision = number; });
-  command.SetFooter(
-      "However long that takes, unless --timeout is given, which then bounds all of it. A call "
-      "that\n"
-      "ends early leaves the hull as it was, or, when all points were sent, may have replaced it.");
+  command.SetDetails(
+      "It takes the time that it takes, unless --timeout is given, which then bounds all of it. A\n"
+      "call that ends early leaves the hull as it was, or, when all points were sent, may have\n"
+      "replaced it.");
+  command.SetExamples(
+      {{"", "hullctl replace arm arm-v2.stl"},
+       {"Only if nobody changed it meanwhile", "hullctl replace arm arm-v2.stl --if-revision 7"}});
   command.OnGiven([=] { invocation->action = [=] { return Replace(*invocation, *arguments); }; });
 }
 

@@ -4,9 +4,13 @@
 #include <unordered_map>
 
 #include "client/formats/byte_source.h"
+#include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
+#include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 namespace {
@@ -14,17 +18,20 @@ namespace {
 // Prints the pairs of a scene as they come.
 class SceneRun {
  public:
-  SceneRun(const Invocation& run, const v1::FindCollisionsRequest& request)
-      : run_(run), request_(request) {}
+  SceneRun(const Invocation& run, const Scene& scene)
+      : run_(run),
+        scene_(scene),
+        request_(scene.request),
+        bar_(run.err, run.shows_progress, "pairs found", 0) {}
 
   absl::Status Run() {
-    if (run_.json) run_.out << "{\"collisions\":[";
     absl::Status status = run_.MakeClient().FindCollisions(
         request_, [this](const v1::FindCollisionsResponse& part) { return Take(part); });
     if (status.ok() && !complete_) {
       status = absl::InternalError("the answers end without their totals");
     }
-    PrintEnd(status.ok());
+    bar_.Clear();
+    if (status.ok() && !run_.json() && !run_.names()) PrintTotals();
     return status;
   }
 
@@ -33,9 +40,12 @@ class SceneRun {
 
  private:
   absl::Status Take(const v1::FindCollisionsResponse& part) {
+    bar_.Clear();
+    if (run_.json()) run_.out << MessageJson(part) << "\n";
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       ++placement_problems_;
-      run_.err << "hullctl: placement " << problem.placement() << ": " << problem.message() << "\n";
+      run_.err << "hullctl: placement " << scene_.NameOf(problem.placement()) << ": "
+               << problem.message() << "\n";
     }
     std::unordered_map<uint64_t, std::string> problems;
     for (const v1::PairProblem& problem : part.columns().pair_problems()) {
@@ -50,11 +60,12 @@ class SceneRun {
       const std::string* const cause = problem == problems.end() ? nullptr : &problem->second;
       const uint32_t a = part.pairs(2 * i);
       const uint32_t b = part.pairs(2 * i + 1);
-      if (HullIdOf(a) == nullptr || HullIdOf(b) == nullptr) {
+      if (scene_.HullOf(a) == nullptr || scene_.HullOf(b) == nullptr) {
         return absl::InternalError("the answer names a placement that there is not");
       }
-      Print(a, b, RowAt(part.columns(), i), cause);
+      if (!run_.json()) Print(a, b, RowAt(part.columns(), i), cause);
     }
+    bar_.Update(found_ += static_cast<uint64_t>(count));
     if (part.has_totals()) {
       totals_ = part.totals();
       complete_ = true;
@@ -63,41 +74,16 @@ class SceneRun {
   }
 
   void Print(uint32_t a, uint32_t b, const AnswerRow& row, const std::string* cause) {
-    if (run_.json) {
-      JsonObject object;
-      object.AddJson("a", std::to_string(a)).AddJson("b", std::to_string(b));
-      AddRow(row, &object);
-      if (cause != nullptr) object.Add("problem", *cause);
-      run_.out << (printed_++ > 0 ? ",\n" : "\n") << object.Close();
-      return;
+    bar_.Clear();
+    run_.out << scene_.NameOf(a) << "\t" << scene_.NameOf(b) << "\t";
+    if (cause != nullptr) {
+      run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + *cause) << "\n";
+    } else {
+      run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint)) << "\n";
     }
-    run_.out << Name(a) << "\t" << Name(b) << "\t"
-             << (cause != nullptr ? "FAILED\t" + *cause : RowText(row)) << "\n";
   }
 
-  // Null where there is no such placement.
-  const std::string* HullIdOf(uint32_t placement) const {
-    const v1::PackedPlacements& packed = request_.packed_placements();
-    if (placement < static_cast<uint32_t>(request_.placements_size())) {
-      return &request_.placements(static_cast<int>(placement)).hull_id();
-    }
-    if (placement >= static_cast<uint32_t>(packed.hulls_size())) return nullptr;
-    const uint32_t hull = packed.hulls(static_cast<int>(placement));
-    if (hull >= static_cast<uint32_t>(packed.hull_ids_size())) return nullptr;
-    return &packed.hull_ids(static_cast<int>(hull));
-  }
-
-  std::string Name(uint32_t placement) const {
-    return absl::StrCat(placement, ":", *HullIdOf(placement));
-  }
-
-  void PrintEnd(bool ok) {
-    if (run_.json) {
-      run_.out << "],\n\"complete\":" << (ok ? "true" : "false")
-               << ",\n\"totals\":" << MessageJson(totals_) << "}\n";
-      return;
-    }
-    if (!ok) return;
+  void PrintTotals() {
     run_.out << "# touching " << totals_.touching() << " overlapping " << totals_.overlapping();
     if (request_.tolerance() > 0) run_.out << " within_tolerance " << totals_.within_tolerance();
     if (request_.wanted().has_clearance()) run_.out << " separated " << totals_.separated();
@@ -105,22 +91,38 @@ class SceneRun {
   }
 
   const Invocation& run_;
+  const Scene& scene_;
   const v1::FindCollisionsRequest& request_;
+  ProgressBar bar_;
   v1::SceneTotals totals_;
   bool complete_ = false;
-  uint64_t printed_ = 0;
+  uint64_t found_ = 0;
   uint64_t placement_problems_ = 0;
 };
 
-ExitCode Scene(const Invocation& run, const std::string& path) {
-  const absl::StatusOr<std::string> text = ReadText(path);
-  if (!text.ok()) return run.FailUsage(text.status());
-  v1::FindCollisionsRequest request;
-  const absl::Status parsed = ParseJson(*text, UnknownFields::kRefuse, &request);
-  if (!parsed.ok()) {
-    return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(path, ": ", parsed.message())));
+struct SceneArguments {
+  std::string file;
+  QueryWishes wishes;
+};
+
+ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
+  const auto source = ByteSource::Open(arguments.file);
+  if (!source.ok()) return run.FailUsage(source.status());
+  auto read = ReadScene(source->get());
+  if (!read.ok()) return run.FailUsage(read.status());
+  if (absl::Status rest = RefuseUpdates(source->get(), "scene"); !rest.ok()) {
+    return run.FailUsage(rest);
   }
-  SceneRun scene(run, request);
+  if (read->pairs.has_value()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        absl::StrCat(arguments.file,
+                     ": it names pairs, but 'scene' finds them itself; ask with "
+                     "'hullctl batch', or leave them out")));
+  }
+  double tolerance = read->request.tolerance();
+  arguments.wishes.Apply(read->request.mutable_wanted(), &tolerance);
+  read->request.set_tolerance(tolerance);
+  SceneRun scene(run, *read);
   if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
   if (scene.failed() == 0) return ExitCode::kDone;
   run.err << "hullctl: " << scene.failed() << " placements or pairs have no answer\n";
@@ -130,23 +132,17 @@ ExitCode Scene(const Invocation& run, const std::string& path) {
 }  // namespace
 
 void AddSceneCommand(Command program, Invocation* invocation) {
-  auto path = std::make_shared<std::string>();
+  auto arguments = std::make_shared<SceneArguments>();
   Command command = program.AddCommand("scene", "Find all pairs of a scene that collide");
-  command.AddText("FILE", path.get(), "The scene as JSON; - is standard input").Required();
-  command.SetFooter(
-      "FILE is a FindCollisionsRequest of the contract as JSON. Placements are named by their\n"
-      "index. Optional: a group for each placement, and which groups never collide; movers N, to\n"
-      "ask only about pairs with one of the first N; tolerance; and what is wanted, such\n"
-      "as a clearance, within which pairs are found although they are separated. For example:\n"
-      "  {\"placements\":[{\"hullId\":\"arm\"},\n"
-      "                 {\"hullId\":\"box\",\"pose\":{\"translation\":{\"x\":2}}},\n"
-      "                 {\"hullId\":\"box\",\"pose\":{\"rotation\":{\"w\":1,\"z\":1}}}],\n"
-      "   \"groups\":[0,1,1], \"ignoreSameGroup\":true, \"wanted\":{\"clearance\":0.1}}\n"
-      "Many placements are read faster as packedPlacements: the IDs of the hulls, the index of\n"
-      "each placement's hull, and its pose in seven numbers, w x y z and x y z:\n"
-      "  {\"packedPlacements\":{\"hullIds\":[\"arm\",\"box\"], \"hulls\":[0,1],\n"
-      "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]}}");
-  command.OnGiven([=] { invocation->action = [=] { return Scene(*invocation, *path); }; });
+  command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
+  AddWantedOptions(command, &arguments->wishes);
+  command.SetDetails(std::string(kSceneFileHelp) +
+                     "\nWith a clearance, pairs within it are found although they are separated.");
+  command.SetExamples({{"", "hullctl scene scene.json"},
+                       {"What comes within a centimetre",
+                        "hullctl scene scene.txt --clearance 0.01 --separation"}});
+  command.OnGiven(
+      [=] { invocation->action = [=] { return FindInScene(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -14,12 +14,26 @@ std::string UptimeText(const google::protobuf::Duration& uptime) {
   return std::to_string(seconds / 3600) + " h " + std::to_string(seconds / 60 % 60) + " min";
 }
 
-void Print(const v1::GetStatusResponse& status, const std::string& server, const char* health,
-           std::ostream& out) {
+void AddMoreLimits(const v1::Limits& limits, Table* table) {
+  table->Row({"max message bytes", std::to_string(limits.max_message_bytes())})
+      .Row({"max points per hull", std::to_string(limits.max_points_per_hull())})
+      .Row({"max placements", std::to_string(limits.max_placements())})
+      .Row({"max calls", std::to_string(limits.max_calls())})
+      .Row({"max waiting calls", std::to_string(limits.max_waiting_calls())})
+      .Row({"max streams per client", std::to_string(limits.max_streams_per_client())})
+      .Row({"max concurrent batches", std::to_string(limits.max_concurrent_batches())})
+      .Row({"max writers per hull", std::to_string(limits.max_writers_per_hull())})
+      .Row({"memory limit bytes", std::to_string(limits.memory_limit_bytes())});
+  if (limits.has_max_request_time()) {
+    table->Row({"max request time", DurationText(limits.max_request_time())});
+  }
+}
+
+void Print(const Invocation& run, const v1::GetStatusResponse& status, const std::string& health) {
   const v1::Limits& limits = status.limits();
   Table table;
-  table.Row({"server", server})
-      .Row({"health", health})
+  table.Row({"server", run.server})
+      .Row({"health", run.paint(health == "SERVING" ? Hue::kGood : Hue::kBad, health)})
       .Row({"version", status.version()})
       .Row({"uptime", UptimeText(status.uptime())})
       .Row({"store", status.store_kind() + "  " + status.header().store_id()})
@@ -31,7 +45,8 @@ void Print(const v1::GetStatusResponse& status, const std::string& server, const
       .Row({"max hulls", std::to_string(limits.max_hulls())})
       .Row({"max pairs per batch", std::to_string(limits.max_pairs_per_batch())})
       .Row({"max textbook axes", std::to_string(limits.max_textbook_axes())});
-  table.Print(out);
+  if (run.wide()) AddMoreLimits(limits, &table);
+  table.Print(run.out);
 }
 
 ExitCode Status(const Invocation& run) {
@@ -42,11 +57,12 @@ ExitCode Status(const Invocation& run) {
   // A server without the health service is healthy when it answers at all.
   const bool serving = health.ok() || absl::IsUnimplemented(health);
   const char* const text = health.ok() ? "SERVING" : serving ? "UNKNOWN" : "NOT_SERVING";
-  if (run.json) {
-    run.out << JsonObject().Add("health", text).AddJson("status", MessageJson(*status)).Close()
-            << "\n";
+  if (run.json()) {
+    run.out << MessageJson(*status) << "\n";
+  } else if (run.names()) {
+    run.out << text << "\n";
   } else {
-    Print(*status, run.server, text, run.out);
+    Print(run, *status, text);
   }
   if (serving) return ExitCode::kDone;
   return run.Fail(health);
@@ -55,7 +71,8 @@ ExitCode Status(const Invocation& run) {
 ExitCode Health(const Invocation& run) {
   const absl::Status health = run.MakeClient().CheckHealth();
   if (!health.ok()) return run.Fail(health);
-  run.out << "SERVING\n";
+  // The JSON of grpc.health.v1.HealthCheckResponse.
+  run.out << (run.json() ? "{\"status\":\"SERVING\"}" : "SERVING") << "\n";
   return ExitCode::kDone;
 }
 
@@ -64,12 +81,18 @@ ExitCode Health(const Invocation& run) {
 void AddStatusCommand(Command program, Invocation* invocation) {
   Command command =
       program.AddCommand("status", "Show what the server is and whether it is serving");
-  command.SetFooter("Exits with 0 only when the server answers and is serving.");
+  command.SetDetails("Exits with 0 only when the server answers and is serving.");
+  command.SetExamples({{"", "hullctl status --server hulls.example:50551 --tls"},
+                       {"All limits", "hullctl status --output wide"}});
   command.OnGiven([=] { invocation->action = [=] { return Status(*invocation); }; });
+}
 
+void AddHealthCommand(Command program, Invocation* invocation) {
   Command health =
       program.AddCommand("health", "Ask whether the server is serving; needs no token");
-  health.SetFooter("Exits with 0 only when it is.");
+  health.SetDetails("Exits with 0 only when it is.");
+  health.SetExamples(
+      {{"In a script that waits for a server", "until hullctl health; do sleep 1; done"}});
   health.OnGiven([=] { invocation->action = [=] { return Health(*invocation); }; });
 }
 

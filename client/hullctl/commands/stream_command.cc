@@ -1,55 +1,111 @@
-#include <absl/strings/str_cat.h>
-
 #include <memory>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
+#include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 namespace {
 
-std::string ProblemJson(const v1::PairProblem& problem) {
-  return JsonObject()
-      .AddJson("code", std::to_string(problem.code()))
-      .Add("message", problem.message())
-      .Add("reason", v1::ErrorReason_Name(problem.reason()))
-      .Close();
-}
+struct StreamArguments {
+  std::string file;
+  QueryWishes wishes;
+  bool only_changes = false;
+};
 
-// The answer to one message, as one line.
-absl::StatusOr<std::string> AnswerJson(const v1::StreamCollisionsResponse& answer) {
-  const v1::AnswerColumns& columns = answer.columns();
-  if (!AreParallel(columns, static_cast<size_t>(answer.pairs_size()))) {
-    return absl::InternalError("the answer's columns and pairs disagree");
+// One stream: what it is about, its answers, and how they are printed.
+class StreamRun {
+ public:
+  StreamRun(const Invocation& run, const Scene& scene, std::vector<uint32_t> pairs)
+      : run_(run), scene_(scene), pairs_(std::move(pairs)) {}
+
+  absl::Status Open(bool only_changes) {
+    v1::CollisionStreamOpen open;
+    *open.mutable_placements() = scene_.request.placements();
+    if (scene_.request.has_packed_placements()) {
+      *open.mutable_packed_placements() = scene_.request.packed_placements();
+    }
+    open.mutable_pairs()->Add(pairs_.begin(), pairs_.end());
+    *open.mutable_wanted() = scene_.request.wanted();
+    open.set_tolerance(scene_.request.tolerance());
+    open.set_only_changes(only_changes);
+    stream_ = run_.MakeClient().OpenCollisionStream();
+    return Print(stream_->Open(std::move(open)));
   }
-  std::unordered_map<uint64_t, const v1::PairProblem*> problems;
-  for (const v1::PairProblem& problem : columns.pair_problems()) problems[problem.row()] = &problem;
-  std::string rows;
-  for (int i = 0; i < answer.pairs_size(); ++i) {
-    JsonObject row;
-    row.AddJson("pair", std::to_string(answer.pairs(i)));
-    AddRow(RowAt(columns, i), &row);
-    const auto problem = problems.find(static_cast<uint64_t>(i));
-    if (problem != problems.end()) row.AddJson("problem", ProblemJson(*problem->second));
-    absl::StrAppend(&rows, i > 0 ? "," : "", row.Close());
+
+  absl::Status Update(v1::CollisionStreamUpdate update) {
+    return Print(stream_->Update(std::move(update)));
   }
-  std::string placement_problems;
-  for (const v1::PlacementProblem& problem : answer.placement_problems()) {
-    absl::StrAppend(&placement_problems, placement_problems.empty() ? "" : ",",
-                    MessageJson(problem));
+
+  absl::Status Close() { return stream_->Close(); }
+
+ private:
+  absl::Status Print(const absl::StatusOr<v1::StreamCollisionsResponse>& answer) {
+    if (!answer.ok()) return answer.status();
+    const v1::AnswerColumns& columns = answer->columns();
+    if (!AreParallel(columns, static_cast<size_t>(answer->pairs_size()))) {
+      return absl::InternalError("the answer's columns and pairs disagree");
+    }
+    for (const uint32_t pair : answer->pairs()) {
+      if (pair < pairs_.size() / 2) continue;
+      return absl::InternalError("the answer names a pair that there is not");
+    }
+    if (run_.json()) {
+      run_.out << MessageJson(*answer) << "\n" << std::flush;
+      return absl::OkStatus();
+    }
+    if (answer->placement_problems_size() > 0 || answer->hulls_size() > 0) problems_.clear();
+    for (const v1::PlacementProblem& problem : answer->placement_problems()) {
+      problems_[problem.placement()] = problem.message();
+    }
+    PrintRows(*answer);
+    return absl::OkStatus();
   }
-  JsonObject line;
-  line.Add("update", answer.update()).Add("revision", answer.header().revision());
-  line.AddJson("answers", "[" + rows + "]");
-  if (!placement_problems.empty()) {
-    line.AddJson("placementProblems", "[" + placement_problems + "]");
+
+  void PrintRows(const v1::StreamCollisionsResponse& answer) {
+    std::unordered_map<uint64_t, std::string> causes;
+    for (const v1::PairProblem& problem : answer.columns().pair_problems()) {
+      causes[problem.row()] = problem.message();
+    }
+    for (int i = 0; i < answer.pairs_size(); ++i) {
+      const uint32_t a = pairs_[2 * answer.pairs(i)];
+      const uint32_t b = pairs_[2 * answer.pairs(i) + 1];
+      const AnswerRow row = RowAt(answer.columns(), i);
+      run_.out << answer.update() << "\t" << scene_.NameOf(a) << "\t" << scene_.NameOf(b) << "\t";
+      if (row.relation == v1::RELATION_UNSPECIFIED) {
+        const auto cause = causes.find(static_cast<uint64_t>(i));
+        const std::string text = cause != causes.end() ? cause->second : ProblemOf(a, b);
+        run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + text) << "\n";
+      } else {
+        run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint)) << "\n";
+      }
+    }
+    run_.out << std::flush;
   }
-  return line.Close();
-}
+
+  std::string ProblemOf(uint32_t a, uint32_t b) const {
+    for (const uint32_t placement : {a, b}) {
+      const auto found = problems_.find(placement);
+      if (found != problems_.end()) return found->second;
+    }
+    return "the server gave no cause";
+  }
+
+  const Invocation& run_;
+  const Scene& scene_;
+  const std::vector<uint32_t> pairs_;
+  std::unique_ptr<CollisionStream> stream_;
+  // Why placements have no hull, as the last answer with hulls said.
+  std::unordered_map<uint32_t, std::string> problems_;
+};
 
 // The next line that is not blank.
 bool NextLine(ByteSource* source, std::string* text) {
@@ -62,54 +118,55 @@ bool NextLine(ByteSource* source, std::string* text) {
   return false;
 }
 
-ExitCode Stream(const Invocation& run, const std::string& path) {
-  const auto source = ByteSource::Open(path);
+ExitCode Stream(const Invocation& run, const StreamArguments& arguments) {
+  const auto source = ByteSource::Open(arguments.file);
   if (!source.ok()) return run.FailUsage(source.status());
-  const auto at_line = [&](const absl::Status& status) {
-    return (*source)->ErrorAtLine(std::string(status.message().data(), status.message().size()));
-  };
-  const Client client = run.MakeClient();
-  std::unique_ptr<CollisionStream> stream;
+  auto scene = ReadScene(source->get());
+  if (!scene.ok()) return run.FailUsage(scene.status());
+  auto pairs = PairsOf(*scene, arguments.file);
+  if (!pairs.ok()) return run.FailUsage(pairs.status());
+  double tolerance = scene->request.tolerance();
+  arguments.wishes.Apply(scene->request.mutable_wanted(), &tolerance);
+  scene->request.set_tolerance(tolerance);
+  StreamRun stream(run, *scene, *std::move(pairs));
+  absl::Status status = stream.Open(scene->only_changes || arguments.only_changes);
   std::string text;
-  while (NextLine(source->get(), &text)) {
-    v1::CollisionStreamOpen open;
+  while (status.ok() && NextLine(source->get(), &text)) {
     v1::CollisionStreamUpdate update;
-    const bool first = stream == nullptr;
-    const absl::Status parsed = first ? ParseJson(text, UnknownFields::kRefuse, &open)
-                                      : ParseJson(text, UnknownFields::kRefuse, &update);
-    if (!parsed.ok()) return run.FailUsage(at_line(parsed));
-    if (first) stream = client.OpenCollisionStream();
-    const auto answer = first ? stream->Open(std::move(open)) : stream->Update(std::move(update));
-    if (!answer.ok()) return run.Fail(answer.status());
-    const auto json = AnswerJson(*answer);
-    if (!json.ok()) return run.Fail(json.status());
-    run.out << *json << "\n" << std::flush;
+    const absl::Status parsed = ParseJson(text, UnknownFields::kRefuse, &update);
+    if (!parsed.ok()) {
+      return run.FailUsage(
+          (*source)->ErrorAtLine(std::string(parsed.message().data(), parsed.message().size())));
+    }
+    status = stream.Update(std::move(update));
   }
+  if (!status.ok()) return run.Fail(status);
   if (!(*source)->status().ok()) return run.FailUsage((*source)->status());
-  if (stream == nullptr) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat(path, ": the first line must say what the stream is about; see --help")));
-  }
-  const absl::Status closed = stream->Close();
-  return closed.ok() ? ExitCode::kDone : run.Fail(closed);
+  status = stream.Close();
+  return status.ok() ? ExitCode::kDone : run.Fail(status);
 }
 
 }  // namespace
 
 void AddStreamCommand(Command program, Invocation* invocation) {
-  auto path = std::make_shared<std::string>();
+  auto arguments = std::make_shared<StreamArguments>();
   Command command = program.AddCommand("stream", "Ask again and again while poses change");
-  command.AddText("FILE", path.get(), "JSON, one object per line; - is standard input").Required();
-  command.SetFooter(
-      "The first line is a CollisionStreamOpen of the contract, each other line a\n"
-      "CollisionStreamUpdate; each is answered by one line of JSON before the next is read.\n"
-      "Poses are seven numbers for each placement named: quaternion w x y z, translation x y z.\n"
-      "Only pairs with a placement that moved are answered; with \"onlyChanges\":true only those\n"
-      "of them whose relation changed. --timeout bounds the wait for each answer. For example:\n"
+  command.AddText("FILE", &arguments->file, "A scene and updates; - is standard input").Required();
+  AddWantedOptions(command, &arguments->wishes);
+  command.AddFlag("--only-changes", &arguments->only_changes,
+                  "Answer updates only by pairs whose relation changed");
+  command.SetDetails(
+      "FILE starts with a scene, as for 'hullctl batch'. Behind one in JSON, each line is a\n"
+      "CollisionStreamUpdate of the contract, answered before the next is read. Poses are seven\n"
+      "numbers for each placement named: quaternion w x y z, translation x y z. Only pairs with a\n"
+      "placement that moved are answered. --timeout bounds the wait for each answer. A file:\n"
       "  {\"placements\":[{\"hullId\":\"arm\"},{\"hullId\":\"box\"}],\"pairs\":[0,1]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.5,0,0]}\n"
       "  {\"placements\":[1],\"poses\":[1,0,0,0, 0.6,0,0],\"refreshHulls\":true}");
-  command.OnGiven([=] { invocation->action = [=] { return Stream(*invocation, *path); }; });
+  command.SetExamples({{"", "hullctl stream poses.jsonl"},
+                       {"Contacts that begin and end, as messages of the contract",
+                        "simulator | hullctl stream - --only-changes --output json"}});
+  command.OnGiven([=] { invocation->action = [=] { return Stream(*invocation, *arguments); }; });
 }
 
 }  // namespace hulld

@@ -67,7 +67,7 @@ ExitCode NewToken(const Invocation& run, const TokenArguments& arguments) {
     const absl::Status written = WriteTokenFile(arguments.file, *token);
     if (!written.ok()) return run.FailUsage(written);
     run.out << line << "\n";
-  } else if (run.json) {
+  } else if (run.json()) {
     run.out << JsonObject().Add("token", *token).Add("line", line).Close() << "\n";
   } else {
     Table().Row({"token", *token}).Row({"line", line}).Print(run.out);
@@ -92,9 +92,9 @@ void AddTokenCommand(Command program, Invocation* invocation) {
   command.RequireCommand();
   const auto arguments = std::make_shared<TokenArguments>();
   Command make = command.AddCommand("new", "Make a random token");
-  make.AddText("name", &arguments->name, "Whose it is; the server's messages say it")
+  make.AddText("NAME", &arguments->name, "Whose it is; the server's messages say it")
       .Required()
-      .Check("NAME", [](const std::string& name) -> std::string {
+      .Check([](const std::string& name) -> std::string {
         const bool valid = name.size() <= 64 && !name.empty() && std::isalnum(name[0]) != 0 &&
                            name.find_first_not_of(
                                "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
@@ -102,11 +102,13 @@ void AddTokenCommand(Command program, Invocation* invocation) {
         return valid ? "" : "not up to 64 of [A-Za-z0-9._-] that start with a letter or digit";
       });
   make.AddText("--role", &arguments->role, "What it allows")
+      .ValueName("ROLE")
       .Required()
       .OneOf({"read-only", "read-write", "admin"});
   make.AddText("--prefix", &arguments->prefix,
                "What the IDs that it sees start with, ending in \"/\" (default: all)")
-      .Check("PREFIX", [](const std::string& prefix) -> std::string {
+      .ValueName("PREFIX")
+      .Check([](const std::string& prefix) -> std::string {
         const bool valid = prefix.size() > 1 && prefix.back() == '/' &&
                            prefix.find_first_of(" \t") == std::string::npos;
         return valid ? "" : "a prefix ends in \"/\", as in cell-1/";
@@ -115,9 +117,18 @@ void AddTokenCommand(Command program, Invocation* invocation) {
                "Write the token to this new file, which only you can read, and print only the "
                "line")
       .ValueName("FILE");
-  make.OnGiven([=] { invocation->action = [=] { return NewToken(*invocation, *arguments); }; });
+  make.SetExamples({{"For a robot that may write under cell-1/",
+                     "hullctl token new robot-1 --role read-write --prefix cell-1/ "
+                     "--token-out robot-1.token >> tokens"}});
+  make.OnGiven([=] {
+    invocation->needs_server = false;
+    invocation->action = [=] { return NewToken(*invocation, *arguments); };
+  });
   Command hash = command.AddCommand("hash", "Print the hash of a token read from standard input");
-  hash.OnGiven([=] { invocation->action = [=] { return HashToken(*invocation); }; });
+  hash.OnGiven([=] {
+    invocation->needs_server = false;
+    invocation->action = [=] { return HashToken(*invocation); };
+  });
 }
 
 }  // namespace hulld

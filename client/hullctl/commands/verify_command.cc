@@ -11,7 +11,7 @@
 namespace hulld {
 namespace {
 
-// The answer, and the question that stands in it as member "request".
+// A question and its answer.
 struct RecordedAnswer {
   v1::CheckCollisionRequest request;
   v1::CheckCollisionResponse response;
@@ -21,15 +21,11 @@ absl::StatusOr<RecordedAnswer> ReadAnswer(const std::string& path) {
   const auto text = ReadText(path);
   if (!text.ok()) return text.status();
   RecordedAnswer answer;
-  const absl::Status request = ParseMember(*text, "request", &answer.request);
-  if (!request.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(path, ": ", request.message(),
-                     "; write it with: hullctl check A B --certificate --output json"));
-  }
-  const absl::Status response = ParseJson(*text, UnknownFields::kIgnore, &answer.response);
-  if (response.ok()) return answer;
-  return absl::InvalidArgumentError(absl::StrCat(path, ": ", response.message()));
+  absl::Status parsed = ParseMember(*text, "request", &answer.request);
+  if (parsed.ok()) parsed = ParseMember(*text, "response", &answer.response);
+  if (parsed.ok()) return answer;
+  return absl::InvalidArgumentError(absl::StrCat(
+      path, ": ", parsed.message(), "; write it with: hullctl check A B --record FILE"));
 }
 
 ExitCode Verify(const Invocation& run, const std::string& path) {
@@ -42,10 +38,13 @@ ExitCode Verify(const Invocation& run, const std::string& path) {
       checker.Check({answer->request.a(), answer->request.b(), response.relation(),
                      response.certificate(), response.hull_a(), response.hull_b()});
   if (!verification.ok()) return run.Fail(verification.status());
-  if (run.json) {
+  if (run.json()) {
     run.out << VerificationJson(*verification) << "\n";
+  } else if (run.names()) {
+    run.out << RelationText(response.relation()) << "\n";
   } else {
-    run.out << RelationText(response.relation()) << ": " << VerificationText(*verification) << "\n";
+    run.out << PaintedRelation(response.relation(), run.paint) << ": "
+            << VerificationText(*verification, run.paint) << "\n";
   }
   return run.Judge(*verification);
 }
@@ -57,12 +56,14 @@ void AddVerifyCommand(Command program, Invocation* invocation) {
   Command command =
       program.AddCommand("verify", "Check that a recorded answer's certificate proves it");
   command.AddText("FILE", path.get(), "The answer; - is standard input").Required();
-  command.SetFooter(
-      "FILE is what `hullctl check A B --certificate --output json` prints. The vertices are\n"
-      "fetched from the server, the arithmetic is exact and shares no code with it. An answer\n"
-      "about a hull that has changed since cannot be checked, which is not the same as wrong:\n"
-      "ask again, or let `hullctl check --verify` do both at once. For example:\n"
-      "  hullctl check arm box --certificate --output json | hullctl verify -");
+  command.SetDetails(
+      "FILE is what 'hullctl check A B --record FILE' writes. The vertices are fetched from the\n"
+      "server; the arithmetic is exact and shares no code with it. An answer about a hull that "
+      "has\n"
+      "changed since cannot be checked, which is not the same as wrong: ask again, or let\n"
+      "'hullctl check --verify' do both at once.");
+  command.SetExamples(
+      {{"", "hullctl check arm box --record answer.json"}, {"", "hullctl verify answer.json"}});
   command.OnGiven([=] { invocation->action = [=] { return Verify(*invocation, *path); }; });
 }
 

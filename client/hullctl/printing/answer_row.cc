@@ -58,8 +58,8 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
   return row;
 }
 
-std::string RowText(const AnswerRow& row) {
-  std::vector<std::string> cells = {RelationText(row.relation)};
+std::string RowText(const AnswerRow& row, const Painter& paint) {
+  std::vector<std::string> cells = {PaintedRelation(row.relation, paint)};
   if (row.separation) cells.push_back(SeparationText(*row.separation));
   if (row.witness) {
     cells.push_back(DirectionText(row.witness->point_a()));

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/painter.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -30,7 +31,7 @@ bool AreParallel(const v1::AnswerColumns& columns, size_t count);
 AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 
 // For people, separated by tabs, the relation first.
-std::string RowText(const AnswerRow& row);
+std::string RowText(const AnswerRow& row, const Painter& paint);
 
 // Adds a member for each field that there is.
 void AddRow(const AnswerRow& row, JsonObject* object);

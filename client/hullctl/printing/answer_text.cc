@@ -25,6 +25,21 @@ std::string RelationText(v1::Relation relation) {
   return WithoutPrefix(v1::Relation_Name(relation), "RELATION_");
 }
 
+std::string PaintedRelation(v1::Relation relation, const Painter& paint) {
+  const std::string text = RelationText(relation);
+  switch (relation) {
+    case v1::RELATION_SEPARATED:
+      return paint(Hue::kGood, text);
+    case v1::RELATION_TOUCHING:
+    case v1::RELATION_WITHIN_TOLERANCE:
+      return paint(Hue::kNotable, text);
+    case v1::RELATION_OVERLAPPING:
+      return paint(Hue::kBad, text);
+    default:
+      return text;
+  }
+}
+
 std::string AxisKindText(v1::AxisKind kind) {
   return WithoutPrefix(v1::AxisKind_Name(kind), "AXIS_KIND_");
 }
@@ -93,17 +108,17 @@ std::string SeparationText(const v1::Separation& separation) {
   return ShortestText(separation.value()) + " within " + ShortestText(separation.bound());
 }
 
-std::string VerificationText(const Verification& verification) {
+std::string VerificationText(const Verification& verification, const Painter& paint) {
   switch (verification.verdict) {
     case Verdict::kValid:
-      return "valid";
+      return paint(Hue::kGood, "valid");
     case Verdict::kInvalid:
-      return "INVALID: " + verification.reason;
+      return paint(Hue::kBad, "INVALID") + ": " + verification.reason;
     case Verdict::kCannotCheck:
     case Verdict::kMoved:
       break;
   }
-  return "cannot check: " + verification.reason;
+  return paint(Hue::kNotable, "cannot check") + ": " + verification.reason;
 }
 
 std::string VerificationJson(const Verification& verification) {

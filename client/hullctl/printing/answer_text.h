@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "client/hullctl/printing/painter.h"
 #include "client/verify/answer_check.h"
 #include "hulld/v1/collision.pb.h"
 
@@ -12,6 +13,7 @@ namespace hulld {
 
 // "SEPARATED", "TOUCHING", "OVERLAPPING"; "-" when there is none.
 std::string RelationText(v1::Relation relation);
+std::string PaintedRelation(v1::Relation relation, const Painter& paint);
 // "FACET_A" and so on.
 std::string AxisKindText(v1::AxisKind kind);
 std::string RungText(v1::Rung rung);
@@ -28,7 +30,7 @@ std::string CertificateText(const v1::Certificate& certificate);
 // "-0.25 within 1e-16".
 std::string SeparationText(const v1::Separation& separation);
 // "valid", or the verdict and the reason.
-std::string VerificationText(const Verification& verification);
+std::string VerificationText(const Verification& verification, const Painter& paint);
 // {"verdict":"INVALID","reason":...}
 std::string VerificationJson(const Verification& verification);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/hullctl/printing/painter.h"
+
 namespace hulld {
 
 Table& Table::Row(std::vector<std::string> cells) {
@@ -15,13 +17,14 @@ void Table::Print(std::ostream& out) const {
   for (const auto& row : rows_) {
     widths.resize(std::max(widths.size(), row.size()));
     // The last cell of a row has nothing to its right.
-    for (size_t i = 0; i + 1 < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+    for (size_t i = 0; i + 1 < row.size(); ++i)
+      widths[i] = std::max(widths[i], VisibleWidth(row[i]));
   }
   for (const auto& row : rows_) {
     std::string line;
     for (size_t i = 0; i < row.size(); ++i) {
       line += row[i];
-      if (i + 1 < row.size()) line.append(widths[i] + 2 - row[i].size(), ' ');
+      if (i + 1 < row.size()) line.append(widths[i] + 2 - VisibleWidth(row[i]), ' ');
     }
     out << line << "\n";
   }

@@ -86,16 +86,19 @@ class BlockInsertion {
   }
 
   ConflictLists::Outcome InsertSample(size_t stride) {
-    ConflictLists lists(surface_, vertices_);
+    ConflictLists lists(surface_, vertices_, poll_);
     if (surface_.triangle_count() <= kMostTrianglesToTest) {
       lists.Take(Sample(stride));
     } else {
       TakeByDirection(stride, lists);
     }
-    const ConflictLists::Outcome outcome = lists.InsertAll(poll_);
+    const ConflictLists::Outcome outcome = lists.InsertAll();
     if (outcome == ConflictLists::Outcome::kStopped) return outcome;
     if (outcome == ConflictLists::Outcome::kGaveUp) rest_ = lists.TakeRest();
-    for (const Vector& p : astray_) surface_.Insert(vertices_, p);
+    for (const Vector& p : astray_) {
+      if (poll_.Step(1 + surface_.TakeSteps())) return ConflictLists::Outcome::kStopped;
+      surface_.Insert(vertices_, p);
+    }
     astray_.clear();
     surface_.FinishInsertions(vertices_);
     return outcome;
@@ -124,6 +127,7 @@ class BlockInsertion {
     std::vector<Vector> outside;
     std::vector<TriangleId> seen;
     for (const Vector& p : SurvivorsOf(stride)) {
+      if (poll_.Step()) return;
       const std::optional<Surface::Location> location = surface_.Locate(vertices_, p);
       if (!location) {
         astray_.push_back(p);
@@ -140,7 +144,7 @@ class BlockInsertion {
   // The points of a sample that the map of directions cannot reject, nor a finer one where these
   // are many.
   std::vector<Vector> SurvivorsOf(size_t stride) {
-    surface_.MeasureBefore(vertices_, points_.size() / stride, kMapFineness, kWalksPerPoint);
+    surface_.MeasureBefore(vertices_, points_.size() / stride, kMapFineness, kWalksPerPoint, poll_);
     std::vector<Vector> survivors;
     size_t asked = 0;
     for (const Range& range : RangesOf(stride)) {
@@ -155,7 +159,8 @@ class BlockInsertion {
     }
     surface_.CountRejected(asked, asked - survivors.size());
     if (survivors.size() > kManyPerTriangle * surface_.triangle_count() &&
-        surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness, kWalksPerSurvivor)) {
+        surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness, kWalksPerSurvivor,
+                               poll_)) {
       indices_.clear();
       surface_.directions()->AppendSurvivors(survivors, indices_);
       for (size_t k = 0; k < indices_.size(); ++k) survivors[k] = survivors[indices_[k]];

@@ -177,11 +177,12 @@ class FaceCollector {
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
   }
 
-  // Only neighbours with a common apex can lie in one plane (see Surface): the next one round the
-  // apex is asked for.
+  // Edges at which triangles were joined know whether they are flat; of those between triangles
+  // that were made together, with a common apex, the one to the next round the apex is asked for.
   void FindFlatEdges(StopPoll& poll) {
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;
+      flags_[id] |= t.flat;
       const TriangleId next = t.neighbours[1];
       const SurfaceTriangle& other = surface_.triangle(next);
       if (other.corners[2] != t.corners[2]) return;

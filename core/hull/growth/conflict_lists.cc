@@ -68,17 +68,17 @@ void ConflictLists::CountTaken(std::span<const Vector> points) {
   lists_.resize(surface_.id_bound());
 }
 
-ConflictLists::Outcome ConflictLists::InsertAll(StopPoll& poll) {
+ConflictLists::Outcome ConflictLists::InsertAll() {
   size_t insertions = 0;
   for (; next_in_queue_ < queue_.size(); ++next_in_queue_) {
     const TriangleId id = queue_[next_in_queue_];
     if (lists_[id].count == 0) continue;
-    if (poll.Step(kStepsPerInsertion)) return Outcome::kStopped;
+    if (poll_.Step(kStepsPerInsertion + surface_.TakeSteps())) return Outcome::kStopped;
     ++insertions;
     InsertFrom(id);
     if (moved_ > kMostMoves * taken_ || IsMostlyOutside(insertions)) return Outcome::kGaveUp;
   }
-  return Outcome::kDone;
+  return poll_.stopped() ? Outcome::kStopped : Outcome::kDone;
 }
 
 // After some insertions, all of them far out, most of a cloud is inside or will never be.
@@ -160,7 +160,8 @@ void ConflictLists::Match(std::span<const TriangleId> targets) {
     const std::span<const PointBlock> of_source = BlocksOf(source);
     if (MatchPlanes(of_source, planes_, matches)) {
       for (size_t i = 0; i < source.count; ++i) {
-        if (matches[i] == kUncertain) matches[i] = MatchExactly(PointOf(source, i), targets);
+        if (matches[i] != kUncertain) continue;
+        matches[i] = poll_.Step() ? kBelowAll : MatchExactly(PointOf(source, i), targets);
       }
     }
     matches += of_source.size() * PointBlock::kSize;

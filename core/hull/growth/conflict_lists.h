@@ -32,7 +32,10 @@ class ConflictLists {
     kGaveUp
   };
 
-  ConflictLists(Surface& surface, VertexTable& vertices) : surface_(surface), vertices_(vertices) {}
+  // The poll's steps are single insertions or exact tests. After it said stop, InsertAll says so,
+  // and some points that are waiting may be lost.
+  ConflictLists(Surface& surface, VertexTable& vertices, StopPoll& poll)
+      : surface_(surface), vertices_(vertices), poll_(poll) {}
 
   // Takes points that may lie anywhere; those inside are counted and forgotten. Requires that no
   // point is waiting. Cost: as many tests a point as the surface has triangles.
@@ -40,8 +43,8 @@ class ConflictLists {
   // Takes points that see seen[i] strictly. Requires that no point is waiting.
   void Take(std::span<const Vector> points, std::span<const TriangleId> seen);
 
-  // Adds all points that were taken. The poll's steps are single insertions.
-  Outcome InsertAll(StopPoll& poll);
+  // Adds all points that were taken.
+  Outcome InsertAll();
   // The points not yet added.
   std::vector<Vector> TakeRest();
 
@@ -71,6 +74,7 @@ class ConflictLists {
 
   Surface& surface_;
   VertexTable& vertices_;
+  StopPoll& poll_;
   // All lists, with gaps where lists were.
   std::unique_ptr<PointBlock[]> blocks_;
   size_t end_ = 0;

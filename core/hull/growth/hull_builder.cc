@@ -23,9 +23,6 @@
 namespace hulld {
 namespace {
 
-// A block of at most this many points is not worth a copy of the builder for the sake of stopping
-// within it.
-constexpr size_t kUninterruptedPoints = 1024;
 // Insertions between two polls of should_stop.
 constexpr size_t kInsertionsPerPoll = 256;
 // Points looked at for some that are extreme along the axes, at most twice.
@@ -82,6 +79,46 @@ bool LexicographicallyLess(const Vector& a, const Vector& b) {
 // surface.
 class HullBuilder::State {
  public:
+  // Starts a journal: what comes can be undone until it ends.
+  void StartJournal() {
+    vertices_.StartJournal();
+    before_ = Before{ends_, polygon_.has_value(), surface_.has_value(), std::nullopt};
+    if (polygon_) polygon_->StartJournal();
+    if (surface_) surface_->StartJournal();
+  }
+  // Makes everything as it was when the journal was started.
+  void Undo() {
+    HULLD_CHECK(before_.has_value());
+    ends_ = before_->ends;
+    if (before_->has_surface) {
+      surface_->Undo();
+    } else {
+      surface_.reset();
+    }
+    if (before_->polygon) polygon_ = std::move(before_->polygon);
+    if (before_->has_polygon) {
+      polygon_->Undo();
+    } else {
+      polygon_.reset();
+    }
+    vertices_.Undo();
+    before_.reset();
+  }
+  // Keeps what changed.
+  void EndJournal() {
+    vertices_.EndJournal();
+    if (polygon_) polygon_->EndJournal();
+    if (surface_ && before_->has_surface) surface_->EndJournal();
+    before_.reset();
+  }
+  size_t JournalBytes() const {
+    size_t bytes = vertices_.JournalBytes();
+    if (polygon_) bytes += polygon_->JournalBytes();
+    if (before_->polygon) bytes += before_->polygon->MemoryBytes();
+    if (surface_) bytes += surface_->JournalBytes();
+    return bytes;
+  }
+
   void BeginBlock() { vertices_.BeginBlock(); }
   void FinishBlock() { vertices_.FinishBlock(); }
   void Insert(const Vector& point) {
@@ -178,6 +215,7 @@ class HullBuilder::State {
     }
     const std::vector<VertexId> loop = polygon_->Loop();
     surface_.emplace(vertices_, loop, vertices_.Add(point));
+    if (before_ && before_->has_polygon) before_->polygon = std::move(polygon_);
     polygon_.reset();
   }
 
@@ -188,13 +226,23 @@ class HullBuilder::State {
   // Dimension 2: three points, not collinear, that span the plane.
   std::array<Vector, 3> plane_;
   std::optional<Surface> surface_;
+
+  // What the journal keeps beside those of the parts: the stage, and the polygon once it has given
+  // way to a surface.
+  struct Before {
+    std::vector<VertexId> ends;
+    bool has_polygon;
+    bool has_surface;
+    std::optional<PolygonBoundary> polygon;
+  };
+  std::optional<Before> before_;
 };
 
 HullBuilder::HullBuilder() : state_(std::make_unique<State>()) {}
 HullBuilder::HullBuilder(const HullBuilder& other)
-    : state_(std::make_unique<State>(*other.state_)) {}
+    : state_(std::make_unique<State>(*other.state_)), undo_bytes_(other.undo_bytes_) {}
 HullBuilder& HullBuilder::operator=(const HullBuilder& other) {
-  if (this != &other) state_ = std::make_unique<State>(*other.state_);
+  if (this != &other) *this = HullBuilder(other);
   return *this;
 }
 HullBuilder::HullBuilder(HullBuilder&&) noexcept = default;
@@ -204,24 +252,25 @@ HullBuilder::~HullBuilder() = default;
 absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
                                              const AddLimits& limits) {
   if (!AreFinite(points)) return DescribeNotFinite(points);
-  const bool may_stop = limits.should_stop && points.size() > kUninterruptedPoints;
+  const bool may_stop = limits.should_stop && points.size() > 1;
   const bool may_exceed = vertex_count() + points.size() > limits.max_vertices;
-  std::unique_ptr<State> before;
-  if (may_stop || may_exceed) before = std::make_unique<State>(*state_);
-
+  const bool may_fail = may_stop || may_exceed;
+  if (may_fail) state_->StartJournal();
   state_->BeginBlock();
   const std::function<bool()> never;
   StopPoll poll(may_stop ? limits.should_stop : never, kInsertionsPerPoll);
-  if (!state_->InsertAll(points, poll)) {
-    state_ = std::move(before);
-    return absl::CancelledError("stopped while adding points; the hull is as before");
-  }
-  if (vertex_count() > limits.max_vertices) {
-    const size_t reached = vertex_count();
-    state_ = std::move(before);
+  const bool is_done = state_->InsertAll(points, poll);
+  const size_t reached = vertex_count();
+  undo_bytes_ = may_fail ? state_->JournalBytes() : 0;
+  if (!is_done || reached > limits.max_vertices) {
+    state_->Undo();
+    if (!is_done) {
+      return absl::CancelledError("stopped while adding points; the hull is as before");
+    }
     return absl::ResourceExhaustedError(absl::StrCat(
         "the hull would have ", reached, " vertices; the limit is ", limits.max_vertices));
   }
+  if (may_fail) state_->EndJournal();
   state_->FinishBlock();
   HULLD_CHECK(state_->vertices().outside() + state_->vertices().duplicate() <= points.size());
   PointCounts counts;

@@ -39,8 +39,9 @@ struct PointCounts {
 struct AddLimits {
   // The hull after the block may have at most this many vertices.
   size_t max_vertices = std::numeric_limits<size_t>::max();
-  // Polled every few hundred insertions of a block of more than 1024 points; true ends the call
-  // with CANCELLED. May be empty.
+  // Polled within each block of more than one point, about every millisecond; true ends the call
+  // with CANCELLED. May be empty. A single insertion is not interrupted: it takes some 50 ns for
+  // each triangle that goes or comes.
   std::function<bool()> should_stop;
 };
 
@@ -61,6 +62,8 @@ class HullBuilder {
 
   // Adds a block: all of it, or nothing when the result is an error.
   // points: n x 3, the caller's length unit. -0 is stored as +0.
+  // Where the limits may end it, a journal of what changes is kept to undo it: of each triangle and
+  // vertex that was there before and changes, what it was.
   // Errors: INVALID_ARGUMENT "points[17].y is NaN" (or "is infinite"); RESOURCE_EXHAUSTED when the
   // hull would exceed limits.max_vertices; CANCELLED when limits.should_stop said so.
   absl::StatusOr<PointCounts> Add(std::span<const Vector> points, const AddLimits& limits = {});
@@ -78,6 +81,10 @@ class HullBuilder {
   // What the builder holds in memory, by capacities, in bytes. Below 230 a vertex from 1000
   // vertices on; inside points are not kept. Cost: O(1) from dimension 3 on.
   size_t MemoryBytes() const;
+  // What the last Add held in its journal when it ended, in bytes, beyond MemoryBytes(): at most in
+  // proportion to what it changed, whatever the size of the hull; 0 when its limits could not end
+  // it.
+  size_t undo_bytes() const { return undo_bytes_; }
   // Steps of work that insertions did so far beyond the triangles that they removed and created:
   // for tests that no single point stalls.
   uint64_t housekeeping_steps() const;
@@ -92,6 +99,7 @@ class HullBuilder {
  private:
   class State;
   std::unique_ptr<State> state_;
+  size_t undo_bytes_ = 0;
 };
 
 }  // namespace hulld

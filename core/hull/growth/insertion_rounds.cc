@@ -41,9 +41,11 @@ uint32_t Scramble(uint32_t x) {
 // index in the lower.
 using SortKey = uint64_t;
 // Cells a side, as a power of two, of the grid that tells the place; and the bits of a place: three
-// for the face of the cube.
-constexpr int kGridBits = 10;
+// for the face of the cube. As fine as the upper half can hold: points along a curve, such as the
+// rim of a prism, are in few of them.
+constexpr int kGridBits = 14;
 constexpr int kPlaceBits = 3 + 2 * kGridBits;
+static_assert(kPlaceBits <= 32);
 
 void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch) {
   constexpr size_t kWorthRadix = 2048;
@@ -51,7 +53,7 @@ void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch) 
     std::sort(keys.begin(), keys.end());
     return;
   }
-  constexpr int kDigit = 12;
+  constexpr int kDigit = 11;
   scratch.resize(keys.size());
   for (int shift = 32; shift < 32 + kPlaceBits; shift += kDigit) {
     std::array<uint32_t, 1 << kDigit> starts{};
@@ -112,7 +114,7 @@ class RoundsInsertion {
     members_.clear();
     if (!is_last) rounds_.AppendRound(round, members_);
     surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(), kMapFineness,
-                           kWalksPerPoint);
+                           kWalksPerPoint, poll_);
     const DirectionMap* directions = surface_.directions();
     if (is_last) ChooseLast(round, directions);
     chosen_.clear();
@@ -146,7 +148,7 @@ class RoundsInsertion {
 
   bool InsertChosen() {
     for (const Vector& point : chosen_) {
-      if (poll_.Step()) return false;
+      if (poll_.Step(1 + surface_.TakeSteps())) return false;
       surface_.Insert(vertices_, point);
     }
     return true;

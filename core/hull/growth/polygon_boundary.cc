@@ -36,6 +36,18 @@ std::vector<VertexId> PolygonBoundary::Loop() const {
   return loop;
 }
 
+void PolygonBoundary::Undo() {
+  for (auto change = journal_.rbegin(); change != journal_.rend(); ++change) {
+    Chain& chain = change->is_lower ? lower_ : upper_;
+    if (change->came) {
+      chain.erase(change->key);
+    } else {
+      chain.emplace(change->key, change->id);
+    }
+  }
+  EndJournal();
+}
+
 void PolygonBoundary::InsertVertex(VertexTable& vertices, VertexId id) {
   const bool is_below = IsBeyond(vertices, lower_, +1, vertices[id]);
   if (is_below) Extend(vertices, lower_, +1, id);
@@ -57,6 +69,7 @@ bool PolygonBoundary::IsBeyond(const VertexTable& vertices, const Chain& chain, 
 // with its second chain.
 void PolygonBoundary::Extend(VertexTable& vertices, Chain& chain, int turn, VertexId id) {
   const auto it = chain.emplace(KeyOf(vertices[id]), id).first;
+  Note(chain, true, it->first, id);
   const auto turns = [&](Chain::iterator a, Chain::iterator b, Chain::iterator c) {
     return Orient2d(vertices[a->second], vertices[b->second], vertices[c->second], plane_) == turn;
   };
@@ -74,6 +87,7 @@ void PolygonBoundary::Erase(VertexTable& vertices, Chain& chain, Chain::iterator
   const Chain& other = &chain == &lower_ ? upper_ : lower_;
   const auto [key, id] = *it;
   chain.erase(it);
+  Note(chain, false, key, id);
   if (!other.contains(key)) vertices.Remove(id);
 }
 

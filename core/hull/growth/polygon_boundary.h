@@ -28,8 +28,20 @@ class PolygonBoundary {
 
   // What it holds in memory: each node has three links, a color, a key and an ID. Cost: O(1).
   size_t MemoryBytes() const {
-    return (lower_.size() + upper_.size()) * (4 * sizeof(void*) + sizeof(Chain::value_type));
+    return (lower_.size() + upper_.size()) * (4 * sizeof(void*) + sizeof(Chain::value_type)) +
+           journal_.capacity() * sizeof(Change);
   }
+
+  // Starts a journal of what changes; makes everything as it was then; ends the journal and keeps
+  // what changed; tells what the journal holds. The vertices are the table's to undo. Cost: the
+  // changes.
+  void StartJournal() { has_journal_ = true; }
+  void Undo();
+  void EndJournal() {
+    has_journal_ = false;
+    journal_ = {};
+  }
+  size_t JournalBytes() const { return journal_.size() * sizeof(Change); }
 
   // The vertices in order, counter-clockwise in the coordinate plane.
   std::vector<VertexId> Loop() const;
@@ -42,6 +54,13 @@ class PolygonBoundary {
     friend auto operator<=>(const Key&, const Key&) = default;
   };
   using Chain = std::map<Key, VertexId>;
+  // A vertex that came to a chain, or went from it.
+  struct Change {
+    bool is_lower;
+    bool came;
+    Key key;
+    VertexId id;
+  };
 
   Key KeyOf(const Vector& point) const { return {point[plane_.first], point[plane_.second]}; }
   void InsertVertex(VertexTable& vertices, VertexId id);
@@ -49,12 +68,17 @@ class PolygonBoundary {
                 const Vector& point) const;
   void Extend(VertexTable& vertices, Chain& chain, int turn, VertexId id);
   void Erase(VertexTable& vertices, Chain& chain, Chain::iterator it);
+  void Note(const Chain& chain, bool came, const Key& key, VertexId id) {
+    if (has_journal_) journal_.push_back({&chain == &lower_, came, key, id});
+  }
 
   CoordinatePlane plane_;
   // Left to right; the lower one turns left (+1), the upper one right (-1). Both hold the first and
   // the last point.
   Chain lower_;
   Chain upper_;
+  bool has_journal_ = false;
+  std::vector<Change> journal_;
 };
 
 }  // namespace hulld

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <utility>
 
 #include "core/base/check.h"
@@ -14,6 +13,9 @@
 
 namespace hulld {
 namespace {
+
+// Triangles removed and created that take about as long as a step of a poll.
+constexpr size_t kTrianglesPerStep = 64;
 
 // Times the power of two that brings the largest component into [1/2, 1).
 Vector WithUnitSize(const Vector& v) {
@@ -33,14 +35,14 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
   // Seen from outside, the apex is behind the base.
   if (side > 0) std::reverse(loop.begin(), loop.end());
   const size_t n = loop.size();
-  for (size_t i = 1; i + 1 < n; ++i) {
-    SetTriangle(vertices, NewId(), loop[i], loop[i + 1], loop[0]);
-  }
+  // The sides have the IDs 0 to n - 1.
   for (size_t i = 0; i < n; ++i) {
     SetTriangle(vertices, NewId(), loop[(i + 1) % n], loop[i], apex);
   }
+  for (TriangleId i = 0; i < n; ++i) Link(i, 2, i + 1 == n ? 0 : i + 1, 1, false);
+  const TriangleId base = MakeBase(vertices, loop, 0, n - 1);
+  Link(base, 2, static_cast<TriangleId>(n - 1), 0, false);
   alive_ = triangles_.size();
-  LinkAll();
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   Update(vertices);
   DcheckSurface(*this, vertices);
@@ -95,11 +97,69 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
 size_t Surface::MemoryBytes() const {
   size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + vertex_mark_.MemoryBytes();
   if (directions_) bytes += directions_->MemoryBytes();
+  if (before_ && before_->directions) bytes += before_->directions->MemoryBytes();
   if (measuring_) {
     bytes += measuring_->map.MemoryBytes() + measuring_->hint.capacity() * sizeof(TriangleId);
   }
   return bytes + region_.capacity() * sizeof(TriangleId) +
-         horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit);
+         horizon_.capacity() * sizeof(HorizonEdge) + visits_.capacity() * sizeof(Visit) +
+         flat_stars_.capacity() * sizeof(TriangleId);
+}
+
+void Surface::StartJournal() {
+  HULLD_CHECK(!before_);
+  triangles_.StartJournal();
+  free_.StartJournal();
+  before_ = Before{.alive = alive_,
+                   .extent = extent_,
+                   .next_update = next_update_,
+                   .asked = asked_,
+                   .rejected = rejected_,
+                   .measured_at = measured_at_,
+                   .mark = mark_,
+                   .last = last_,
+                   .was_measuring = measuring_.has_value(),
+                   .has_new_directions = false,
+                   .directions = std::nullopt};
+}
+
+// Marks and hints stay: a mark matters only while it is the present one, and a hint may be any
+// number.
+void Surface::Undo() {
+  HULLD_CHECK(before_.has_value());
+  triangles_.Undo();
+  free_.Undo();
+  alive_ = before_->alive;
+  extent_ = before_->extent;
+  next_update_ = before_->next_update;
+  asked_ = before_->asked;
+  rejected_ = before_->rejected;
+  measured_at_ = before_->measured_at;
+  last_ = before_->last;
+  if (before_->has_new_directions) directions_ = std::move(before_->directions);
+  // What was measured of a larger surface is not true of this one: measured anew soon.
+  measuring_.reset();
+  if (before_->was_measuring) next_update_ = alive_;
+  if (mark_ < before_->mark) ResetMarks();
+  before_.reset();
+}
+
+void Surface::EndJournal() {
+  triangles_.EndJournal();
+  free_.EndJournal();
+  before_.reset();
+}
+
+size_t Surface::JournalBytes() const {
+  size_t bytes = triangles_.JournalBytes() + free_.JournalBytes();
+  if (before_ && before_->directions) bytes += before_->directions->MemoryBytes();
+  return bytes;
+}
+
+// To be called before another map takes the place of the map of directions.
+void Surface::KeepDirections() {
+  if (!before_ || std::exchange(before_->has_new_directions, true)) return;
+  before_->directions = std::move(directions_);
 }
 
 double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
@@ -115,7 +175,7 @@ int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
 
 void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b,
                           VertexId c) {
-  SurfaceTriangle& t = triangles_[id];
+  SurfaceTriangle& t = triangles_.Mutable(id);
   Vector e = vertices[b] - vertices[a];
   Vector f = vertices[c] - vertices[a];
   double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
@@ -129,6 +189,7 @@ void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a
   t.offset = t.normal.dot(vertices[a]);
   t.slope = static_cast<float>(slope * (1 + 0x1p-20));
   t.mark = 0;
+  t.flat = 0;
 }
 
 TriangleId Surface::NewId() {
@@ -141,20 +202,31 @@ TriangleId Surface::NewId() {
   return id;
 }
 
-// Links neighbours by their common edges, for a surface whose triangles are all new.
-void Surface::LinkAll() {
-  std::map<std::pair<VertexId, VertexId>, std::pair<TriangleId, int>> by_edge;
-  for (TriangleId id = 0; id < triangles_.size(); ++id) {
-    for (int i = 0; i < 3; ++i) {
-      const auto& corners = triangles_[id].corners;
-      by_edge[{corners[i], corners[(i + 1) % 3]}] = {id, i};
-    }
-  }
-  for (const auto& [edge, place] : by_edge) {
-    const auto twin = by_edge.find({edge.second, edge.first});
-    HULLD_CHECK(twin != by_edge.end());
-    triangles_[place.first].neighbours[place.second] = twin->second.first;
-  }
+void Surface::Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat) {
+  const auto link = [this, is_flat](TriangleId from, uint32_t edge, TriangleId to) {
+    SurfaceTriangle& t = triangles_.Mutable(from);
+    t.neighbours[edge] = to;
+    t.flat = (t.flat & ~(1u << edge)) | static_cast<uint32_t>(is_flat) << edge;
+  };
+  link(a, edge_a, b);
+  link(b, edge_b, a);
+}
+
+// Makes the triangles of the part of a cone's base from the loop's place `first` to `last`, linked
+// to each other and to the sides, which have the places' IDs; returns the one at the chord between
+// the two, which is its edge 2. Halves of halves, so that a line crosses few.
+TriangleId Surface::MakeBase(const VertexTable& vertices, std::span<const VertexId> loop,
+                             size_t first, size_t last) {
+  const size_t middle = first + (last - first) / 2;
+  const TriangleId id = NewId();
+  SetTriangle(vertices, id, loop[first], loop[middle], loop[last]);
+  const auto link_part = [&](uint32_t edge, size_t from, size_t to) {
+    if (to - from == 1) return Link(id, edge, static_cast<TriangleId>(from), 0, false);
+    Link(id, edge, MakeBase(vertices, loop, from, to), 2, true);
+  };
+  link_part(0, first, middle);
+  link_part(1, middle, last);
+  return id;
 }
 
 std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleId id,
@@ -166,21 +238,25 @@ std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleI
 }
 
 void Surface::ResetMarks() {
-  for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_[id].mark = 0;
-  for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_[id] = 0;
+  for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_.Mutable(id).mark = 0;
+  for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_.Mutable(id) = 0;
   mark_ = 0;
 }
 
-// Fills the region with the connected triangles that the point sees or whose planes hold it, and
-// the horizon with their boundary, in order round it: depth first, the edges of each triangle
-// counter-clockwise from the one it was entered by.
-void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
-                            double size) {
-  if (mark_ == UINT32_MAX) ResetMarks();
-  const uint32_t mark = ++mark_;
+uint32_t Surface::NextMark() {
+  if (mark_ == kLastMark) ResetMarks();
+  return ++mark_;
+}
+
+// Fills the region with the connected triangles for which classify(id) > 0, and the horizon with
+// their boundary, in order round it: depth first, the edges of each triangle counter-clockwise from
+// the one it was entered by. Where classify says 0, the horizon's edge is flat.
+template <typename Classify>
+void Surface::Traverse(TriangleId first, Classify&& classify) {
+  const uint32_t mark = NextMark();
   region_.assign(1, first);
   horizon_.clear();
-  triangles_[first].mark = mark;
+  triangles_.Mutable(first).mark = mark;
   visits_.assign(1, {first, 0, 3});
   while (!visits_.empty()) {
     Visit& visit = visits_.back();
@@ -194,17 +270,71 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
     visit.edge = static_cast<uint8_t>((i + 1) % 3);
     --visit.left;
     const TriangleId next = t.neighbours[i];
-    SurfaceTriangle& other = triangles_[next];
+    const SurfaceTriangle& other = triangles_[next];
     if (other.mark == mark) continue;
-    const uint32_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
+    const auto back = static_cast<uint8_t>(other.neighbours[0] == id   ? 0
+                                           : other.neighbours[1] == id ? 1
+                                                                       : 2);
     HULLD_DCHECK(other.neighbours[back] == id);
-    if (SideOf(vertices, next, point, size) >= 0) {
-      other.mark = mark;
+    const int side = classify(next);
+    if (side > 0) {
+      triangles_.Mutable(next).mark = mark;
       region_.push_back(next);
       visits_.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
     } else {
-      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back});
+      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back, side == 0});
     }
+  }
+}
+
+// Fills the region with the triangles that the point sees, and those round vertices that it makes
+// redundant; and the horizon with their boundary.
+void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
+                            double size) {
+  Traverse(first, [&](TriangleId id) { return SideOf(vertices, id, point, size); });
+  if (!CollectFlatStars(vertices, point, size)) return;
+  const uint32_t seen = mark_;
+  for (const TriangleId id : flat_stars_) triangles_.Mutable(id).mark = seen;
+  // Marks start anew rarely; before, so that this one is told from the next.
+  if (mark_ == kLastMark) {
+    ResetMarks();
+    return CollectRegion(vertices, first, point, size);
+  }
+  Traverse(first, [&](TriangleId id) {
+    return triangles_[id].mark == seen ? 1 : SideOf(vertices, id, point, size);
+  });
+}
+
+// Collects the triangles round the vertices of the horizon that lie in planes with the point on all
+// their sides that it does not see. True when there are some.
+bool Surface::CollectFlatStars(const VertexTable& vertices, const Vector& point, double size) {
+  flat_stars_.clear();
+  const HorizonEdge* before = &horizon_.back();
+  for (const HorizonEdge& edge : horizon_) {
+    if (before->is_flat && edge.is_flat) {
+      const size_t count = flat_stars_.size();
+      if (!IsFlatAround(vertices, *before, point, size)) flat_stars_.resize(count);
+    }
+    before = &edge;
+  }
+  return !flat_stars_.empty();
+}
+
+// Whether all triangles round the head of a horizon's edge that are not in the region lie in planes
+// with the point. Appends them, until one does not, to the flat stars.
+bool Surface::IsFlatAround(const VertexTable& vertices, const HorizonEdge& before,
+                           const Vector& point, double size) {
+  TriangleId id = before.beyond;
+  // The edge of the triangle that leads away from the vertex.
+  uint32_t edge = before.edge_beyond;
+  for (;;) {
+    flat_stars_.push_back(id);
+    const TriangleId next = triangles_[id].neighbours[(edge + 2) % 3];
+    if (triangles_[next].mark == mark_) return true;
+    if (SideOf(vertices, next, point, size) != 0) return false;
+    const auto& back = triangles_[next].neighbours;
+    edge = back[0] == id ? 0 : back[1] == id ? 1 : 2;
+    id = next;
   }
 }
 
@@ -212,11 +342,11 @@ void Surface::CollectRegion(const VertexTable& vertices, TriangleId first, const
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
 void Surface::RemoveVertices(VertexTable& vertices) {
   if (region_.size() + 2 == horizon_.size()) return;
-  for (const HorizonEdge& edge : horizon_) vertex_mark_[edge.tail] = mark_;
+  for (const HorizonEdge& edge : horizon_) vertex_mark_.Mutable(edge.tail) = mark_;
   for (const TriangleId id : region_) {
     for (const VertexId v : triangles_[id].corners) {
       if (vertex_mark_[v] == mark_) continue;
-      vertex_mark_[v] = mark_;
+      vertex_mark_.Mutable(v) = mark_;
       vertices.Remove(v);
     }
   }
@@ -231,15 +361,18 @@ void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
     const HorizonEdge& edge = horizon_[k];
     const TriangleId id = region_[k];
     SetTriangle(vertices, id, edge.tail, edge.head, apex);
-    triangles_[id].neighbours = {edge.beyond, region_[k + 1 == new_count ? 0 : k + 1],
-                                 region_[k == 0 ? new_count - 1 : k - 1]};
-    triangles_[edge.beyond].neighbours[edge.edge_beyond] = id;
+    SurfaceTriangle& t = triangles_.Mutable(id);
+    t.neighbours[1] = region_[k + 1 == new_count ? 0 : k + 1];
+    t.neighbours[2] = region_[k == 0 ? new_count - 1 : k - 1];
+    Link(id, 0, edge.beyond, edge.edge_beyond, edge.is_flat);
   }
   for (size_t k = new_count; k < old_count; ++k) {
-    triangles_[region_[k]].corners[0] = kDead;
-    triangles_[region_[k]].neighbours[0] = region_[0];
+    SurfaceTriangle& t = triangles_.Mutable(region_[k]);
+    t.corners[0] = kDead;
+    t.neighbours[0] = region_[0];
     free_.push_back(region_[k]);
   }
+  steps_ += 1 + (old_count + new_count) / kTrianglesPerStep;
   alive_ = alive_ - old_count + new_count;
   last_ = region_[0];
 }

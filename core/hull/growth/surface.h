@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/stop_poll.h"
 #include "core/hull/growth/chunked_vector.h"
 #include "core/hull/growth/direction_map.h"
 #include "core/hull/growth/vertex_table.h"
@@ -30,21 +32,28 @@ struct alignas(64) SurfaceTriangle {
   std::array<VertexId, 3> corners;
   std::array<TriangleId, 3> neighbours;
   float slope;
-  // The last insertion whose region this triangle was in.
-  uint32_t mark;
+  // The last traversal in whose region this triangle was.
+  uint32_t mark : 29;
+  // Bit i: the triangle beyond edge i is in the same plane. That is known where one of the two was
+  // joined to the other across a horizon; of two that were made together it is not, and then the
+  // bit is 0.
+  uint32_t flat : 3;
 };
 static_assert(sizeof(SurfaceTriangle) == 64);
 
 // The triangulated boundary of a growing convex polytope of dimension 3, exactly.
 //
 // Idea: to add a point that sees some triangle strictly from outside, remove every triangle that it
-// sees strictly or whose plane it lies in, and join the point to the horizon, the boundary of what
-// was removed. Removing the coplanar triangles too is what keeps the vertex set minimal: it is the
-// visible region of the point moved outwards by an infinitesimal amount, hence a disk; a vertex
-// that the new point makes non-extreme has only such triangles around it and goes with them; and
-// every triangle beyond the horizon is strictly invisible, so that no new triangle is degenerate
-// and no horizon vertex redundant. So only neighbours with a common apex, made together, can lie in
-// one plane: the later of two others was joined to the earlier one across the horizon.
+// sees strictly, and join the point to the horizon, the boundary of what was removed. A triangle
+// beyond the horizon may lie in a plane with the point, and then the new one extends its facet: so
+// a facet of many corners grows at one side and is left alone elsewhere. Where that would leave a
+// vertex that is no longer extreme, one whose triangles that stay all lie in planes with the point,
+// these triangles are removed as well. That keeps the vertex set minimal: a vertex stays extreme as
+// long as some plane through it leaves the new point below. What is removed is a disk: what the
+// point sees when moved inwards by an infinitesimal amount, and, in each facet that lies in a plane
+// with the point, the triangles round consecutive corners; the point sees the edges of these that
+// remain strictly from within that plane, as they are chords between corners that stay. So no new
+// triangle is degenerate and no vertex of the horizon redundant.
 //
 // The triangle to start from is found by walking on the surface, towards the one that the ray from
 // a fixed interior point through the new point pierces; a map of directions round that point
@@ -52,8 +61,9 @@ static_assert(sizeof(SurfaceTriangle) == 64);
 // for the incremental hull; Devillers, Pion and Teillaud 2002 for the walk.
 class Surface {
  public:
-  // The cone from `apex` over a polygon. `polygon`: at least three vertices in order, either way
-  // round. Requires that the polygon's plane does not hold the apex.
+  // The cone from `apex` over a polygon, the base in triangles of which a line crosses few.
+  // `polygon`: at least three vertices in order, either way round. Requires that the polygon's
+  // plane does not hold the apex.
   Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex);
 
   // Adds a point. Cost: the triangles removed and created, and a walk of a few exact signs; a scan
@@ -98,18 +108,30 @@ class Surface {
     return SideOf(vertices, id, point, SizeWith(vertices, point)) == 0;
   }
   // Adds a point that sees the triangle `seen` strictly, in two steps: the first removes and
-  // returns the triangles that go, for the caller to move what it keeps by triangle; the second
-  // joins the point to their boundary and returns the triangles that come, which take over IDs.
-  // The spans hold until the next insertion. In builds without NDEBUG the second checks the
-  // triangles that came (FindStarDefect).
+  // returns the triangles that go (that the point sees, and those round vertices that go), for the
+  // caller to move what it keeps by triangle; the second joins the point to their boundary and
+  // returns the triangles that come, which take over IDs. The spans hold until the next insertion.
+  // In builds without NDEBUG the second checks the triangles that came (FindStarDefect).
   std::span<const TriangleId> RemoveVisible(VertexTable& vertices, const Vector& point,
                                             TriangleId seen);
   std::span<const TriangleId> JoinToBoundary(VertexTable& vertices, const Vector& point);
   // The corner of the triangle that the point equals.
   std::optional<VertexId> CornerAt(const VertexTable& vertices, TriangleId id,
                                    const Vector& point) const;
+  // Steps of insertions since this was last asked, for a poll: one for each, and more for those
+  // that change many triangles.
+  uint64_t TakeSteps() { return std::exchange(steps_, 0); }
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
+
+  // Starts a journal of what changes; makes all as it was then, but for hints where to start
+  // looking; ends the journal and keeps what changed. Requires, in turn, that no journal is kept,
+  // and that one is. Cost: the changes.
+  void StartJournal();
+  void Undo();
+  void EndJournal();
+  // What the journal holds.
+  size_t JournalBytes() const;
 
   // The map of directions, for choosing what to insert and in which order; null where no interior
   // point is known.
@@ -120,10 +142,10 @@ class Surface {
   }
   // Measures the surface anew when a map is worth that for so many points to be looked up.
   // fineness: at most so many times the cells a side that suit points one by one. True when it did;
-  // it does not where no interior point is known. Cost: at most `walks_per_point` walks for each
-  // point.
+  // it does not where no interior point is known, or the poll, whose steps are walks, said stop.
+  // Cost: at most `walks_per_point` walks for each point.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
-                     double walks_per_point);
+                     double walks_per_point, StopPoll& poll);
   // Tells how many points were looked up in the map and how many it rejected: what it is worth.
   void CountRejected(size_t asked, size_t rejected) {
     asked_ += asked;
@@ -161,12 +183,14 @@ class Surface {
   // Corrupts surfaces, to see that FindDefect notices.
   friend class SurfaceTestPeer;
 
-  // An edge of the horizon, its triangle beyond, and which edge it is there.
+  // An edge of the horizon, its triangle beyond, which edge it is there, and whether that triangle
+  // is in a plane with the point.
   struct HorizonEdge {
     VertexId tail;
     VertexId head;
     TriangleId beyond;
-    uint32_t edge_beyond;
+    uint8_t edge_beyond;
+    bool is_flat;
   };
   // What the steps of a walk share: the point from the center, and what a triple product of it and
   // two vertices from the center errs by.
@@ -215,13 +239,14 @@ class Surface {
   int ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point) const;
   void SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b, VertexId c);
   TriangleId NewId();
-  void LinkAll();
+  void Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat);
 
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
                                TriangleId start, uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
   size_t EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t, const Vector& point,
                      const Ray& ray, std::optional<uint32_t> first) const;
+  double LeastTurn(const VertexTable& vertices, TriangleId id, const Vector& direction) const;
   Location Scan(const VertexTable& vertices, const Vector& point, double size) const;
   void Measure(const VertexTable& vertices);
   void Update(const VertexTable& vertices);
@@ -236,17 +261,43 @@ class Surface {
 
   void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
                      double size);
+  template <typename Classify>
+  void Traverse(TriangleId first, Classify&& classify);
+  bool CollectFlatStars(const VertexTable& vertices, const Vector& point, double size);
+  bool IsFlatAround(const VertexTable& vertices, const HorizonEdge& before, const Vector& point,
+                    double size);
+  uint32_t NextMark();
+  TriangleId MakeBase(const VertexTable& vertices, std::span<const VertexId> loop, size_t first,
+                      size_t last);
+  void KeepDirections();
   void InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell);
   void RemoveVertices(VertexTable& vertices);
   void JoinHorizon(const VertexTable& vertices, VertexId apex);
   void ResetMarks();
 
   static constexpr VertexId kDead = UINT32_MAX;
+  static constexpr uint32_t kLastMark = (1u << 29) - 1;
+
+  // What the journal keeps beside that of the triangles.
+  struct Before {
+    size_t alive;
+    double extent;
+    size_t next_update;
+    size_t asked;
+    size_t rejected;
+    size_t measured_at;
+    uint32_t mark;
+    TriangleId last;
+    bool was_measuring;
+    // The map, once another has taken its place: it would reject too much.
+    bool has_new_directions = false;
+    std::optional<DirectionMap> directions;
+  };
 
   ChunkedVector<SurfaceTriangle> triangles_;
   ChunkedVector<TriangleId> free_;
   size_t alive_ = 0;
-  // By vertex: the last insertion whose region it was in.
+  // By vertex: the last traversal in whose region it was.
   ChunkedVector<uint32_t> vertex_mark_;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.
@@ -269,8 +320,13 @@ class Surface {
   std::vector<TriangleId> region_;
   std::vector<HorizonEdge> horizon_;
   std::vector<Visit> visits_;
-  // The number of the insertion.
+  // The triangles that go though the point does not see them.
+  std::vector<TriangleId> flat_stars_;
+  // The number of the traversal.
   uint32_t mark_ = 0;
+  // See TakeSteps.
+  uint64_t steps_ = 0;
+  std::optional<Before> before_;
   // Where the last insertion was.
   TriangleId last_ = 0;
 };

@@ -65,7 +65,11 @@ const char* FindLinkDefect(const Surface& surface, const VertexTable& vertices, 
     if (j == 3) return "a neighbour does not run along the common edge the other way";
     if (other.neighbours[j] != id) return "a neighbour does not link back";
     if (const char* defect = FindCornerDefect(vertices, other)) return defect;
-    if (BendAt(vertices, t, other, j) > 0) return "the surface is not convex at an edge";
+    const int bend = BendAt(vertices, t, other, j);
+    if (bend > 0) return "the surface is not convex at an edge";
+    const bool is_flat = (t.flat >> i & 1) != 0;
+    if (is_flat != ((other.flat >> j & 1) != 0)) return "one side alone of an edge is flat";
+    if (is_flat && bend != 0) return "an edge that is flat bends";
   }
   return nullptr;
 }
@@ -100,7 +104,8 @@ const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
     if (t.corners[2] != apex) return "a new triangle does not end at the new vertex";
     if (t.neighbours[1] != star[(k + 1) % star.size()]) return "the new triangles form no ring";
     const SurfaceTriangle& beyond = surface.triangle(t.neighbours[0]);
-    if (BendAt(vertices, t, beyond, TwinOf(t, 0, beyond)) >= 0) return "the horizon does not bend";
+    const bool is_flat = BendAt(vertices, t, beyond, TwinOf(t, 0, beyond)) == 0;
+    if (is_flat != ((t.flat & 1) != 0)) return "the horizon does not bend where it should";
   }
   return nullptr;
 }

@@ -16,14 +16,15 @@ namespace hulld {
 // live and span a plane; their neighbours are alive, link back, and run along the common edge the
 // other way; no neighbour's opposite corner lies above (exact signs); the center of the map of
 // directions, where there is one, lies strictly below; their rounded plane holds their corners
-// within its error. Also that the counts of vertices, triangles and free IDs agree (Euler). Cost:
-// O(triangles given), some five exact signs each.
+// within its error; edges that are said to be flat are, on both sides. Also that the counts of
+// vertices, triangles and free IDs agree (Euler). Cost: O(triangles given), some five exact signs
+// each.
 const char* FindDefect(const Surface& surface, const VertexTable& vertices,
                        std::span<const TriangleId> ids);
 
 // Checks the triangles that an insertion created: as FindDefect, and that each has the new vertex
-// `apex` as its last corner, that each turns about the apex to the next one, and that the surface
-// bends strictly at the edges opposite to the apex.
+// `apex` as its last corner, that each turns about the apex to the next one, and that the edges
+// opposite to the apex are flat exactly where they are said to be.
 const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
                            std::span<const TriangleId> star, VertexId apex);
 

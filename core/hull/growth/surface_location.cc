@@ -72,6 +72,19 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
   return 3;
 }
 
+// How far the direction is within the triangle's cone, less than zero outside, in no unit: the least
+// of what EdgeTowards compares.
+double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
+                          const Vector& direction) const {
+  const Vector& center = directions_->center();
+  const SurfaceTriangle& t = triangles_[id];
+  const Vector a = vertices[t.corners[0]] - center;
+  const Vector b = vertices[t.corners[1]] - center;
+  const Vector c = vertices[t.corners[2]] - center;
+  return std::min(direction.dot(a.cross(b)),
+                  std::min(direction.dot(b.cross(c)), direction.dot(c.cross(a))));
+}
+
 // Crosses edges that have the point on their far side. Each such step leads to a triangle whose
 // plane the ray from the interior point through the point meets no later, and sooner unless both
 // are coplanar. So only among coplanar triangles can a walk go in circles, and not for ever once it
@@ -140,6 +153,7 @@ void Surface::SetCenter(const VertexTable& vertices) {
   work_ += 2 * triangles_.size();
   const std::optional<Vector> interior = FindInterior(vertices);
   if (!interior) return;
+  KeepDirections();
   directions_.emplace(*interior);
   extent_ = 0;
   ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
@@ -169,7 +183,7 @@ std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
 bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsMeasurable(); }
 
 bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
-                            double walks_per_point) {
+                            double walks_per_point, StopPoll& poll) {
   if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return false;
   // Six faces, and some two walks to measure a corner.
   const double affordable = std::sqrt(static_cast<double>(points) * walks_per_point / 12);
@@ -178,8 +192,10 @@ bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double f
   if (wanted < 4) return false;
   if (wanted <= directions_->resolution() && 4 * alive_ <= 5 * measured_at_) return false;
   StartMeasuring(vertices, wanted);
-  ContinueMeasuring(vertices, SIZE_MAX);
-  return true;
+  while (measuring_ && !poll.Step(kCornersPerInsertion)) {
+    ContinueMeasuring(vertices, kCornersPerInsertion);
+  }
+  return !measuring_;
 }
 
 void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
@@ -198,6 +214,7 @@ void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
   for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
   if (measuring_->face < 6) return;
   measuring_->map.Finish(measuring_->least, measuring_->largest);
+  KeepDirections();
   directions_ = std::move(measuring_->map);
   measuring_.reset();
 }
@@ -207,9 +224,15 @@ void Surface::MeasureCorner(const VertexTable& vertices) {
   Measurement& m = *measuring_;
   const auto j = static_cast<size_t>(m.j);
   const TriangleId hint_above = m.hint[j];
-  // From the corner to the left, or from the one above.
+  const Vector direction = m.map.CornerDirection(m.face, m.i, m.j);
+  // From the corner to the left or the one above: where triangles are long and thin, such as on the
+  // side of a prism, it is far across them, and near along them.
   TriangleId near = Alive(m.hint[j == 0 ? 0 : j - 1]);
-  const double reach = Reach(vertices, m.map.CornerDirection(m.face, m.i, m.j), near);
+  if (m.i > 0 && j > 0) {
+    const TriangleId above = Alive(hint_above);
+    if (LeastTurn(vertices, above, direction) > LeastTurn(vertices, near, direction)) near = above;
+  }
+  const double reach = Reach(vertices, direction, near);
   m.map.AppendCorner(reach);
   m.hint[j] = near;
   m.least = std::min(m.least, reach);

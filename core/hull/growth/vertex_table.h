@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/base/check.h"
@@ -20,15 +21,45 @@ class VertexTable {
  public:
   // Starts counting anew.
   void BeginBlock() {
-    ++block_;
-    outside_ = 0;
-    duplicate_ = 0;
+    ++count_.block;
+    count_.outside = 0;
+    count_.duplicate = 0;
     added_.clear();
+  }
+  // Starts a journal: until it ends, everything can be undone. Requires that none is kept.
+  void StartJournal() {
+    points_.StartJournal();
+    counts_.StartJournal();
+    free_.StartJournal();
+    // The block that begins next would clear them.
+    added_before_ = std::move(added_);
+    count_before_ = count_;
+  }
+  // Makes everything as it was when the journal was started, and ends it. Cost: the changes.
+  void Undo() {
+    points_.Undo();
+    counts_.Undo();
+    free_.Undo();
+    added_ = std::move(added_before_);
+    added_before_ = {};
+    count_ = count_before_;
+  }
+  // Ends the journal and keeps what changed. Cost: the changes.
+  void EndJournal() {
+    points_.EndJournal();
+    counts_.EndJournal();
+    free_.EndJournal();
+    added_before_ = {};
+  }
+  // What the journal holds.
+  size_t JournalBytes() const {
+    return points_.JournalBytes() + counts_.JournalBytes() + free_.JournalBytes() +
+           added_before_.size() * sizeof(VertexId);
   }
   // Gives back the memory of what came and went within the block. Cost: amortized by the vertices
   // that came.
   void FinishBlock() {
-    if (added_.size() > outside_) {
+    if (added_.size() > count_.outside) {
       if (id_bound() <= 8 * added_.size()) {
         added_.clear();
         for (VertexId id = 0; id < id_bound(); ++id) added_.push_back(id);
@@ -37,8 +68,8 @@ class VertexTable {
     }
     if (added_.capacity() > 2 * added_.size() + 16) added_.shrink_to_fit();
   }
-  uint64_t outside() const { return outside_; }
-  uint64_t duplicate() const { return duplicate_; }
+  uint64_t outside() const { return count_.outside; }
+  uint64_t duplicate() const { return count_.duplicate; }
 
   // -0 is stored as +0.
   VertexId Add(const Vector& given) {
@@ -49,15 +80,15 @@ class VertexTable {
       HULLD_CHECK(points_.size() < UINT32_MAX);
       id = static_cast<VertexId>(points_.size());
       points_.push_back(point);
-      counts_.push_back({block_, 0, true, true});
+      counts_.push_back({count_.block, 0, true, true});
     } else {
       id = free_.back();
       free_.pop_back();
-      points_[id] = point;
-      counts_[id] = {block_, 0, true, true};
+      points_.Mutable(id) = point;
+      counts_.Mutable(id) = {count_.block, 0, true, true};
     }
-    max_abs_coordinate_ = std::max(max_abs_coordinate_, point.cwiseAbs().maxCoeff());
-    ++outside_;
+    count_.max_abs_coordinate = std::max(count_.max_abs_coordinate, point.cwiseAbs().maxCoeff());
+    ++count_.outside;
     added_.push_back(id);
     return id;
   }
@@ -65,20 +96,20 @@ class VertexTable {
   // Requires a vertex that lives.
   void CountDuplicate(VertexId id) {
     HULLD_DCHECK(IsAlive(id));
-    Counts& counts = counts_[id];
-    if (counts.block != block_) counts = {block_, 0, false, true};
+    Counts& counts = counts_.Mutable(id);
+    if (counts.block != count_.block) counts = {count_.block, 0, false, true};
     ++counts.duplicates;
-    ++duplicate_;
+    ++count_.duplicate;
   }
 
   // Requires a vertex that lives.
   void Remove(VertexId id) {
     HULLD_DCHECK(IsAlive(id));
-    Counts& counts = counts_[id];
+    Counts& counts = counts_.Mutable(id);
     counts.is_alive = false;
-    if (counts.block == block_) {
-      duplicate_ -= counts.duplicates;
-      if (counts.is_new) --outside_;
+    if (counts.block == count_.block) {
+      count_.duplicate -= counts.duplicates;
+      if (counts.is_new) --count_.outside;
       counts.is_new = false;
     }
     free_.push_back(id);
@@ -112,10 +143,10 @@ class VertexTable {
   size_t id_bound() const { return points_.size(); }
   size_t MemoryBytes() const {
     return points_.MemoryBytes() + counts_.MemoryBytes() + free_.MemoryBytes() +
-           added_.capacity() * sizeof(VertexId);
+           (added_.capacity() + added_before_.capacity()) * sizeof(VertexId);
   }
   // At least the largest absolute coordinate of all vertices that ever lived.
-  double max_abs_coordinate() const { return max_abs_coordinate_; }
+  double max_abs_coordinate() const { return count_.max_abs_coordinate; }
 
  private:
   struct Counts {
@@ -126,10 +157,18 @@ class VertexTable {
     bool is_alive;
   };
 
+  struct Count {
+    double max_abs_coordinate = 0;
+    uint64_t block = 0;
+    uint64_t outside = 0;
+    uint64_t duplicate = 0;
+  };
+
   // Leaves those that the current block added and that live, ascending and each once.
   void KeepNew(std::vector<VertexId>& ids) const {
-    std::erase_if(
-        ids, [this](VertexId id) { return counts_[id].block != block_ || !counts_[id].is_new; });
+    std::erase_if(ids, [this](VertexId id) {
+      return counts_[id].block != count_.block || !counts_[id].is_new;
+    });
     // An ID comes twice where one vertex of the block took the place of another.
     if (!std::is_sorted(ids.begin(), ids.end())) std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
@@ -140,10 +179,10 @@ class VertexTable {
   ChunkedVector<VertexId> free_;
   // By the current block; some of them are gone again.
   std::vector<VertexId> added_;
-  double max_abs_coordinate_ = 0;
-  uint64_t block_ = 0;
-  uint64_t outside_ = 0;
-  uint64_t duplicate_ = 0;
+  Count count_;
+  // When the journal was started.
+  std::vector<VertexId> added_before_;
+  Count count_before_;
 };
 
 }  // namespace hulld

@@ -5,33 +5,29 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
-#include "core/hull/audit.h"
-#include "core/hull/growth/hull_builder.h"
-#include "core/hull/simplification/triangle_distance.h"
-#include "core/hull/simplification/vertex_subset.h"
+#include "core/hull/simplification/enclosure.h"
+#include "core/hull/simplification/inside_order.h"
+#include "core/hull/simplification/unit_scale.h"
 
 namespace hulld {
 namespace {
 
 constexpr size_t kBoxVertices = 8;
-// Outwards by this much of the distance from the centre, at first; eight times as much each time
-// that does not enclose.
-constexpr double kFirstInflation = 0x1p-46;
-constexpr int kMostInflations = 16;
-
-// Distances from a corner to a triangle, some 30 ns each, that one error may cost: measuring
-// against the full hull is tighter, against the inside one cheaper.
-constexpr size_t kMostDistances = 2'000'000;
 
 absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {
-  if (!(target.max_error >= 0) || std::isinf(target.max_error)) {
-    return absl::InvalidArgumentError("max_error must be finite and at least 0");
+  if (std::isnan(target.max_error) || target.max_error < 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("max_error is ", std::isnan(target.max_error) ? "NaN" : "negative",
+                     "; give a length above 0, or 0 for no limit"));
+  }
+  if (std::isinf(target.max_error)) {
+    return absl::InvalidArgumentError("max_error is infinite; give 0 for no limit");
   }
   if (target.max_vertices == 0 && target.max_error == 0) {
     return absl::InvalidArgumentError("give max_vertices, max_error or both");
@@ -43,191 +39,153 @@ absl::Status CheckTarget(const SimplifyTarget& target, size_t least_vertices) {
   return absl::OkStatus();
 }
 
-Hull HullOf(std::span<const Vector> points) {
-  HullBuilder builder;
-  // Finite points without limits are never refused.
-  HULLD_CHECK(builder.Add(points).ok());
-  return builder.Snapshot();
-}
+absl::Status Stopped() { return absl::CancelledError("stopped while simplifying"); }
 
-// What was chosen, and how far the rest is from it at most.
-struct Choice {
-  std::vector<Vector> points;
-  double error = 0;
-};
+// One call of SimplifyOutside, for a hull of dimension 2 or 3.
+class OutsideSearch {
+ public:
+  OutsideSearch(const Hull& hull, const SimplifyTarget& target, StopPoll& poll)
+      : hull_(hull),
+        target_(target),
+        poll_(poll),
+        scale_(hull.max_abs_coordinate()),
+        most_(target.max_vertices == 0 ? hull.vertices().size()
+                                       : std::min(target.max_vertices, hull.vertices().size())),
+        order_(hull, scale_, poll),
+        enclosure_(hull, scale_, target.should_stop, poll) {}
 
-absl::StatusOr<Choice> ChooseVertices(const Hull& hull, const SimplifyTarget& target) {
-  VertexSubset subset(hull.vertices());
-  const size_t most = target.max_vertices == 0
-                          ? hull.vertices().size()
-                          : std::min(target.max_vertices, hull.vertices().size());
-  StopPoll poll(target.should_stop, 1);
-  while (subset.chosen().size() < most) {
-    if (target.max_error > 0 && subset.DistanceBound() <= target.max_error) break;
-    if (poll.Step()) return absl::CancelledError("stopped while simplifying");
-    subset.ChooseNext();
-  }
-  Choice choice;
-  for (const uint32_t i : subset.chosen()) choice.points.push_back(hull.vertices()[i]);
-  if (!subset.is_complete()) choice.error = subset.DistanceBound();
-  return choice;
-}
-
-// A half-space n . (x - centre) <= reach, n of unit length as far as rounding goes.
-struct HalfSpace {
-  Vector normal;
-  double reach;
-};
-
-std::vector<HalfSpace> SupportingHalfSpaces(const Hull& full, const Hull& inside,
-                                            const Vector& center) {
-  std::vector<HalfSpace> result;
-  const auto add = [&](const Vector& normal) {
-    double reach = 0;
-    for (const Vector& v : full.vertices()) reach = std::max(reach, normal.dot(v - center));
-    if (reach > 0) result.push_back({normal, reach});
-  };
-  for (size_t f = 0; f < inside.facet_count(); ++f) {
-    const auto facet = inside.facet(f);
-    const Vector& a = inside.vertices()[facet[0]];
-    const Vector normal =
-        (inside.vertices()[facet[1]] - a).cross(inside.vertices()[facet[2]] - a).stableNormalized();
-    if (normal.allFinite() && normal.norm() > 0.5) add(normal);
-  }
-  return result;
-}
-
-// The corners of the intersection of half-spaces round the centre, by duality: a facet of the hull
-// of the points normal / reach is a corner. Rounded.
-std::vector<Vector> CornersOf(const std::vector<HalfSpace>& half_spaces) {
-  std::vector<Vector> dual;
-  for (const HalfSpace& h : half_spaces) dual.push_back(h.normal / h.reach);
-  const Hull dual_hull = HullOf(dual);
-  std::vector<Vector> corners;
-  if (dual_hull.dimension() < 3) return corners;
-  for (size_t f = 0; f < dual_hull.facet_count(); ++f) {
-    const auto facet = dual_hull.facet(f);
-    const Vector& a = dual_hull.vertices()[facet[0]];
-    const Vector& b = dual_hull.vertices()[facet[1]];
-    const Vector& c = dual_hull.vertices()[facet[2]];
-    const Vector normal = (b - a).cross(c - a);
-    const Vector corner = normal / normal.dot(a);
-    if (!corner.allFinite()) return {};
-    corners.push_back(corner);
-  }
-  return corners;
-}
-
-// Requires a point.
-std::vector<Vector> BoxOf(std::span<const Vector> points) {
-  HULLD_CHECK(!points.empty());
-  Vector low = points[0];
-  Vector high = points[0];
-  for (const Vector& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  std::vector<Vector> corners;
-  for (const double x : {low.x(), high.x()}) {
-    for (const double y : {low.y(), high.y()}) {
-      for (const double z : {low.z(), high.z()}) corners.emplace_back(x, y, z);
-    }
-  }
-  return corners;
-}
-
-// Proven: no corner is farther than this from the hull that a part of it, or all of it, stands for.
-double DistanceFrom(const Hull& part, std::span<const Vector> corners) {
-  double bound = 0;
-  for (const Vector& corner : corners) {
-    double nearest = INFINITY;
-    for (size_t f = 0; f < part.facet_count(); ++f) {
-      const auto facet = part.facet(f);
-      for (size_t i = 1; i + 1 < facet.size(); ++i) {
-        nearest = std::min(
-            nearest, DistanceToTriangleBound(part.vertices()[facet[0]], part.vertices()[facet[i]],
-                                             part.vertices()[facet[i + 1]], corner));
+  absl::StatusOr<SimplifiedHull> Run() {
+    if (!poll_.stopped()) {
+      if (hull_.vertices().size() <= most_) Consider(SimplifiedHull{hull_, 0});
+      Consider(enclosure_.ByBox());
+      if (target_.max_error > 0) {
+        SearchByPushing();
+        SearchByPlanes();
       }
+      if (!best_ || !Reaches(*best_)) UseAll();
     }
-    bound = std::max(bound, nearest);
+    if (poll_.stopped()) return Stopped();
+    // The box is a hull for all finite doubles, of no more vertices than may be asked for.
+    HULLD_CHECK(best_.has_value());
+    return *std::move(best_);
   }
-  return bound;
-}
 
-// Flat hulls may have no triangle; a vertex stands for a triangle then.
-SimplifiedHull EncloseInBox(const Hull& hull) {
-  const std::vector<Vector> corners = BoxOf(hull.vertices());
-  double error = 0;
-  for (const Vector& corner : corners) {
-    double nearest = INFINITY;
-    for (const Vector& v : hull.vertices()) {
-      nearest = std::min(nearest, DistanceToTriangleBound(v, v, v, corner));
+ private:
+  bool Reaches(const SimplifiedHull& hull) const {
+    return target_.max_error > 0 && hull.error <= target_.max_error;
+  }
+
+  // Fewer vertices among those that keep max_error, which go before all others; else less error.
+  bool IsBetter(const SimplifiedHull& a, const SimplifiedHull& b) const {
+    if (Reaches(a) != Reaches(b)) return Reaches(a);
+    const size_t count_a = a.hull.vertices().size();
+    const size_t count_b = b.hull.vertices().size();
+    if (Reaches(a) && count_a != count_b) return count_a < count_b;
+    return a.error != b.error ? a.error < b.error : count_a < count_b;
+  }
+
+  // Keeps the hull if it is the best so far. Returns whether it keeps to both limits.
+  bool Consider(std::optional<SimplifiedHull> hull) {
+    if (!hull || poll_.stopped() || hull->hull.vertices().size() > most_) return false;
+    const bool reaches = Reaches(*hull);
+    if (!best_ || IsBetter(*hull, *best_)) best_ = std::move(hull);
+    return reaches;
+  }
+
+  // The vertices that a better hull may have: as many as the best with its error or less.
+  size_t Worthwhile() const {
+    return best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
+  }
+
+  std::optional<Hull> Inside(size_t count) { return order_.HullOf(count, target_.should_stop); }
+  bool TryPushing(size_t inside_vertices) {
+    const std::optional<Hull> inside = Inside(inside_vertices);
+    return inside && Consider(enclosure_.ByPushing(*inside));
+  }
+  bool TryPlanes(size_t inside_vertices) {
+    const std::optional<Hull> inside = Inside(inside_vertices);
+    return inside && Consider(enclosure_.ByPlanes(*inside));
+  }
+
+  size_t CornersPerVertex() const { return hull_.dimension() == 2 ? 2 : 1; }
+
+  // Pushing a vertex errs by no less than what it is pushed, about as much as the inside hull errs:
+  // the search starts there, goes on in steps, and comes back by halves.
+  void SearchByPushing() {
+    const size_t most = Worthwhile() / CornersPerVertex();
+    if (most < order_.least()) return;
+    size_t fails = order_.CountFor(target_.max_error, most);
+    if (TryPushing(fails)) return;
+    size_t reaches = fails;
+    do {
+      if (reaches == most || poll_.stopped()) return;
+      fails = reaches;
+      reaches = std::min(most, reaches + reaches / 8 + 1);
+    } while (!TryPushing(reaches));
+    while (reaches - fails > 1 + reaches / 32 && !poll_.stopped()) {
+      const size_t middle = fails + (reaches - fails) / 2;
+      (TryPushing(middle) ? reaches : fails) = middle;
     }
-    error = std::max(error, nearest);
   }
-  return {HullOf(corners), error};
-}
 
-// Encloses `full` along the facets of `inside`; nothing when rounding gets in the way.
-std::optional<SimplifiedHull> EncloseAlong(const Hull& full, const Hull& inside) {
-  const Vector center = inside.center();
-  const std::vector<Vector> corners = CornersOf(SupportingHalfSpaces(full, inside, center));
-  if (corners.empty()) return std::nullopt;
-  double inflation = kFirstInflation;
-  for (int attempt = 0; attempt < kMostInflations; ++attempt, inflation *= 8) {
-    std::vector<Vector> points;
-    for (const Vector& corner : corners) points.push_back(center + (1 + inflation) * corner);
-    if (!std::all_of(points.begin(), points.end(), [](const Vector& p) { return p.allFinite(); })) {
-      return std::nullopt;
+  // Planes through the facets of an inside hull of n vertices meet in some 4 n corners; in fewer
+  // where facets are large, so it is tried as long as half of these would do.
+  void SearchByPlanes() {
+    if (hull_.dimension() < 3) return;
+    const size_t all = hull_.vertices().size();
+    for (size_t n = order_.least(); n <= all && 2 * n <= Worthwhile() && !poll_.stopped();
+         n += n / 2 + 1) {
+      if (TryPlanes(n)) return;
     }
-    const Hull outside = HullOf(points);
-    if (!AuditContainment(outside, full.vertices()).ok()) continue;
-    const bool affordable = points.size() * full.facet_count() <= kMostDistances;
-    return SimplifiedHull{outside, DistanceFrom(affordable ? full : inside, outside.vertices())};
   }
-  return std::nullopt;
-}
 
-// Vertices of an inside hull whose facets, at most 2 n - 4, meet in at most `corners` corners: k
-// planes have at most 2 k - 4.
-size_t InsideVerticesFor(size_t corners) { return (corners + 12) / 4; }
+  // Without an error to reach, or none in reach: what as many vertices as there may be can do.
+  void UseAll() {
+    const size_t pushed = most_ / CornersPerVertex();
+    if (pushed >= order_.least()) TryPushing(std::min(pushed, hull_.vertices().size()));
+    if (hull_.dimension() < 3) return;
+    // k planes have at most 2 k - 4 corners, and n vertices 2 n - 4 facets.
+    TryPlanes(std::min((most_ + 12) / 4, hull_.vertices().size()));
+  }
+
+  const Hull& hull_;
+  const SimplifyTarget& target_;
+  StopPoll& poll_;
+  const UnitScale scale_;
+  const size_t most_;
+  InsideOrder order_;
+  Enclosure enclosure_;
+  std::optional<SimplifiedHull> best_;
+};
 
 }  // namespace
 
 absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTarget& target) {
   const auto least = static_cast<size_t>(hull.dimension() + 1);
   if (absl::Status s = CheckTarget(target, least); !s.ok()) return s;
-  if (hull.vertices().size() <= std::max(least, target.max_vertices)) {
-    return SimplifiedHull{hull, 0};
-  }
-  const absl::StatusOr<Choice> choice = ChooseVertices(hull, target);
-  if (!choice.ok()) return choice.status();
-  return SimplifiedHull{HullOf(choice->points), choice->error};
+  const size_t all = hull.vertices().size();
+  const size_t most = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
+  if (all <= least || (target.max_error == 0 && all == most)) return SimplifiedHull{hull, 0};
+  StopPoll poll(target.should_stop);
+  InsideOrder order(hull, UnitScale(hull.max_abs_coordinate()), poll);
+  if (poll.stopped()) return Stopped();
+  // Nothing but all vertices has no error.
+  const size_t count = order.CountFor(target.max_error, most);
+  const double error = order.ErrorAt(count);
+  std::optional<Hull> inside = order.HullOf(count, target.should_stop);
+  if (!inside) return Stopped();
+  return SimplifiedHull{*std::move(inside), error};
 }
 
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target) {
   if (absl::Status s = CheckTarget(target, kBoxVertices); !s.ok()) return s;
   const size_t all = hull.vertices().size();
-  if (all <= std::max(kBoxVertices, target.max_vertices)) return SimplifiedHull{hull, 0};
-  const size_t most_inside =
-      target.max_vertices == 0 ? all : std::min(all, InsideVerticesFor(target.max_vertices));
-  std::optional<SimplifiedHull> best;
-  size_t inside_vertices = target.max_error > 0 ? InsideVerticesFor(kBoxVertices) : most_inside;
-  while (hull.dimension() == 3) {
-    const absl::StatusOr<SimplifiedHull> inside =
-        SimplifyInside(hull, {inside_vertices, 0, target.should_stop});
-    if (!inside.ok()) return inside.status();
-    std::optional<SimplifiedHull> outside = EncloseAlong(hull, inside->hull);
-    if (outside && (!best || outside->error < best->error)) best = std::move(outside);
-    const bool enough = best && target.max_error > 0 && best->error <= target.max_error;
-    if (enough || inside_vertices >= most_inside) break;
-    inside_vertices = std::min(most_inside, inside_vertices * 3 / 2 + 1);
+  if (all <= kBoxVertices || (target.max_error == 0 && all <= target.max_vertices)) {
+    // With up to 8 vertices, no enclosure has an error of 0 and fewer.
+    return SimplifiedHull{hull, 0};
   }
-  SimplifiedHull box = EncloseInBox(hull);
-  if (!best || box.error < best->error) best = std::move(box);
-  const bool missed = target.max_error > 0 && best->error > target.max_error;
-  if (missed && target.max_vertices == 0) return SimplifiedHull{hull, 0};
-  return *std::move(best);
+  StopPoll poll(target.should_stop);
+  return OutsideSearch(hull, target, poll).Run();
 }
 
 }  // namespace hulld

@@ -47,21 +47,22 @@ std::pair<double, double> NearestOnTriangle(const Vector& e, const Vector& f, co
 
 // The distance to the point a + s e + t f, which belongs to the triangle for the doubles s and t;
 // where it is does not matter for the bound, and kSubsetDistanceErrorFactor covers its evaluation.
-double DistanceToTriangleBound(const Vector& a, const Vector& b, const Vector& c, const Vector& p) {
+TriangleDistance DistanceToTriangle(const Vector& a, const Vector& b, const Vector& c,
+                                    const Vector& p) {
   const Vector e = b - a;
   const Vector f = c - a;
   const Vector offset = p - a;
-  const double size =
-      offset.cwiseAbs().maxCoeff() + e.cwiseAbs().maxCoeff() + f.cwiseAbs().maxCoeff();
-  if (size == 0) return kLeastPositive;
+  const double size = LargestComponent(offset) + LargestComponent(e) + LargestComponent(f);
+  if (size == 0) return {kLeastPositive, a};
   auto [s, t] = NearestOnTriangle(e / size, f / size, offset / size);
   if (!(s >= 0 && t >= 0 && s + t <= 1)) {
     s = std::clamp(s, 0.0, 1.0);
     t = std::clamp(t, 0.0, 1.0 - s);
     if (!(s + t <= 1)) s = t = 0;
   }
-  const double distance = (offset - s * e - t * f).stableNorm();
-  return distance + kSubsetDistanceErrorFactor * (distance + size) + kLeastPositive;
+  const Vector along = s * e + t * f;
+  const double distance = (offset - along).stableNorm();
+  return {distance + kSubsetDistanceErrorFactor * (distance + size) + kLeastPositive, a + along};
 }
 
 }  // namespace hulld

@@ -1,22 +1,30 @@
 #include "core/hull/simplification/vertex_subset.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
-#include <set>
+#include <cstddef>
 #include <utility>
 
 #include "core/base/check.h"
 #include "core/hull/simplification/triangle_distance.h"
+#include "core/numeric/orientation.h"
 
 namespace hulld {
 namespace {
 
-// The point of `candidates` for which `measure` is largest.
-template <typename Measure>
-uint32_t Farthest(size_t count, Measure&& measure) {
+// Steps from triangle to triangle in search of a nearer one; the next search goes on from there.
+constexpr int kMostSteps = 64;
+
+// The number below `count`, other than `excluded`, for which `measure` is largest.
+template <size_t n, typename Measure>
+uint32_t Farthest(size_t count, const std::array<uint32_t, n>& excluded, StopPoll& poll,
+                  Measure&& measure) {
   uint32_t best = 0;
   double most = -1;
-  for (uint32_t i = 0; i < count; ++i) {
+  for (uint32_t i = 0; i < count && !poll.Step(); ++i) {
+    bool is_excluded = false;
+    for (const uint32_t other : excluded) is_excluded |= i == other;
+    if (is_excluded) continue;
     if (const double value = measure(i); value > most) {
       most = value;
       best = i;
@@ -27,150 +35,194 @@ uint32_t Farthest(size_t count, Measure&& measure) {
 
 }  // namespace
 
-VertexSubset::VertexSubset(std::span<const Vector> points) : points_(points) {
-  HULLD_CHECK(!points.empty());
-  Vector low = points[0];
-  Vector high = points[0];
-  for (const Vector& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  // Quartered, so that no difference overflows.
-  const Vector extent = high * 0.25 - low * 0.25;
-  std::array<int, 3> exponents{};
-  for (int k = 0; k < 3; ++k) std::frexp(extent[k], &exponents[k]);
-  for (const Vector& p : points) {
-    Vector moved = p * 0.25 - (low * 0.125 + high * 0.125);
-    for (int k = 0; k < 3; ++k) moved[k] = std::ldexp(moved[k], -exponents[k]);
-    scaled_.push_back(moved);
-  }
+VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points,
+                           StopPoll& poll)
+    : points_(points), unit_points_(unit_points) {
+  HULLD_CHECK(points.size() >= 4 && points.size() == unit_points.size());
+  next_.resize(points.size(), kNone);
+  distance_.resize(points.size(), 0);
+  Start(poll);
+}
 
-  const size_t n = points.size();
-  const uint32_t a = Farthest(n, [&](uint32_t i) { return -scaled_[i].x() + 2; });
-  const uint32_t b = Farthest(n, [&](uint32_t i) { return (scaled_[i] - scaled_[a]).norm(); });
-  const Vector ab = scaled_[b] - scaled_[a];
+// Four points that span the set about as well as any. Three vertices are never on one line; that
+// the fourth is not in their plane is decided exactly.
+void VertexSubset::Start(StopPoll& poll) {
+  const std::span<const Vector> u = unit_points_;
+  const size_t n = points_.size();
+  const uint32_t a = 0;
+  const uint32_t b =
+      Farthest<1>(n, {a}, poll, [&](uint32_t i) { return (u[i] - u[a]).stableNorm(); });
+  const Vector ab = (u[b] - u[a]).stableNormalized();
   const uint32_t c =
-      Farthest(n, [&](uint32_t i) { return ab.cross(scaled_[i] - scaled_[a]).norm(); });
-  const Vector normal = ab.cross(scaled_[c] - scaled_[a]);
-  const uint32_t d =
-      Farthest(n, [&](uint32_t i) { return std::abs(normal.dot(scaled_[i] - scaled_[a])); });
-  for (const uint32_t i : {a, b, c, d}) {
-    if (std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end()) chosen_.push_back(i);
+      Farthest<2>(n, {a, b}, poll, [&](uint32_t i) { return ab.cross(u[i] - u[a]).stableNorm(); });
+  const Vector normal = ab.cross((u[c] - u[a]).stableNormalized()).stableNormalized();
+  uint32_t d = Farthest<3>(n, {a, b, c}, poll,
+                           [&](uint32_t i) { return std::abs(normal.dot(u[i] - u[a])); });
+  if (poll.stopped()) return;
+  const auto is_apart = [&](uint32_t i) {
+    return Orient3d(points_[a], points_[b], points_[c], points_[i]) != 0;
+  };
+  for (uint32_t i = 0; !is_apart(d) && i < n; ++i) d = i;
+  HULLD_CHECK(is_apart(d));
+
+  chosen_ = {a, b, c, d};
+  for (const uint32_t i : chosen_) vertices_.Add(points_[i]);
+  const std::array<VertexId, 3> base = {0, 1, 2};
+  surface_.emplace(vertices_, base, 3);
+  std::vector<TriangleId> all;
+  surface_->ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { all.push_back(id); });
+  for (const TriangleId id : all) MakeCell(id);
+  for (uint32_t i = 0; i < n && !poll.Step(); ++i) {
+    if (i != a && i != b && i != c && i != d) Assign(i, all);
   }
-  if (chosen_.size() < 4) {
-    // Flat as far as rounding tells: both sides of a triangle, or of a segment.
-    AddTriangle(a, b, c);
-    AddTriangle(a, c, b);
-  } else if (normal.dot(scaled_[d] - scaled_[a]) > 0) {
-    AddTriangle(a, c, b);
-    AddTriangle(a, b, d);
-    AddTriangle(b, c, d);
-    AddTriangle(c, a, d);
-  } else {
-    AddTriangle(a, b, c);
-    AddTriangle(b, a, d);
-    AddTriangle(c, b, d);
-    AddTriangle(a, c, d);
-  }
-  for (uint32_t i = 0; i < n; ++i) {
-    if (std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end()) Assign(i, 0);
-  }
+  EnqueueChanged();
 }
 
-void VertexSubset::AddTriangle(uint32_t a, uint32_t b, uint32_t c) {
-  Triangle t;
-  t.corners = {a, b, c};
-  t.normal = (scaled_[b] - scaled_[a]).cross(scaled_[c] - scaled_[a]);
-  const double length = t.normal.norm();
-  if (length > 0) t.normal /= length;
-  t.offset = t.normal.dot(scaled_[a]);
-  triangles_.push_back(std::move(t));
+void VertexSubset::ChooseNext(StopPoll& poll) {
+  HULLD_CHECK(!is_complete());
+  const TriangleId worst = Worst();
+  // Each vertex that is not chosen is in a list.
+  HULLD_CHECK(worst != kNone);
+  const uint32_t next = cells_[worst].farthest;
+  orphans_.clear();
+  for (const TriangleId gone : surface_->RemoveVisible(vertices_, points_[next], worst)) {
+    for (uint32_t i = cells_[gone].first; i != kNone; i = next_[i]) {
+      if (i != next) orphans_.push_back(i);
+    }
+    cells_[gone] = {};
+  }
+  const std::span<const TriangleId> created = surface_->JoinToBoundary(vertices_, points_[next]);
+  chosen_.push_back(next);
+  HULLD_CHECK(vertices_.size() == chosen_.size());
+  for (const TriangleId id : created) MakeCell(id);
+  for (const uint32_t i : orphans_) {
+    if (poll.Step()) return;
+    Assign(i, created);
+  }
+  EnqueueChanged();
 }
 
-double VertexSubset::HeightOf(const Triangle& triangle, uint32_t point) const {
-  return triangle.normal.dot(scaled_[point]) - triangle.offset;
+double VertexSubset::DistanceBound() {
+  const TriangleId worst = Worst();
+  return worst == kNone ? 0 : distance_[cells_[worst].farthest];
 }
 
-// Gives the point to the triangle, of those from `first_triangle` on, that it is nearest to.
-void VertexSubset::Assign(uint32_t point, size_t first_triangle) {
-  HULLD_CHECK(first_triangle < triangles_.size());
-  size_t best = first_triangle;
-  double least = INFINITY;
-  for (size_t k = first_triangle; k < triangles_.size(); ++k) {
-    if (const double distance = DistanceTo(triangles_[k], point); distance < least) {
-      least = distance;
-      best = k;
+void VertexSubset::MakeCell(TriangleId id) {
+  if (cells_.size() <= id) cells_.resize(id + 1);
+  const auto& [a, b, c] = surface_->triangle(id).corners;
+  const Vector& corner = unit_points_[chosen_[a]];
+  const Vector e = unit_points_[chosen_[b]] - corner;
+  const Vector f = unit_points_[chosen_[c]] - corner;
+  cells_[id] = {};
+  cells_[id].corner = corner;
+  cells_[id].normal = e.stableNormalized().cross(f.stableNormalized()).stableNormalized();
+}
+
+double VertexSubset::DistanceTo(TriangleId id, uint32_t point) const {
+  const auto& [a, b, c] = surface_->triangle(id).corners;
+  return DistanceToTriangleBound(unit_points_[chosen_[a]], unit_points_[chosen_[b]],
+                                 unit_points_[chosen_[c]], unit_points_[point]);
+}
+
+// Gives the vertex to a triangle that it sees strictly, the one that it is highest above unless
+// rounding deceives. Requires that it sees a target: see ConflictLists for why it does.
+void VertexSubset::Assign(uint32_t point, std::span<const TriangleId> targets) {
+  TriangleId best = targets[0];
+  double most = HeightOver(best, point);
+  for (const TriangleId id : targets.subspan(1)) {
+    if (const double height = HeightOver(id, point); height > most) {
+      most = height;
+      best = id;
     }
   }
-  Triangle& triangle = triangles_[best];
-  if (triangle.near.empty() || least > triangle.distance) {
-    triangle.distance = least;
-    triangle.farthest = point;
+  best = ClimbFrom(best, point);
+  for (size_t k = 0; !Sees(point, best); ++k) {
+    HULLD_CHECK(k < targets.size());
+    best = targets[k];
   }
-  triangle.near.push_back(point);
+  Link(best, point, DistanceTo(best, point));
 }
 
-void VertexSubset::ChooseNext() {
-  HULLD_CHECK(!is_complete());
-  Triangle* worst = nullptr;
-  for (Triangle& t : triangles_) {
-    if (t.near.empty()) continue;
-    if (worst == nullptr || t.distance > worst->distance) worst = &t;
+void VertexSubset::Link(TriangleId id, uint32_t point, double distance) {
+  Cell& cell = cells_[id];
+  next_[point] = cell.first;
+  distance_[point] = distance;
+  cell.first = point;
+  NoteChange(id);
+  if (cell.farthest == kNone || distance > distance_[cell.farthest]) cell.farthest = point;
+}
+
+// Moves the vertices of a list to triangles that came nearer.
+void VertexSubset::Redistribute(TriangleId id) {
+  uint32_t i = std::exchange(cells_[id].first, kNone);
+  cells_[id].farthest = kNone;
+  NoteChange(id);
+  while (i != kNone) {
+    const uint32_t next = next_[i];
+    TriangleId target = ClimbFrom(id, i);
+    double distance = distance_[i];
+    if (target != id) {
+      const double nearer = DistanceTo(target, i);
+      if (nearer < distance && Sees(i, target)) {
+        distance = nearer;
+      } else {
+        target = id;
+      }
+    }
+    Link(target, i, distance);
+    i = next;
   }
-  // Each point that is not chosen is near some triangle.
-  HULLD_CHECK(worst != nullptr);
-  const uint32_t next = worst->farthest;
-  chosen_.push_back(next);
-  Forget(*worst, next);
+}
 
-  // The triangles that the point is above go; where rounding lets none be seen, the nearest.
-  std::vector<char> goes;
-  for (const Triangle& t : triangles_) goes.push_back(HeightOf(t, next) > 0);
-  if (std::find(goes.begin(), goes.end(), 1) == goes.end()) goes[worst - triangles_.data()] = 1;
+// Puts the lists that changed into the queue as they are now.
+void VertexSubset::EnqueueChanged() {
+  for (const TriangleId id : changed_) {
+    Cell& cell = cells_[id];
+    if (!std::exchange(cell.is_changed, false)) continue;
+    cell.entry = ++entries_;
+    if (cell.first != kNone) queue_.push({distance_[cell.farthest], id, cell.entry});
+  }
+  changed_.clear();
+}
 
-  std::vector<Triangle> kept;
-  std::set<std::pair<uint32_t, uint32_t>> edges;
-  std::vector<uint32_t> orphans;
-  for (size_t k = 0; k < triangles_.size(); ++k) {
-    Triangle& t = triangles_[k];
-    if (!goes[k]) {
-      kept.push_back(std::move(t));
+// The triangle to which steps lead that each raise the point's height.
+TriangleId VertexSubset::ClimbFrom(TriangleId id, uint32_t point) const {
+  double height = HeightOver(id, point);
+  for (int step = 0; step < kMostSteps; ++step) {
+    TriangleId higher = id;
+    for (const TriangleId next : surface_->triangle(id).neighbours) {
+      if (const double h = HeightOver(next, point); h > height) {
+        height = h;
+        higher = next;
+      }
+    }
+    if (higher == id) break;
+    id = higher;
+  }
+  return id;
+}
+
+// The triangle of the farthest vertex, which no step brings nearer to the surface; kNone when no
+// vertex waits. Moves vertices to nearer triangles on the way, all of a list at once: what one
+// gains from a new triangle others mostly do, too.
+TriangleId VertexSubset::Worst() {
+  while (!queue_.empty()) {
+    const Entry top = queue_.top();
+    if (cells_[top.triangle].entry != top.number) {
+      queue_.pop();
       continue;
     }
-    orphans.insert(orphans.end(), t.near.begin(), t.near.end());
-    for (int i = 0; i < 3; ++i) {
-      const std::pair<uint32_t, uint32_t> edge(t.corners[i], t.corners[(i + 1) % 3]);
-      if (edges.erase({edge.second, edge.first}) == 0) edges.insert(edge);
+    const uint32_t point = cells_[top.triangle].farthest;
+    const TriangleId nearer = ClimbFrom(top.triangle, point);
+    if (nearer == top.triangle || !(DistanceTo(nearer, point) < top.distance) ||
+        !Sees(point, nearer)) {
+      return top.triangle;
     }
+    queue_.pop();
+    Redistribute(top.triangle);
+    EnqueueChanged();
   }
-  triangles_ = std::move(kept);
-  const size_t first_new = triangles_.size();
-  for (const auto& [tail, head] : edges) AddTriangle(tail, head, next);
-  for (const uint32_t point : orphans) Assign(point, first_new);
-}
-
-void VertexSubset::Forget(Triangle& triangle, uint32_t point) {
-  std::erase(triangle.near, point);
-  triangle.distance = 0;
-  for (const uint32_t other : triangle.near) {
-    if (const double distance = DistanceTo(triangle, other); distance >= triangle.distance) {
-      triangle.distance = distance;
-      triangle.farthest = other;
-    }
-  }
-}
-
-double VertexSubset::DistanceBound() const {
-  double bound = 0;
-  for (const Triangle& t : triangles_) {
-    if (!t.near.empty()) bound = std::max(bound, t.distance);
-  }
-  return bound;
-}
-
-double VertexSubset::DistanceTo(const Triangle& triangle, uint32_t point) const {
-  const auto& [a, b, c] = triangle.corners;
-  return DistanceToTriangleBound(points_[a], points_[b], points_[c], points_[point]);
+  return kNone;
 }
 
 }  // namespace hulld

@@ -14,7 +14,7 @@
 
 #include "client/client.h"
 #include "client/connection_security.h"
-#include "client/hullctl/hullctl.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
 #include "tests/server/harness/test_certificates.h"
 #include "tests/server/harness/test_server.h"
 
@@ -25,22 +25,6 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
 using ::testing::Not;
-
-struct Ran {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-Ran Hullctl(const std::vector<std::string>& arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
-  Ran ran;
-  ran.code = RunHullctl(arguments, out, err);
-  ran.out = out.str();
-  ran.err = err.str();
-  return ran;
-}
 
 class GuardedServer : public server::ServerTest {
  protected:
@@ -63,6 +47,7 @@ class GuardedServer : public server::ServerTest {
 
   ~GuardedServer() override {
     unsetenv("HULLD_TOKEN");
+    UseNoContexts();
     std::filesystem::remove_all(directory_);
   }
 
@@ -78,7 +63,7 @@ class GuardedServer : public server::ServerTest {
     std::vector<std::string> arguments = {
         "token", "new", name, "--role", role, "--token-out", directory_ + "/" + name};
     if (!prefix.empty()) arguments.insert(arguments.end(), {"--prefix", prefix});
-    const Ran made = Hullctl(arguments);
+    const Ran made = RunTool(arguments);
     EXPECT_EQ(made.code, 0) << made.err;
     return made.out;
   }
@@ -93,7 +78,7 @@ class GuardedServer : public server::ServerTest {
   Ran As(const std::string& token, std::vector<std::string> arguments) {
     arguments.insert(arguments.end(), {"--server", server_->address(), "--ca-cert", authorities_,
                                        "--token-file", directory_ + "/" + token});
-    return Hullctl(arguments);
+    return RunTool(arguments);
   }
 
   const server::TestAuthority authority_{"authority"};
@@ -116,7 +101,7 @@ TEST_F(GuardedServer, TokensMadeByHullctlAreWhatTheServerTakes) {
   EXPECT_EQ(role.code, 1);
   EXPECT_THAT(role.err, HasSubstr("token \"view\" has the role read-only"));
   EXPECT_THAT(As("cell", {"status"}).out, HasSubstr("hulls                  -"));
-  EXPECT_EQ(Hullctl({"health", "--server", server_->address(), "--ca-cert", authorities_}).out,
+  EXPECT_EQ(RunTool({"health", "--server", server_->address(), "--ca-cert", authorities_}).out,
             "SERVING\n");
 }
 
@@ -147,15 +132,35 @@ TEST_F(GuardedServer, TheTokenMayComeFromTheEnvironment) {
   Restart(config_);
   const std::vector<std::string> list = {"list", "--server", server_->address(), "--ca-cert",
                                          authorities_};
-  const Ran none = Hullctl(list);
+  const Ran none = RunTool(list);
   EXPECT_EQ(none.code, 1);
   EXPECT_THAT(none.err, AllOf(HasSubstr("carries no token"), HasSubstr("--token-file")));
   setenv("HULLD_TOKEN", TokenOf("view").c_str(), 1);
-  EXPECT_EQ(Hullctl(list).code, 0);
+  EXPECT_EQ(RunTool(list).code, 0);
   setenv("HULLD_TOKEN", "hunter2", 1);
-  const Ran wrong = Hullctl(list);
+  const Ran wrong = RunTool(list);
   EXPECT_EQ(wrong.code, 1);
   EXPECT_THAT(wrong.err, AllOf(HasSubstr("unknown or no longer valid"), Not(HasSubstr("hunter2"))));
+}
+
+TEST_F(GuardedServer, AContextHoldsAllThatAServerWants) {
+  Restart(config_);
+  ASSERT_EQ(setenv("XDG_CONFIG_HOME", (directory_ + "/config").c_str(), 1), 0);
+  const Ran added = As("view", {"context", "add", "guarded"});
+  EXPECT_EQ(added.code, 0) << added.err;
+  EXPECT_EQ(added.out, "context guarded added, and used from now on\n");
+  EXPECT_EQ(RunTool({"list"}).code, 0);
+  // Its token stays with its server.
+  const Ran elsewhere = RunTool({"context", "show", "--server", "127.0.0.1:1"});
+  EXPECT_EQ(elsewhere.out, "server  127.0.0.1:1  (--server)\n");
+  // A variable goes before it, an option before that.
+  setenv("HULLD_TOKEN", "hunter2", 1);
+  EXPECT_EQ(RunTool({"list"}).code, 1);
+  EXPECT_EQ(RunTool({"list", "--token-file", directory_ + "/view"}).code, 0);
+  EXPECT_EQ(RunTool({"list", "--context", "guarded"}).code, 0);
+  std::ifstream file(directory_ + "/config/hullctl/contexts.json");
+  const std::string kept{std::istreambuf_iterator<char>(file), {}};
+  EXPECT_THAT(kept, AllOf(HasSubstr("/view\""), Not(HasSubstr(TokenOf("view")))));
 }
 
 TEST_F(GuardedServer, MutualTlsNeedsCertAndKey) {
@@ -179,7 +184,7 @@ TEST_F(GuardedServer, SaysWhatToTryWhenTheConnectionFails) {
   setenv("HULLD_TOKEN", TokenOf("boss").c_str(), 1);
   const auto expect = [this](std::vector<std::string> options, const std::string& hint) {
     options.insert(options.begin(), {"status", "--server", server_->address()});
-    const Ran ran = Hullctl(options);
+    const Ran ran = RunTool(options);
     EXPECT_EQ(ran.code, 3) << hint;
     EXPECT_THAT(ran.err, HasSubstr(hint));
   };
@@ -233,16 +238,16 @@ TEST(ConnectionSecurity, TokenFilesAreOnesOwnAndHoldOneToken) {
 }
 
 TEST(HullctlToken, NewTokensAreRandomAndNeverOverwriteAFile) {
-  const Ran first = Hullctl({"token", "new", "a", "--role", "admin"});
+  const Ran first = RunTool({"token", "new", "a", "--role", "admin"});
   EXPECT_THAT(first.out, MatchesRegex("token +hulld_[A-Za-z0-9_-]{43}\nline +a admin \\* "
                                       "sha256:[0-9a-f]{64}\n"));
-  EXPECT_NE(Hullctl({"token", "new", "a", "--role", "admin"}).out, first.out);
+  EXPECT_NE(RunTool({"token", "new", "a", "--role", "admin"}).out, first.out);
   const std::string path = ::testing::TempDir() + "/hulld_token_new_test";
   std::ofstream(path) << "mine";
-  EXPECT_EQ(Hullctl({"token", "new", "a", "--role", "admin", "--token-out", path}).code, 2);
-  EXPECT_EQ(Hullctl({"token", "new", "a", "--role", "root"}).code, 2);
-  EXPECT_EQ(Hullctl({"token", "new", "a b", "--role", "admin"}).code, 2);
-  EXPECT_EQ(Hullctl({"token", "new", "a", "--role", "admin", "--prefix", "cell-1"}).code, 2);
+  EXPECT_EQ(RunTool({"token", "new", "a", "--role", "admin", "--token-out", path}).code, 2);
+  EXPECT_EQ(RunTool({"token", "new", "a", "--role", "root"}).code, 2);
+  EXPECT_EQ(RunTool({"token", "new", "a b", "--role", "admin"}).code, 2);
+  EXPECT_EQ(RunTool({"token", "new", "a", "--role", "admin", "--prefix", "cell-1"}).code, 2);
   std::remove(path.c_str());
 }
 

@@ -6,16 +6,17 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <map>
 #include <random>
 #include <sstream>
 #include <thread>
 
 #include "client/client.h"
-#include "client/hullctl/hullctl.h"
 #include "client/hullctl/printing/json.h"
 #include "client/verify/certificate_check.h"
 #include "tests/client/formats/point_reading.h"
-#include "tests/server/harness/test_server.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
 
 namespace hulld {
 namespace {
@@ -24,29 +25,12 @@ using ::google::protobuf::Struct;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-struct Ran {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-class HullctlOnServer : public server::ServerTest {
+class HullctlQuestions : public HullctlOnServer {
  protected:
-  Ran Ask(std::vector<std::string> arguments) {
-    arguments.insert(arguments.end(), {"--server", server_->address()});
-    std::ostringstream out;
-    std::ostringstream err;
-    Ran ran;
-    ran.code = RunHullctl(arguments, out, err);
-    ran.out = out.str();
-    ran.err = err.str();
-    return ran;
-  }
-
-  // A recorded answer, as `check --certificate --output json` writes it.
+  // A recorded answer, as `check --record` writes it.
   static std::string Recorded(const v1::CheckCollisionRequest& request,
                               const v1::CheckCollisionResponse& response) {
-    return "{\"request\":" + MessageJson(request) + "," + MessageJson(response).substr(1);
+    return "{\"request\":" + MessageJson(request) + ",\"response\":" + MessageJson(response) + "}";
   }
 
   // Two cubes that share a face, with a certificate of that.
@@ -62,7 +46,7 @@ class HullctlOnServer : public server::ServerTest {
   }
 };
 
-TEST_F(HullctlOnServer, VerifyTellsValidInvalidAndUncheckableApart) {
+TEST_F(HullctlQuestions, VerifyTellsValidInvalidAndUncheckableApart) {
   Put("cube", server::Cube());
   auto [request, response] = TouchingCubes();
   const TempFile valid("valid.json", Recorded(request, response));
@@ -100,29 +84,37 @@ TEST_F(HullctlOnServer, VerifyTellsValidInvalidAndUncheckableApart) {
   EXPECT_THAT(ran.err, HasSubstr("was deleted"));
 }
 
-TEST_F(HullctlOnServer, VerifyRefusesWhatIsNoRecordedAnswer) {
+TEST_F(HullctlQuestions, VerifyRefusesWhatIsNoRecordedAnswer) {
   const TempFile no_json("no.json", "relation SEPARATED\n");
   EXPECT_EQ(Ask({"verify", no_json.path()}).code, 2);
   const TempFile no_request("bare.json", MessageJson(v1::CheckCollisionResponse()));
   const Ran ran = Ask({"verify", no_request.path()});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, AllOf(HasSubstr("no member \"request\""), HasSubstr("--certificate")));
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("no member \"request\""), HasSubstr("--record")));
   EXPECT_EQ(Ask({"verify", "/no/such/file"}).code, 2);
 }
 
-TEST_F(HullctlOnServer, CheckVerifiesAtOnceAndRecordsForLater) {
+TEST_F(HullctlQuestions, CheckVerifiesAtOnceAndRecordsForLater) {
   Put("cube", server::Cube());
   for (const char* pose : {"0.5,0,0", "1,0,0", "1,1,1", "3,0,0", "1,1,0,0,0,0,1"}) {
     const Ran ran = Ask({"check", "cube", "cube", "--pose-b", pose, "--verify"});
     EXPECT_EQ(ran.code, 0) << ran.err;
     EXPECT_THAT(ran.out, HasSubstr("verified     valid\n"));
-    const Ran recorded =
-        Ask({"check", "cube", "cube", "--pose-b", pose, "--certificate", "--output", "json"});
+    const Ran recorded = Ask({"check", "cube", "cube", "--pose-b", pose, "--record", "-"});
     const TempFile file("answer.json", recorded.out);
     EXPECT_EQ(Ask({"verify", file.path()}).code, 0) << recorded.out;
+    const TempFile beside("beside.json", "");
+    const Ran both =
+        AskJson({"check", "cube", "cube", "--pose-b", pose, "--record", beside.path()});
+    EXPECT_EQ(Ask({"verify", beside.path()}).code, 0);
+    const auto answers = MessagesIn<v1::CheckCollisionResponse>(both.out);
+    ASSERT_EQ(answers.size(), 1U);
+    EXPECT_TRUE(answers[0].has_certificate());
   }
-  const Ran json = Ask({"check", "cube", "cube", "--verify", "--output", "json"});
-  EXPECT_THAT(json.out, HasSubstr("\"verification\":{\"verdict\":\"VALID\""));
+  for (const char* wish : {"--verify", "--certificate"}) {
+    const Ran json = AskJson({"check", "cube", "cube", wish});
+    EXPECT_EQ(MessagesIn<v1::CheckCollisionResponse>(json.out).size(), 1U) << wish;
+  }
 }
 
 // Hulls of every dimension on a lattice, turned by quaternions whose squares are 1, 2, 3 and 5.
@@ -141,7 +133,7 @@ std::string LatticeScene(uint32_t seed, int placements) {
   return text.str();
 }
 
-TEST_F(HullctlOnServer, EveryCertificateOfABatchIsValid) {
+TEST_F(HullctlQuestions, EveryCertificateOfABatchIsValid) {
   Put("cube", server::Cube());
   Put("ball", server::Sphere(40));
   Put("square", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
@@ -151,24 +143,37 @@ TEST_F(HullctlOnServer, EveryCertificateOfABatchIsValid) {
   constexpr uint32_t kSeed = 11;
   const TempFile file("scene", LatticeScene(kSeed, 90));
   for (const char* method : {"--axis", "--textbook"}) {
-    const Ran ran = Ask({"batch", file.path(), "--verify", "--output", "json", method});
+    const Ran ran = Ask({"batch", file.path(), "--verify", method});
     ASSERT_EQ(ran.code, 0) << "seed " << kSeed << ": " << ran.err;
-    Struct json;
-    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok());
-    const auto& answers = json.fields().at("answers").list_value();
-    ASSERT_EQ(answers.values_size(), 90 * 89 / 2);
-    for (const auto& answer : answers.values()) {
-      const auto& verification = answer.struct_value().fields().at("verification");
-      EXPECT_EQ(verification.struct_value().fields().at("verdict").string_value(), "VALID");
+    std::istringstream lines(ran.out);
+    std::map<std::string, int> counts;
+    for (std::string line; std::getline(lines, line) && line[0] != '#';) {
+      EXPECT_THAT(line, testing::EndsWith("\tvalid"));
+      std::istringstream words(line);
+      std::string a, b, relation;
+      words >> a >> b >> relation;
+      ++counts[relation];
     }
-    const auto& summary = json.fields().at("summary").struct_value().fields();
-    for (const char* relation : {"separated", "touching", "overlapping"}) {
-      EXPECT_GT(std::stoi(summary.at(relation).string_value()), 40) << relation;
+    int total = 0;
+    for (const char* relation : {"SEPARATED", "TOUCHING", "OVERLAPPING"}) {
+      EXPECT_GT(counts[relation], 40) << relation;
+      total += counts[relation];
     }
+    EXPECT_EQ(total, 90 * 89 / 2);
+    // The same as messages of the contract.
+    const Ran json = AskJson({"batch", file.path(), "--verify", method});
+    ASSERT_EQ(json.code, 0) << json.err;
+    uint64_t next = 0;
+    for (const auto& part : MessagesIn<v1::BatchCheckCollisionsResponse>(json.out)) {
+      if (part.columns().relations_size() == 0) continue;
+      EXPECT_EQ(part.first_pair(), next);
+      next += static_cast<uint64_t>(part.columns().relations_size());
+    }
+    EXPECT_EQ(next, uint64_t{90 * 89 / 2});
   }
 }
 
-TEST_F(HullctlOnServer, CertificatesOfCachedAnswersAreValid) {
+TEST_F(HullctlQuestions, CertificatesOfCachedAnswersAreValid) {
   Put("cube", server::Cube(-0.5, 1));
   Put("ball", server::Sphere(80));
   ClientOptions options;
@@ -209,7 +214,7 @@ TEST_F(HullctlOnServer, CertificatesOfCachedAnswersAreValid) {
   EXPECT_TRUE(stream->Close().ok());
 }
 
-TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
+TEST_F(HullctlQuestions, SceneFindsWhatCollides) {
   Put("cube", server::Cube());
   const std::string placements =
       R"({"placements":[{"hullId":"cube"},{"hullId":"cube","pose":{"translation":{"x":1}}},
@@ -220,10 +225,10 @@ TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
   EXPECT_EQ(ran.out, "0:cube\t1:cube\tTOUCHING\n# touching 1 overlapping 0 failed 0\n");
   ran = Ask({"scene", file.path(), "--output", "json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  Struct json;
-  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(ran.out, &json).ok()) << ran.out;
-  EXPECT_EQ(json.fields().at("collisions").list_value().values_size(), 1);
-  EXPECT_TRUE(json.fields().at("complete").bool_value());
+  v1::FindCollisionsResponse all;
+  for (const auto& part : MessagesIn<v1::FindCollisionsResponse>(ran.out)) all.MergeFrom(part);
+  EXPECT_THAT(all.pairs(), testing::ElementsAre(0, 1));
+  EXPECT_EQ(all.totals().touching(), 1U);
   const TempFile clear("clear.json", placements + R"(,"wanted":{"clearance":0.25}})");
   ran = Ask({"scene", clear.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -247,10 +252,10 @@ TEST_F(HullctlOnServer, SceneFindsWhatCollides) {
   const TempFile lost("lost.json", R"({"placements":[{"hullId":"nope"}]})");
   ran = Ask({"scene", lost.path()});
   EXPECT_EQ(ran.code, 4);
-  EXPECT_THAT(ran.err, HasSubstr("placement 0: hull \"nope\" not found"));
+  EXPECT_THAT(ran.err, HasSubstr("placement 0:nope: hull \"nope\" not found"));
 }
 
-TEST_F(HullctlOnServer, StreamAnswersEachLineByALine) {
+TEST_F(HullctlQuestions, StreamAnswersEachLineByALine) {
   Put("cube", server::Cube());
   const TempFile file("poses.jsonl",
                       R"({"placements":[{"hullId":"cube"},{"hullId":"cube"}],"pairs":[0,1]})"
@@ -259,25 +264,50 @@ TEST_F(HullctlOnServer, StreamAnswersEachLineByALine) {
                       "\n"
                       R"({"placements":[1],"poses":[2,0,0,0,1.5,0,0],"refreshHulls":true})"
                       "\n");
-  const Ran ran = Ask({"stream", file.path()});
+  Ran ran = Ask({"stream", file.path()});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  std::istringstream lines(ran.out);
-  for (const char* relation : {"RELATION_OVERLAPPING", "RELATION_TOUCHING", "RELATION_SEPARATED"}) {
-    std::string line;
-    ASSERT_TRUE(std::getline(lines, line));
-    Struct json;
-    ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &json).ok()) << line;
-    const auto& answers = json.fields().at("answers").list_value();
-    ASSERT_EQ(answers.values_size(), 1);
-    const auto& answer = answers.values(0).struct_value().fields();
-    EXPECT_EQ(answer.at("pair").number_value(), 0);
-    EXPECT_EQ(answer.at("relation").string_value(), relation);
+  EXPECT_EQ(ran.out,
+            "0\t0:cube\t1:cube\tOVERLAPPING\n1\t0:cube\t1:cube\tTOUCHING\n"
+            "2\t0:cube\t1:cube\tSEPARATED\n");
+  ran = AskJson({"stream", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  const auto answers = MessagesIn<v1::StreamCollisionsResponse>(ran.out);
+  ASSERT_EQ(answers.size(), 3U);
+  for (size_t i = 0; i < answers.size(); ++i) {
+    EXPECT_EQ(answers[i].update(), i);
+    EXPECT_TRUE(answers[i].last());
+    EXPECT_THAT(answers[i].pairs(), testing::ElementsAre(0));
   }
-  std::string rest;
-  EXPECT_FALSE(std::getline(lines, rest));
+  EXPECT_EQ(answers[2].columns().relations(0), v1::RELATION_SEPARATED);
 }
 
-TEST_F(HullctlOnServer, StreamErrorsNameTheLineOrTheField) {
+TEST_F(HullctlQuestions, EachCommandTakesEachFormatOfAScene) {
+  Put("cube", server::Cube());
+  const TempFile text("text", "place a cube\nplace b cube 1 0 0\nplace c cube 1.5 0 0\n");
+  const TempFile json("json", R"({"placements":[{"hullId":"cube"},
+      {"hullId":"cube","pose":{"translation":{"x":1}}},
+      {"hullId":"cube","pose":{"translation":{"x":1.5}}}]})");
+  const TempFile packed("packed", R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0,0],
+      "poses":[1,0,0,0,0,0,0, 1,0,0,0,1,0,0, 1,0,0,0,1.5,0,0]}})");
+  for (const TempFile* file : {&text, &json, &packed}) {
+    Ran ran = Ask({"batch", file->path(), "--verify"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("# separated 1 touching 1 overlapping 1 failed 0\n"));
+    EXPECT_EQ(AskJson({"batch", file->path(), "--verify"}).code, 0);
+    ran = Ask({"scene", file->path()});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("# touching 1 overlapping 1 failed 0\n"));
+    ran = Ask({"stream", file->path(), "--output", "name"});
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    EXPECT_EQ(std::count(ran.out.begin(), ran.out.end(), '\n'), 3);
+  }
+  const TempFile pairs("pairs", "place a cube\nplace b cube\npair a b\n");
+  const Ran ran = Ask({"scene", pairs.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("it names pairs, but 'scene' finds them itself"));
+}
+
+TEST_F(HullctlQuestions, StreamErrorsNameTheLineOrTheField) {
   Put("cube", server::Cube());
   const std::string open = R"({"placements":[{"hullId":"cube"},{"hullId":"nope"}],"pairs":[0,1]})"
                            "\n";
@@ -285,7 +315,7 @@ TEST_F(HullctlOnServer, StreamErrorsNameTheLineOrTheField) {
   Ran ran = Ask({"stream", typo.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, AllOf(HasSubstr(":2: "), HasSubstr("placement")));
-  EXPECT_THAT(ran.out, HasSubstr("hull \\\"nope\\\" not found"));
+  EXPECT_THAT(ran.out, HasSubstr("FAILED\thull \"nope\" not found\n"));
   const TempFile range("range.jsonl", open + R"({"placements":[7],"poses":[1,0,0,0,1,0,0]})");
   ran = Ask({"stream", range.path()});
   EXPECT_EQ(ran.code, 1);
@@ -293,10 +323,10 @@ TEST_F(HullctlOnServer, StreamErrorsNameTheLineOrTheField) {
   const TempFile empty("empty.jsonl", "\n");
   ran = Ask({"stream", empty.path()});
   EXPECT_EQ(ran.code, 2);
-  EXPECT_THAT(ran.err, HasSubstr("the first line must say"));
+  EXPECT_THAT(ran.err, HasSubstr("there is no scene in it"));
 }
 
-TEST_F(HullctlOnServer, WishesThatExcludeEachOtherAreExplained) {
+TEST_F(HullctlQuestions, WishesThatExcludeEachOtherAreExplained) {
   Put("cube", server::Cube());
   Ran ran = Ask({"check", "cube", "cube", "--tolerance", "0.1", "--separation"});
   EXPECT_EQ(ran.code, 1);
@@ -310,7 +340,7 @@ TEST_F(HullctlOnServer, WishesThatExcludeEachOtherAreExplained) {
   }
 }
 
-TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
+TEST_F(HullctlQuestions, LoadReportsEveryModeAndLeavesNoHullBehind) {
   Put("cube", server::Cube());
   for (const char* mode : {"check", "batch", "append", "mixed"}) {
     const Ran ran = Ask({"bench", "load", "--mode", mode, "--clients", "2", "--requests", "30",
@@ -324,7 +354,7 @@ TEST_F(HullctlOnServer, LoadReportsEveryModeAndLeavesNoHullBehind) {
   EXPECT_EQ(Ask({"list"}).out, Ask({"list", "cube"}).out);
 }
 
-TEST_F(HullctlOnServer, LoadCountsItemsInJson) {
+TEST_F(HullctlQuestions, LoadCountsItemsInJson) {
   const Ran ran = Ask({"bench", "load", "--mode", "batch", "--requests", "5", "--pairs", "70",
                        "--rate", "1000", "--json"});
   EXPECT_EQ(ran.code, 0) << ran.err;
@@ -348,7 +378,7 @@ TEST_F(HullctlOnServer, LoadCountsItemsInJson) {
   EXPECT_EQ(counted, 5);
 }
 
-TEST_F(HullctlOnServer, LoadRefusesAPrefixThatIsInUse) {
+TEST_F(HullctlQuestions, LoadRefusesAPrefixThatIsInUse) {
   Put("mine/cube", server::Cube());
   const Ran ran = Ask({"bench", "load", "--requests", "1", "--prefix", "mine"});
   EXPECT_EQ(ran.code, 1);
@@ -356,7 +386,7 @@ TEST_F(HullctlOnServer, LoadRefusesAPrefixThatIsInUse) {
   EXPECT_EQ(Get("mine/cube").hull().vertex_count(), 8U);
 }
 
-TEST_F(HullctlOnServer, LoadShowsErrorsByCode) {
+TEST_F(HullctlQuestions, LoadShowsErrorsByCode) {
   const Ran ran = Ask({"bench", "load", "--mode", "append", "--requests", "2", "--timeout", "5s",
                        "--prefix", "a b"});
   EXPECT_EQ(ran.code, 1);
@@ -365,7 +395,7 @@ TEST_F(HullctlOnServer, LoadShowsErrorsByCode) {
 }
 
 // The signal comes once hulls of the load are there; the load itself would last for minutes.
-TEST_F(HullctlOnServer, AnInterruptedLoadReportsAndDeletesItsHulls) {
+TEST_F(HullctlQuestions, AnInterruptedLoadReportsAndDeletesItsHulls) {
   std::thread interrupter([this] {
     v1::ListHullsRequest request;
     request.set_prefix("short/append-");
@@ -388,7 +418,7 @@ TEST_F(HullctlOnServer, AnInterruptedLoadReportsAndDeletesItsHulls) {
   EXPECT_EQ(left.hulls_size(), 0);
 }
 
-TEST_F(HullctlOnServer, LoadOptionsThatMakeNoSenseAreExplained) {
+TEST_F(HullctlQuestions, LoadOptionsThatMakeNoSenseAreExplained) {
   Ran ran = Ask({"bench", "load", "--rate", "0"});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("--rate: \"0\" is not a number of requests a second"));

@@ -1,6 +1,4 @@
 // hullctl's commands, run within the test against a fake server.
-#include "client/hullctl/hullctl.h"
-
 #include <gmock/gmock.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
@@ -9,9 +7,9 @@
 #include <sstream>
 
 #include "client/hullctl/printing/json.h"
-#include "client/hullctl/printing/progress_bar.h"
 #include "tests/client/fake_hulld.h"
 #include "tests/client/formats/point_reading.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
 #include "tests/client/hullctl/xml_check.h"
 
 namespace hulld {
@@ -22,22 +20,6 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
-
-struct Ran {
-  int code = -1;
-  std::string out;
-  std::string err;
-};
-
-Ran RunTool(const std::vector<std::string>& arguments) {
-  std::ostringstream out;
-  std::ostringstream err;
-  Ran ran;
-  ran.code = RunHullctl(arguments, out, err);
-  ran.out = out.str();
-  ran.err = err.str();
-  return ran;
-}
 
 // The output as JSON; an empty object, and a failure, when it is none.
 Struct Json(const Ran& ran) {
@@ -133,22 +115,71 @@ TEST_F(HullctlTest, MistakesOnTheCommandLineExitWithTwo) {
   }
 }
 
-TEST_F(HullctlTest, AnUnknownCommandIsNamedWithTheNearestOne) {
+TEST_F(HullctlTest, AMistypedWordIsNamedWithTheNearestOne) {
   const auto error = [](const std::vector<std::string>& arguments) {
     const Ran ran = RunTool(arguments);
     EXPECT_EQ(ran.code, 2);
     EXPECT_EQ(ran.out, "");
     return ran.err.substr(0, ran.err.find('\n'));
   };
-  EXPECT_EQ(error({"chek", "a", "b"}), "Unknown command \"chek\". Did you mean \"check\"?");
-  EXPECT_EQ(error({"chekc", "a", "b"}), "Unknown command \"chekc\". Did you mean \"check\"?");
+  EXPECT_EQ(error({"chek", "a", "b"}),
+            "hullctl: 'hullctl' has no command \"chek\"; did you mean \"check\"?");
+  EXPECT_EQ(error({"chekc", "a", "b"}),
+            "hullctl: 'hullctl' has no command \"chekc\"; did you mean \"check\"?");
   EXPECT_EQ(error({"--output", "json", "del", "a", "--verify"}),
-            "Unknown command \"del\". Did you mean \"delete\"?");
-  EXPECT_EQ(error({"backup", "sav", "f"}), "Unknown command \"sav\". Did you mean \"save\"?");
-  EXPECT_EQ(error({"fly"}), "Unknown command \"fly\".");
-  EXPECT_EQ(error({}), "A subcommand is required");
-  EXPECT_EQ(error({"backup"}), "A subcommand is required");
-  EXPECT_EQ(error({"check", "a"}), "B is required");
+            "hullctl: 'hullctl' has no command \"del\"; did you mean \"delete\"?");
+  EXPECT_EQ(error({"del", "a"}),
+            "hullctl: 'hullctl' has no command \"del\"; did you mean \"delete\"?");
+  EXPECT_EQ(error({"help", "del"}),
+            "hullctl: 'hullctl' has no command \"del\"; did you mean \"delete\"?");
+  EXPECT_EQ(error({"backup", "sav", "f"}),
+            "hullctl: 'hullctl backup' has no command \"sav\"; did you mean \"save\"?");
+  EXPECT_EQ(error({"backup", "x"}),
+            "hullctl: 'hullctl backup' has no command \"x\"; there are save, restore");
+  EXPECT_EQ(error({"fly"}), "hullctl: 'hullctl' has no command \"fly\"");
+  EXPECT_EQ(error({}), "hullctl: which command? hullctl COMMAND [OPTIONS]");
+  EXPECT_EQ(error({"backup"}), "hullctl: which command? hullctl backup COMMAND [OPTIONS]");
+  EXPECT_EQ(error({"check", "a"}), "hullctl: B is required; usage: hullctl check A B [OPTIONS]");
+  EXPECT_EQ(error({"create", "a", "b"}),
+            "hullctl: unexpected argument \"b\"; usage: hullctl create ID [OPTIONS]");
+  EXPECT_EQ(error({"check", "a", "b", "--verfy"}),
+            "hullctl: 'hullctl check' has no option \"--verfy\"; did you mean \"--verify\"?");
+  EXPECT_EQ(error({"list", "--servr=x:1"}),
+            "hullctl: 'hullctl list' has no option \"--servr\"; did you mean \"--server\"?");
+  EXPECT_EQ(error({"list", "--output", "jsn"}),
+            "hullctl: --output: \"jsn\" is none of table, wide, name, json; did you mean "
+            "\"json\"?");
+  EXPECT_EQ(error({"list", "--limit"}), "hullctl: --limit needs a value: --limit N");
+}
+
+TEST_F(HullctlTest, HelpGroupsCommandsByTaskAndEachHasExamples) {
+  const std::string help = RunTool({"--help"}).out;
+  size_t at = 0;
+  for (const char* word : {"\nBuild hulls:\n", "\n  append ", "\nLook at hulls:\n", "\n  list ",
+                           "\nAsk what collides:\n", "\n  check ", "\nRun a server:\n",
+                           "\n  status ", "\nWork with hullctl:\n", "\n  context ",
+                           "\nOptions of every command:\n", "\nExit codes:\n", "\nExamples:\n"}) {
+    const size_t found = help.find(word, at);
+    ASSERT_NE(found, std::string::npos) << word;
+    at = found;
+  }
+  EXPECT_THAT(help, testing::Not(HasSubstr("__")));
+  for (const char* command :
+       {"create",      "append",         "replace",    "delete",      "list",       "get",
+        "mesh",        "picture",        "check",      "batch",       "scene",      "stream",
+        "verify",      "status",         "bench load", "generate",    "completion", "shell",
+        "backup save", "backup restore", "token new",  "context add", "context use"}) {
+    std::vector<std::string> words = {"help"};
+    std::istringstream names(command);
+    for (std::string word; names >> word;) words.push_back(word);
+    const std::string text = RunTool(words).out;
+    EXPECT_THAT(text, HasSubstr(std::string("Usage: hullctl ") + command)) << command;
+    EXPECT_THAT(text, HasSubstr("\nExamples:\n")) << command;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      EXPECT_LE(line.size(), 100U) << command << ": " << line;
+    }
+  }
 }
 
 TEST_F(HullctlTest, HelpAndVersionExitWithZero) {
@@ -290,20 +321,19 @@ TEST_F(HullctlTest, BatchPrintsEachPairAndExitsWithFourWhenSomeFail) {
   EXPECT_THAT(some.err, HasSubstr("2 of 3 pairs have no answer"));
   const Ran json = AskJson({"batch", mixed.path(), "--axis", "--report"});
   EXPECT_EQ(json.code, 4);
-  const auto answers = Json(json).fields().at("answers").list_value();
-  ASSERT_EQ(answers.values_size(), 3);
-  const auto& failed = answers.values(1).struct_value().fields();
-  EXPECT_EQ(failed.at("relation").string_value(), "RELATION_UNSPECIFIED");
-  EXPECT_EQ(failed.at("problem").struct_value().fields().at("code").number_value(), 5);
-  EXPECT_EQ(answers.values(0)
-                .struct_value()
-                .fields()
-                .at("axis")
-                .struct_value()
-                .fields()
-                .at("kind")
-                .string_value(),
-            "AXIS_KIND_EDGE_EDGE");
+  v1::BatchCheckCollisionsResponse all;
+  for (const auto& part : MessagesIn<v1::BatchCheckCollisionsResponse>(json.out)) {
+    all.MergeFrom(part);
+  }
+  ASSERT_EQ(all.columns().relations_size(), 3);
+  EXPECT_EQ(all.columns().relations(1), v1::RELATION_UNSPECIFIED);
+  ASSERT_EQ(all.placement_problems_size(), 1);
+  EXPECT_EQ(all.placement_problems(0).placement(), 2u);
+  EXPECT_EQ(all.placement_problems(0).code(), grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(all.columns().axes(0).kind(), v1::AXIS_KIND_EDGE_EDGE);
+  const Ran unclear = AskJson({"batch", mixed.path(), "--colliding"});
+  EXPECT_EQ(unclear.code, 2);
+  EXPECT_THAT(unclear.err, HasSubstr("'hullctl scene' finds those"));
 }
 
 TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
@@ -319,6 +349,16 @@ TEST_F(HullctlTest, BigBatchesAreSplitAndEachCallHoldsWhatItNeeds) {
   ASSERT_EQ(requests.size(), 2u);
   EXPECT_EQ(requests[0].pairs_size() + requests[1].pairs_size(), 2 * 125250);
   EXPECT_LT(requests[1].placements_size(), 501);
+  // The contract's messages name placements by their place in the file and count pairs on.
+  uint64_t next = 0;
+  for (const auto& part :
+       MessagesIn<v1::BatchCheckCollisionsResponse>(AskJson({"batch", file.path()}).out)) {
+    if (part.columns().relations_size() == 0) continue;
+    EXPECT_EQ(part.first_pair(), next);
+    next += static_cast<uint64_t>(part.columns().relations_size());
+  }
+  EXPECT_EQ(next, 125250U);
+  EXPECT_EQ(fake_.batch_requests().back().placements_size(), 501);
 }
 
 TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
@@ -344,16 +384,17 @@ TEST_F(HullctlTest, ABatchThatContradictsItselfIsRefused) {
 
 TEST_F(HullctlTest, EveryJsonOutputIsValid) {
   const TempFile points("a.xyz", "1 2 3\n");
-  EXPECT_EQ(Json(AskJson({"append", "a", "--create", points.path()}))
-                .fields()
-                .at("pointsSent")
-                .string_value(),
-            "1");
+  const auto appended =
+      MessagesIn<v1::AppendPointsResponse>(AskJson({"append", "a", "--create", points.path()}).out);
+  ASSERT_EQ(appended.size(), 2u);
+  EXPECT_EQ(appended[0].opened().hull().hull_id(), "a");
+  EXPECT_EQ(appended[1].ack().sequence(), 1u);
+  EXPECT_EQ(appended[1].ack().counts().received(), 1u);
   Json(AskJson({"create", "b"}));
   Json(AskJson({"get", "a", "--audit"}));
   EXPECT_EQ(Json(AskJson({"list"})).fields().at("hulls").list_value().values_size(), 2);
   Json(AskJson({"check", "a", "b", "--axis", "--report"}));
-  EXPECT_EQ(Json(AskJson({"status"})).fields().at("health").string_value(), "SERVING");
+  EXPECT_EQ(MessagesIn<v1::GetStatusResponse>(AskJson({"status"}).out).size(), 1u);
   Json(AskJson({"delete", "b"}));
   EXPECT_EQ(QuoteJson("a\"b\\c\n\x01"), "\"a\\\"b\\\\c\\u000a\\u0001\"");
 }
@@ -480,15 +521,37 @@ TEST_F(HullctlTest, GenerateWritesTheSamePointsEachTime) {
             "-1 0 0\n-0.9 0 0\n-1 0.1 0\n");
 }
 
-TEST(ProgressBar, ShowsShareAndPoints) {
-  EXPECT_EQ(ProgressText(50, 100, 1200), "[###############---------------]  50 %  1200 points");
-  EXPECT_EQ(ProgressText(5, 0, 7), "7 points");
-  EXPECT_THAT(ProgressText(200, 100, 1), HasSubstr("100 %"));
-  std::ostringstream out;
-  ProgressBar hidden(out, false, 10);
-  hidden.Update(5, 1);
-  hidden.Clear();
-  EXPECT_EQ(out.str(), "");
+TEST_F(HullctlTest, NamesStandAloneOnALine) {
+  const TempFile points("a.xyz", "1 2 3\n");
+  const auto names = [this](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--output", "name", "--color", "always"});
+    return Ask(arguments).out;
+  };
+  EXPECT_EQ(names({"create", "b"}), "b\n");
+  EXPECT_EQ(names({"append", "a", "--create", points.path()}), "a\n");
+  EXPECT_EQ(names({"get", "a"}), "a\n");
+  EXPECT_EQ(names({"list"}), "a\nb\n");
+  EXPECT_EQ(names({"list", "--count"}), "2\n");
+  EXPECT_EQ(names({"status"}), "SERVING\n");
+  fake_.collision_answer.set_relation(v1::RELATION_TOUCHING);
+  EXPECT_EQ(names({"check", "a", "b"}), "TOUCHING\n");
+  const TempFile scene("scene", "place x a\nplace y nope\nplace z b\n");
+  EXPECT_EQ(names({"batch", scene.path()}), "x\ty\tFAILED\nx\tz\tTOUCHING\ny\tz\tFAILED\n");
+  EXPECT_EQ(names({"delete", "b"}), "b\n");
+}
+
+TEST_F(HullctlTest, ColoursAreForTerminalsUnlessAskedFor) {
+  fake_.collision_answer.set_relation(v1::RELATION_OVERLAPPING);
+  constexpr char kPainted[] = "\x1b[31mOVERLAPPING\x1b[0m";
+  EXPECT_THAT(Ask({"check", "a", "b"}).out, testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(Ask({"check", "a", "b", "--color", "never"}).out, testing::Not(HasSubstr("\x1b")));
+  EXPECT_THAT(Ask({"check", "a", "b", "--color", "always"}).out, HasSubstr(kPainted));
+  EXPECT_THAT(AskJson({"check", "a", "b", "--color", "always"}).out,
+              testing::Not(HasSubstr("\x1b")));
+  // A column is as wide as what is seen.
+  fake_.PutHull("long-name", {});
+  const Ran list = Ask({"list", "--color", "always"});
+  EXPECT_THAT(list.out, HasSubstr("\x1b[1mHULL\x1b[0m       \x1b[1mDIMENSION"));
 }
 
 }  // namespace

@@ -13,8 +13,8 @@
 #include "client/formats/byte_source.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
-#include "client/hullctl/command_line/batch_file.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/scene/scene_file.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld::fuzz {
@@ -144,17 +144,23 @@ FileVerdict CheckMesh(absl::Status (*reader)(ByteSource*, TriangleMesh*),
   return {"", true};
 }
 
-FileVerdict CheckBatchFile(std::string_view content) {
+FileVerdict CheckScene(std::string_view content) {
   ByteSource source(OpenInMemory(content), kName);
-  const absl::StatusOr<BatchScene> scene = ReadBatchFile(&source);
+  const absl::StatusOr<Scene> scene = ReadScene(&source);
   if (!scene.ok()) return {CheckRefusal(scene.status()), false};
-  if (scene->names.size() != scene->placements.size()) return {"names without placement", false};
-  for (const auto& [a, b] : scene->pairs) {
-    if (a >= scene->placements.size() || b >= scene->placements.size()) {
-      return {"a pair without a placement", false};
-    }
+  const uint32_t size = scene->size();
+  if (!scene->names.empty() && scene->names.size() != size)
+    return {"names without placement", false};
+  for (uint32_t i = 0; i < size; ++i) {
+    if (scene->HullOf(i) == nullptr) return {"a placement without a hull", false};
+    if (scene->PlacementOf(i).hull_id() != *scene->HullOf(i)) return {"another hull", false};
   }
-  return {"", true};
+  const absl::StatusOr<std::vector<uint32_t>> pairs = PairsOf(*scene, kName);
+  if (!pairs.ok()) return {CheckRefusal(pairs.status()), false};
+  for (const uint32_t index : *pairs) {
+    if (index >= size) return {"a pair without a placement", false};
+  }
+  return {pairs->size() % 2 == 0 ? "" : "half a pair", true};
 }
 
 // What reads back must be the same bits, NaN included.
@@ -182,7 +188,7 @@ FileVerdict CheckAnswer(std::string_view content) {
   v1::CheckCollisionRequest request;
   v1::CheckCollisionResponse response;
   absl::Status status = ParseMember(json, "request", &request);
-  if (status.ok()) status = ParseJson(json, UnknownFields::kIgnore, &response);
+  if (status.ok()) status = ParseMember(json, "response", &response);
   if (!status.ok()) {
     const bool explained = absl::IsInvalidArgument(status) && !status.message().empty();
     return {explained ? "" : "an answer refused without a word: " + status.ToString(), false};
@@ -204,7 +210,7 @@ FileVerdict CheckFile(FileKind kind, std::string_view content) {
     case FileKind::kOffMesh:
       return CheckMesh(ReadOffMesh, content);
     case FileKind::kBatch:
-      return CheckBatchFile(content);
+      return CheckScene(content);
     case FileKind::kAnswerJson:
       return CheckAnswer(content);
     case FileKind::kStreamJson: {
@@ -251,14 +257,21 @@ std::vector<SeedFile> SeedFiles() {
        "# c\nplace a arm\nplace b box 1 2 3\nplace c box 1 0 0 0 1 2 3\n"
        "pair a b\npair b c # d\n"},
       {FileKind::kBatch, "place a arm\nplace b arm 1 0 0\nall\n"},
+      {FileKind::kBatch, R"({"placements":[{"hullId":"a"},{"hullId":"b"}],)"
+                         "\n"
+                         R"("pairs":[0,1],"method":1})"},
+      {FileKind::kBatch,
+       R"({"packedPlacements":{"hullIds":["a"],"hulls":[0,0],"poses":[1,0,0,0,0,0,0,)"
+       R"(1,0,0,0,2,0,0]},"groups":[1,2],"ignoredGroupPairs":[2,2],"movers":1})"},
       {FileKind::kSceneJson,
        R"({"placements":[{"hullId":"a"},{"hullId":"b","pose":{"translation":{"x":2}}},)"
        R"({"hullId":"b","pose":{"rotation":{"w":1,"z":"NaN"}}}],"groups":[0,1,1],)"
        R"("ignoreSameGroup":true,"movers":1,"wanted":{"clearance":0.1}})"},
       {FileKind::kAnswerJson,
-       R"({"request":{"a":{"hullId":"a"},"b":{"hullId":"b"}},"header":{"storeId":"s",)"
-       R"("revision":"4"},"relation":"RELATION_TOUCHING","rung":4,"certificate":{"direction":)"
-       R"({"x":1},"pairs":[{"indexA":4,"vertexA":{"x":1e308}}]},"withinClearance":false})"},
+       R"({"request":{"a":{"hullId":"a"},"b":{"hullId":"b"}},"response":{"header":)"
+       R"({"storeId":"s","revision":"4"},"relation":"RELATION_TOUCHING","rung":4,"certificate":)"
+       R"({"direction":{"x":1},"pairs":[{"indexA":4,"vertexA":{"x":1e308}}]},)"
+       R"("withinClearance":false}})"},
       {FileKind::kStreamJson,
        R"({"placements":[{"hullId":"a"},{"hullId":"b"}],"pairs":[0,1],"onlyChanges":true})"},
   };

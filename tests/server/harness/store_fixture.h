@@ -14,19 +14,21 @@
 
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
+#include "server/store/memory_store.h"
 #include "server/store/rocksdb_store.h"
 
 namespace hulld::server {
 
-// A registry over a durable store.
-class DurableRegistry {
+// A registry over a store.
+template <typename StoreType>
+class TestRegistry {
  public:
-  explicit DurableRegistry(std::unique_ptr<RocksDbStore> store, const Limits& limits = {})
+  explicit TestRegistry(std::unique_ptr<StoreType> store, const Limits& limits = {})
       : store_(std::move(store)), registry_(*store_, limits, writers_) {
     loaded_ = registry_.Load();
   }
 
-  RocksDbStore& store() { return *store_; }
+  StoreType& store() { return *store_; }
   Registry& registry() { return registry_; }
   const absl::Status& loaded() const { return loaded_; }
 
@@ -82,11 +84,14 @@ class DurableRegistry {
   }
 
  private:
-  std::unique_ptr<RocksDbStore> store_;
+  std::unique_ptr<StoreType> store_;
   WorkerPool writers_{2};
   Registry registry_;
   absl::Status loaded_;
 };
+
+using DurableRegistry = TestRegistry<RocksDbStore>;
+using MemoryRegistry = TestRegistry<MemoryStore>;
 
 // Gives each test a directory of its own, and opens stores in it.
 class StoreTest : public ::testing::Test {

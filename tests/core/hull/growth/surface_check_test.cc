@@ -18,7 +18,7 @@ namespace hulld {
 class SurfaceTestPeer {
  public:
   static SurfaceTriangle& Triangle(Surface& surface, TriangleId id) {
-    return surface.triangles_[id];
+    return surface.triangles_.Mutable(id);
   }
   static void CountOneMore(Surface& surface) { ++surface.alive_; }
 };

@@ -1,0 +1,102 @@
+#include "client/hullctl/command_line/connection.h"
+
+#include <absl/status/statusor.h>
+#include <absl/strings/str_cat.h>
+
+#include <cstdlib>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/context/context_file.h"
+
+namespace hulld {
+namespace {
+
+constexpr char kContextVariable[] = "HULLCTL_CONTEXT";
+
+// The context that holds where no option says which: its name, and what told it.
+struct NamedContext {
+  std::string name;
+  std::string told_by;
+};
+
+NamedContext ContextInForce(const Invocation& invocation, const ContextFile& file) {
+  if (!invocation.context.empty()) return {invocation.context, "--context"};
+  const char* const variable = std::getenv(kContextVariable);
+  if (variable != nullptr && *variable != '\0') return {variable, "$HULLCTL_CONTEXT"};
+  return {file.current, ContextFilePath()};
+}
+
+absl::StatusOr<std::vector<SettingsLayer>> LayersOf(const Invocation& invocation) {
+  auto environment = SettingsOfEnvironment();
+  if (!environment.ok()) return environment.status();
+  auto file = ReadContextFile();
+  if (!file.ok()) return file.status();
+  std::vector<SettingsLayer> layers = {{"", invocation.flags, false},
+                                       {"environment", *std::move(environment), false}};
+  const NamedContext named = ContextInForce(invocation, *file);
+  if (named.name.empty()) return layers;
+  auto context = FindContext(*file, named.name);
+  if (!context.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(named.told_by, ": ", context.status().message()));
+  }
+  const bool by_option = !invocation.context.empty();
+  const auto server = invocation.flags.find("server");
+  if (by_option && server != invocation.flags.end() && server->second != context->at("server")) {
+    return absl::InvalidArgumentError(absl::StrCat("--server ", server->second, " and --context ",
+                                                   named.name, ", which is ", context->at("server"),
+                                                   ", contradict each other; give one of them"));
+  }
+  SettingsLayer layer{"context " + named.name, *std::move(context), !by_option};
+  if (by_option) layers[1].only_for_its_server = true;
+  layers.insert(layers.begin() + (by_option ? 1 : 2), std::move(layer));
+  return layers;
+}
+
+}  // namespace
+
+void AddConnectionOptions(Command command, Invocation* invocation) {
+  ConnectionSettings* const flags = &invocation->flags;
+  command.AddText("--context", &invocation->context, "The server of that name: see 'context'")
+      .ValueName("NAME")
+      .Completes(ValueKind::kContext)
+      .Variable(kContextVariable);
+  for (const ConnectionSetting& setting : kConnectionSettings) {
+    const std::string name = setting.name;
+    const std::string option = name == "server" ? "-s,--server" : "--" + name;
+    const char* const variable = setting.variable == nullptr ? "" : setting.variable;
+    if (setting.kind == SettingKind::kFlag) {
+      command
+          .AddFlag(
+              option, [=] { (*flags)[name] = "true"; }, setting.help)
+          .Variable(variable);
+      continue;
+    }
+    const auto take = [=](const std::string& text) {
+      (*flags)[name] = text;
+      return name == "server" ? ValidateServer(text) : absl::OkStatus();
+    };
+    command.AddParsed(option, take, setting.help).ValueName(setting.value_name).Variable(variable);
+  }
+}
+
+absl::Status ResolveConnection(Invocation* invocation) {
+  auto layers = LayersOf(*invocation);
+  if (!layers.ok()) return layers.status();
+  invocation->connection = Combine(*layers);
+  const ChosenSetting& server = invocation->connection.at("server");
+  if (const absl::Status valid = ValidateServer(server.value); !valid.ok()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("server of ", server.source, ": ", valid.message()));
+  }
+  invocation->server = server.value;
+  auto security = ReadSecurity(invocation->connection);
+  if (!security.ok()) return security.status();
+  invocation->security = *std::move(security);
+  return ValidateSecurity(invocation->security, invocation->server);
+}
+
+}  // namespace hulld

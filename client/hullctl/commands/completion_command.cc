@@ -1,0 +1,87 @@
+// completion, and the hidden command that writes man pages: what shells and manuals are told.
+#include <absl/strings/str_cat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include "client/hullctl/command_line/output_file.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/completion/completion_script.h"
+#include "client/hullctl/help/man_page.h"
+
+namespace hulld {
+namespace {
+
+ExitCode PrintScript(const Invocation& run, const std::string& shell) {
+  run.out << CompletionScript(shell);
+  return ExitCode::kDone;
+}
+
+// What the program's page says beyond its help.
+std::vector<ManSection> ProgramSections() {
+  std::string variables;
+  for (const ConnectionSetting& setting : kConnectionSettings) {
+    if (setting.variable == nullptr) continue;
+    absl::StrAppend(&variables, "  ", setting.variable,
+                    std::string(22 - std::string(setting.variable).size(), ' '), "as --",
+                    setting.name, "\n");
+  }
+  absl::StrAppend(&variables,
+                  "  HULLCTL_CONTEXT       as --context\n"
+                  "  HULLD_TOKEN           the token itself\n"
+                  "  NO_COLOR              no colours, unless --color says so");
+  return {{"environment", variables},
+          {"files",
+           "  $XDG_CONFIG_HOME/hullctl/contexts.json   contexts: see hullctl-context(1)\n"
+           "  $XDG_STATE_HOME/hullctl/history          what was typed in hullctl-shell(1)"}};
+}
+
+ExitCode WriteManPages(const Invocation& run, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  const CommandDescription& program = *run.program;
+  const auto write = [&](const CommandDescription& command,
+                         const std::vector<ManSection>& sections) {
+    return WriteOutput(
+        absl::StrCat(folder, "/", ManPageName(command)), run.out,
+        [&](std::ostream& out) { out << ManPage(program, command, HULLD_VERSION, sections); });
+  };
+  absl::Status written = write(program, ProgramSections());
+  for (const auto& command : program.commands) {
+    if (written.ok() && !command->hidden) written = write(*command, {});
+  }
+  return written.ok() ? ExitCode::kDone : run.FailUsage(written);
+}
+
+}  // namespace
+
+void AddCompletionCommand(Command program, Invocation* invocation) {
+  auto shell = std::make_shared<std::string>();
+  Command command = program.AddCommand("completion", "Print what makes a shell complete hullctl");
+  command.AddText("SHELL", shell.get(), "The shell").Required().OneOf({"bash", "zsh", "fish"});
+  command.SetDetails(
+      "It completes commands, options, values, names of contexts, and IDs of hulls, which it asks\n"
+      "the server for: for half a second at most, and silently when there is no answer.");
+  command.SetExamples({{"In ~/.bashrc", "source <(hullctl completion bash)"},
+                       {"In ~/.zshrc, behind compinit", "source <(hullctl completion zsh)"},
+                       {"In ~/.config/fish/config.fish", "hullctl completion fish | source"}});
+  command.OnGiven([=] {
+    invocation->needs_server = false;
+    invocation->action = [=] { return PrintScript(*invocation, *shell); };
+  });
+}
+
+void AddManCommand(Command program, Invocation* invocation) {
+  auto folder = std::make_shared<std::string>();
+  Command command = program.AddCommand("__man", "Write the manual pages");
+  command.AddText("FOLDER", folder.get(), "Where to").Required();
+  command.Hide();
+  command.OnGiven([=] {
+    invocation->needs_server = false;
+    invocation->action = [=] { return WriteManPages(*invocation, *folder); };
+  });
+}
+
+}  // namespace hulld

@@ -1,0 +1,220 @@
+#include <absl/strings/str_cat.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/connection.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/context/context_file.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+struct ContextArguments {
+  std::string name;
+  bool replace = false;
+  bool none = false;
+};
+
+// What the options say, with paths that hold wherever hullctl runs.
+ConnectionSettings Lasting(const ConnectionSettings& flags) {
+  ConnectionSettings settings = flags;
+  for (const ConnectionSetting& setting : kConnectionSettings) {
+    const auto found = settings.find(setting.name);
+    if (setting.kind != SettingKind::kFile || found == settings.end()) continue;
+    found->second = std::filesystem::absolute(found->second).lexically_normal().string();
+  }
+  return settings;
+}
+
+std::string MemberJson(const std::string& text, SettingKind kind) {
+  return kind == SettingKind::kFlag ? text : QuoteJson(text);
+}
+
+std::string ContextJson(const std::string& name, const ConnectionSettings& settings, bool current) {
+  JsonObject object;
+  object.Add("name", name).AddJson("current", current ? "true" : "false");
+  for (const ConnectionSetting& setting : kConnectionSettings) {
+    const auto found = settings.find(setting.name);
+    if (found != settings.end()) {
+      object.AddJson(setting.name, MemberJson(found->second, setting.kind));
+    }
+  }
+  return object.Close();
+}
+
+ExitCode Add(const Invocation& run, const ContextArguments& arguments) {
+  const auto usage = [&run](const std::string& what) {
+    return run.FailUsage(absl::InvalidArgumentError(what));
+  };
+  if (const std::string problem = ContextNameProblem(arguments.name); !problem.empty()) {
+    return usage(absl::StrCat(Quoted(arguments.name), ": ", problem));
+  }
+  if (!run.flags.contains("server")) return usage("say where its server is: --server HOST:PORT");
+  auto file = ReadContextFile();
+  if (!file.ok()) return run.FailUsage(file.status());
+  if (file->contexts.contains(arguments.name) && !arguments.replace) {
+    return usage(absl::StrCat("there is a context ", arguments.name,
+                              " already; say --replace if this one is to take its place"));
+  }
+  const ConnectionSettings settings = Lasting(run.flags);
+  // A file that is not there, or a token that all can read, is found now.
+  const auto security = ReadSecurity(Combine({{"", settings, false}}));
+  if (!security.ok()) return run.FailUsage(security.status());
+  const absl::Status valid = ValidateSecurity(*security, settings.at("server"));
+  if (!valid.ok()) return run.FailUsage(valid);
+  file->contexts[arguments.name] = settings;
+  const bool first = file->current.empty();
+  if (first) file->current = arguments.name;
+  if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
+  if (run.json()) {
+    run.out << ContextJson(arguments.name, settings, file->current == arguments.name) << "\n";
+  } else if (run.names()) {
+    run.out << arguments.name << "\n";
+  } else {
+    run.out << "context " << arguments.name << " added" << (first ? ", and used from now on" : "")
+            << "\n";
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode Use(const Invocation& run, const ContextArguments& arguments) {
+  if (arguments.none == !arguments.name.empty()) {
+    return run.FailUsage(absl::InvalidArgumentError("name a context, or say --none"));
+  }
+  auto file = ReadContextFile();
+  if (!file.ok()) return run.FailUsage(file.status());
+  if (!arguments.none) {
+    const auto found = FindContext(*file, arguments.name);
+    if (!found.ok()) return run.FailUsage(found.status());
+  }
+  file->current = arguments.name;
+  if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
+  if (arguments.none) {
+    run.out << "no context is used from now on\n";
+  } else {
+    run.out << "context " << arguments.name
+            << " is used from now on: " << file->contexts.at(arguments.name).at("server") << "\n";
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode List(const Invocation& run) {
+  const auto file = ReadContextFile();
+  if (!file.ok()) return run.FailUsage(file.status());
+  Table table;
+  std::vector<std::string> head = {"CONTEXT", "SERVER", "TLS", "TOKEN FILE", "USED"};
+  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
+  table.Row(head);
+  for (const auto& [name, settings] : file->contexts) {
+    const bool current = name == file->current;
+    if (run.json()) {
+      run.out << ContextJson(name, settings, current) << "\n";
+    } else if (run.names()) {
+      run.out << name << "\n";
+    }
+    const auto security = settings.contains("tls") || settings.contains("ca-cert") ||
+                          settings.contains("cert") || settings.contains("server-name");
+    const auto token = settings.find("token-file");
+    table.Row({name, settings.at("server"), security ? "yes" : "no",
+               token == settings.end() ? "-" : token->second, current ? "yes" : "no"});
+  }
+  if (run.json() || run.names()) return ExitCode::kDone;
+  table.Print(run.out);
+  if (file->contexts.empty()) {
+    run.err << "hullctl: there are no contexts; add one with 'hullctl context add'\n";
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode Remove(const Invocation& run, const ContextArguments& arguments) {
+  auto file = ReadContextFile();
+  if (!file.ok()) return run.FailUsage(file.status());
+  if (const auto found = FindContext(*file, arguments.name); !found.ok()) {
+    return run.FailUsage(found.status());
+  }
+  file->contexts.erase(arguments.name);
+  const bool was_used = file->current == arguments.name;
+  if (was_used) file->current.clear();
+  if (absl::Status s = WriteContextFile(*file); !s.ok()) return run.FailUsage(s);
+  run.out << "context " << arguments.name << " removed"
+          << (was_used ? "; no context is used from now on" : "") << "\n";
+  return ExitCode::kDone;
+}
+
+// What holds for the commands that follow, and why.
+ExitCode Show(Invocation run, const ContextArguments& arguments) {
+  if (!arguments.name.empty()) run.context = arguments.name;
+  const absl::Status resolved = ResolveConnection(&run);
+  // Files that cannot be read are told, behind what names them.
+  if (!resolved.ok() && run.connection.empty()) return run.FailUsage(resolved);
+  Table table;
+  JsonObject object;
+  for (const ConnectionSetting& setting : kConnectionSettings) {
+    const auto found = run.connection.find(setting.name);
+    if (found == run.connection.end()) continue;
+    table.Row({setting.name, found->second.value, "(" + found->second.source + ")"});
+    object.AddJson(setting.name, MemberJson(found->second.value, setting.kind));
+  }
+  if (const auto token = run.connection.find(kTokenSetting); token != run.connection.end()) {
+    table.Row({kTokenSetting, "set", absl::StrCat("($", kTokenVariable, ")")});
+  }
+  if (run.json()) {
+    run.out << object.Close() << "\n";
+  } else if (run.names()) {
+    run.out << run.connection.at("server").value << "\n";
+  } else {
+    table.Print(run.out);
+  }
+  return resolved.ok() ? ExitCode::kDone : run.FailUsage(resolved);
+}
+
+}  // namespace
+
+void AddContextCommand(Command program, Invocation* invocation) {
+  Command command =
+      program.AddCommand("context", "Keep servers under names, and choose among them");
+  command.RequireCommand();
+  const auto arguments = std::make_shared<ContextArguments>();
+  const auto act = [=](const std::function<ExitCode()>& action) {
+    return [=] {
+      invocation->needs_server = false;
+      invocation->action = action;
+    };
+  };
+  command.SetDetails(
+      "Contexts stand in $XDG_CONFIG_HOME/hullctl/contexts.json, else ~/.config. The file holds\n"
+      "paths of tokens, never tokens. What holds, in this order: an option; a context that\n"
+      "--context names; the environment; the context that $HULLCTL_CONTEXT names or 'context use'\n"
+      "chose; the default. A context goes with its own server only: where --server or\n"
+      "$HULLCTL_SERVER names another, it is left aside, its token and authorities too.");
+  Command add = command.AddCommand("add", "Keep --server and what goes with it under a name");
+  add.AddText("NAME", &arguments->name, "What to call it").Required();
+  add.AddFlag("--replace", &arguments->replace, "Take the place of one of that name");
+  add.SetExamples({{"",
+                    "hullctl context add cell-3 --server cell-3.example:50551 --tls "
+                    "--token-file cell-3.token"},
+                   {"", "hullctl context add here --server 127.0.0.1:50551"}});
+  add.OnGiven(act([=] { return Add(*invocation, *arguments); }));
+  Command use = command.AddCommand("use", "Use a context from now on");
+  use.AddText("NAME", &arguments->name, "Its name").Completes(ValueKind::kContext);
+  use.AddFlag("--none", &arguments->none, "Use none");
+  use.SetExamples({{"", "hullctl context use cell-3"},
+                   {"Another one for one command", "hullctl list --context here"}});
+  use.OnGiven(act([=] { return Use(*invocation, *arguments); }));
+  Command list = command.AddCommand("list", "List the contexts");
+  list.OnGiven(act([=] { return List(*invocation); }));
+  Command show =
+      command.AddCommand("show", "Show which server is asked, and where each setting comes from");
+  show.AddText("NAME", &arguments->name, "As if --context named it").Completes(ValueKind::kContext);
+  show.OnGiven(act([=] { return Show(*invocation, *arguments); }));
+  Command remove = command.AddCommand("remove", "Forget a context");
+  remove.AddText("NAME", &arguments->name, "Its name").Required().Completes(ValueKind::kContext);
+  remove.OnGiven(act([=] { return Remove(*invocation, *arguments); }));
+}
+
+}  // namespace hulld

@@ -1,0 +1,176 @@
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+
+namespace hulld {
+namespace {
+
+struct DeleteArguments {
+  std::vector<std::string> hull_ids;
+  std::string prefix;
+  bool has_prefix = false;
+  bool yes = false;
+  bool if_exists = false;
+  std::optional<uint64_t> if_revision;
+};
+
+// A hull to delete; with the revision at which a list showed it, if one did.
+struct Doomed {
+  std::string hull_id;
+  std::optional<uint64_t> if_revision;
+};
+
+std::string Naming(const std::vector<Doomed>& doomed) {
+  constexpr size_t kNamed = 5;
+  std::string text;
+  for (size_t i = 0; i < doomed.size() && i < kNamed; ++i) {
+    absl::StrAppend(&text, i > 0 ? ", " : "", doomed[i].hull_id);
+  }
+  if (doomed.size() > kNamed) absl::StrAppend(&text, ", ...");
+  return text;
+}
+
+// Whether what was asked is meant. One hull that is named is; more need a yes, by option or by a
+// person at a terminal.
+absl::StatusOr<bool> IsMeant(const Invocation& run, const DeleteArguments& arguments,
+                             const std::vector<Doomed>& doomed) {
+  if (arguments.yes || (doomed.size() == 1 && !arguments.has_prefix)) return true;
+  const bool is_terminal = isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
+  if (!is_terminal) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("this would delete ", doomed.size(), " hulls (", Naming(doomed),
+                     "); say --yes if that is meant, as nobody can be asked here"));
+  }
+  run.err << "Delete " << doomed.size() << (doomed.size() == 1 ? " hull (" : " hulls (")
+          << Naming(doomed) << ")? [y/N] " << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "Y" || answer == "yes";
+}
+
+absl::StatusOr<std::vector<Doomed>> Choose(const Client& client, const DeleteArguments& arguments) {
+  std::vector<Doomed> doomed;
+  std::set<std::string> named;
+  for (const std::string& hull_id : arguments.hull_ids) {
+    if (named.insert(hull_id).second) doomed.push_back({hull_id, arguments.if_revision});
+  }
+  if (!arguments.has_prefix) return doomed;
+  const auto listed = client.ListAllHulls(arguments.prefix);
+  if (!listed.ok()) return listed.status();
+  for (const v1::HullInfo& hull : listed->hulls()) {
+    // What changed since it was listed is not what was meant; a damaged one has no revision.
+    std::optional<uint64_t> revision;
+    if (!hull.damaged()) revision = hull.revision();
+    doomed.push_back({hull.hull_id(), revision});
+  }
+  return doomed;
+}
+
+void Print(const Invocation& run, const std::string& hull_id,
+           const v1::DeleteHullResponse& response) {
+  if (run.json()) {
+    run.out << MessageJson(response) << "\n";
+  } else if (run.names()) {
+    run.out << hull_id << "\n";
+  } else {
+    run.out << hull_id << " deleted at revision " << response.header().revision() << "\n";
+  }
+}
+
+ExitCode DeleteAll(const Invocation& run, const Client& client, const DeleteArguments& arguments,
+                   const std::vector<Doomed>& doomed) {
+  ProgressBar bar(run.err, run.shows_progress, "hulls", doomed.size());
+  uint64_t deleted = 0;
+  ExitCode worst = ExitCode::kDone;
+  for (const Doomed& hull : doomed) {
+    const auto response = client.DeleteHull(hull.hull_id, hull.if_revision);
+    const bool gone = absl::IsNotFound(response.status());
+    if (gone && (arguments.if_exists || arguments.has_prefix)) continue;
+    bar.Clear();
+    if (response.ok()) {
+      ++deleted;
+      Print(run, hull.hull_id, *response);
+      bar.Update(deleted);
+      continue;
+    }
+    worst = run.Fail(response.status());
+    // Without a server or a right, the others would fail the same way.
+    const bool own = gone || absl::IsAborted(response.status());
+    if (!own) break;
+  }
+  bar.Clear();
+  if (worst == ExitCode::kDone || doomed.size() == 1) return worst;
+  run.err << "hullctl: deleted " << deleted << " of " << doomed.size() << " hulls\n";
+  return worst;
+}
+
+ExitCode Delete(const Invocation& run, const DeleteArguments& arguments) {
+  const auto usage = [&run](const char* what) {
+    return run.FailUsage(absl::InvalidArgumentError(what));
+  };
+  if (arguments.hull_ids.empty() == !arguments.has_prefix) {
+    return usage("name the hulls to delete, or give --prefix, but not both");
+  }
+  if (arguments.if_revision && arguments.hull_ids.size() != 1) {
+    return usage("--if-revision is about one hull; name one");
+  }
+  if (arguments.has_prefix && arguments.prefix.empty()) {
+    return usage("--prefix is empty, which would mean every hull of the server; name a prefix");
+  }
+  const Client client = run.MakeClient();
+  const auto doomed = Choose(client, arguments);
+  if (!doomed.ok()) return run.Fail(doomed.status());
+  if (doomed->empty()) {
+    run.err << "hullctl: no hull starts with " << Quoted(arguments.prefix) << "\n";
+    return ExitCode::kDone;
+  }
+  const auto meant = IsMeant(run, arguments, *doomed);
+  if (!meant.ok()) return run.FailUsage(meant.status());
+  if (!*meant) return usage("nothing was deleted");
+  return DeleteAll(run, client, arguments, *doomed);
+}
+
+}  // namespace
+
+void AddDeleteCommand(Command program, Invocation* invocation) {
+  auto arguments = std::make_shared<DeleteArguments>();
+  Command command = program.AddCommand("delete", "Remove hulls");
+  command.AddTexts("ID", &arguments->hull_ids, "Names of the hulls").Completes(ValueKind::kHull);
+  command
+      .AddParsed(
+          "--prefix",
+          [arguments](const std::string& prefix) {
+            arguments->prefix = prefix;
+            arguments->has_prefix = true;
+            return absl::OkStatus();
+          },
+          "Instead of names: all that start with it, as they are when they are listed")
+      .ValueName("PREFIX")
+      .Completes(ValueKind::kHull);
+  command.AddFlag("--yes", &arguments->yes, "Do not ask before several are deleted");
+  command.AddFlag("--if-exists", &arguments->if_exists, "Accept that a hull is not there");
+  command.AddNumber("--if-revision", 0, kAnyNumber, "Only if its revision is this one",
+                    [arguments](uint64_t number) { arguments->if_revision = number; });
+  command.SetDetails(
+      "Before several are deleted, a question on the terminal tells how many and which; where "
+      "there\n"
+      "is no terminal, only --yes lets it happen. A hull that changed after it was listed for\n"
+      "--prefix stays, and the exit code is 1.");
+  command.SetExamples({{"", "hullctl delete arm/3"},
+                       {"All of one cell", "hullctl delete --prefix cell-3/"},
+                       {"In a script", "hullctl delete --prefix cell-3/ --yes"}});
+  command.OnGiven([=] { invocation->action = [=] { return Delete(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

@@ -1,0 +1,145 @@
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+struct ListArguments {
+  std::string prefix;
+  uint64_t limit = 0;
+  std::string sort;
+  bool reverse = false;
+  bool count = false;
+};
+
+// What a list is sorted by: the largest first, but IDs ascend.
+using SortKey = std::function<uint64_t(const v1::HullInfo&)>;
+const std::map<std::string, SortKey>& SortKeys() {
+  static const auto* const keys = new std::map<std::string, SortKey>{
+      {"id", nullptr},
+      {"vertices", [](const v1::HullInfo& hull) { return hull.vertex_count(); }},
+      {"points", [](const v1::HullInfo& hull) { return hull.counts().received(); }},
+      {"revision", [](const v1::HullInfo& hull) { return hull.revision(); }},
+      {"created", [](const v1::HullInfo& hull) { return hull.create_revision(); }}};
+  return *keys;
+}
+
+void Sort(const ListArguments& arguments, v1::ListHullsResponse* response) {
+  const SortKey& key = SortKeys().at(arguments.sort.empty() ? "id" : arguments.sort);
+  auto begin = response->mutable_hulls()->pointer_begin();
+  auto end = response->mutable_hulls()->pointer_end();
+  // They come by ID, and stay so where keys are equal.
+  if (key != nullptr) {
+    std::stable_sort(begin, end, [&key](const v1::HullInfo* a, const v1::HullInfo* b) {
+      return key(*a) > key(*b);
+    });
+  }
+  if (arguments.reverse) std::reverse(begin, end);
+}
+
+void PrintCount(const Invocation& run, const v1::ListHullsResponse& response) {
+  uint64_t vertices = 0;
+  uint64_t points = 0;
+  for (const v1::HullInfo& hull : response.hulls()) {
+    vertices += hull.vertex_count();
+    points += hull.counts().received();
+  }
+  const auto hulls = static_cast<uint64_t>(response.hulls_size());
+  if (run.json()) {
+    run.out
+        << JsonObject().Add("hulls", hulls).Add("vertices", vertices).Add("points", points).Close()
+        << "\n";
+  } else if (run.names()) {
+    run.out << hulls << "\n";
+  } else {
+    Table()
+        .Row({"hulls", std::to_string(hulls)})
+        .Row({"vertices", std::to_string(vertices)})
+        .Row({"points", std::to_string(points)})
+        .Print(run.out);
+  }
+}
+
+void PrintTable(const Invocation& run, const v1::ListHullsResponse& response) {
+  Table table;
+  std::vector<std::string> head = {"HULL", "DIMENSION", "VERTICES", "POINTS", "REVISION"};
+  if (run.wide()) head.insert(head.end(), {"CREATED", "OUTSIDE", "DUPLICATE", "INSIDE", "STATE"});
+  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
+  table.Row(head);
+  for (const v1::HullInfo& hull : response.hulls()) {
+    const v1::PointCounts& counts = hull.counts();
+    std::vector<std::string> row = {
+        hull.hull_id(), std::to_string(hull.dimension()), std::to_string(hull.vertex_count()),
+        std::to_string(counts.received()), std::to_string(hull.revision())};
+    if (run.wide()) {
+      row.insert(row.end(),
+                 {std::to_string(hull.create_revision()), std::to_string(counts.outside()),
+                  std::to_string(counts.duplicate()), std::to_string(counts.inside()),
+                  hull.damaged() ? run.paint(Hue::kBad, "damaged") : "ok"});
+    }
+    table.Row(row);
+  }
+  table.Print(run.out);
+}
+
+ExitCode List(const Invocation& run, const ListArguments& arguments) {
+  // What is sorted must be there as a whole before the limit cuts it.
+  const bool sorts = arguments.reverse || !arguments.sort.empty();
+  auto response = run.MakeClient().ListAllHulls(arguments.prefix, sorts ? 0 : arguments.limit);
+  if (!response.ok()) return run.Fail(response.status());
+  Sort(arguments, &*response);
+  bool cut = !response->next_page_token().empty();
+  const uint64_t limit = arguments.limit;
+  if (sorts && limit > 0 && static_cast<uint64_t>(response->hulls_size()) > limit) {
+    const int keep = static_cast<int>(limit);
+    response->mutable_hulls()->DeleteSubrange(keep, response->hulls_size() - keep);
+    cut = true;
+  }
+  if (arguments.count) {
+    PrintCount(run, *response);
+  } else if (run.json()) {
+    run.out << MessageJson(*response) << "\n";
+  } else if (run.names()) {
+    for (const v1::HullInfo& hull : response->hulls()) run.out << hull.hull_id() << "\n";
+  } else {
+    PrintTable(run, *response);
+  }
+  for (const v1::HullInfo& hull : response->hulls()) {
+    if (!hull.damaged()) continue;
+    run.err << "hullctl: " << hull.hull_id() << " is damaged in the store; only delete helps\n";
+  }
+  if (cut) run.err << "hullctl: there are more hulls; raise --limit to see them\n";
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddListCommand(Command program, Invocation* invocation) {
+  auto arguments = std::make_shared<ListArguments>();
+  Command command = program.AddCommand("list", "List the hulls and their sizes");
+  command.AddText("PREFIX", &arguments->prefix, "Only names that start with it")
+      .Completes(ValueKind::kHull);
+  std::vector<std::string> keys;
+  for (const auto& [name, key] : SortKeys()) keys.push_back(name);
+  command.AddText("--sort", &arguments->sort, "What comes first: the largest, or the first name")
+      .ValueName("BY")
+      .OneOf(keys);
+  command.AddFlag("--reverse", &arguments->reverse, "The other way round");
+  command.AddNumber("--limit", 1, 1000000000, "Stop after N hulls (default: all)",
+                    [arguments](uint64_t number) { arguments->limit = number; });
+  command.AddFlag("--count", &arguments->count,
+                  "Only how many there are, with how many vertices and points");
+  command.SetExamples({{"Those of one cell", "hullctl list cell-3/"},
+                       {"The ten largest", "hullctl list --sort vertices --limit 10"},
+                       {"How many there are", "hullctl list --count"},
+                       {"Names alone, for a script", "hullctl list arm/ --output name"}});
+  command.OnGiven([=] { invocation->action = [=] { return List(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

@@ -1,0 +1,273 @@
+#include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <spawn.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+
+#include "client/hullctl/command_line/output_file.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/view/bridge/bridge.h"
+#include "client/hullctl/view/bridge/page_html.h"
+#include "client/hullctl/view/demo_scenes.h"
+#include "client/hullctl/view/page_session.h"
+#include "client/hullctl/view/recording.h"
+#include "client/hullctl/view/temporary_hulls.h"
+
+extern char** environ;
+
+namespace hulld {
+namespace {
+
+struct ViewArguments {
+  std::vector<std::string> things;
+  bool demo = false;
+  std::string scene_key;
+  uint16_t port = 0;
+  bool no_open = false;
+  std::string html_file;
+  std::string up = "y";
+};
+
+// Holds SIGINT and SIGTERM back while it lives, in this thread and those that it starts, so that
+// what was put on the server is removed at the end.
+class HeldSignals {
+ public:
+  HeldSignals() {
+    sigemptyset(&signals_);
+    sigaddset(&signals_, SIGINT);
+    sigaddset(&signals_, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &signals_, &before_);
+  }
+  ~HeldSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  HeldSignals(const HeldSignals&) = delete;
+  HeldSignals& operator=(const HeldSignals&) = delete;
+
+  void WaitForOne() const {
+    int signal = 0;
+    sigwait(&signals_, &signal);
+  }
+
+ private:
+  sigset_t signals_;
+  sigset_t before_;
+};
+
+// A file that only this user can read and that sends a browser to the address. Other users see the
+// arguments of programs, so that the address itself must not be one.
+class AddressFile {
+ public:
+  explicit AddressFile(const std::string& address) {
+    const char* const runtime = getenv("XDG_RUNTIME_DIR");
+    std::string pattern =
+        absl::StrCat(runtime != nullptr ? runtime : "/tmp", "/hullctl-view-XXXXXX.html");
+    const int file = mkstemps(pattern.data(), 5);
+    if (file < 0) return;
+    const std::string page = absl::StrCat(
+        "<!doctype html><meta charset=\"utf-8\"><meta http-equiv=\"refresh\" content=\"0; url=",
+        address, "\"><title>hulld</title>");
+    if (write(file, page.data(), page.size()) == static_cast<ssize_t>(page.size())) path_ = pattern;
+    close(file);
+  }
+  ~AddressFile() {
+    if (!path_.empty()) unlink(path_.c_str());
+  }
+  AddressFile(const AddressFile&) = delete;
+  AddressFile& operator=(const AddressFile&) = delete;
+
+  // Empty when it could not be written.
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+// Whether a browser was asked to open the file.
+bool OpenInBrowser(const std::string& path) {
+  if (path.empty()) return false;
+  posix_spawn_file_actions_t quiet;
+  posix_spawn_file_actions_init(&quiet);
+  for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
+    posix_spawn_file_actions_addopen(&quiet, stream, "/dev/null", O_WRONLY, 0);
+  }
+  std::string program = "xdg-open";
+  std::string argument = path;
+  char* const arguments[] = {program.data(), argument.data(), nullptr};
+  pid_t child = 0;
+  const int failed = posix_spawnp(&child, program.c_str(), &quiet, nullptr, arguments, environ);
+  posix_spawn_file_actions_destroy(&quiet);
+  return failed == 0;
+}
+
+// What `view` was asked to show, with the hulls that it made for it.
+class Viewing {
+ public:
+  Viewing(const Invocation& run, const ViewArguments& arguments)
+      : run_(run),
+        arguments_(arguments),
+        program_{run.MakeClient(), run.server, arguments.up, {}, {}},
+        temporary_(program_.client) {}
+
+  ExitCode Run() {
+    const ExitCode loaded = arguments_.demo ? LoadDemo() : LoadThings();
+    if (loaded != ExitCode::kDone) return loaded;
+    return arguments_.html_file.empty() ? Serve() : WriteHtml();
+  }
+
+ private:
+  ExitCode LoadDemo() {
+    auto scenes = MakeDemoScenes(program_.client, &temporary_);
+    if (!scenes.ok()) return run_.Fail(scenes.status());
+    program_.scenes = *std::move(scenes);
+    const ViewScene& last = program_.scenes.back();
+    growing_ = std::make_unique<GrowingHull>(program_.client, last.objects[kGrowingObject].hull_id);
+    program_.on_show = [this](const std::string& key) {
+      if (key == kGrowingSceneKey) growing_->Restart();
+    };
+    // Pages start with the first.
+    if (!arguments_.scene_key.empty()) {
+      const size_t chosen = static_cast<size_t>(arguments_.scene_key[0] - '0');
+      std::rotate(program_.scenes.begin(), program_.scenes.begin() + chosen,
+                  program_.scenes.begin() + chosen + 1);
+    }
+    return ExitCode::kDone;
+  }
+
+  ExitCode LoadThings() {
+    ViewScene scene;
+    std::vector<std::string> things = arguments_.things;
+    scene.title = things.empty()      ? "All hulls"
+                  : IsFile(things[0]) ? ShownName(things[0])
+                                      : things[0];
+    if (things.size() > 1) absl::StrAppend(&scene.title, " and ", things.size() - 1, " more");
+    if (things.empty()) things.emplace_back();
+    for (const std::string& thing : things) {
+      if (thing.ends_with(".json") && IsFile(thing)) {
+        if (things.size() > 1) {
+          return run_.FailUsage(absl::InvalidArgumentError(absl::StrCat(
+              thing, " is a whole scene: its groups count its placements; give it alone")));
+        }
+        const absl::Status added = AddSceneFile(thing, &scene);
+        if (!added.ok()) return run_.FailUsage(added);
+      } else if (IsFile(thing)) {
+        const absl::Status added = AddFile(thing, &scene);
+        if (!added.ok()) return run_.FailUsage(added);
+      } else {
+        const absl::Status added = AddHulls(program_.client, thing, &scene);
+        if (!added.ok()) return run_.Fail(added);
+      }
+    }
+    program_.scenes.push_back(std::move(scene));
+    return ExitCode::kDone;
+  }
+
+  // The shape of a file comes from the file, and its hull from the server.
+  absl::Status AddFile(const std::string& path, ViewScene* scene) {
+    auto shape = ReadShape(path);
+    if (!shape.ok()) return shape.status();
+    const auto hull_id = temporary_.AddFile(path);
+    if (!hull_id.ok()) {
+      run_.err << "hullctl: warning: " << path << " is shown without its hull\n";
+      static_cast<void>(run_.Fail(hull_id.status()));
+    }
+    scene->objects.push_back({shape->name, hull_id.ok() ? *hull_id : "",
+                              static_cast<int>(scene->files.size()), kIdentityPose});
+    scene->files.push_back(std::make_shared<FileShape>(*std::move(shape)));
+    return absl::OkStatus();
+  }
+
+  ExitCode WriteHtml() {
+    const auto recording = RecordScene(program_, program_.scenes.front());
+    if (!recording.ok()) return run_.Fail(recording.status());
+    const absl::Status written =
+        WriteOutput(arguments_.html_file, run_.out,
+                    [&](std::ostream& out) { out << StandalonePage(*recording); });
+    if (!written.ok()) return run_.FailUsage(written);
+    if (arguments_.html_file == "-") return ExitCode::kDone;
+    const size_t count = program_.scenes.front().objects.size();
+    run_.out << arguments_.html_file << ": " << count << (count == 1 ? " object" : " objects")
+             << "; open it in a browser\n";
+    return ExitCode::kDone;
+  }
+
+  ExitCode Serve() {
+    BridgeOptions options;
+    options.port = arguments_.port;
+    options.open_page = [this](std::shared_ptr<PageChannel> page) {
+      return std::make_unique<PageSession>(program_, std::move(page));
+    };
+    const auto bridge = Bridge::Start(std::move(options));
+    if (!bridge.ok()) return run_.FailUsage(bridge.status());
+    run_.out << "viewer at " << (*bridge)->Address() << "\n"
+             << "the address lets one browser in, once; Ctrl-C ends the viewer" << std::endl;
+    std::unique_ptr<AddressFile> address;
+    if (!arguments_.no_open && isatty(STDOUT_FILENO) != 0) {
+      address = std::make_unique<AddressFile>((*bridge)->Address());
+      OpenInBrowser(address->path());
+    }
+    signals_.WaitForOne();
+    return ExitCode::kDone;
+  }
+
+  const Invocation& run_;
+  const ViewArguments& arguments_;
+  const HeldSignals signals_;
+  ViewProgram program_;
+  TemporaryHulls temporary_;
+  std::unique_ptr<GrowingHull> growing_;
+};
+
+ExitCode View(const Invocation& run, const ViewArguments& arguments) {
+  if (arguments.demo && !arguments.things.empty()) {
+    return run.FailUsage(absl::InvalidArgumentError("--demo shows scenes of its own; leave out " +
+                                                    arguments.things[0]));
+  }
+  if (!arguments.demo && !arguments.scene_key.empty()) {
+    return run.FailUsage(absl::InvalidArgumentError("--scene chooses among those of --demo"));
+  }
+  return Viewing(run, arguments).Run();
+}
+
+}  // namespace
+
+void AddViewCommand(Command program, Invocation* invocation) {
+  auto arguments = std::make_shared<ViewArguments>();
+  Command command = program.AddCommand("view", "Look at hulls and files in a browser");
+  command
+      .AddTexts("ID|PREFIX|FILE", &arguments->things,
+                "Hulls, hulls whose IDs start so, meshes, points, or a scene (.json); default: "
+                "all hulls")
+      .Completes(ValueKind::kHull);
+  command.AddFlag("--demo", &arguments->demo,
+                  "Show the textbook's scenes, keys 0 to 7, with hulls made for them");
+  command.AddText("--scene", &arguments->scene_key, "The scene of --demo to start with")
+      .OneOf({"0", "1", "2", "3", "4", "5", "6", "7"});
+  command.AddNumber("--port", 0, 65535, "Port on 127.0.0.1 (default 0: any free one)",
+                    [arguments](uint64_t port) { arguments->port = static_cast<uint16_t>(port); });
+  command.AddFlag("--no-open", &arguments->no_open, "Print the address and open no browser");
+  command
+      .AddText("--html", &arguments->html_file,
+               "Write one file that shows the scene without a server, and end")
+      .ValueName("FILE");
+  command.AddText("--up", &arguments->up, "The axis that points up (default y)")
+      .ValueName("x|y|z")
+      .OneOf({"x", "y", "z"});
+  command.SetDetails(
+      "The page asks hulld through hullctl: it never sees your token, and it changes nothing on\n"
+      "the server. The hull of a FILE is made by the server, under view/, and deleted at the end;\n"
+      "without the right to write, the file is shown without its hull. Press ? on the page for\n"
+      "its keys. 'hullctl picture' draws without a browser.");
+  command.SetExamples(
+      {{"All hulls of the server", "hullctl view"},
+       {"Those whose IDs start so, and those to come", "hullctl view cell-3/"},
+       {"A hull beside the points, mesh and hull of a file", "hullctl view arm part.stl"},
+       {"Placements, as for 'hullctl scene'", "hullctl view scene.json"},
+       {"One file to send to someone", "hullctl view arm --html arm.html"}});
+  command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

@@ -1,0 +1,167 @@
+#include "client/hullctl/completion/completion.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace hulld {
+namespace {
+
+// Reads words as the parser does: which command they name, what its arguments are, and what is
+// still open at the end.
+class WordReader {
+ public:
+  explicit WordReader(const CommandDescription& program) : path_{&program} {}
+
+  void Take(const std::string& word) {
+    if (open_ != nullptr) {
+      open_ = nullptr;
+    } else if (!only_arguments_ && word == "--") {
+      only_arguments_ = true;
+    } else if (!only_arguments_ && word.size() > 1 && word[0] == '-') {
+      const OptionDescription* const option = Find(word.substr(0, word.find('=')));
+      if (option != nullptr) given_.push_back(option);
+      const bool has_value = word.find('=') != std::string::npos;
+      if (option != nullptr && option->takes_value() && !has_value) open_ = option;
+    } else if (const CommandDescription* below = FindCommand(*path_.back(), {word});
+               below != nullptr) {
+      path_.push_back(below);
+    } else {
+      ++arguments_;
+    }
+  }
+
+  // The option with that name, of the command or of one above it; null when there is none.
+  const OptionDescription* Find(const std::string& name) const {
+    for (auto command = path_.rbegin(); command != path_.rend(); ++command) {
+      const OptionDescription* const option = FindOption(**command, name);
+      if (option != nullptr) return option;
+    }
+    return nullptr;
+  }
+
+  // The argument that the next word is; null when no more fit.
+  const OptionDescription* NextArgument() const {
+    size_t left = arguments_;
+    for (const OptionDescription& option : command().options) {
+      if (!option.is_argument()) continue;
+      if (option.repeated || left == 0) return &option;
+      --left;
+    }
+    return nullptr;
+  }
+
+  const CommandDescription& command() const { return *path_.back(); }
+  const std::vector<const CommandDescription*>& path() const { return path_; }
+  // The option whose value the next word is; null: none.
+  const OptionDescription* open() const { return open_; }
+  bool only_arguments() const { return only_arguments_; }
+  bool was_given(const OptionDescription& option) const {
+    return std::find(given_.begin(), given_.end(), &option) != given_.end();
+  }
+
+ private:
+  std::vector<const CommandDescription*> path_;
+  const OptionDescription* open_ = nullptr;
+  std::vector<const OptionDescription*> given_;
+  size_t arguments_ = 0;
+  bool only_arguments_ = false;
+};
+
+void Offer(const std::string& text, const std::string& help, const std::string& start,
+           Completion* completion) {
+  if (absl::StartsWith(text, start)) completion->candidates.push_back({text, help});
+}
+
+// The values of an option or argument; each with `front` before it.
+void OfferValues(const OptionDescription& option, const std::string& start,
+                 const std::string& front, const ValueSource& values, Completion* completion) {
+  for (const std::string& choice : option.choices) {
+    if (absl::StartsWith(choice, start)) completion->candidates.push_back({front + choice, ""});
+  }
+  if (!option.choices.empty()) return;
+  switch (option.value_kind) {
+    case ValueKind::kText:
+      return;
+    case ValueKind::kFile:
+      completion->files = true;
+      return;
+    case ValueKind::kDirectory:
+      completion->directories = true;
+      return;
+    case ValueKind::kHull:
+    case ValueKind::kContext:
+      break;
+  }
+  for (Candidate& value : values(option.value_kind, start)) {
+    value.text = front + value.text;
+    completion->candidates.push_back(std::move(value));
+  }
+}
+
+void OfferOptions(const WordReader& reader, const std::string& start, Completion* completion) {
+  for (auto command = reader.path().rbegin(); command != reader.path().rend(); ++command) {
+    for (const OptionDescription& option : (*command)->options) {
+      if (option.is_argument() || option.hidden || reader.was_given(option)) continue;
+      // --version belongs to the program, not to its commands.
+      if (option.long_name() == "--version" && reader.path().size() > 1) continue;
+      Offer(option.long_name(), option.help, start, completion);
+    }
+  }
+}
+
+}  // namespace
+
+Completion Complete(const CommandDescription& program, const std::vector<std::string>& words,
+                    const ValueSource& values) {
+  Completion completion;
+  if (words.empty()) return completion;
+  WordReader reader(program);
+  for (size_t i = 0; i + 1 < words.size(); ++i) reader.Take(words[i]);
+  const std::string& word = words.back();
+  if (reader.open() != nullptr) {
+    OfferValues(*reader.open(), word, "", values, &completion);
+    return completion;
+  }
+  if (!reader.only_arguments() && absl::StartsWith(word, "-")) {
+    const size_t equals = word.find('=');
+    if (equals == std::string::npos) {
+      OfferOptions(reader, word, &completion);
+      return completion;
+    }
+    const OptionDescription* const option = reader.Find(word.substr(0, equals));
+    if (option == nullptr || !option->takes_value()) return completion;
+    OfferValues(*option, word.substr(equals + 1), word.substr(0, equals + 1), values, &completion);
+    return completion;
+  }
+  for (const auto& below : reader.command().commands) {
+    if (!below->hidden) Offer(below->name, below->help, word, &completion);
+  }
+  if (const OptionDescription* const argument = reader.NextArgument(); argument != nullptr) {
+    OfferValues(*argument, word, "", values, &completion);
+  }
+  return completion;
+}
+
+std::vector<std::string> ProgramOptionsIn(const CommandDescription& program,
+                                          const std::vector<std::string>& words) {
+  std::vector<std::string> found;
+  for (size_t i = 0; i + 1 < words.size(); ++i) {
+    const std::string& word = words[i];
+    if (word == "--") break;
+    const size_t equals = word.find('=');
+    const OptionDescription* const option = FindOption(program, word.substr(0, equals));
+    if (option == nullptr || option->is_argument()) continue;
+    // They would end the program.
+    if (option->long_name() == "--help" || option->long_name() == "--version") continue;
+    const bool takes_next = option->takes_value() && equals == std::string::npos;
+    if (takes_next && i + 2 >= words.size()) break;
+    found.push_back(word);
+    if (takes_next) found.push_back(words[++i]);
+  }
+  return found;
+}
+
+}  // namespace hulld

@@ -1,0 +1,289 @@
+#include "client/hullctl/scene/scene_file.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <set>
+#include <string_view>
+#include <utility>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/scene/text_scene.h"
+
+namespace hulld {
+namespace {
+
+constexpr int kPoseNumbers = 7;
+
+// Follows a JSON object piece by piece, as far as it takes to see its end and the names of its own
+// members; whether it is JSON is for the parser to say.
+class ObjectScanner {
+ public:
+  void Take(std::string_view piece) {
+    for (const char c : piece) TakeLetter(c);
+  }
+  bool complete() const { return begun_ && depth_ == 0; }
+  bool has(const char* name) const { return members_.contains(name); }
+
+ private:
+  void TakeLetter(char c) {
+    if (in_text_) {
+      if (escaped_) {
+        escaped_ = false;
+      } else if (c == '\\') {
+        escaped_ = true;
+      } else if (c == '"') {
+        in_text_ = false;
+        return;
+      }
+      text_ += c;
+      return;
+    }
+    switch (c) {
+      case '"':
+        in_text_ = true;
+        text_.clear();
+        break;
+      case '{':
+      case '[':
+        ++depth_;
+        begun_ = true;
+        break;
+      case '}':
+      case ']':
+        --depth_;
+        break;
+      case ':':
+        if (depth_ == 1) members_.insert(text_);
+        break;
+      default:
+        break;
+    }
+  }
+
+  std::set<std::string> members_;
+  std::string text_;
+  int depth_ = 0;
+  bool begun_ = false;
+  bool in_text_ = false;
+  bool escaped_ = false;
+};
+
+// Fields of one name in both messages.
+template <typename Message>
+void TakeShared(Message* from, Scene* scene) {
+  v1::FindCollisionsRequest& request = scene->request;
+  request.mutable_placements()->Swap(from->mutable_placements());
+  if (from->has_packed_placements()) {
+    request.mutable_packed_placements()->Swap(from->mutable_packed_placements());
+  }
+  if (from->has_wanted()) *request.mutable_wanted() = from->wanted();
+  request.set_tolerance(from->tolerance());
+  if (from->pairs_size() > 0) {
+    scene->pairs.emplace(from->pairs().begin(), from->pairs().end());
+  }
+}
+
+// Whether the lists of packed placements fit each other.
+absl::Status CheckPacked(const v1::FindCollisionsRequest& request) {
+  const v1::PackedPlacements& packed = request.packed_placements();
+  if (request.has_packed_placements() && request.placements_size() > 0) {
+    return absl::InvalidArgumentError("give placements or packedPlacements, not both");
+  }
+  if (packed.poses_size() != kPoseNumbers * packed.hulls_size()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("packedPlacements.poses holds ", packed.poses_size(), " numbers for ",
+                     packed.hulls_size(), " placements; each takes seven"));
+  }
+  for (const uint32_t hull : packed.hulls()) {
+    if (hull < static_cast<uint32_t>(packed.hull_ids_size())) continue;
+    return absl::InvalidArgumentError(absl::StrCat("packedPlacements.hulls names hull ", hull,
+                                                   "; hullIds holds ", packed.hull_ids_size()));
+  }
+  return absl::OkStatus();
+}
+
+// The object as the message that its members belong to.
+absl::StatusOr<Scene> ParseScene(const std::string& text, const ObjectScanner& scanner) {
+  Scene scene;
+  const bool names_pairs = scanner.has("pairs");
+  if (scanner.has("onlyChanges") || scanner.has("only_changes")) {
+    v1::CollisionStreamOpen open;
+    if (absl::Status s = ParseJson(text, UnknownFields::kRefuse, &open); !s.ok()) return s;
+    TakeShared(&open, &scene);
+    scene.only_changes = open.only_changes();
+  } else if (names_pairs || scanner.has("method")) {
+    for (const char* name : {"groups", "ignoreSameGroup", "ignoredGroupPairs", "movers"}) {
+      if (names_pairs && scanner.has(name)) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("\"pairs\" and \"", name,
+                         "\" do not go together: name the pairs, or say which are left out"));
+      }
+    }
+    v1::BatchCheckCollisionsRequest batch;
+    if (absl::Status s = ParseJson(text, UnknownFields::kRefuse, &batch); !s.ok()) return s;
+    TakeShared(&batch, &scene);
+    scene.method = batch.method();
+  } else {
+    const absl::Status s = ParseJson(text, UnknownFields::kRefuse, &scene.request);
+    if (!s.ok()) return s;
+  }
+  if (absl::Status fits = CheckPacked(scene.request); !fits.ok()) return fits;
+  if (scene.pairs.has_value() && scene.pairs->size() % 2 != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("pairs holds ", scene.pairs->size(), " indices; a pair has two"));
+  }
+  for (const uint32_t index : scene.pairs.value_or(std::vector<uint32_t>())) {
+    if (index < scene.size()) continue;
+    return absl::InvalidArgumentError(
+        absl::StrCat("pairs names placement ", index, "; there are ", scene.size()));
+  }
+  return scene;
+}
+
+absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
+  ObjectScanner scanner;
+  scanner.Take(text);
+  const uint64_t first_line = source->line();
+  std::string_view line;
+  while (!scanner.complete() && source->ReadLine(&line)) {
+    absl::StrAppend(&text, "\n", absl::string_view(line.data(), line.size()));
+    scanner.Take(line);
+  }
+  if (!source->status().ok()) return source->status();
+  absl::StatusOr<Scene> scene = ParseScene(text, scanner);
+  if (scene.ok()) return scene;
+  const std::string message(scene.status().message().data(), scene.status().message().size());
+  if (source->line() == first_line) return source->ErrorAtLine(message);
+  return absl::InvalidArgumentError(absl::StrCat(source->name(), ": ", message));
+}
+
+// Which pairs of placements are never asked about together.
+class GroupRule {
+ public:
+  explicit GroupRule(const v1::FindCollisionsRequest& request) : request_(request) {
+    for (int i = 0; i + 1 < request.ignored_group_pairs_size(); i += 2) {
+      const uint32_t g = request.ignored_group_pairs(i);
+      const uint32_t h = request.ignored_group_pairs(i + 1);
+      ignored_.insert({std::min(g, h), std::max(g, h)});
+    }
+  }
+
+  bool Ignores(uint32_t a, uint32_t b) const {
+    if (request_.groups_size() == 0) return false;
+    const uint32_t g = request_.groups(static_cast<int>(a));
+    const uint32_t h = request_.groups(static_cast<int>(b));
+    if (g == h && request_.ignore_same_group()) return true;
+    return ignored_.contains({std::min(g, h), std::max(g, h)});
+  }
+
+ private:
+  const v1::FindCollisionsRequest& request_;
+  std::set<std::pair<uint32_t, uint32_t>> ignored_;
+};
+
+}  // namespace
+
+uint32_t Scene::size() const {
+  const int packed = request.packed_placements().hulls_size();
+  return static_cast<uint32_t>(packed > 0 ? packed : request.placements_size());
+}
+
+const std::string* Scene::HullOf(uint32_t placement) const {
+  if (placement < static_cast<uint32_t>(request.placements_size())) {
+    return &request.placements(static_cast<int>(placement)).hull_id();
+  }
+  const v1::PackedPlacements& packed = request.packed_placements();
+  if (placement >= static_cast<uint32_t>(packed.hulls_size())) return nullptr;
+  const uint32_t hull = packed.hulls(static_cast<int>(placement));
+  if (hull >= static_cast<uint32_t>(packed.hull_ids_size())) return nullptr;
+  return &packed.hull_ids(static_cast<int>(hull));
+}
+
+v1::Placement Scene::PlacementOf(uint32_t placement) const {
+  if (request.placements_size() > 0) return request.placements(static_cast<int>(placement));
+  v1::Placement result;
+  result.set_hull_id(*HullOf(placement));
+  const double* const pose =
+      request.packed_placements().poses().data() + ptrdiff_t{kPoseNumbers} * placement;
+  v1::Quaternion& rotation = *result.mutable_pose()->mutable_rotation();
+  rotation.set_w(pose[0]);
+  rotation.set_x(pose[1]);
+  rotation.set_y(pose[2]);
+  rotation.set_z(pose[3]);
+  v1::Vector3& translation = *result.mutable_pose()->mutable_translation();
+  translation.set_x(pose[4]);
+  translation.set_y(pose[5]);
+  translation.set_z(pose[6]);
+  return result;
+}
+
+std::string Scene::NameOf(uint32_t placement) const {
+  if (placement < names.size()) return names[placement];
+  const std::string* const hull = HullOf(placement);
+  return absl::StrCat(placement, ":", hull == nullptr ? "" : *hull);
+}
+
+absl::StatusOr<Scene> ReadScene(ByteSource* source) {
+  TextSceneReader text(source);
+  bool first = true;
+  for (std::string_view line; source->ReadLine(&line);) {
+    const std::string_view trimmed = Trim(line);
+    if (first && !trimmed.empty() && trimmed.front() == '{') {
+      return ReadJsonScene(source, std::string(line));
+    }
+    if (!trimmed.empty() && trimmed.front() != '#') first = false;
+    if (absl::Status status = text.TakeLine(line); !status.ok()) return status;
+  }
+  if (!source->status().ok()) return source->status();
+  if (first) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(source->name(), ": there is no scene in it; --help shows what one is"));
+  }
+  return text.Finish();
+}
+
+absl::StatusOr<std::vector<uint32_t>> PairsOf(const Scene& scene, const std::string& file) {
+  if (scene.pairs.has_value()) return *scene.pairs;
+  const v1::FindCollisionsRequest& request = scene.request;
+  const uint64_t n = scene.size();
+  const auto problem = [&file](const std::string& what) {
+    return absl::InvalidArgumentError(absl::StrCat(file, ": ", what));
+  };
+  if (request.groups_size() != 0 && static_cast<uint64_t>(request.groups_size()) != n) {
+    return problem(
+        absl::StrCat("groups holds ", request.groups_size(), " groups for ", n, " placements"));
+  }
+  // A pair has at least one mover, and the lower index is one if any is.
+  const uint64_t movers = request.has_movers() ? std::min<uint64_t>(request.movers(), n) : n;
+  const std::string too_many =
+      absl::StrCat("more than ", kMostPairs,
+                   " pairs; ask for them in several files, or let 'hullctl scene' find them");
+  // Groups may leave few of very many, but finding those takes a look at each.
+  constexpr uint64_t kMostLooks = uint64_t{16} * kMostPairs;
+  if (movers * n > kMostLooks) return problem(too_many);
+  const GroupRule rule(request);
+  std::vector<uint32_t> pairs;
+  for (uint32_t a = 0; a < movers; ++a) {
+    for (uint32_t b = a + 1; b < n; ++b) {
+      if (rule.Ignores(a, b)) continue;
+      if (pairs.size() >= 2 * kMostPairs) return problem(too_many);
+      pairs.insert(pairs.end(), {a, b});
+    }
+  }
+  if (pairs.empty()) return problem("there is no pair to ask about");
+  return pairs;
+}
+
+absl::Status RefuseUpdates(ByteSource* source, const std::string& command) {
+  for (std::string_view line; source->ReadLine(&line);) {
+    if (Trim(line).empty()) continue;
+    return source->ErrorAtLine(absl::StrCat("'hullctl ", command,
+                                            "' takes nothing behind the scene; 'hullctl stream' "
+                                            "answers updates"));
+  }
+  return source->status();
+}
+
+}  // namespace hulld

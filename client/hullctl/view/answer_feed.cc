@@ -1,0 +1,334 @@
+#include "client/hullctl/view/answer_feed.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <unordered_map>
+#include <utility>
+
+#include "client/hullctl/printing/answer_row.h"
+#include "client/hullctl/printing/json.h"
+
+namespace hulld {
+namespace {
+
+// While something is dragged, a scene of more objects is asked about at rest only.
+constexpr size_t kMostObjectsInMotion = 3000;
+// Of a scene's colliding pairs, the page lists and lights these; totals count all.
+constexpr size_t kMostPairs = 5000;
+
+v1::Pose ToPose(const Pose7& numbers) {
+  v1::Pose pose;
+  v1::Quaternion* const q = pose.mutable_rotation();
+  q->set_w(numbers[0]);
+  q->set_x(numbers[1]);
+  q->set_y(numbers[2]);
+  q->set_z(numbers[3]);
+  v1::Vector3* const t = pose.mutable_translation();
+  t->set_x(numbers[4]);
+  t->set_y(numbers[5]);
+  t->set_z(numbers[6]);
+  return pose;
+}
+
+v1::Wanted WantedOfPair() {
+  v1::Wanted wanted;
+  wanted.set_axis(true);
+  wanted.set_certificate(true);
+  wanted.set_separation(true);
+  wanted.set_witness(true);
+  return wanted;
+}
+
+std::string PairJson(std::pair<uint32_t, uint32_t> pair) {
+  return absl::StrCat("[", pair.first, ",", pair.second, "]");
+}
+
+std::string PosesJson(const ViewObject& a, const ViewObject& b) {
+  std::vector<double> poses(a.pose.begin(), a.pose.end());
+  poses.insert(poses.end(), b.pose.begin(), b.pose.end());
+  return NumbersJson(poses.data(), poses.size());
+}
+
+std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
+                          const ViewObject& b, uint64_t update, bool rest,
+                          const v1::HullVersion& version_a, const v1::HullVersion& version_b,
+                          const AnswerRow& row) {
+  JsonObject message;
+  message.Add("type", "answer")
+      .AddJson("update", std::to_string(update))
+      .AddJson("rest", rest ? "true" : "false")
+      .AddJson("pair", PairJson(pair))
+      .AddJson("poses", PosesJson(a, b))
+      .AddJson("hullA", MessageJson(version_a))
+      .AddJson("hullB", MessageJson(version_b));
+  AddRow(row, &message);
+  return message.Close();
+}
+
+// The pairs that FindCollisions tells, put together.
+class SceneAnswer {
+ public:
+  explicit SceneAnswer(std::vector<uint32_t> objects) : objects_(std::move(objects)) {}
+
+  absl::Status Take(const v1::FindCollisionsResponse& part) {
+    if (part.has_header()) revision_ = part.header().revision();
+    for (const v1::PlacementProblem& problem : part.placement_problems()) {
+      AddProblem(problem.message());
+    }
+    for (const v1::PairProblem& problem : part.columns().pair_problems()) {
+      AddProblem(problem.message());
+    }
+    if (part.has_totals()) totals_ = part.totals();
+    const int count = part.pairs_size() / 2;
+    if (!AreParallel(part.columns(), static_cast<size_t>(count))) {
+      return absl::InternalError("the answer's columns and pairs disagree");
+    }
+    for (int i = 0; i < count; ++i) {
+      const uint32_t a = part.pairs(2 * i);
+      const uint32_t b = part.pairs(2 * i + 1);
+      if (a >= objects_.size() || b >= objects_.size()) {
+        return absl::InternalError("the answer names a placement that there is not");
+      }
+      const v1::Relation relation = part.columns().relations(i);
+      if (relation == v1::RELATION_UNSPECIFIED || shown_++ >= kMostPairs) continue;
+      absl::StrAppend(&pairs_, pairs_.empty() ? "" : ",", "[", objects_[a], ",", objects_[b], ",",
+                      QuoteJson(v1::Relation_Name(relation)), "]");
+    }
+    return absl::OkStatus();
+  }
+
+  std::string Json(uint64_t update) const {
+    return TextMessage("collisions", {{"update", std::to_string(update)},
+                                      {"revision", QuoteJson(std::to_string(revision_))},
+                                      {"pairs", "[" + pairs_ + "]"},
+                                      {"problems", "[" + problems_ + "]"},
+                                      {"totals", MessageJson(totals_)}});
+  }
+
+ private:
+  void AddProblem(const std::string& message) {
+    constexpr int kMostProblems = 20;
+    if (problem_count_++ >= kMostProblems) return;
+    absl::StrAppend(&problems_, problems_.empty() ? "" : ",", QuoteJson(message));
+  }
+
+  // The object of each placement.
+  const std::vector<uint32_t> objects_;
+  std::string pairs_;
+  std::string problems_;
+  size_t shown_ = 0;
+  int problem_count_ = 0;
+  uint64_t revision_ = 0;
+  v1::SceneTotals totals_;
+};
+
+// Those that have a hull, packed; `objects`: which they are.
+v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint32_t>* objects) {
+  v1::PackedPlacements packed;
+  std::unordered_map<std::string, uint32_t> index_of;
+  for (uint32_t i = 0; i < from.size(); ++i) {
+    const ViewObject& object = from[i];
+    if (object.hull_id.empty()) continue;
+    const auto [place, is_new] =
+        index_of.emplace(object.hull_id, static_cast<uint32_t>(index_of.size()));
+    if (is_new) packed.add_hull_ids(object.hull_id);
+    packed.add_hulls(place->second);
+    packed.mutable_poses()->Add(object.pose.begin(), object.pose.end());
+    objects->push_back(i);
+  }
+  return packed;
+}
+
+}  // namespace
+
+v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b) {
+  v1::CheckCollisionRequest request;
+  request.mutable_a()->set_hull_id(a.hull_id);
+  *request.mutable_a()->mutable_pose() = ToPose(a.pose);
+  request.mutable_b()->set_hull_id(b.hull_id);
+  *request.mutable_b()->mutable_pose() = ToPose(b.pose);
+  *request.mutable_wanted() = WantedOfPair();
+  return request;
+}
+
+std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
+                           const ViewObject& b, uint64_t update,
+                           const v1::CheckCollisionResponse& response) {
+  AnswerRow row;
+  row.relation = response.relation();
+  row.rung = response.rung();
+  if (response.has_axis()) row.axis = &response.axis();
+  if (response.has_certificate()) row.certificate = &response.certificate();
+  if (response.has_separation()) row.separation = response.separation();
+  if (response.has_witness()) row.witness = response.witness();
+  return AnswerMessage(pair, a, b, update, /*rest=*/true, response.hull_a(), response.hull_b(),
+                       row);
+}
+
+absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
+                                            const v1::FindCollisionsRequest& rules,
+                                            const std::vector<ViewObject>& objects,
+                                            double tolerance, uint64_t update) {
+  v1::FindCollisionsRequest request = rules;
+  std::vector<uint32_t> placed;
+  *request.mutable_packed_placements() = Pack(objects, &placed);
+  if (tolerance > 0) request.set_tolerance(tolerance);
+  SceneAnswer answer(std::move(placed));
+  if (request.packed_placements().hulls_size() < 2) return answer.Json(update);
+  const absl::Status status = client.FindCollisions(
+      request, [&](const v1::FindCollisionsResponse& part) { return answer.Take(part); });
+  if (!status.ok()) return status;
+  return answer.Json(update);
+}
+
+AnswerFeed::AnswerFeed(const Client& client, std::shared_ptr<PageChannel> page)
+    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
+
+AnswerFeed::~AnswerFeed() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void AnswerFeed::Show(const ViewScene& scene) {
+  const std::lock_guard lock(mutex_);
+  question_ = Question();
+  question_.objects = scene.objects;
+  question_.rules = scene.rules;
+  // The page asks once it has the scene.
+  asked_ = false;
+}
+
+void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects) {
+  const std::lock_guard lock(mutex_);
+  question_.objects.insert(question_.objects.end(), objects.begin(), objects.end());
+}
+
+void AnswerFeed::Ask(const ViewQuestion& question) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (size_t i = 0; i < question.objects.size(); ++i) {
+      // The page may speak of a scene that was replaced meanwhile.
+      if (question.objects[i] >= question_.objects.size()) continue;
+      question_.objects[question.objects[i]].pose = question.poses[i];
+    }
+    question_.pair = question.pair;
+    if (question.pair &&
+        std::max(question.pair->first, question.pair->second) >= question_.objects.size()) {
+      question_.pair.reset();
+    }
+    question_.tolerance = question.tolerance;
+    question_.update = question.update;
+    question_.rest = question.rest;
+    asked_ = true;
+  }
+  changed_.notify_all();
+}
+
+void AnswerFeed::HullsChanged() {
+  {
+    const std::lock_guard lock(mutex_);
+    question_.hulls_changed = true;
+    asked_ = true;
+  }
+  changed_.notify_all();
+}
+
+void AnswerFeed::Run() {
+  while (true) {
+    Question question;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return asked_ || ended_; });
+      if (ended_) return;
+      question = question_;
+      asked_ = false;
+      question_.hulls_changed = false;
+    }
+    if (question.pair && !AnswerPair(question)) return;
+    if (!question.rest && question.objects.size() > kMostObjectsInMotion) continue;
+    if (!AnswerScene(question)) return;
+  }
+}
+
+bool AnswerFeed::AnswerPair(const Question& question) {
+  const auto& [a, b] = *question.pair;
+  if (question.objects[a].hull_id.empty() || question.objects[b].hull_id.empty()) return true;
+  const auto answer = question.rest ? RestingAnswer(question) : MovingAnswer(question);
+  if (answer.ok()) return page_->SendText(*answer);
+  stream_.reset();
+  const std::string message(answer.status().message().data(), answer.status().message().size());
+  return page_->SendText(JsonObject()
+                             .Add("type", "answer")
+                             .AddJson("update", std::to_string(question.update))
+                             .AddJson("pair", PairJson(*question.pair))
+                             .Add("problem", message)
+                             .Close());
+}
+
+absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) const {
+  const ViewObject& a = question.objects[question.pair->first];
+  const ViewObject& b = question.objects[question.pair->second];
+  const auto response = client_.CheckCollision(PairRequest(a, b));
+  if (!response.ok()) return response.status();
+  return PairAnswerJson(*question.pair, a, b, question.update, *response);
+}
+
+absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
+  const ViewObject& a = question.objects[question.pair->first];
+  const ViewObject& b = question.objects[question.pair->second];
+  const std::pair<std::string, std::string> hulls(a.hull_id, b.hull_id);
+  absl::StatusOr<v1::StreamCollisionsResponse> response;
+  if (stream_ == nullptr || hulls != streamed_hulls_) {
+    stream_ = client_.OpenCollisionStream();
+    streamed_hulls_ = hulls;
+    v1::CollisionStreamOpen open;
+    const v1::CheckCollisionRequest request = PairRequest(a, b);
+    *open.add_placements() = request.a();
+    *open.add_placements() = request.b();
+    open.add_pairs(0);
+    open.add_pairs(1);
+    *open.mutable_wanted() = request.wanted();
+    response = stream_->Open(std::move(open));
+  } else {
+    v1::CollisionStreamUpdate update;
+    update.add_placements(0);
+    update.add_placements(1);
+    update.mutable_poses()->Add(a.pose.begin(), a.pose.end());
+    update.mutable_poses()->Add(b.pose.begin(), b.pose.end());
+    // It costs one look-up of each of two hulls.
+    update.set_refresh_hulls(true);
+    response = stream_->Update(std::move(update));
+  }
+  if (!response.ok()) return response.status();
+  for (const v1::PlacementProblem& problem : response->placement_problems()) {
+    return absl::NotFoundError(problem.message());
+  }
+  if (response->hulls_size() == 2) {
+    streamed_version_a_ = response->hulls(0);
+    streamed_version_b_ = response->hulls(1);
+  }
+  const v1::AnswerColumns& columns = response->columns();
+  if (response->pairs_size() != 1 || !AreParallel(columns, 1)) {
+    return absl::InternalError("the answer's columns and pairs disagree");
+  }
+  if (columns.pair_problems_size() > 0) {
+    return absl::InternalError(columns.pair_problems(0).message());
+  }
+  return AnswerMessage(*question.pair, a, b, question.update, /*rest=*/false, streamed_version_a_,
+                       streamed_version_b_, RowAt(columns, 0));
+}
+
+bool AnswerFeed::AnswerScene(const Question& question) const {
+  const auto answer = SceneAnswerJson(client_, question.rules, question.objects, question.tolerance,
+                                      question.update);
+  if (answer.ok()) return page_->SendText(*answer);
+  return page_->SendText(ProblemMessage(
+      absl::StrCat("The pairs that collide are not known: ", answer.status().message())));
+}
+
+}  // namespace hulld

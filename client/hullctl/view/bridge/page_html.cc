@@ -1,0 +1,89 @@
+#include "client/hullctl/view/bridge/page_html.h"
+
+#include <absl/strings/escaping.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+
+#include <vector>
+
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/view/bridge/page_files.h"
+
+namespace hulld {
+namespace {
+
+// Where index.html wants styles and scripts.
+constexpr char kMarker[] = "<!-- resources -->";
+
+// three.js comes as classic scripts, in this order, before our modules.
+constexpr std::string_view kClassicScripts[] = {"three/three.min.js", "three/OrbitControls.js",
+                                                "three/TransformControls.js"};
+
+bool IsModule(std::string_view name) {
+  return name.ends_with(".js") && !name.starts_with("three/");
+}
+
+// Our modules name each other "hulld/NAME.js"; the map tells what that is. So the same files work
+// when they are fetched and when all stands in one page.
+template <typename AddressOf>
+std::string ImportMap(const AddressOf& address_of) {
+  JsonObject imports;
+  for (const PageFile& file : PageFiles()) {
+    if (!IsModule(file.name)) continue;
+    imports.Add(absl::StrCat("hulld/", std::string(file.name)).c_str(), address_of(file));
+  }
+  return JsonObject().AddJson("imports", imports.Close()).Close();
+}
+
+std::string FillIn(const std::string& resources) {
+  return absl::StrReplaceAll(std::string(FindPageFile("index.html")->bytes),
+                             {{kMarker, resources}});
+}
+
+// Text of a script that ends no <script> before its time: "</" only occurs in strings, where the
+// backslash means nothing.
+std::string InScript(std::string_view text) {
+  return absl::StrReplaceAll(absl::string_view(text.data(), text.size()), {{"</", "<\\/"}});
+}
+
+}  // namespace
+
+std::string ServedPage(std::string_view nonce) {
+  std::string resources = "<link rel=\"stylesheet\" href=\"/style.css\">\n";
+  for (const std::string_view script : kClassicScripts) {
+    absl::StrAppend(&resources, "<script src=\"/", std::string(script), "\"></script>\n");
+  }
+  const std::string map =
+      ImportMap([](const PageFile& file) { return absl::StrCat("/", std::string(file.name)); });
+  absl::StrAppend(&resources, "<script type=\"importmap\" nonce=\"", std::string(nonce), "\">", map,
+                  "</script>\n<script type=\"module\" src=\"/main.js\"></script>");
+  return FillIn(resources);
+}
+
+std::string ServedPagePolicy(std::string_view nonce, std::string_view host) {
+  return absl::StrCat("default-src 'none'; script-src 'self' 'nonce-", std::string(nonce),
+                      "'; style-src 'self'; connect-src ws://", std::string(host),
+                      "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
+}
+
+std::string StandalonePage(std::string_view recording_json) {
+  // No connection to anywhere is among what it may do.
+  std::string resources =
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+      "script-src 'unsafe-inline' data:; style-src 'unsafe-inline'\">\n";
+  absl::StrAppend(&resources, "<style>\n", std::string(FindPageFile("style.css")->bytes),
+                  "</style>\n");
+  for (const std::string_view script : kClassicScripts) {
+    absl::StrAppend(&resources, "<script>", InScript(FindPageFile(script)->bytes), "</script>\n");
+  }
+  const std::string map = ImportMap([](const PageFile& file) {
+    return absl::StrCat("data:text/javascript;base64,",
+                        absl::Base64Escape({file.bytes.data(), file.bytes.size()}));
+  });
+  absl::StrAppend(&resources, "<script type=\"importmap\">", map, "</script>\n",
+                  "<script type=\"application/json\" id=\"recording\">", InScript(recording_json),
+                  "</script>\n<script type=\"module\">import \"hulld/main.js\";</script>");
+  return FillIn(resources);
+}
+
+}  // namespace hulld

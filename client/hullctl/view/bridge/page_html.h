@@ -1,0 +1,23 @@
+#ifndef HULLD_CLIENT_HULLCTL_VIEW_BRIDGE_PAGE_HTML_H_
+#define HULLD_CLIENT_HULLCTL_VIEW_BRIDGE_PAGE_HTML_H_
+
+#include <string>
+#include <string_view>
+
+namespace hulld {
+
+// index.html, whose scripts and styles the browser fetches one by one. `nonce` admits the one
+// script that stands in the page: the map from modules' names to addresses.
+std::string ServedPage(std::string_view nonce);
+
+// What the page may do, as the value of the header Content-Security-Policy: its own scripts and
+// styles, and a WebSocket to `host`, nothing else.
+std::string ServedPagePolicy(std::string_view nonce, std::string_view host);
+
+// The same page as one file that needs no server and no network. `recording_json`: what the page
+// shows (protocol.h).
+std::string StandalonePage(std::string_view recording_json);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_VIEW_BRIDGE_PAGE_HTML_H_

@@ -1,0 +1,17 @@
+#include "client/hullctl/view/bridge/random_name.h"
+
+#include <absl/strings/escaping.h>
+#include <sys/random.h>
+
+namespace hulld {
+
+absl::StatusOr<std::string> RandomHex(size_t bytes) {
+  std::string random(bytes, '\0');
+  // Up to 256 bytes come whole or not at all.
+  if (getrandom(random.data(), bytes, 0) != static_cast<ssize_t>(bytes)) {
+    return absl::InternalError("the system gives no random bytes");
+  }
+  return absl::BytesToHexString(random);
+}
+
+}  // namespace hulld

@@ -1,0 +1,109 @@
+#include "client/hullctl/view/hull_follower.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <chrono>
+#include <utility>
+
+#include "client/connection_security.h"
+#include "client/grpc_status.h"
+
+namespace hulld {
+namespace {
+
+constexpr std::chrono::seconds kPauseBetweenCalls{1};
+
+}  // namespace
+
+HullFollower::HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
+                           Complaint complain)
+    : client_(client),
+      request_(std::move(request)),
+      receive_(std::move(receive)),
+      complain_(std::move(complain)),
+      thread_([this] { Run(); }) {}
+
+HullFollower::~HullFollower() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    if (context_ != nullptr) context_->TryCancel();
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void HullFollower::Run() {
+  std::string last_complaint;
+  while (true) {
+    const absl::Status status = Follow();
+    std::unique_lock lock(mutex_);
+    if (ended_) return;
+    const bool is_unknown = absl::IsUnimplemented(status);
+    const std::string complaint =
+        absl::StrCat("Changes of hulls are not followed at present: ",
+                     is_unknown ? "this hulld does not know WatchHulls" : status.message());
+    if (!status.ok() && complaint != std::exchange(last_complaint, complaint)) complain_(complaint);
+    if (is_unknown) return;
+    if (changed_.wait_for(lock, kPauseBetweenCalls, [this] { return ended_; })) return;
+  }
+}
+
+absl::Status HullFollower::Follow() {
+  const ClientOptions& options = client_.options();
+  const auto stub = v1::HullService::NewStub(OpenChannel(options.server, options.security, {}));
+  grpc::ClientContext context;
+  {
+    const std::lock_guard lock(mutex_);
+    if (ended_) return absl::CancelledError();
+    context_ = &context;
+  }
+  const auto reader = stub->WatchHulls(&context, request_);
+  v1::WatchHullsResponse response;
+  while (reader->Read(&response)) {
+    Take(response);
+    response.Clear();
+  }
+  const grpc::Status status = reader->Finish();
+  const std::lock_guard lock(mutex_);
+  context_ = nullptr;
+  return FromGrpcStatus(status);
+}
+
+void HullFollower::Take(const v1::WatchHullsResponse& response) {
+  if (response.anew()) {
+    told_anew_.clear();
+    synced_ = false;
+  }
+  for (const v1::HullEvent& event : response.events()) {
+    const std::string& id = event.hull().hull_id();
+    if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {
+      present_.erase(id);
+      told_anew_.erase(id);
+    } else {
+      present_.insert(id);
+      if (!synced_) told_anew_.insert(id);
+    }
+    receive_(event, synced_);
+  }
+  if (response.synced() && !synced_) {
+    synced_ = true;
+    for (auto id = present_.begin(); id != present_.end();) {
+      if (told_anew_.contains(*id)) {
+        ++id;
+        continue;
+      }
+      v1::HullEvent gone;
+      gone.set_kind(v1::HULL_EVENT_KIND_DELETED);
+      gone.mutable_hull()->set_hull_id(*id);
+      gone.mutable_hull()->set_revision(response.header().revision());
+      receive_(gone, synced_);
+      id = present_.erase(id);
+    }
+    told_anew_.clear();
+  }
+  request_.set_after_revision(response.header().revision());
+  request_.set_store_id(response.header().store_id());
+}
+
+}  // namespace hulld

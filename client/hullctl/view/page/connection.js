@@ -1,0 +1,67 @@
+// The page's side of the protocol (client/hullctl/view/protocol.h), over a WebSocket to the bridge
+// or from a recording.
+
+const utf8 = new TextDecoder();
+
+// {head, xyz: Float64Array, rest: Uint32Array} of one binary frame.
+export function decodeFrame(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const head = JSON.parse(utf8.decode(new Uint8Array(buffer, 4, length)));
+  const start = Math.ceil((4 + length) / 8) * 8;
+  const vertices = head.vertices || 0;
+  const xyz = new Float64Array(buffer, start, 3 * vertices);
+  return {head, xyz, rest: new Uint32Array(buffer, start + 24 * vertices)};
+}
+
+// Calls handlers.TYPE(message) for each message and handlers.frame({head, xyz, rest}).
+class BridgeConnection {
+  constructor(handlers) {
+    this.live = true;
+    this.socket = new WebSocket(`ws://${location.host}/page`);
+    this.socket.binaryType = 'arraybuffer';
+    this.socket.onmessage = ({data}) => {
+      if (data instanceof ArrayBuffer) {
+        handlers.frame(decodeFrame(data));
+        return;
+      }
+      const message = JSON.parse(data);
+      handlers[message.type]?.(message);
+    };
+    this.socket.onclose = () => handlers.lost();
+  }
+
+  send(message) {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
+  }
+}
+
+// Answers from what was recorded; what was not recorded has no answer.
+class Recording {
+  constructor(handlers, recording) {
+    this.live = false;
+    this.handlers = handlers;
+    this.recording = recording;
+    queueMicrotask(() => {
+      handlers.hello({...recording.hello, scenes: []});
+      handlers.scene(recording.scene);
+      for (const text of recording.frames) {
+        const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+        handlers.frame(decodeFrame(bytes.buffer));
+      }
+      handlers.collisions(recording.collisions);
+    });
+  }
+
+  send(message) {
+    if (message.type !== 'question' || !message.pair) return;
+    const [a, b] = message.pair;
+    const answer = this.recording.answers.find(({pair}) => pair[0] === a && pair[1] === b);
+    if (answer) this.handlers.answer({...answer, update: message.update});
+  }
+}
+
+export function connect(handlers) {
+  const element = document.getElementById('recording');
+  return element ? new Recording(handlers, JSON.parse(element.textContent)) :
+                   new BridgeConnection(handlers);
+}

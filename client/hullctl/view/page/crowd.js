@@ -1,0 +1,126 @@
+// Many objects as one surface and one set of lines, placed in double and then made float: two calls
+// of the GPU instead of two for each object.
+import {RELATIONS} from 'hulld/palette.js';
+import {rotate, unitQuaternion} from 'hulld/pose.js';
+import {THREE} from 'hulld/three.js';
+
+// Lines of more edges than this hide what they stand on.
+const MOST_EDGES = 400000;
+
+export class Crowd {
+  constructor(model, stage) {
+    this.model = model;
+    this.stage = stage;
+    this.group = new THREE.Group();
+    stage.scene.add(this.group);
+  }
+
+  clear() {
+    for (const part of [...this.group.children]) {
+      part.geometry.dispose();
+      part.material.dispose();
+      this.group.remove(part);
+    }
+    this.ranges = new Map();
+  }
+
+  dispose() {
+    this.clear();
+    this.stage.scene.remove(this.group);
+  }
+
+  // `except`: the object that is drawn on its own.
+  rebuild(except) {
+    this.clear();
+    const {model} = this;
+    const members = model.objects.filter(
+        (object) => object.index !== except && model.isShown(object) && model.hullOf(object));
+    const total = (count) => members.reduce((sum, o) => sum + count(model.hullOf(o)), 0);
+    const edgeTotal = total((hull) => hull.edges.length);
+    const withEdges = model.show.edges && edgeTotal / 2 <= MOST_EDGES;
+    this.positions = new Float32Array(3 * total((hull) => hull.vertexCount));
+    this.colours = new Uint8Array(this.positions.length);
+    const triangles = new Uint32Array(total((hull) => hull.triangles.length));
+    const edges = new Uint32Array(withEdges ? edgeTotal : 0);
+    let vertex = 0;
+    let t = 0;
+    let e = 0;
+    for (const object of members) {
+      const hull = model.hullOf(object);
+      this.ranges.set(object.index, vertex);
+      this.write(object, hull, vertex);
+      for (let i = 0; i < hull.triangles.length; ++i) triangles[t++] = hull.triangles[i] + vertex;
+      if (withEdges) {
+        for (let i = 0; i < hull.edges.length; ++i) edges[e++] = hull.edges[i] + vertex;
+      }
+      vertex += hull.vertexCount;
+    }
+    this.add(triangles, edges);
+  }
+
+  add(triangles, edges) {
+    const position = new THREE.BufferAttribute(this.positions, 3);
+    const colour = new THREE.BufferAttribute(this.colours, 3, true);
+    const geometryWith = (index) => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute('position', position);
+      geometry.setAttribute('color', colour);
+      geometry.setIndex(new THREE.BufferAttribute(index, 1));
+      return geometry;
+    };
+    const parts = [];
+    if (this.model.show.hull) {
+      parts.push(new THREE.Mesh(geometryWith(triangles), new THREE.MeshPhongMaterial({
+        vertexColors: THREE.VertexColors, flatShading: true, shininess: 12, specular: 0x222222,
+        polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
+      })));
+    }
+    if (edges.length) {
+      parts.push(new THREE.LineSegments(geometryWith(edges), new THREE.LineBasicMaterial({
+        color: this.stage.theme.edge, transparent: true, opacity: 0.35,
+      })));
+    }
+    if (this.model.show.points) {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute('position', position);
+      parts.push(new THREE.Points(geometry, new THREE.PointsMaterial(
+          {color: this.stage.theme.edge, size: 2, sizeAttenuation: false})));
+    }
+    for (const part of parts) {
+      // One sphere about all of it is never out of sight.
+      part.frustumCulled = false;
+      this.group.add(part);
+    }
+  }
+
+  write(object, hull, vertex) {
+    const quaternion = unitQuaternion(object.pose);
+    const {origin} = this.model;
+    const relation = RELATIONS[this.model.relationOf.get(object.index)];
+    const colour = new THREE.Color(relation ? relation.lit : object.colour);
+    const bytes = [colour.r, colour.g, colour.b].map((value) => Math.round(255 * value));
+    const shift = [object.pose[4] - origin[0], object.pose[5] - origin[1], object.pose[6] - origin[2]];
+    for (let i = 0; i < hull.xyz.length; i += 3) {
+      const p = rotate(quaternion, [hull.xyz[i], hull.xyz[i + 1], hull.xyz[i + 2]]);
+      for (let k = 0; k < 3; ++k) {
+        this.positions[3 * vertex + i + k] = p[k] + shift[k];
+        this.colours[3 * vertex + i + k] = bytes[k];
+      }
+    }
+  }
+
+  // Colours of all anew, as what collides changed.
+  recolour() {
+    for (const [index, vertex] of this.ranges) {
+      const object = this.model.objects[index];
+      const relation = RELATIONS[this.model.relationOf.get(index)];
+      const colour = new THREE.Color(relation ? relation.lit : object.colour);
+      const bytes = [colour.r, colour.g, colour.b].map((value) => Math.round(255 * value));
+      const end = 3 * (vertex + this.model.hullOf(object).vertexCount);
+      for (let i = 3 * vertex; i < end; ++i) this.colours[i] = bytes[i % 3];
+    }
+    for (const part of this.group.children) {
+      if (part.geometry.attributes.color) part.geometry.attributes.color.needsUpdate = true;
+    }
+  }
+}

@@ -1,0 +1,32 @@
+// Makes elements: element('dt', {className: 'quiet'}, 'text', child).
+export function element(name, properties = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(properties)) {
+    if (key.startsWith('on')) made.addEventListener(key.slice(2), value);
+    else if (key.includes('-')) made.setAttribute(key, value);
+    else made[key] = value;
+  }
+  made.append(...children.filter((child) => child || child === 0));
+  return made;
+}
+
+// A number that reads back as the same double.
+export const exact = (value) => element('span', {className: 'number'}, String(Number(value)));
+
+// "1234567" as "1 234 567", with thin spaces.
+export const grouped = (count) => String(count).replace(/\B(?=(\d{3})+$)/g, '\u2009');
+
+// For people: a few digits.
+export const short = (value) => Number(Number(value).toPrecision(4)).toString();
+
+// A list of facts; rows without a value are left out.
+export function facts(rows) {
+  const list = element('dl', {className: 'facts'});
+  for (const [name, ...values] of rows) {
+    if (values[0] === undefined || values[0] === null) continue;
+    list.append(element('dt', {}, name), element('dd', {}, ...values));
+  }
+  return list;
+}
+
+export const vector = (...xyz) => element('span', {className: 'number'}, xyz.map((v) => String(Number(v))).join(' '));

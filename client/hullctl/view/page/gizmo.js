@@ -1,0 +1,100 @@
+// Handles that move and turn the selected object. They stand at the middle of its box.
+import {AXIS_COLOURS} from 'hulld/palette.js';
+import {rotate, unitQuaternion} from 'hulld/pose.js';
+import {THREE} from 'hulld/three.js';
+
+// three.js paints axes pure red, green and blue, which not all eyes tell apart.
+function repaint(handles) {
+  const colours = {ff0000: AXIS_COLOURS.x, '00ff00': AXIS_COLOURS.y, '0000ff': AXIS_COLOURS.z};
+  handles.traverse((part) => {
+    const colour = part.material && colours[part.material.color.getHexString()];
+    if (colour) part.material.color.set(colour);
+  });
+}
+
+export class Gizmo {
+  constructor(model, stage) {
+    this.model = model;
+    this.stage = stage;
+    this.proxy = new THREE.Object3D();
+    this.handles = new THREE.TransformControls(stage.camera, stage.canvas);
+    this.handles.setSize(0.75);
+    repaint(this.handles);
+    stage.scene.add(this.proxy, this.handles);
+    this.handles.addEventListener('change', () => stage.draw());
+    this.handles.addEventListener('objectChange', () => this.follow(false));
+    this.handles.addEventListener('dragging-changed', ({value}) => {
+      stage.controls.enabled = !value;
+      this.dragged = true;
+      if (value) this.begin();
+      else this.follow(true);
+    });
+    this.setMode('translate');
+  }
+
+  setMode(mode) {
+    this.mode = mode;
+    this.handles.setMode(mode);
+    this.stage.draw();
+  }
+
+  get object() {
+    return this.model.selected === null ? null : this.model.objects[this.model.selected];
+  }
+
+  // To where the object is, or away.
+  update() {
+    const {object, model} = this;
+    if (!this.handles.enabled || !object || !object.hullId || !model.isShown(object) || !model.shapeOf(object)) {
+      this.handles.detach();
+      return;
+    }
+    if (!this.handles.dragging) {
+      const centre = model.centreOf(object);
+      const [w, x, y, z] = unitQuaternion(object.pose);
+      this.proxy.position.set(...centre.map((value, k) => value - model.origin[k]));
+      this.proxy.quaternion.set(x, y, z, w);
+      this.proxy.updateMatrixWorld();
+    }
+    this.handles.attach(this.proxy);
+  }
+
+  begin() {
+    this.startPose = this.object.pose;
+    this.startPosition = this.proxy.position.clone();
+  }
+
+  // The pose that the handles stand for. A move adds to the translation and leaves the quaternion as
+  // it is, bit for bit; a turn keeps the middle of the box where it is.
+  follow(rest) {
+    const {object, model} = this;
+    if (!object || !this.startPose) return;
+    let pose = this.startPose.slice();
+    if (this.mode === 'translate') {
+      const moved = this.proxy.position.clone().sub(this.startPosition).toArray();
+      for (let k = 0; k < 3; ++k) pose[4 + k] += moved[k];
+    } else {
+      const {w, x, y, z} = this.proxy.quaternion;
+      const centre = model.shapeOf(object).centre;
+      const before = rotate(unitQuaternion(pose), centre);
+      const after = rotate(unitQuaternion([w, x, y, z]), centre);
+      pose = [w, x, y, z, ...[0, 1, 2].map((k) => pose[4 + k] + (before[k] - after[k]))];
+    }
+    model.setPose(object.index, pose, rest);
+  }
+
+  // Moves the selected object along an axis of the world, by `steps` of about a hundredth of its
+  // size: a power of ten, so that numbers stay short.
+  nudge(axis, steps) {
+    const {object, model} = this;
+    if (!object || !object.hullId) return;
+    const step = 10 ** Math.floor(Math.log10((model.radiusOf(object) || 1) / 20));
+    const pose = object.pose.slice();
+    const k = 4 + 'xyz'.indexOf(axis);
+    // In whole steps where that is exact enough to be one.
+    const count = pose[k] / step + steps;
+    const rounded = Math.abs(count - Math.round(count)) < 1e-6 ? Math.round(count) : count;
+    pose[k] = step < 1 ? rounded / Math.round(1 / step) : rounded * step;
+    model.setPose(object.index, pose, true);
+  }
+}

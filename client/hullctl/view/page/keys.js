@@ -1,0 +1,66 @@
+// The keyboard: everything that the pointer can do.
+import {element} from 'hulld/dom.js';
+
+// Keys, what they do for people, and what they call.
+export function bindKeys(actions) {
+  const table = [
+    [['0', '7'], '\u2013', 'show a scene of the demo', null],
+    [['F'], '', 'show everything', actions.fit],
+    [['C'], '', 'fly to the selected object', actions.flyToSelected],
+    [['J'], '', 'select the next object', () => actions.step(1)],
+    [['K'], '', 'select the previous object', () => actions.step(-1)],
+    [['B'], '', 'take the next object as the other one of the pair', actions.nextOther],
+    [['N'], '', 'fly to the next pair that collides', actions.nextCollision],
+    [['Esc'], '', 'select nothing', actions.deselect],
+    [['G'], '', 'handles that move', () => actions.mode('translate')],
+    [['R'], '', 'handles that turn', () => actions.mode('rotate')],
+    [['X', 'Y', 'Z'], ' ', 'move the object a step along an axis; with Shift back', null],
+    [['Backspace'], '', 'put the object back where it was', actions.reset],
+    [['\u2190', '\u2191', '\u2193', '\u2192'], ' ', 'orbit; with Shift pan', null],
+    [['+', '\u2212'], ' ', 'zoom', null],
+    [['P'], '', 'points', () => actions.show('points')],
+    [['M'], '', 'mesh', () => actions.show('mesh')],
+    [['H'], '', 'hull', () => actions.show('hull')],
+    [['E'], '', 'edges', () => actions.show('edges')],
+    [['L'], '', 'labels', () => actions.show('labels')],
+    [['V'], '', 'hide or show the selected object', actions.toggleVisible],
+    [['/'], '', 'search', actions.search],
+    [['D'], '', 'light or dark', actions.theme],
+    [['?'], '', 'this list', actions.help],
+  ];
+  const list = document.getElementById('keys-list');
+  for (const [keys, between, text] of table) {
+    const names = keys.flatMap((key, i) => [...(i ? [between] : []), element('kbd', {}, key)]);
+    list.append(element('dt', {}, ...names), element('dd', {}, text));
+  }
+  const plain = new Map(table.filter(([, , , act]) => act).map(([[key], , , act]) => [key.toLowerCase(), act]));
+  plain.set('escape', plain.get('esc'));
+
+  addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const typing = event.target.matches?.('input:not([type="checkbox"]):not([type="color"]), select, textarea');
+    if (typing) {
+      if (event.key === 'Escape') event.target.blur();
+      return;
+    }
+    if (document.querySelector('dialog[open]')) return;
+    const act = special(event, actions) || plain.get(event.key.toLowerCase());
+    if (!act) return;
+    event.preventDefault();
+    act();
+  });
+}
+
+function special({key, shiftKey}, actions) {
+  const TURN = 0.12;
+  const arrows = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
+  if (arrows[key]) {
+    const [x, y] = arrows[key];
+    return () => (shiftKey ? actions.pan(x, y) : actions.orbit(TURN * x, -TURN * y));
+  }
+  if (/^[xyz]$/i.test(key)) return () => actions.nudge(key.toLowerCase(), shiftKey ? -1 : 1);
+  if (/^[0-7]$/.test(key)) return () => actions.scene(key);
+  if (key === '+' || key === '=') return () => actions.zoom(0.85);
+  if (key === '-' || key === '_') return () => actions.zoom(1 / 0.85);
+  return null;
+}

@@ -1,0 +1,537 @@
+// Puts the page together: messages change the model, the model tells the parts, the parts draw.
+import {AnswerPanel} from 'hulld/answer_panel.js';
+import {connect} from 'hulld/connection.js';
+import {Crowd} from 'hulld/crowd.js';
+import {element, grouped} from 'hulld/dom.js';
+import {Gizmo} from 'hulld/gizmo.js';
+import {bindKeys} from 'hulld/keys.js';
+import {Labels} from 'hulld/labels.js';
+import {Marks} from 'hulld/marks.js';
+import {Model} from 'hulld/model.js';
+import {ObjectPanel} from 'hulld/object_panel.js';
+import {ObjectView} from 'hulld/object_view.js';
+import {pick} from 'hulld/picking.js';
+import {HullShape, MeshShape, newVertices} from 'hulld/shape.js';
+import {ShellView} from 'hulld/shell_view.js';
+import {Stage} from 'hulld/stage.js';
+import {Tree} from 'hulld/tree.js';
+
+const $ = (id) => document.getElementById(id);
+
+class Viewer {
+  constructor() {
+    this.model = new Model();
+    this.stage = new Stage($('canvas'), this.model);
+    this.setTheme(matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light');
+    this.marks = new Marks(this.model, this.stage);
+    this.shell = new ShellView(this.model, this.stage);
+    this.labels = new Labels(this.model, this.stage);
+    this.tree = new Tree(this.model);
+    this.gizmo = new Gizmo(this.model, this.stage);
+    this.views = new Map();
+    this.crowd = null;
+    this.update = 0;
+    this.moved = new Set();
+    // Hulls that were asked for and did not come yet; true: it changed meanwhile.
+    this.awaited = new Map();
+    this.connection = connect({
+      hello: (message) => this.hello(message),
+      scene: (message) => this.scene(message),
+      objects: (message) => this.moreObjects(message.objects),
+      hull: (message) => this.hullChanged(message.event, message.synced),
+      answer: (message) => this.answer(message),
+      collisions: (message) => this.collisions(message),
+      problem: (message) => this.say(message.message),
+      frame: (frame) => this.frame(frame),
+      lost: () => this.lost(),
+    });
+    this.answerPanel = new AnswerPanel(this.model, this.marks, this.connection.live);
+    this.objectPanel = new ObjectPanel(this.model, this.connection.live,
+                                       (...wish) => this.simplify(...wish));
+    this.listen();
+    this.bindControls();
+    this.stage.beforeFrame((now) => [...this.views.values()].reduce((any, view) => view.fade(now) || any, false));
+    document.body.dataset.ready = 'yes';
+  }
+
+  // The model changed.
+  listen() {
+    const {model} = this;
+    model.on('selection', () => {
+      this.shell.clear();
+      if (model.isCrowd) this.rebuildViews();
+      this.gizmo.update();
+      this.marks.rebuild();
+      this.labels.rebuild();
+      this.tree.rebuild();
+      this.answerPanel.rebuild();
+      this.objectPanel.rebuild();
+      this.updateTools();
+      this.ask(true);
+    });
+    model.on('pose', ({index, rest}) => {
+      this.views.get(index)?.place();
+      this.moved.add(index);
+      this.gizmo.update();
+      this.shell.place();
+      this.objectPanel.updatePose();
+      this.updateTools();
+      this.stage.draw();
+      this.ask(rest);
+    });
+    model.on('visibility colour shown', () => {
+      this.rebuildViews();
+      this.gizmo.update();
+      this.marks.rebuild();
+      this.labels.rebuild();
+      this.tree.rebuild();
+    });
+    model.on('collisions', (changed) => {
+      this.answerPanel.updateCollisions();
+      if (!changed.size) return;
+      if (model.isCrowd) this.crowd?.recolour();
+      for (const index of changed) this.views.get(index)?.rebuild();
+      this.tree.rebuild();
+      this.labels.rebuild();
+      this.stage.draw();
+    });
+    model.on('tolerance', () => {
+      this.shell.showTolerance();
+      this.ask(true);
+    });
+    model.on('fly', (objects) => {
+      const bounds = model.bounds(objects);
+      if (bounds) this.stage.flyTo(bounds);
+    });
+  }
+
+  // --- Messages ---
+
+  hello({server, version, up, scenes}) {
+    this.server = server;
+    this.stage.setUp(up);
+    this.gizmo.handles.camera = this.stage.camera;
+    const choice = $('scene-choice');
+    choice.hidden = scenes.length < 2;
+    const ordered = scenes.slice().sort((a, b) => a.key.localeCompare(b.key));
+    choice.replaceChildren(...ordered.map(({key, title}) => element('option', {value: key}, `${key}  ${title}`)));
+    $('status').dataset.live = this.connection.live ? 'yes' : 'no';
+    $('status').title = this.connection.live ? `hulld ${version} at ${server}` : 'A recording; nothing here changes';
+    this.scenes = scenes.map(({key}) => key);
+  }
+
+  scene(message) {
+    const {model} = this;
+    model.load(message);
+    $('scene-choice').value = message.key;
+    $('title').textContent = message.title;
+    $('note').textContent = message.note;
+    document.title = `${message.title} \u2013 hulld`;
+    document.body.dataset.scene = message.key;
+    this.moved = new Set(model.objects.map(({index}) => index));
+    this.awaited.clear();
+    this.fitted = false;
+    this.clearViews();
+    this.shell.clear();
+    this.syncShown();
+    model.tell('selection');
+    this.answerPanel.updateCollisions();
+    this.connection.send({type: 'geometry', files: model.files.map((_, i) => i), hullIds: []});
+    this.fetchHulls(new Set(model.objects.map(({hullId}) => hullId).filter(Boolean)));
+    this.updateStatus();
+  }
+
+  moreObjects(objects) {
+    const {model} = this;
+    const before = model.objects.length;
+    const wasCrowd = model.isCrowd;
+    model.addObjects(objects);
+    if (wasCrowd !== model.isCrowd) this.clearViews();
+    for (const object of model.objects.slice(before)) this.moved.add(object.index);
+    this.fetchHulls(objects.map(({hullId}) => hullId));
+    this.soon('tree', () => {
+      this.tree.rebuild();
+      this.answerPanel.rebuild();
+    });
+  }
+
+  fetchHulls(ids) {
+    const wanted = [];
+    for (const id of ids) {
+      if (this.awaited.has(id)) this.awaited.set(id, true);
+      else wanted.push(id);
+    }
+    for (const id of wanted) this.awaited.set(id, false);
+    if (wanted.length) this.connection.send({type: 'geometry', files: [], hullIds: wanted});
+  }
+
+  hullChanged({kind, hull}, synced) {
+    const {model} = this;
+    const gone = kind === 'HULL_EVENT_KIND_DELETED';
+    model.info.set(hull.hullId, gone ? undefined : hull);
+    for (const object of model.objects) {
+      if (object.hullId === hull.hullId && object.gone !== gone) {
+        object.gone = gone;
+        this.soon('gone', () => model.tell('visibility'));
+      }
+    }
+    this.updateStatus(hull.revision);
+    const known = model.hulls.get(hull.hullId);
+    if (!gone && synced && known?.revision !== hull.revision) this.fetchHulls([hull.hullId]);
+  }
+
+  frame(frame) {
+    const {model} = this;
+    const {kind} = frame.head;
+    if (kind === 'mesh') {
+      model.meshes.set(frame.head.file, new MeshShape(frame));
+    } else if (kind === 'hull') {
+      this.hullCame(new HullShape(frame), frame.head.hullId);
+    } else if (kind === 'simplified') {
+      const hull = new HullShape(frame);
+      this.shell.showSimplified(frame.head, hull);
+      this.objectPanel.simplified(hull);
+      return;
+    } else {
+      this.frameMissing(frame.head);
+    }
+    if (model.isCrowd) {
+      if (this.awaited.size === 0) this.geometryChanged();
+    } else {
+      this.geometryChanged();
+    }
+  }
+
+  hullCame(hull, id) {
+    const {model} = this;
+    const before = model.hulls.get(id);
+    model.hulls.set(id, hull);
+    const again = this.awaited.get(id);
+    this.awaited.delete(id);
+    if (again) this.fetchHulls([id]);
+    this.updateStatus(hull.revision);
+    if (!before || model.isCrowd) return;
+    const fresh = newVertices(before, hull);
+    if (!fresh.length) return;
+    // After the views are built anew.
+    this.flashes = [...(this.flashes || []), {id, hull, fresh}];
+  }
+
+  frameMissing(head) {
+    if (head.simplified) {
+      this.objectPanel.simplifyFailed(head.message);
+      return;
+    }
+    this.awaited.delete(head.hullId);
+    const known = this.model.info.get(head.hullId);
+    if (known || head.file !== undefined) this.say(head.message);
+    for (const object of this.model.objects) {
+      if (object.hullId === head.hullId && head.hullId) {
+        object.gone = true;
+        this.soon('gone', () => this.model.tell('visibility'));
+      }
+    }
+  }
+
+  // Some shapes are here that were not before.
+  geometryChanged() {
+    this.soon('geometry', () => {
+      const {model} = this;
+      if (!this.fitted && this.awaited.size === 0) this.firstFit();
+      this.rebuildViews();
+      for (const {id, hull, fresh} of this.flashes || []) {
+        for (const object of model.objects) {
+          if (object.hullId === id) this.views.get(object.index)?.flash(hull, fresh);
+        }
+      }
+      this.flashes = [];
+      this.gizmo.update();
+      this.marks.rebuild();
+      this.labels.rebuild();
+      this.objectPanel.rebuild();
+      this.syncShown();
+    });
+  }
+
+  // Everything is here: the origin goes to the middle of it, and a small scene gets a pair.
+  firstFit() {
+    const {model} = this;
+    const bounds = model.bounds();
+    if (!bounds) return;
+    this.fitted = true;
+    model.origin = bounds.centre.slice();
+    this.stage.radius = bounds.radius;
+    this.stage.flyTo(bounds, {jump: true, direction: this.stage.defaultView()});
+    const hulls = model.objects.filter(({hullId, gone}) => hullId && !gone);
+    if (hulls.length === 2) model.select(hulls[1].index, hulls[0].index);
+    else if (model.objects.length === 1) model.select(0);
+    else this.ask(true);
+    document.body.dataset.fitted = document.body.dataset.scene || 'yes';
+  }
+
+  answer(message) {
+    const {pair} = this.model;
+    if (!pair || message.pair[0] !== pair[0] || message.pair[1] !== pair[1]) return;
+    this.model.answer = message;
+    this.marks.rebuild();
+    this.answerPanel.update();
+  }
+
+  collisions(message) {
+    if (!this.model.objects.length) return;
+    if (message.revision !== '0') this.updateStatus(message.revision);
+    this.model.setCollisions(message);
+  }
+
+  lost() {
+    $('status').dataset.live = 'lost';
+    $('status').textContent = 'ended';
+    this.say('hullctl has ended, or lets this page in no more. What is here stays, and nothing follows. ' +
+             'Run hullctl view again for another address.');
+  }
+
+  // --- Questions ---
+
+  ask(rest) {
+    const {model} = this;
+    const objects = [...this.moved];
+    this.moved.clear();
+    this.connection.send({
+      type: 'question',
+      update: ++this.update,
+      objects,
+      poses: objects.flatMap((index) => model.objects[index].pose),
+      pair: model.pair || [],
+      tolerance: model.tolerance,
+      rest,
+    });
+  }
+
+  simplify(object, side, maxError) {
+    if (maxError === 0) {
+      this.shell.clear();
+      return;
+    }
+    this.shell.expect(object);
+    this.connection.send({type: 'simplify', hullId: object.hullId, side, maxError, maxVertices: 0});
+  }
+
+  // --- Drawing ---
+
+  clearViews() {
+    for (const view of this.views.values()) view.dispose();
+    this.views.clear();
+    this.crowd?.dispose();
+    this.crowd = null;
+    this.stage.draw();
+  }
+
+  rebuildViews() {
+    const {model, stage} = this;
+    const single = model.isCrowd ?
+        model.objects.filter(({index}) => index === model.selected) : model.objects;
+    const wanted = new Set(single.map(({index}) => index));
+    for (const [index, view] of this.views) {
+      if (wanted.has(index)) continue;
+      view.dispose();
+      this.views.delete(index);
+    }
+    for (const object of single) {
+      if (!this.views.has(object.index)) this.views.set(object.index, new ObjectView(model, stage, object));
+      this.views.get(object.index).rebuild();
+    }
+    if (model.isCrowd) {
+      this.crowd ??= new Crowd(model, stage);
+      this.crowd.rebuild(model.selected);
+    }
+    stage.draw();
+  }
+
+  fit() {
+    const bounds = this.model.bounds();
+    if (!bounds) return;
+    this.stage.radius = bounds.radius;
+    this.stage.flyTo(bounds);
+  }
+
+  // Runs `work` once, before the next frame, however often it is asked for.
+  soon(name, work) {
+    this.waiting ??= new Map();
+    if (this.waiting.size === 0) {
+      setTimeout(() => {
+        const works = [...this.waiting.values()];
+        this.waiting.clear();
+        for (const each of works) each();
+      });
+    }
+    this.waiting.set(name, work);
+  }
+
+  // --- The bar and the tools ---
+
+  updateStatus(revision = undefined) {
+    const newer = (a, b) => (BigInt(a || 0) > BigInt(b || 0) ? a : b);
+    if (revision !== undefined) this.revision = newer(revision, this.revision);
+    if ($('status').dataset.live === 'lost') return;
+    const count = this.model.objects.filter(({gone}) => !gone).length;
+    const objects = count === 1 ? '1 object' : `${grouped(count)} objects`;
+    $('status').textContent = this.revision ? `${objects}, revision ${this.revision}` : objects;
+  }
+
+  say(text) {
+    $('message').textContent = text;
+    $('message').hidden = false;
+    clearTimeout(this.silence);
+    this.silence = setTimeout(() => { $('message').hidden = true; }, 12000);
+  }
+
+  setTheme(name) {
+    this.theme = name;
+    document.documentElement.dataset.theme = name;
+    $('theme').textContent = name === 'dark' ? 'Light' : 'Dark';
+    this.stage.setTheme(name);
+    if (this.views) this.rebuildViews();
+  }
+
+  syncShown() {
+    const {model} = this;
+    for (const [key, on] of Object.entries(model.show)) $(`show-${key}`).checked = on;
+    $('show-mesh').disabled = !model.files.length;
+  }
+
+  updateTools() {
+    const object = this.model.selected === null ? null : this.model.objects[this.model.selected];
+    const can = Boolean(object?.hullId) && this.connection.live;
+    for (const [id, mode] of [['mode-move', 'translate'], ['mode-turn', 'rotate']]) {
+      $(id).disabled = !can;
+      $(id).setAttribute('aria-pressed', String(can && this.gizmo.mode === mode));
+    }
+    $('mode-reset').disabled = !can || object.pose === object.start;
+    if (!this.connection.live) document.querySelector('.tools').hidden = true;
+    this.gizmo.handles.enabled = this.connection.live;
+    if (!this.connection.live) this.gizmo.handles.detach();
+  }
+
+  bindControls() {
+    const {model, stage} = this;
+    for (const key of Object.keys(model.show)) {
+      $(`show-${key}`).addEventListener('change', ({target}) => {
+        model.show[key] = target.checked;
+        model.tell('shown');
+      });
+    }
+    $('fit').addEventListener('click', () => this.fit());
+    $('theme').addEventListener('click', () => this.setTheme(this.theme === 'dark' ? 'light' : 'dark'));
+    $('help').addEventListener('click', () => $('keys').showModal());
+    $('scene-choice').addEventListener('change', ({target}) => {
+      this.connection.send({type: 'show', key: target.value});
+      $('canvas').focus();
+    });
+    $('mode-move').addEventListener('click', () => this.mode('translate'));
+    $('mode-turn').addEventListener('click', () => this.mode('rotate'));
+    $('mode-reset').addEventListener('click', () => this.reset());
+    for (const tab of document.querySelectorAll('.tabs button')) {
+      tab.addEventListener('click', () => this.showPanel(tab.dataset.panel));
+    }
+    this.showPanel('answer');
+    this.bindPicking();
+    bindKeys({
+      fit: () => this.fit(),
+      flyToSelected: () => model.selected !== null && model.tell('fly', [model.objects[model.selected]]),
+      step: (by) => this.step(by),
+      nextOther: () => this.nextOther(),
+      nextCollision: () => this.nextCollision(),
+      deselect: () => model.select(null),
+      mode: (mode) => this.mode(mode),
+      reset: () => this.reset(),
+      show: (key) => $(`show-${key}`).click(),
+      toggleVisible: () => this.toggleVisible(),
+      search: () => {
+        this.showPanel('objects');
+        $('search').focus();
+      },
+      theme: () => $('theme').click(),
+      help: () => $('keys').showModal(),
+      pan: (x, y) => stage.pan(x, y),
+      orbit: (around, over) => stage.orbit(around, over),
+      zoom: (factor) => stage.zoom(factor),
+      nudge: (axis, steps) => this.connection.live && this.gizmo.nudge(axis, steps),
+      scene: (key) => this.scenes?.length > 1 && this.connection.send({type: 'show', key}),
+    });
+  }
+
+  // A click selects; a drag does not.
+  bindPicking() {
+    const canvas = $('canvas');
+    let down = null;
+    canvas.addEventListener('pointerdown', ({clientX, clientY, button}) => {
+      down = button === 0 ? [clientX, clientY] : null;
+      this.gizmo.dragged = false;
+      canvas.focus();
+    });
+    canvas.addEventListener('pointerup', ({clientX, clientY, shiftKey, offsetX, offsetY}) => {
+      if (!down || this.gizmo.dragged || this.gizmo.handles.dragging) return;
+      if (Math.hypot(clientX - down[0], clientY - down[1]) > 4) return;
+      const index = pick(this.model, this.stage, offsetX, offsetY);
+      if (index === null) this.model.select(null);
+      else this.tree.choose(this.model.objects[index], shiftKey);
+    });
+  }
+
+  showPanel(name) {
+    document.querySelector('main').dataset.panel = name;
+    for (const tab of document.querySelectorAll('.tabs button')) {
+      tab.setAttribute('aria-selected', String(tab.dataset.panel === name));
+    }
+  }
+
+  mode(mode) {
+    this.gizmo.setMode(mode);
+    this.updateTools();
+  }
+
+  reset() {
+    const object = this.model.objects[this.model.selected];
+    if (object) this.model.setPose(object.index, object.start, true);
+  }
+
+  toggleVisible() {
+    const object = this.model.objects[this.model.selected];
+    if (!object) return;
+    object.visible = !object.visible;
+    this.model.tell('visibility');
+  }
+
+  step(by) {
+    const present = this.model.objects.filter(({gone}) => !gone);
+    if (!present.length) return;
+    const at = present.findIndex(({index}) => index === this.model.selected);
+    const next = at < 0 ? (by > 0 ? 0 : present.length - 1) : (at + by + present.length) % present.length;
+    this.model.select(present[next].index);
+  }
+
+  nextOther() {
+    const {model} = this;
+    const others = model.objects.filter(({hullId, gone, index}) => hullId && !gone && index !== model.selected);
+    if (model.selected === null || !others.length) return;
+    const at = others.findIndex(({index}) => index === model.other);
+    model.select(model.selected, others[(at + 1) % others.length].index);
+  }
+
+  nextCollision() {
+    const {pairs} = this.model.collisions;
+    if (!pairs.length) return;
+    this.visited = ((this.visited ?? -1) + 1) % pairs.length;
+    this.answerPanel.visit(pairs[this.visited][0], pairs[this.visited][1]);
+  }
+}
+
+try {
+  // For the console and for tests.
+  globalThis.hulldViewer = new Viewer();
+} catch (error) {
+  const message = $('message');
+  message.textContent = `The picture cannot be drawn: ${error.message}`;
+  message.hidden = false;
+  throw error;
+}

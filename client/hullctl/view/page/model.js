@@ -1,0 +1,193 @@
+// What is looked at and what the user chose, without any drawing. Parts of the page listen to it.
+import {CROWD_COLOUR, OBJECT_COLOURS} from 'hulld/palette.js';
+import {samePose, toWorld} from 'hulld/pose.js';
+
+// At most so many objects are each drawn and labelled on their own; more are drawn as a crowd.
+export const MOST_SINGLE_OBJECTS = 200;
+
+// Of larger shapes the box stands for them.
+const MOST_CORNERS = 100;
+
+export class Model extends EventTarget {
+  constructor() {
+    super();
+    this.show = {points: false, mesh: false, hull: true, edges: true, labels: true};
+    this.tolerance = 0;
+    this.clear();
+  }
+
+  clear() {
+    this.objects = [];
+    this.files = [];
+    // By hull ID, and by file.
+    this.hulls = new Map();
+    this.meshes = new Map();
+    this.info = new Map();
+    this.selected = null;
+    this.other = null;
+    this.answer = null;
+    this.collisions = {pairs: [], problems: [], totals: {}};
+    this.relationOf = new Map();
+    // In double; what is drawn is relative to it.
+    this.origin = [0, 0, 0];
+  }
+
+  tell(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, {detail}));
+  }
+
+  on(types, listener) {
+    for (const type of types.split(' ')) this.addEventListener(type, (e) => listener(e.detail));
+  }
+
+  load({files, objects}) {
+    this.clear();
+    this.files = files;
+    this.addObjects(objects);
+    this.show.mesh = files.length > 0;
+  }
+
+  addObjects(objects) {
+    const many = this.objects.length + objects.length > MOST_SINGLE_OBJECTS;
+    for (const object of objects) {
+      const index = this.objects.length;
+      this.objects.push({
+        ...object,
+        index,
+        start: object.pose,
+        visible: true,
+        gone: false,
+        colour: many ? CROWD_COLOUR : OBJECT_COLOURS[index % OBJECT_COLOURS.length],
+      });
+    }
+  }
+
+  get isCrowd() {
+    return this.objects.length > MOST_SINGLE_OBJECTS;
+  }
+
+  hullOf(object) {
+    return this.hulls.get(object.hullId);
+  }
+
+  meshOf(object) {
+    return this.meshes.get(object.file);
+  }
+
+  shapeOf(object) {
+    return this.hullOf(object) || this.meshOf(object);
+  }
+
+  isShown(object) {
+    return object.visible && !object.gone;
+  }
+
+  // The middle of an object's box, in the world, in double.
+  centreOf(object) {
+    const shape = this.shapeOf(object);
+    return toWorld(object.pose, shape ? shape.centre : [0, 0, 0]);
+  }
+
+  radiusOf(object) {
+    return this.shapeOf(object)?.radius || 0;
+  }
+
+  // Points of the world that are about an object: its vertices where they are few, else the corners
+  // of its box.
+  cornersOf(object) {
+    const {low, high, xyz, vertexCount} = this.shapeOf(object);
+    if (vertexCount <= MOST_CORNERS) {
+      return Array.from({length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
+    }
+    const corners = [];
+    for (let i = 0; i < 8; ++i) {
+      corners.push(toWorld(object.pose, [0, 1, 2].map((k) => (i >> k & 1 ? high[k] : low[k]))));
+    }
+    return corners;
+  }
+
+  // {centre, radius, corners}: a sphere about all that is shown, and what it was made of; null when
+  // nothing is shown.
+  bounds(objects = this.objects) {
+    const corners = objects
+        .filter((object) => this.isShown(object) && this.shapeOf(object) && !this.shapeOf(object).isEmpty)
+        .flatMap((object) => this.cornersOf(object));
+    if (!corners.length) return null;
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (const corner of corners) {
+      for (let k = 0; k < 3; ++k) {
+        low[k] = Math.min(low[k], corner[k]);
+        high[k] = Math.max(high[k], corner[k]);
+      }
+    }
+    const centre = low.map((value, k) => value / 2 + high[k] / 2);
+    return {centre, radius: Math.hypot(...high.map((value, k) => value - low[k])) / 2 || 1, corners};
+  }
+
+  select(index, other = undefined) {
+    if (index === this.selected && (other === undefined || other === this.other)) return;
+    const before = this.selected;
+    this.selected = index;
+    if (index === null) {
+      this.other = null;
+    } else if (other !== undefined) {
+      this.other = other;
+    } else if (before !== null && before !== index && this.other === index) {
+      this.other = before;
+    } else if (this.other === null || this.other === index) {
+      this.other = this.nearestTo(index);
+    }
+    this.answer = null;
+    this.tell('selection');
+  }
+
+  // The other object whose sphere is nearest; null when there is none.
+  nearestTo(index) {
+    const object = this.objects[index];
+    const centre = this.centreOf(object);
+    let nearest = null;
+    let least = Infinity;
+    for (const candidate of this.objects) {
+      if (candidate === object || !candidate.hullId || candidate.gone) continue;
+      const c = this.centreOf(candidate);
+      const gap = Math.hypot(c[0] - centre[0], c[1] - centre[1], c[2] - centre[2]) -
+          this.radiusOf(candidate);
+      if (gap < least) [nearest, least] = [candidate.index, gap];
+    }
+    return nearest;
+  }
+
+  // The pair that is asked about, lower index first; null when there is none.
+  get pair() {
+    if (this.selected === null || this.other === null) return null;
+    const pair = [this.selected, this.other].sort((a, b) => a - b);
+    return pair.every((i) => this.objects[i].hullId) ? pair : null;
+  }
+
+  // `rest`: whether the motion has ended.
+  setPose(index, pose, rest) {
+    const object = this.objects[index];
+    if (samePose(object.pose, pose) && !rest) return;
+    object.pose = pose;
+    this.tell('pose', {index, rest});
+  }
+
+  setCollisions(collisions) {
+    const before = this.relationOf;
+    this.collisions = collisions;
+    this.relationOf = new Map();
+    for (const [a, b, relation] of collisions.pairs) {
+      for (const index of [a, b]) {
+        if (this.relationOf.get(index) !== 'RELATION_OVERLAPPING') {
+          this.relationOf.set(index, relation);
+        }
+      }
+    }
+    const changed = new Set();
+    for (const index of [...before.keys(), ...this.relationOf.keys()]) {
+      if (before.get(index) !== this.relationOf.get(index)) changed.add(index);
+    }
+    this.tell('collisions', changed);
+  }
+}

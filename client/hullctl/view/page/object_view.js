@@ -1,0 +1,171 @@
+// One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the middle
+// of the object's box, turned as the pose says.
+import {MARK_COLOURS, RELATIONS} from 'hulld/palette.js';
+import {unitQuaternion} from 'hulld/pose.js';
+import {THREE, discTexture} from 'hulld/three.js';
+
+const FLASH_MS = 1200;
+
+// Shapes are shared by objects; each is given to the GPU once.
+const geometries = new WeakMap();
+export function geometryOf(shape, kind) {
+  const kinds = geometries.get(shape) || {};
+  geometries.set(shape, kinds);
+  if (!kinds[kind]) {
+    kinds.position ??= new THREE.BufferAttribute(shape.positions(), 3);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', kinds.position);
+    if (kind !== 'points') geometry.setIndex(new THREE.BufferAttribute(shape[kind], 1));
+    geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), shape.radius || 1e-9);
+    kinds[kind] = geometry;
+  }
+  return kinds[kind];
+}
+
+const surface = (colour, options) => new THREE.MeshPhongMaterial({
+  color: colour, flatShading: true, shininess: 12, specular: 0x222222,
+  polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, ...options,
+});
+
+// The lines of a larger hull would cover all of it, and both of its sides cost twice.
+const isHuge = (hull) => hull.facetCount > 200000;
+
+// Many lines hide what they stand on.
+const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
+
+export class ObjectView {
+  constructor(model, stage, object) {
+    this.model = model;
+    this.stage = stage;
+    this.object = object;
+    this.group = new THREE.Group();
+    stage.scene.add(this.group);
+  }
+
+  dispose() {
+    this.clear();
+    this.stage.scene.remove(this.group);
+  }
+
+  clear() {
+    for (const part of [...this.group.children]) {
+      part.material.dispose();
+      this.group.remove(part);
+    }
+  }
+
+  // Builds what is to be drawn anew; cheap, as geometries are shared.
+  rebuild() {
+    const {model, object} = this;
+    this.clear();
+    this.group.visible = model.isShown(object);
+    const hull = model.hullOf(object);
+    const mesh = model.meshOf(object);
+    this.centre = (hull || mesh)?.centre || [0, 0, 0];
+    const {show} = model;
+    if (mesh && show.mesh && mesh.triangles.length) this.addMesh(mesh);
+    // A file without triangles has nothing but its points to show.
+    const cloud = mesh || hull;
+    if (cloud && (show.points || (mesh && !mesh.triangles.length && show.mesh))) {
+      this.addPoints(cloud);
+    }
+    if (hull && show.hull && !hull.isEmpty) this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
+    if (hull && show.edges && !hull.isEmpty && !isHuge(hull) && (show.hull || !(mesh && show.mesh))) {
+      this.addEdges(hull);
+    }
+    this.place();
+  }
+
+  // Parts of other shapes than the hull have centres of their own.
+  shift(part, shape) {
+    part.position.set(...shape.centre.map((value, k) => value - this.centre[k]));
+    this.group.add(part);
+  }
+
+  addMesh(mesh) {
+    const material = surface(this.object.colour, {side: THREE.DoubleSide});
+    this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles'), material), mesh);
+  }
+
+  addPoints(shape) {
+    const size = shape.vertexCount > 20000 ? 1.5 : 4;
+    const material = new THREE.PointsMaterial({
+      color: this.stage.theme.edge, size, sizeAttenuation: false, map: discTexture(), alphaTest: 0.5,
+    });
+    const points = new THREE.Points(geometryOf(shape, 'points'), material);
+    points.renderOrder = 2;
+    this.shift(points, shape);
+  }
+
+  // Far sides first, then near ones: right for anything convex.
+  addHull(hull, isBeside) {
+    const flat = hull.info.dimension < 3;
+    const sides = flat ? [THREE.DoubleSide] :
+        isHuge(hull) ? [THREE.FrontSide] : [THREE.BackSide, THREE.FrontSide];
+    for (const side of sides) {
+      const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
+      const material = surface(this.object.colour, {side, ...(isHuge(hull) && !isBeside ? {} : glass)});
+      const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
+      part.renderOrder = side === THREE.FrontSide ? 4 : 3;
+      this.shift(part, hull);
+    }
+  }
+
+  addEdges(hull) {
+    const relation = RELATIONS[this.model.relationOf.get(this.object.index)];
+    const material = new THREE.LineBasicMaterial({
+      color: relation ? relation.lit : this.stage.theme.edge,
+      transparent: true,
+      opacity: relation ? 0.6 : this.stage.theme.edgeOpacity * edgeWeight(hull.edgeCount),
+    });
+    const edges = new THREE.LineSegments(geometryOf(hull, 'edges'), material);
+    edges.renderOrder = 5;
+    this.shift(edges, hull);
+  }
+
+  // The difference of two doubles, then float: no jitter.
+  place() {
+    const centre = this.model.centreOf(this.object);
+    const [w, x, y, z] = unitQuaternion(this.object.pose);
+    this.group.position.set(...centre.map((value, k) => value - this.model.origin[k]));
+    this.group.quaternion.set(x, y, z, w);
+  }
+
+  // Vertices that were not there before.
+  flash(hull, indices) {
+    const geometry = new THREE.BufferGeometry();
+    const positions = new Float32Array(3 * indices.length);
+    indices.forEach((v, i) => {
+      for (let k = 0; k < 3; ++k) positions[3 * i + k] = hull.xyz[3 * v + k] - hull.centre[k];
+    });
+    geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+    const material = new THREE.PointsMaterial({
+      color: MARK_COLOURS.flash, size: 11, sizeAttenuation: false, transparent: true, depthTest: false,
+      map: discTexture(),
+    });
+    const points = new THREE.Points(geometry, material);
+    points.renderOrder = 6;
+    points.userData.end = performance.now() + FLASH_MS;
+    this.shift(points, hull);
+    this.stage.draw();
+  }
+
+  // Lets flashes fade; whether there are any.
+  fade(now) {
+    let any = false;
+    for (const part of [...this.group.children]) {
+      const {end} = part.userData;
+      if (!end) continue;
+      const left = (end - now) / FLASH_MS;
+      if (left > 0) {
+        part.material.opacity = Math.min(left, 1);
+        any = true;
+      } else {
+        part.geometry.dispose();
+        part.material.dispose();
+        this.group.remove(part);
+      }
+    }
+    return any;
+  }
+}

@@ -1,0 +1,37 @@
+// Colours that people with any kind of colour vision tell apart, and the words that stand beside
+// them. Source: Okabe and Ito 2008, Color Universal Design.
+export const OBJECT_COLOURS = ['#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999'];
+
+// Of many objects those that collide shall stand out, and nothing else.
+export const CROWD_COLOUR = '#8fa9bd';
+
+// `sign` tells relations apart without colour.
+export const RELATIONS = {
+  RELATION_OVERLAPPING: {word: 'overlapping', sign: '\u25cf', style: 'overlapping', lit: '#d55e00'},
+  RELATION_TOUCHING: {word: 'touching', sign: '\u25d0', style: 'touching', lit: '#e69f00'},
+  RELATION_SEPARATED: {word: 'separated', sign: '\u25cb', style: 'separated', lit: '#0072b2'},
+  RELATION_WITHIN_TOLERANCE:
+      {word: 'within tolerance', sign: '\u25cc', style: 'tolerance', lit: '#cc79a7'},
+};
+
+export const RUNGS = {
+  RUNG_BOUNDS: 'bounds of the hulls',
+  RUNG_CACHED: 'what decided before',
+  RUNG_FLOATING_POINT: 'floating point, proven bound',
+  RUNG_EXACT: 'exact arithmetic',
+};
+
+export const MARK_COLOURS = {
+  plane: '#56b4e9',
+  axis: '#009e73',
+  witness: '#d55e00',
+  certificate: '#cc79a7',
+  shell: '#f0e442',
+  flash: '#e69f00',
+};
+export const AXIS_COLOURS = {x: '#d55e00', y: '#009e73', z: '#0072b2'};
+
+export const THEMES = {
+  light: {ground: 0xf4f5f6, edge: 0x2a3036, edgeOpacity: 0.5, sky: 0xffffff, earth: 0xb4bac2},
+  dark: {ground: 0x121417, edge: 0xd5dae0, edgeOpacity: 0.35, sky: 0xffffff, earth: 0x5a616a},
+};

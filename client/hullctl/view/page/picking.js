@@ -1,0 +1,56 @@
+// Which object is under the pointer: the first one that a ray meets, in double.
+import {rotateBack, unitQuaternion} from 'hulld/pose.js';
+import {THREE} from 'hulld/three.js';
+
+// Distance along the ray to the nearest triangle; Infinity when it meets none. Source: Moeller and
+// Trumbore 1997.
+function hitTriangles(shape, o, d) {
+  const {xyz, triangles} = shape;
+  let nearest = Infinity;
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [3 * triangles[t], 3 * triangles[t + 1], 3 * triangles[t + 2]];
+    const ux = xyz[b] - xyz[a], uy = xyz[b + 1] - xyz[a + 1], uz = xyz[b + 2] - xyz[a + 2];
+    const vx = xyz[c] - xyz[a], vy = xyz[c + 1] - xyz[a + 1], vz = xyz[c + 2] - xyz[a + 2];
+    const px = d[1] * vz - d[2] * vy, py = d[2] * vx - d[0] * vz, pz = d[0] * vy - d[1] * vx;
+    const det = ux * px + uy * py + uz * pz;
+    if (det === 0) continue;
+    const sx = o[0] - xyz[a], sy = o[1] - xyz[a + 1], sz = o[2] - xyz[a + 2];
+    const u = (sx * px + sy * py + sz * pz) / det;
+    if (u < 0 || u > 1) continue;
+    const qx = sy * uz - sz * uy, qy = sz * ux - sx * uz, qz = sx * uy - sy * ux;
+    const v = (d[0] * qx + d[1] * qy + d[2] * qz) / det;
+    if (v < 0 || u + v > 1) continue;
+    const distance = (vx * qx + vy * qy + vz * qz) / det;
+    if (distance > 0 && distance < nearest) nearest = distance;
+  }
+  return nearest;
+}
+
+// The index of the object under (x, y), in CSS pixels of the canvas; null when there is none.
+export function pick(model, stage, x, y) {
+  const ray = new THREE.Raycaster();
+  ray.setFromCamera({
+    x: 2 * x / stage.canvas.clientWidth - 1,
+    y: 1 - 2 * y / stage.canvas.clientHeight,
+  }, stage.camera);
+  const origin = ray.ray.origin.toArray();
+  const direction = ray.ray.direction.toArray();
+  let nearest = Infinity;
+  let picked = null;
+  for (const object of model.objects) {
+    const shape = model.shapeOf(object);
+    if (!model.isShown(object) || !shape || shape.isEmpty) continue;
+    const centre = model.centreOf(object).map((value, k) => value - model.origin[k]);
+    const towards = origin.map((value, k) => value - centre[k]);
+    const along = -(towards[0] * direction[0] + towards[1] * direction[1] + towards[2] * direction[2]);
+    const closest = towards.map((value, k) => value + along * direction[k]);
+    if (Math.hypot(...closest) > shape.radius || along + shape.radius < 0) continue;
+    if (along - shape.radius > nearest) continue;
+    const q = unitQuaternion(object.pose);
+    const local = rotateBack(q, towards).map((value, k) => value + shape.centre[k]);
+    const distance = shape.triangles.length ?
+        hitTriangles(shape, local, rotateBack(q, direction)) : along;
+    if (distance < nearest) [nearest, picked] = [distance, object.index];
+  }
+  return picked;
+}

@@ -1,0 +1,179 @@
+// What a frame holds, made ready for drawing and measured. All in double; only what goes to the
+// GPU is float, relative to the shape's centre, so that nothing jitters far from the origin.
+
+function boxOf(xyz) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < xyz.length; ++i) {
+    const k = i % 3;
+    if (xyz[i] < low[k]) low[k] = xyz[i];
+    if (xyz[i] > high[k]) high[k] = xyz[i];
+  }
+  return {low, high};
+}
+
+// Facets as fans of triangles, and each edge once.
+function triangulate(rest, facets) {
+  const sizes = rest.subarray(0, facets);
+  const corners = rest.subarray(facets);
+  const count = corners.length - 2 * facets;
+  const triangles = new Uint32Array(3 * count);
+  const edges = new Uint32Array(corners.length * (facets === 1 ? 2 : 1));
+  let t = 0;
+  let e = 0;
+  let first = 0;
+  for (let f = 0; f < facets; ++f) {
+    const size = sizes[f];
+    for (let i = 0; i < size; ++i) {
+      const a = corners[first + i];
+      const b = corners[first + (i + 1) % size];
+      // Of a closed surface each edge comes once in each direction.
+      if (a < b || facets === 1) {
+        edges[e++] = a;
+        edges[e++] = b;
+      }
+      if (i === 0 || i === size - 1) continue;
+      triangles[t++] = corners[first];
+      triangles[t++] = a;
+      triangles[t++] = b;
+    }
+    first += size;
+  }
+  return {triangles, edges: edges.subarray(0, e)};
+}
+
+// Volume (signed, by the divergence theorem) and area of triangles, about the centre.
+function measure(xyz, triangles, [cx, cy, cz]) {
+  let volume = 0;
+  let area = 0;
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [3 * triangles[t], 3 * triangles[t + 1], 3 * triangles[t + 2]];
+    const ax = xyz[a] - cx, ay = xyz[a + 1] - cy, az = xyz[a + 2] - cz;
+    const bx = xyz[b] - cx, by = xyz[b + 1] - cy, bz = xyz[b + 2] - cz;
+    const dx = xyz[c] - cx, dy = xyz[c + 1] - cy, dz = xyz[c + 2] - cz;
+    const nx = by * dz - bz * dy, ny = bz * dx - bx * dz, nz = bx * dy - by * dx;
+    volume += ax * nx + ay * ny + az * nz;
+    const ux = bx - ax, uy = by - ay, uz = bz - az;
+    const vx = dx - ax, vy = dy - ay, vz = dz - az;
+    area += Math.hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx);
+  }
+  return {volume: volume / 6, area: area / 2};
+}
+
+// Whether every edge of a mesh is met once in each direction, corners at one place taken as one.
+// Only then has it a volume.
+function isClosed(xyz, triangles) {
+  const places = new Map();
+  const place = (v) => {
+    const key = `${xyz[3 * v]},${xyz[3 * v + 1]},${xyz[3 * v + 2]}`;
+    if (!places.has(key)) places.set(key, places.size);
+    return places.get(key);
+  };
+  const open = new Map();
+  for (let t = 0; t < triangles.length; t += 3) {
+    const corners = [place(triangles[t]), place(triangles[t + 1]), place(triangles[t + 2])];
+    for (let i = 0; i < 3; ++i) {
+      const a = corners[i];
+      const b = corners[(i + 1) % 3];
+      if (a === b) continue;
+      const key = a < b ? `${a} ${b}` : `${b} ${a}`;
+      open.set(key, (open.get(key) || 0) + (a < b ? 1 : -1));
+    }
+  }
+  return [...open.values()].every((balance) => balance === 0);
+}
+
+// Larger meshes are not asked whether they are closed: it takes a second for a million triangles.
+const MOST_TRIANGLES_TO_CLOSE = 400000;
+
+export class Shape {
+  constructor(xyz, triangles, edges) {
+    this.xyz = xyz;
+    this.triangles = triangles;
+    this.edges = edges;
+    const {low, high} = boxOf(xyz);
+    this.isEmpty = xyz.length === 0;
+    this.low = low;
+    this.high = high;
+    this.centre = this.isEmpty ? [0, 0, 0] : low.map((value, k) => value / 2 + high[k] / 2);
+    let reach = 0;
+    for (let i = 0; i < xyz.length; i += 3) {
+      reach = Math.max(reach, Math.hypot(xyz[i] - this.centre[0], xyz[i + 1] - this.centre[1],
+                                         xyz[i + 2] - this.centre[2]));
+    }
+    this.radius = reach;
+  }
+
+  get vertexCount() {
+    return this.xyz.length / 3;
+  }
+
+  // Relative to the centre.
+  positions() {
+    const [cx, cy, cz] = this.centre;
+    const positions = new Float32Array(this.xyz.length);
+    for (let i = 0; i < positions.length; i += 3) {
+      positions[i] = this.xyz[i] - cx;
+      positions[i + 1] = this.xyz[i + 1] - cy;
+      positions[i + 2] = this.xyz[i + 2] - cz;
+    }
+    return positions;
+  }
+
+  // {volume, area}; volume is null where there is none.
+  get measures() {
+    if (!this.measured) {
+      this.measured = measure(this.xyz, this.triangles, this.centre);
+      if (!this.hasVolume()) this.measured.volume = null;
+    }
+    return this.measured;
+  }
+
+  hasVolume() {
+    return true;
+  }
+}
+
+export class HullShape extends Shape {
+  constructor({head, xyz, rest}) {
+    const {triangles, edges} = triangulate(rest, head.facets);
+    super(xyz, triangles, edges);
+    this.facetCount = head.facets;
+    this.facets = rest;
+    this.info = head.header.hull;
+    this.error = head.header.error;
+    this.edgeCount = edges.length / 2;
+  }
+
+  get revision() {
+    return this.info.revision;
+  }
+}
+
+export class MeshShape extends Shape {
+  constructor({head, xyz, rest}) {
+    super(xyz, rest, new Uint32Array());
+    this.pointCount = head.points;
+  }
+
+  hasVolume() {
+    if (this.closed === undefined) {
+      this.closed = this.triangles.length > 0 &&
+          this.triangles.length / 3 <= MOST_TRIANGLES_TO_CLOSE &&
+          isClosed(this.xyz, this.triangles);
+    }
+    return this.closed;
+  }
+}
+
+// The vertices of `after` that `before` has not, as indices.
+export function newVertices(before, after) {
+  const known = new Set();
+  const key = (xyz, i) => `${xyz[i]},${xyz[i + 1]},${xyz[i + 2]}`;
+  for (let i = 0; i < before.xyz.length; i += 3) known.add(key(before.xyz, i));
+  const fresh = [];
+  for (let i = 0; i < after.xyz.length; i += 3) {
+    if (!known.has(key(after.xyz, i))) fresh.push(i / 3);
+  }
+  return fresh;
+}

@@ -1,0 +1,232 @@
+// The picture: renderer, camera, lights, orbiting. Draws when something changed, and not otherwise.
+// Coordinates here are relative to model.origin.
+import {AXIS_COLOURS, THEMES} from 'hulld/palette.js';
+import {THREE} from 'hulld/three.js';
+
+const FLIGHT_MS = 350;
+const calm = matchMedia('(prefers-reduced-motion: reduce)');
+
+export class Stage {
+  constructor(canvas, model) {
+    this.model = model;
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, preserveDrawingBuffer: true});
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 1000);
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x888888, 0.75);
+    this.lamp = new THREE.DirectionalLight(0xffffff, 0.45);
+    this.lamp.position.set(0.4, 0.7, 1);
+    this.camera.add(this.lamp);
+    this.scene.add(this.sky, this.camera);
+    this.radius = 1;
+    this.frames = 0;
+    this.before = [];
+    this.after = [];
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+    this.setUp('y');
+    this.resize();
+  }
+
+  // `up`: the axis that points up.
+  setUp(up) {
+    this.up = up;
+    this.camera.up.set(...{x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1]}[up]);
+    this.controls?.dispose();
+    // Orbiting reads the axis when it is made.
+    this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+    this.controls.enableKeys = false;
+    this.controls.screenSpacePanning = true;
+    this.controls.addEventListener('change', () => this.draw());
+    this.controls.addEventListener('start', () => { this.flight = null; });
+  }
+
+  setTheme(name) {
+    this.theme = THEMES[name];
+    this.renderer.setClearColor(this.theme.ground);
+    this.sky.color.set(this.theme.sky);
+    this.sky.groundColor.set(this.theme.earth);
+    this.draw();
+  }
+
+  resize() {
+    const {clientWidth, clientHeight} = this.canvas.parentElement;
+    if (!clientWidth || !clientHeight) return;
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  // Asks for a frame.
+  draw() {
+    if (this.waiting) return;
+    this.waiting = requestAnimationFrame((now) => {
+      this.waiting = 0;
+      this.frame(now);
+    });
+  }
+
+  // `update(now)` is called before each frame; while one returns true, frames follow each other.
+  beforeFrame(update) {
+    this.before.push(update);
+  }
+
+  // `update()` is called after each frame, when the camera is where it was drawn from.
+  afterFrame(update) {
+    this.after.push(update);
+  }
+
+  frame(now) {
+    let more = this.fly(now);
+    for (const update of this.before) more = update(now) || more;
+    this.fitDepth();
+    this.renderer.render(this.scene, this.camera);
+    ++this.frames;
+    for (const update of this.after) update();
+    this.drawTriad();
+    if (more) this.draw();
+  }
+
+  // Near and far planes about the scene, so that depth has all its digits there.
+  fitDepth() {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const reach = 4 * this.radius + this.controls.target.length();
+    this.camera.near = Math.max((distance - reach) / 2, distance / 500, reach / 1e5);
+    this.camera.far = distance + 2 * reach;
+    this.camera.updateProjectionMatrix();
+  }
+
+  // The direction from the target to the camera that shows three sides.
+  defaultView() {
+    const view = {x: [0.45, 0.8, 0.75], y: [0.75, 0.45, 0.8], z: [0.75, -0.8, 0.45]}[this.up];
+    return new THREE.Vector3(...view).normalize();
+  }
+
+  // Shows all of the bounds (model.js); keeps the direction of view unless one is given.
+  flyTo({centre, radius, corners}, {jump = false, direction = null} = {}) {
+    const target = new THREE.Vector3(...centre.map((value, k) => value - this.model.origin[k]));
+    const view = direction ||
+        this.camera.position.clone().sub(this.controls.target).normalize();
+    if (!(view.length() > 0.5)) view.copy(this.defaultView());
+    const right = new THREE.Vector3().crossVectors(this.camera.up, view).normalize();
+    const up = new THREE.Vector3().crossVectors(view, right);
+    // So far away that each corner is within the picture, with a margin for handles and labels.
+    const height = 0.84 * Math.tan(this.camera.fov * Math.PI / 360);
+    const width = height * this.camera.aspect;
+    let distance = 0.05 * radius;
+    for (const corner of corners) {
+      const p = new THREE.Vector3(...corner.map((value, k) => value - centre[k]));
+      distance = Math.max(distance, p.dot(view) + Math.abs(p.dot(up)) / height,
+                          p.dot(view) + Math.abs(p.dot(right)) / width);
+    }
+    const position = target.clone().addScaledVector(view, distance);
+    if (jump || calm.matches) {
+      this.flight = null;
+      this.controls.target.copy(target);
+      this.camera.position.copy(position);
+      this.controls.update();
+    } else {
+      this.flight = {
+        start: null,
+        from: [this.controls.target.clone(), this.camera.position.clone()],
+        to: [target, position],
+      };
+    }
+    this.draw();
+  }
+
+  fly(now) {
+    if (!this.flight) return false;
+    const flight = this.flight;
+    flight.start ??= now;
+    const t = Math.min((now - flight.start) / FLIGHT_MS, 1);
+    const eased = t * t * (3 - 2 * t);
+    this.controls.target.lerpVectors(flight.from[0], flight.to[0], eased);
+    this.camera.position.lerpVectors(flight.from[1], flight.to[1], eased);
+    this.camera.lookAt(this.controls.target);
+    if (t < 1) return true;
+    this.flight = null;
+    this.controls.update();
+    return false;
+  }
+
+  // By the keyboard: angles in radians, or a factor of the distance, or a shift across the picture.
+  orbit(around, over) {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const up = this.camera.up;
+    const right = new THREE.Vector3().crossVectors(up, offset).normalize();
+    const height = offset.angleTo(up);
+    offset.applyAxisAngle(right, Math.min(Math.max(over, 0.05 - height), Math.PI - 0.05 - height));
+    offset.applyAxisAngle(up, around);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.draw();
+  }
+
+  zoom(factor) {
+    const offset = this.camera.position.clone().sub(this.controls.target).multiplyScalar(factor);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.controls.update();
+    this.draw();
+  }
+
+  pan(right, up) {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const shift = new THREE.Vector3(right, up, 0).multiplyScalar(distance * 0.05)
+        .applyQuaternion(this.camera.quaternion);
+    this.camera.position.add(shift);
+    this.controls.target.add(shift);
+    this.controls.update();
+    this.draw();
+  }
+
+  // Where a point of the scene is in the picture, in CSS pixels; null behind the camera.
+  toScreen(point) {
+    const p = point.clone().project(this.camera);
+    if (p.z > 1 || p.z < -1) return null;
+    return [(p.x + 1) / 2 * this.canvas.clientWidth, (1 - p.y) / 2 * this.canvas.clientHeight];
+  }
+
+  // The axes of the world, in a corner.
+  drawTriad() {
+    const svg = document.getElementById('triad');
+    if (!svg.firstChild) {
+      for (const name of 'xyz') {
+        const line = document.createElementNS(svg.namespaceURI, 'line');
+        const text = document.createElementNS(svg.namespaceURI, 'text');
+        line.setAttribute('stroke', AXIS_COLOURS[name]);
+        line.setAttribute('stroke-width', '2');
+        text.setAttribute('fill', 'currentColor');
+        text.setAttribute('text-anchor', 'middle');
+        text.setAttribute('dominant-baseline', 'central');
+        text.textContent = name;
+        svg.append(line, text);
+      }
+    }
+    const inverse = this.camera.quaternion.clone().conjugate();
+    ['x', 'y', 'z'].forEach((name, i) => {
+      const axis = new THREE.Vector3(+(i === 0), +(i === 1), +(i === 2)).applyQuaternion(inverse);
+      const [line, text] = [svg.children[2 * i], svg.children[2 * i + 1]];
+      line.setAttribute('x2', 22 * axis.x);
+      line.setAttribute('y2', -22 * axis.y);
+      text.setAttribute('x', 31 * axis.x);
+      text.setAttribute('y', -31 * axis.y);
+    });
+  }
+
+  // Frames a second while the camera goes around, each awaited; for measurements.
+  async measure(frames = 60) {
+    const pixel = new Uint8Array(4);
+    const gl = this.renderer.getContext();
+    const start = performance.now();
+    for (let i = 0; i < frames; ++i) {
+      this.orbit(2 * Math.PI / frames, 0);
+      this.frame(performance.now());
+      // Reading a pixel waits for the drawing.
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+      await new Promise((resume) => setTimeout(resume));
+    }
+    return 1000 * frames / (performance.now() - start);
+  }
+}

@@ -1,0 +1,129 @@
+#include "client/hullctl/view/page_session.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/hullctl/printing/json.h"
+
+namespace hulld {
+namespace {
+
+std::string CommonPrefix(const std::string& a, const std::string& b) {
+  const auto end = std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first;
+  return {a.begin(), end};
+}
+
+// One watch that covers all of the scene. Events of other hulls are passed over.
+v1::WatchHullsRequest WatchFor(const ViewScene& scene) {
+  v1::WatchHullsRequest request;
+  std::vector<std::string> names = scene.prefixes;
+  for (const ViewObject& object : scene.objects) {
+    if (!object.hull_id.empty()) names.push_back(object.hull_id);
+  }
+  if (names.empty()) return request;
+  std::string prefix = names[0];
+  for (const std::string& name : names) prefix = CommonPrefix(prefix, name);
+  const bool is_one = scene.prefixes.empty() &&
+                      std::all_of(names.begin(), names.end(),
+                                  [&names](const std::string& name) { return name == names[0]; });
+  if (is_one) {
+    request.set_hull_id(prefix);
+  } else {
+    request.set_prefix(prefix);
+  }
+  return request;
+}
+
+}  // namespace
+
+std::string HelloMessage(const ViewProgram& program) {
+  std::string scenes = "[";
+  for (const ViewScene& scene : program.scenes) {
+    absl::StrAppend(&scenes, scenes.size() > 1 ? "," : "",
+                    JsonObject().Add("key", scene.key).Add("title", scene.title).Close());
+  }
+  return TextMessage("hello", {{"server", QuoteJson(program.server)},
+                               {"version", QuoteJson(HULLD_VERSION)},
+                               {"up", QuoteJson(program.up)},
+                               {"scenes", scenes + "]"}});
+}
+
+PageSession::PageSession(const ViewProgram& program, std::shared_ptr<PageChannel> page)
+    : program_(program),
+      page_(std::move(page)),
+      answers_(program.client, page_),
+      geometry_(program.client, page_) {
+  page_->SendText(HelloMessage(program_));
+  Show(program_.scenes.front().key);
+}
+
+PageSession::~PageSession() = default;
+
+void PageSession::OnMessage(std::string_view json) {
+  auto message = ParsePageMessage(json);
+  if (!message.ok()) {
+    page_->SendText(ProblemMessage(absl::StrCat("The bridge cannot read a message of the page: ",
+                                                message.status().message())));
+    return;
+  }
+  if (message->show) Show(*message->show);
+  if (!message->geometry.empty()) geometry_.Ask(message->geometry);
+  if (message->question) answers_.Ask(*message->question);
+}
+
+void PageSession::Show(const std::string& key) {
+  const auto scene =
+      std::find_if(program_.scenes.begin(), program_.scenes.end(),
+                   [&key](const ViewScene& candidate) { return candidate.key == key; });
+  if (scene == program_.scenes.end()) {
+    page_->SendText(ProblemMessage(absl::StrCat("There is no scene \"", key, "\".")));
+    return;
+  }
+  // No event of the former scene comes once its follower has ended.
+  follower_.reset();
+  {
+    const std::lock_guard lock(mutex_);
+    prefixes_ = scene->prefixes;
+    known_.clear();
+    for (const ViewObject& object : scene->objects) known_.insert(object.hull_id);
+  }
+  answers_.Show(*scene);
+  geometry_.Show(scene->files);
+  page_->SendText(SceneMessage(*scene));
+  if (program_.on_show) program_.on_show(key);
+  if (scene->prefixes.empty() && known_.empty()) return;
+  follower_ = std::make_unique<HullFollower>(
+      program_.client, WatchFor(*scene),
+      [this](const v1::HullEvent& event, bool synced) { TakeHull(event, synced); },
+      [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); });
+}
+
+void PageSession::TakeHull(const v1::HullEvent& event, bool synced) {
+  const std::string& hull_id = event.hull().hull_id();
+  bool is_new = false;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto starts_so = [&hull_id](const std::string& prefix) {
+      return hull_id.starts_with(prefix);
+    };
+    if (!known_.contains(hull_id)) {
+      const bool is_deleted = event.kind() == v1::HULL_EVENT_KIND_DELETED;
+      if (is_deleted || !std::any_of(prefixes_.begin(), prefixes_.end(), starts_so)) return;
+      known_.insert(hull_id);
+      is_new = true;
+    }
+  }
+  if (is_new) {
+    const std::vector<ViewObject> objects = {{hull_id, hull_id, -1, kIdentityPose}};
+    answers_.AddObjects(objects);
+    page_->SendText(TextMessage("objects", {{"objects", ObjectsJson(objects)}}));
+  }
+  page_->SendText(
+      TextMessage("hull", {{"event", MessageJson(event)}, {"synced", synced ? "true" : "false"}}));
+  // What is there at the start, the page knows already.
+  if (synced || is_new) answers_.HullsChanged();
+}
+
+}  // namespace hulld

@@ -1,0 +1,64 @@
+#ifndef HULLD_CLIENT_HULLCTL_VIEW_PAGE_SESSION_H_
+#define HULLD_CLIENT_HULLCTL_VIEW_PAGE_SESSION_H_
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_set>
+#include <vector>
+
+#include "client/client.h"
+#include "client/hullctl/view/answer_feed.h"
+#include "client/hullctl/view/bridge/bridge.h"
+#include "client/hullctl/view/geometry_feed.h"
+#include "client/hullctl/view/hull_follower.h"
+#include "client/hullctl/view/protocol.h"
+#include "client/hullctl/view/view_scene.h"
+
+namespace hulld {
+
+// What all pages see; must outlive them.
+struct ViewProgram {
+  Client client;
+  std::string server;
+  // "x", "y" or "z".
+  std::string up;
+  // At least one; pages start with the first.
+  std::vector<ViewScene> scenes;
+  // Told the key of each scene that a page starts to show; may be empty.
+  std::function<void(const std::string&)> on_show;
+};
+
+std::string HelloMessage(const ViewProgram& program);
+
+// One page: takes what it asks to the feeds that answer it.
+class PageSession final : public PageHandler {
+ public:
+  PageSession(const ViewProgram& program, std::shared_ptr<PageChannel> page);
+  ~PageSession() override;
+
+  void OnMessage(std::string_view json) override;
+
+ private:
+  void Show(const std::string& key);
+  // Called by the follower's thread.
+  void TakeHull(const v1::HullEvent& event, bool synced);
+
+  const ViewProgram& program_;
+  const std::shared_ptr<PageChannel> page_;
+  AnswerFeed answers_;
+  GeometryFeed geometry_;
+
+  std::mutex mutex_;
+  // Guarded by the mutex: the scene on show and what of it is known by ID.
+  std::vector<std::string> prefixes_;
+  std::unordered_set<std::string> known_;
+
+  // Last: its thread uses the others.
+  std::unique_ptr<HullFollower> follower_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_VIEW_PAGE_SESSION_H_

@@ -1,0 +1,268 @@
+#include "client/hullctl/view/protocol.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/printing/json.h"
+
+namespace hulld {
+namespace {
+
+using google::protobuf::ListValue;
+using google::protobuf::Struct;
+using google::protobuf::Value;
+
+static_assert(std::endian::native == std::endian::little, "frames are little-endian");
+
+// Reads members of a message, and notes the first one that is not what it must be.
+class Reader {
+ public:
+  explicit Reader(const Struct& object) : object_(object) {}
+
+  std::string Text(const std::string& name) {
+    const Value* const value = Find(name);
+    if (value == nullptr) return "";
+    if (value->kind_case() != Value::kStringValue) Complain(name, "is not a text");
+    return value->string_value();
+  }
+  double Number(const std::string& name) {
+    const Value* const value = Find(name);
+    if (value == nullptr) return 0;
+    if (value->kind_case() != Value::kNumberValue) Complain(name, "is not a number");
+    return value->number_value();
+  }
+  bool Flag(const std::string& name) {
+    const Value* const value = Find(name);
+    return value != nullptr && value->bool_value();
+  }
+  const ListValue& List(const std::string& name) {
+    const Value* const value = Find(name);
+    return value == nullptr ? ListValue::default_instance() : value->list_value();
+  }
+  std::vector<uint32_t> Indices(const std::string& name) {
+    std::vector<uint32_t> indices;
+    for (const Value& value : List(name).values()) {
+      const double number = value.number_value();
+      if (!(number >= 0) || number > std::numeric_limits<uint32_t>::max() ||
+          number != std::floor(number)) {
+        Complain(name, "holds what is not an index");
+        return {};
+      }
+      indices.push_back(static_cast<uint32_t>(number));
+    }
+    return indices;
+  }
+  // A whole number of the page, at most 2^53.
+  uint64_t Count(const std::string& name) {
+    const double number = Number(name);
+    if (number >= 0 && number <= 0x1p53 && number == std::floor(number)) {
+      return static_cast<uint64_t>(number);
+    }
+    Complain(name, "is not a whole number");
+    return 0;
+  }
+
+  void Complain(const std::string& name, const std::string& what) {
+    if (status_.ok()) status_ = absl::InvalidArgumentError(absl::StrCat("\"", name, "\" ", what));
+  }
+  const absl::Status& status() const { return status_; }
+
+ private:
+  const Value* Find(const std::string& name) const {
+    const auto member = object_.fields().find(name);
+    return member == object_.fields().end() ? nullptr : &member->second;
+  }
+
+  const Struct& object_;
+  absl::Status status_;
+};
+
+ViewQuestion ReadQuestion(Reader* reader) {
+  ViewQuestion question;
+  question.update = reader->Count("update");
+  question.objects = reader->Indices("objects");
+  const ListValue& poses = reader->List("poses");
+  if (poses.values_size() != static_cast<int>(7 * question.objects.size())) {
+    reader->Complain("poses", "needs seven numbers for each of objects");
+    return question;
+  }
+  question.poses.resize(question.objects.size());
+  for (int i = 0; i < poses.values_size(); ++i) {
+    question.poses[static_cast<size_t>(i) / 7][static_cast<size_t>(i) % 7] =
+        poses.values(i).number_value();
+  }
+  const std::vector<uint32_t> pair = reader->Indices("pair");
+  if (pair.size() == 2 && pair[0] != pair[1]) question.pair.emplace(pair[0], pair[1]);
+  if (!pair.empty() && !question.pair) reader->Complain("pair", "is not two objects");
+  question.tolerance = reader->Number("tolerance");
+  question.rest = reader->Flag("rest");
+  return question;
+}
+
+std::vector<GeometryWish> ReadGeometry(Reader* reader) {
+  std::vector<GeometryWish> wishes;
+  for (const uint32_t file : reader->Indices("files")) wishes.emplace_back().file = file;
+  for (const Value& hull : reader->List("hullIds").values()) {
+    wishes.emplace_back().hull_id = hull.string_value();
+  }
+  return wishes;
+}
+
+GeometryWish ReadSimplification(Reader* reader) {
+  GeometryWish wish;
+  v1::GetHullMeshRequest& request = wish.simplified.emplace();
+  request.set_hull_id(reader->Text("hullId"));
+  v1::Simplification* const simplification = request.mutable_simplification();
+  simplification->set_side(reader->Text("side") == "outside" ? v1::SIMPLIFICATION_SIDE_OUTSIDE
+                                                             : v1::SIMPLIFICATION_SIDE_INSIDE);
+  simplification->set_max_error(reader->Number("maxError"));
+  simplification->set_max_vertices(reader->Count("maxVertices"));
+  return wish;
+}
+
+template <typename Number>
+void AppendBytes(const std::vector<Number>& numbers, std::string* frame) {
+  frame->append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
+}
+
+// The front of a frame.
+std::string StartFrame(const std::string& head, size_t room) {
+  const auto length = static_cast<uint32_t>(head.size());
+  std::string frame;
+  frame.reserve(sizeof(length) + head.size() + sizeof(double) + room);
+  frame.append(reinterpret_cast<const char*>(&length), sizeof(length));
+  frame += head;
+  frame.resize((frame.size() + 7) / 8 * 8);
+  return frame;
+}
+
+std::string FacetFrame(JsonObject head, const HullMesh& mesh) {
+  head.AddJson("header", MessageJson(mesh.header))
+      .AddJson("vertices", std::to_string(mesh.vertex_count()))
+      .AddJson("facets", std::to_string(mesh.facet_sizes.size()))
+      .AddJson("indices", std::to_string(mesh.facet_indices.size()));
+  std::string frame =
+      StartFrame(head.Close(),
+                 8 * mesh.xyz.size() + 4 * (mesh.facet_sizes.size() + mesh.facet_indices.size()));
+  AppendBytes(mesh.xyz, &frame);
+  AppendBytes(mesh.facet_sizes, &frame);
+  AppendBytes(mesh.facet_indices, &frame);
+  return frame;
+}
+
+}  // namespace
+
+absl::StatusOr<PageMessage> ParsePageMessage(std::string_view json) {
+  Struct object;
+  const absl::Status parsed = ParseJson(std::string(json), UnknownFields::kRefuse, &object);
+  if (!parsed.ok()) return parsed;
+  Reader reader(object);
+  const std::string type = reader.Text("type");
+  PageMessage message;
+  if (type == "show") {
+    message.show = reader.Text("key");
+  } else if (type == "geometry") {
+    message.geometry = ReadGeometry(&reader);
+  } else if (type == "simplify") {
+    message.geometry.push_back(ReadSimplification(&reader));
+  } else if (type == "question") {
+    message.question = ReadQuestion(&reader);
+  } else {
+    reader.Complain("type", "is none that the bridge knows");
+  }
+  if (!reader.status().ok()) return reader.status();
+  return message;
+}
+
+std::string TextMessage(const std::string& type,
+                        const std::vector<std::pair<std::string, std::string>>& members) {
+  JsonObject message;
+  message.Add("type", type);
+  for (const auto& [name, json] : members) message.AddJson(name.c_str(), json);
+  return message.Close();
+}
+
+std::string ProblemMessage(const std::string& message) {
+  return TextMessage("problem", {{"message", QuoteJson(message)}});
+}
+
+std::string NumbersJson(const double* numbers, size_t count) {
+  std::string json = "[";
+  for (size_t i = 0; i < count; ++i) {
+    absl::StrAppend(&json, i > 0 ? "," : "",
+                    std::isfinite(numbers[i]) ? ShortestText(numbers[i]) : "null");
+  }
+  return json + "]";
+}
+
+std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
+  std::string json = "[";
+  for (size_t i = from; i < objects.size(); ++i) {
+    const ViewObject& object = objects[i];
+    absl::StrAppend(&json, i > from ? "," : "",
+                    JsonObject()
+                        .Add("name", object.name)
+                        .Add("hullId", object.hull_id)
+                        .AddJson("file", std::to_string(object.file))
+                        .AddJson("pose", NumbersJson(object.pose.data(), object.pose.size()))
+                        .Close());
+  }
+  return json + "]";
+}
+
+std::string SceneMessage(const ViewScene& scene) {
+  std::string files = "[";
+  for (size_t i = 0; i < scene.files.size(); ++i) {
+    absl::StrAppend(&files, i > 0 ? "," : "",
+                    JsonObject().Add("name", scene.files[i]->name).Close());
+  }
+  return TextMessage("scene", {{"key", QuoteJson(scene.key)},
+                               {"title", QuoteJson(scene.title)},
+                               {"note", QuoteJson(scene.note)},
+                               {"files", files + "]"},
+                               {"objects", ObjectsJson(scene.objects)}});
+}
+
+std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {
+  return FacetFrame(std::move(JsonObject().Add("kind", "hull").Add("hullId", hull_id)), mesh);
+}
+
+std::string SimplifiedFrame(const v1::GetHullMeshRequest& request, const HullMesh& mesh) {
+  const bool outside = request.simplification().side() == v1::SIMPLIFICATION_SIDE_OUTSIDE;
+  return FacetFrame(std::move(JsonObject()
+                                  .Add("kind", "simplified")
+                                  .Add("hullId", request.hull_id())
+                                  .Add("side", outside ? "outside" : "inside")),
+                    mesh);
+}
+
+std::string MeshFrame(uint32_t file, const FileShape& shape) {
+  const std::string head = JsonObject()
+                               .Add("kind", "mesh")
+                               .AddJson("file", std::to_string(file))
+                               .AddJson("vertices", std::to_string(shape.xyz.size() / 3))
+                               .AddJson("triangles", std::to_string(shape.triangles.size() / 3))
+                               .AddJson("points", std::to_string(shape.point_count))
+                               .Close();
+  std::string frame = StartFrame(head, 8 * shape.xyz.size() + 4 * shape.triangles.size());
+  AppendBytes(shape.xyz, &frame);
+  AppendBytes(shape.triangles, &frame);
+  return frame;
+}
+
+std::string MissingFrame(const GeometryWish& wish, const std::string& message) {
+  JsonObject head;
+  head.Add("kind", "missing");
+  if (wish.file) head.AddJson("file", std::to_string(*wish.file));
+  if (wish.hull_id) head.Add("hullId", *wish.hull_id);
+  if (wish.simplified) head.Add("simplified", wish.simplified->hull_id());
+  head.Add("message", message);
+  return StartFrame(head.Close(), 0);
+}
+
+}  // namespace hulld

@@ -1,0 +1,71 @@
+#include "client/hullctl/view/temporary_hulls.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "client/formats/point_file.h"
+#include "client/hullctl/command_line/point_input.h"
+#include "client/hullctl/view/bridge/random_name.h"
+
+namespace hulld {
+namespace {
+
+constexpr size_t kPrefixBytes = 6;
+constexpr size_t kMostNameBytes = 100;
+
+// As a segment of an ID must be.
+std::string SegmentOf(std::string name) {
+  if (name.size() > kMostNameBytes) name.resize(kMostNameBytes);
+  for (char& c : name) {
+    const bool allowed =
+        absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';
+    if (!allowed) c = '_';
+  }
+  const bool starts_well =
+      !name.empty() && absl::ascii_isalnum(static_cast<unsigned char>(name[0]));
+  return starts_well ? name : "x" + name;
+}
+
+}  // namespace
+
+TemporaryHulls::~TemporaryHulls() {
+  // Nobody is left to tell of a failure; the next start of the viewer does not depend on it.
+  for (const std::string& id : ids_) static_cast<void>(client_.DeleteHull(id));
+}
+
+absl::StatusOr<std::string> TemporaryHulls::AddFile(const std::string& path) {
+  const auto format = PointFormatOfPath(path);
+  if (!format.ok()) return format.status();
+  ReadRequest request{path, *format, {}, {}};
+  request.options.skip_nonfinite = true;
+  std::string name = std::filesystem::path(path).filename().string();
+  for (const std::string& id : ids_) {
+    if (id == prefix_ + SegmentOf(name)) name = absl::StrCat(ids_.size(), "-", name);
+  }
+  return Add(name, [&request](const Client::PointSink& sink) {
+    return ReadPoints(request, [&sink](const PointBlock& block) { return sink(ToProto(block)); })
+        .status();
+  });
+}
+
+absl::StatusOr<std::string> TemporaryHulls::Add(
+    const std::string& name, const std::function<absl::Status(const Client::PointSink&)>& feed) {
+  if (prefix_.empty()) {
+    const auto random = RandomHex(kPrefixBytes);
+    if (!random.ok()) return random.status();
+    prefix_ = absl::StrCat("view/", *random, "/");
+  }
+  const std::string id = prefix_ + SegmentOf(name);
+  v1::ReplaceOpen open;
+  open.set_hull_id(id);
+  open.set_create_if_absent(true);
+  const auto replaced = client_.ReplaceHull(open, feed);
+  if (!replaced.ok()) return replaced.status();
+  if (std::find(ids_.begin(), ids_.end(), id) == ids_.end()) ids_.push_back(id);
+  return id;
+}
+
+}  // namespace hulld

@@ -1,0 +1,38 @@
+#ifndef HULLD_CLIENT_HULLCTL_VIEW_TEMPORARY_HULLS_H_
+#define HULLD_CLIENT_HULLCTL_VIEW_TEMPORARY_HULLS_H_
+
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+
+namespace hulld {
+
+// Hulls that are on the server while hullctl shows them, under "view/RANDOM/". The destructor
+// deletes them; a process that is killed leaves them there, for `hullctl delete`.
+class TemporaryHulls {
+ public:
+  explicit TemporaryHulls(const Client& client) : client_(client) {}
+  ~TemporaryHulls();
+  TemporaryHulls(const TemporaryHulls&) = delete;
+  TemporaryHulls& operator=(const TemporaryHulls&) = delete;
+
+  // The hull of all points of a file; points that are not finite are left out. Returns its ID.
+  absl::StatusOr<std::string> AddFile(const std::string& path);
+  // The hull of the points that `feed` passes on. A name that is there is replaced.
+  absl::StatusOr<std::string> Add(
+      const std::string& name, const std::function<absl::Status(const Client::PointSink&)>& feed);
+
+ private:
+  const Client& client_;
+  // "view/RANDOM/"; empty before the first.
+  std::string prefix_;
+  std::vector<std::string> ids_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_VIEW_TEMPORARY_HULLS_H_

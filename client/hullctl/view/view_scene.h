@@ -1,0 +1,77 @@
+#ifndef HULLD_CLIENT_HULLCTL_VIEW_VIEW_SCENE_H_
+#define HULLD_CLIENT_HULLCTL_VIEW_VIEW_SCENE_H_
+
+#include <absl/status/statusor.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "hulld/v1/collision.pb.h"
+
+namespace hulld {
+
+// Quaternion w x y z, translation x y z; as in Pose of the contract.
+using Pose7 = std::array<double, 7>;
+inline constexpr Pose7 kIdentityPose = {1, 0, 0, 0, 0, 0, 0};
+
+// The shape that a file holds: a mesh, or points alone.
+struct FileShape {
+  std::string name;
+  // x y z each. At most kMaxDrawnPoints of the points of a file without triangles.
+  std::vector<double> xyz;
+  // Three indices each.
+  std::vector<uint32_t> triangles;
+  uint64_t point_count = 0;
+};
+inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
+
+// One thing that is looked at: a hull at a pose, a file, or both.
+struct ViewObject {
+  std::string name;
+  // Empty: none.
+  std::string hull_id;
+  // Index into ViewScene::files, -1: none.
+  int file = -1;
+  Pose7 pose = kIdentityPose;
+};
+
+struct ViewScene {
+  // What selects it among several.
+  std::string key;
+  std::string title;
+  std::string note;
+  std::vector<ViewObject> objects;
+  std::vector<std::shared_ptr<const FileShape>> files;
+  // Hulls that appear under these become objects, too.
+  std::vector<std::string> prefixes;
+  // Which pairs are asked about: groups and movers of a scene file. Without placements.
+  v1::FindCollisionsRequest rules;
+};
+
+// Reads a mesh (obj, off, stl, gltf) or the points of any other format. Points that are not finite
+// are left out. INVALID_ARGUMENT names the file and the place.
+absl::StatusOr<FileShape> ReadShape(const std::string& path);
+
+// The name of a file without its folders; bytes that are not UTF-8 become question marks, as they
+// would end the connection to the page.
+std::string ShownName(const std::string& path);
+
+// Whether the argument names a file that is there, rather than a hull.
+bool IsFile(const std::string& argument);
+
+// Adds the hull of this ID, or all hulls whose IDs start so, to the scene. NOT_FOUND: there are
+// neither.
+absl::Status AddHulls(const Client& client, const std::string& id_or_prefix, ViewScene* scene);
+
+// Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the place.
+absl::Status AddSceneFile(const std::string& path, ViewScene* scene);
+
+Pose7 NumbersOf(const v1::Pose& pose);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_VIEW_VIEW_SCENE_H_

@@ -1,0 +1,68 @@
+#include "core/hull/simplification/inside_order.h"
+
+#include <absl/status/statusor.h>
+
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/hull/growth/hull_builder.h"
+
+namespace hulld {
+
+InsideOrder::InsideOrder(const Hull& hull, const UnitScale& scale, StopPoll& poll)
+    : hull_(hull), scale_(scale), poll_(poll), unit_points_(scale.ToUnit(hull.vertices())) {
+  HULLD_CHECK(hull.dimension() >= 2);
+  if (hull.dimension() == 2) {
+    polygon_.emplace(unit_points_, hull.facet(0), poll);
+  } else {
+    solid_.emplace(hull.vertices(), unit_points_, poll);
+  }
+  if (poll.stopped()) return;
+  least_ = chosen().size();
+  NoteError();
+}
+
+void InsideOrder::NoteError() {
+  const bool is_complete = chosen().size() == hull_.vertices().size();
+  const double error = polygon_ ? polygon_->DistanceBound() : solid_->DistanceBound();
+  errors_.push_back(is_complete ? 0 : scale_.LengthFromUnit(error));
+}
+
+void InsideOrder::ExtendTo(size_t count) {
+  HULLD_CHECK(count <= hull_.vertices().size());
+  while (chosen().size() < count && !poll_.Step()) {
+    if (polygon_) {
+      polygon_->ChooseNext(poll_);
+    } else {
+      solid_->ChooseNext(poll_);
+    }
+    if (!poll_.stopped()) NoteError();
+  }
+}
+
+size_t InsideOrder::CountFor(double error, size_t most) {
+  size_t count = least_;
+  while (count < most && !poll_.stopped() && ErrorAt(count) > error) ++count;
+  return count;
+}
+
+double InsideOrder::ErrorAt(size_t count) {
+  HULLD_CHECK(count >= least_);
+  ExtendTo(count);
+  return poll_.stopped() ? 0 : errors_[count - least_];
+}
+
+std::optional<Hull> InsideOrder::HullOf(size_t count, const std::function<bool()>& should_stop) {
+  ExtendTo(count);
+  if (poll_.stopped()) return std::nullopt;
+  std::vector<Vector> points;
+  for (size_t i = 0; i < count; ++i) points.push_back(hull_.vertices()[chosen()[i]]);
+  HullBuilder builder;
+  if (!builder.Add(points, {.should_stop = should_stop}).ok()) return std::nullopt;
+  absl::StatusOr<Hull> hull = builder.Snapshot(should_stop);
+  if (!hull.ok()) return std::nullopt;
+  HULLD_CHECK(hull->vertices().size() == count);
+  return *std::move(hull);
+}
+
+}  // namespace hulld

@@ -1,0 +1,149 @@
+#include "core/hull/simplification/support_function.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numeric>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/hull/simplification/triangle_distance.h"
+
+namespace hulld {
+namespace {
+
+constexpr uint32_t kLeafVertices = 8;
+// Edges of a vertex that are climbed along.
+constexpr size_t kMostNeighbours = 64;
+// Support points for one distance. Each makes the bound less, so it holds after any number.
+constexpr int kMostSupportPoints = 32;
+// A bound that is this near to the distance, relatively, is not worth another one.
+constexpr double kRelativeEnough = 1e-9;
+
+double ReachOf(const Vector& low, const Vector& high, const Vector& direction) {
+  double reach = 0;
+  for (int k = 0; k < 3; ++k) reach += direction[k] * (direction[k] > 0 ? high[k] : low[k]);
+  return reach;
+}
+
+}  // namespace
+
+SupportFunction::SupportFunction(const Hull& hull, std::span<const Vector> points)
+    : points_(points), order_(points.size()) {
+  HULLD_CHECK(!points.empty() && points.size() == hull.vertices().size());
+  Link(hull);
+  std::iota(order_.begin(), order_.end(), 0u);
+  Build(0, static_cast<uint32_t>(order_.size()));
+}
+
+void SupportFunction::Link(const Hull& hull) {
+  starts_.assign(points_.size() + 1, 0);
+  for (const Edge& edge : hull.edges()) {
+    ++starts_[edge.tail];
+    ++starts_[edge.head];
+  }
+  uint32_t end = 0;
+  for (uint32_t& start : starts_) start = end += start;
+  neighbours_.resize(2 * hull.edges().size());
+  for (const Edge& edge : hull.edges()) {
+    neighbours_[--starts_[edge.tail]] = edge.head;
+    neighbours_[--starts_[edge.head]] = edge.tail;
+  }
+}
+
+void SupportFunction::Build(uint32_t first, uint32_t end) {
+  const size_t node = nodes_.size();
+  Vector low = points_[order_[first]];
+  Vector high = low;
+  for (uint32_t i = first + 1; i < end; ++i) {
+    low = low.cwiseMin(points_[order_[i]]);
+    high = high.cwiseMax(points_[order_[i]]);
+  }
+  nodes_.push_back({low, high, first, end, 0});
+  if (end - first <= kLeafVertices) return;
+  int axis = 0;
+  (high - low).maxCoeff(&axis);
+  const uint32_t middle = first + (end - first) / 2;
+  std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
+                   [&](uint32_t a, uint32_t b) { return points_[a][axis] < points_[b][axis]; });
+  Build(first, middle);
+  nodes_[node].second_half = static_cast<uint32_t>(nodes_.size());
+  Build(middle, end);
+}
+
+uint32_t SupportFunction::FarthestAlong(const Vector& direction, uint32_t start) const {
+  uint32_t best = start;
+  double most = points_[best].dot(direction);
+  for (;;) {
+    const uint32_t at = best;
+    const std::span<const uint32_t> neighbours = NeighboursOf(at);
+    if (neighbours.size() > kMostNeighbours) break;
+    for (const uint32_t next : neighbours) {
+      if (const double reach = points_[next].dot(direction); reach > most) {
+        most = reach;
+        best = next;
+      }
+    }
+    if (best == at) return best;
+  }
+  Search(0, direction, best, most);
+  return best;
+}
+
+void SupportFunction::Search(uint32_t at, const Vector& direction, uint32_t& best,
+                             double& most) const {
+  const Node& node = nodes_[at];
+  if (node.second_half == 0) {
+    for (uint32_t i = node.first; i < node.end; ++i) {
+      if (const double reach = points_[order_[i]].dot(direction); reach > most) {
+        most = reach;
+        best = order_[i];
+      }
+    }
+    return;
+  }
+  // The half that reaches farther first.
+  std::array<uint32_t, 2> halves = {at + 1, node.second_half};
+  std::array<double, 2> reaches{};
+  for (size_t k = 0; k < 2; ++k) {
+    reaches[k] = ReachOf(nodes_[halves[k]].low, nodes_[halves[k]].high, direction);
+  }
+  if (reaches[1] > reaches[0]) {
+    std::swap(halves[0], halves[1]);
+    std::swap(reaches[0], reaches[1]);
+  }
+  for (size_t k = 0; k < 2; ++k) {
+    if (reaches[k] > most) Search(halves[k], direction, best, most);
+  }
+}
+
+double SupportFunction::DistanceBound(const Vector& p, uint32_t start, double enough) const {
+  std::array<Vector, 3> corners = {points_[start], points_[start], points_[start]};
+  TriangleDistance best = DistanceToTriangle(corners[0], corners[1], corners[2], p);
+  uint32_t at = start;
+  for (int k = 0; k < kMostSupportPoints && best.bound > enough; ++k) {
+    const Vector towards = (p - best.nearest).stableNormalized();
+    at = FarthestAlong(towards, at);
+    const Vector& support = points_[at];
+    // The whole hull is behind the plane through the support point.
+    if (towards.dot(p - support) >= (1 - kRelativeEnough) * best.bound) break;
+    TriangleDistance least = best;
+    size_t goes = 3;
+    for (size_t out = 0; out < 3; ++out) {
+      std::array<Vector, 3> candidate = corners;
+      candidate[out] = support;
+      const TriangleDistance distance =
+          DistanceToTriangle(candidate[0], candidate[1], candidate[2], p);
+      if (distance.bound < least.bound) {
+        least = distance;
+        goes = out;
+      }
+    }
+    if (goes == 3) break;
+    best = least;
+    corners[goes] = support;
+  }
+  return best.bound;
+}
+
+}  // namespace hulld

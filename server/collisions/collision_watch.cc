@@ -1,0 +1,340 @@
+#include "server/collisions/collision_watch.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <numeric>
+#include <utility>
+
+#include "server/collisions/query_settings.h"
+#include "server/collisions/scene_groups.h"
+#include "server/contract/status_map.h"
+#include "server/settings/config.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+// Pairs between two looks at the clock.
+constexpr size_t kPairsPerLook = 16;
+// A watch lasts for many changes; how many is a guess.
+constexpr uint64_t kExpectedRounds = 256;
+// Tag and length of an entry within its message.
+constexpr size_t kEntryBytes = 4;
+// Decoding the poses of an update up to this size takes less than a slice.
+constexpr int kMostShortUpdate = 4096;
+
+bool IsContact(v1::Relation relation) {
+  return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
+}
+
+// What became of a pair; UNSPECIFIED when it is as it was.
+v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, bool is_within) {
+  switch (relation) {
+    case v1::RELATION_OVERLAPPING:
+      if (before.relation == relation) break;
+      return v1::COLLISION_EVENT_KIND_ENTER;
+    case v1::RELATION_TOUCHING:
+      if (before.relation == relation) break;
+      return v1::COLLISION_EVENT_KIND_TOUCH;
+    default:
+      if (IsContact(before.relation)) return v1::COLLISION_EVENT_KIND_EXIT;
+      if (is_within == before.is_within_clearance) break;
+      return is_within ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
+  }
+  return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+}
+
+}  // namespace
+
+grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>*
+CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
+                      Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
+                      TaskPool& pool) {
+  return Launch(std::shared_ptr<CollisionWatch>(
+      new CollisionWatch(context, admission, registry, readers, long_readers, pool)));
+}
+
+void CollisionWatch::OnDone() {
+  const auto self = shared_from_this();
+  ReadingStream::OnDone();
+  if (watch_ == nullptr) return;
+  registry_.CloseWatch(watch_);
+  watch_.reset();
+}
+
+void CollisionWatch::StartWork() {
+  if (!reading() && !has_message_ && !has_said_all_) Read();
+  if (is_working_ || unsent_bytes() > 0) return;
+  const auto work = [this](auto& pool, void (CollisionWatch::*step)()) {
+    is_working_ = true;
+    RunOn(pool, [this, step] { (this->*step)(); });
+  };
+  if (is_telling_) return work(lane_, &CollisionWatch::Tell);
+  if (has_message_) {
+    // What opens resolves all hulls.
+    if (!is_open_) return work(long_readers_, &CollisionWatch::TakeMessage);
+    const bool is_short = request().update().placements_size() <= kMostShortUpdate;
+    if (is_short) return work(pool_, &CollisionWatch::TakeMessage);
+    return work(lane_, &CollisionWatch::TakeMessage);
+  }
+  if (has_said_all_) return End(absl::OkStatus());
+  if (!std::exchange(are_hulls_due_, false)) return;
+  work(readers_, &CollisionWatch::TakeChanges);
+}
+
+void CollisionWatch::OnMessage() {
+  call().BeginMessage();
+  has_message_ = true;
+}
+
+void CollisionWatch::OnNoMessage(const absl::Status& why) {
+  if (!why.ok()) return End(OrStopped(why));
+  has_said_all_ = true;
+}
+
+void CollisionWatch::EndWork(const absl::Status& error) {
+  Locked([&] {
+    is_working_ = false;
+    if (!error.ok()) End(OrStopped(error));
+  });
+}
+
+void CollisionWatch::TakeMessage() {
+  const absl::Status status = HandleMessage();
+  if (!status.ok()) return EndWork(status);
+  answers_message_ = true;
+  Tell();
+}
+
+absl::Status CollisionWatch::HandleMessage() {
+  switch (request().message_case()) {
+    case v1::WatchCollisionsRequest::kOpen:
+      if (is_open_) {
+        return absl::InvalidArgumentError(
+            "open came twice; other placements or pairs need another watch");
+      }
+      return Prefixed("open: ", HandleOpen(request().open()));
+    case v1::WatchCollisionsRequest::kUpdate:
+      if (!is_open_)
+        return absl::InvalidArgumentError("the first message must be open, not update");
+      ++messages_;
+      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
+    case v1::WatchCollisionsRequest::MESSAGE_NOT_SET:
+      break;
+  }
+  return absl::InvalidArgumentError("the message is empty; set open or update");
+}
+
+absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
+  v1::Wanted wanted;
+  if (open.has_clearance()) wanted.set_clearance(open.clearance());
+  const Limits& limits = registry_.limits();
+  absl::StatusOr<QueryOptions> options =
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
+  if (!options.ok()) return options.status();
+  absl::StatusOr<PlacementTable> table =
+      PlacementTable::Make(open.placements(), open.packed_placements(), call().caller(),
+                           limits.max_placements, "the watch");
+  if (!table.ok()) return table.status();
+  const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
+                          open.ignore_same_group() || open.has_movers();
+  if (open.pairs_size() > 0 && has_groups) {
+    return absl::InvalidArgumentError(
+        "pairs are set, and groups or movers too; name the pairs, or say which of all to leave "
+        "out");
+  }
+  absl::Status valid =
+      ValidatePairs(open.pairs(), table->size(), limits.max_pairs_per_batch, "the watch");
+  if (valid.ok()) valid = ValidateGroups(open, table->size());
+  if (!valid.ok()) return valid;
+  options_ = *std::move(options);
+  table_ = *std::move(table);
+  pairs_ = WatchedPairs(open, table_.size(), limits.max_pairs_per_batch);
+  charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
+  if (absl::Status s = WatchHulls(); !s.ok()) return s;
+
+  // It is worth the wait, as each hull is asked about again and again.
+  const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
+  const absl::Status resolved =
+      table_.Resolve(registry_, options_, {kExpectedRounds * per_hull, true});
+  if (!resolved.ok()) return resolved;
+  revision_ = table_.store_revision();
+  for (size_t k = 0; k < table_.hull_ids().size(); ++k) {
+    if (table_.hull(k).ok()) hulls_to_tell_.push_back(k);
+  }
+  std::vector<uint32_t> all(table_.size());
+  std::iota(all.begin(), all.end(), 0);
+  for (const uint32_t i : all) {
+    if (!table_.is_answerable(i)) problems_to_tell_.push_back(i);
+  }
+  is_open_ = true;
+  return AskAbout(all);
+}
+
+// From now on changes of the hulls are noticed: those that come before they are resolved are told
+// twice, and none is missed.
+absl::Status CollisionWatch::WatchHulls() {
+  WatchTarget target;
+  for (size_t k = 0; k < table_.hull_ids().size(); ++k) {
+    const std::string& id = table_.hull_ids()[k];
+    if (!hulls_of_.contains(id)) target.ids.push_back(id);
+    hulls_of_.emplace(id, k);
+  }
+  if (target.ids.empty()) return registry_.CheckMemory();
+  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch = registry_.OpenWatch(
+      target, {}, [this, self = shared_from_this()] { Locked([this] { are_hulls_due_ = true; }); });
+  if (!watch.ok()) return watch.status();
+  watch_ = *std::move(watch);
+  Locked([this] { are_hulls_due_ = true; });
+  return absl::OkStatus();
+}
+
+absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update) {
+  const absl::StatusOr<Moves> moves = ReadMoves(update.placements(), update.poses(), table_.size());
+  if (!moves.ok()) return moves.status();
+  std::vector<uint32_t> changed;
+  changed.reserve(moves->size());
+  for (const auto& [placement, pose] : *moves) {
+    table_.Move(placement, pose);
+    changed.push_back(placement);
+  }
+  return AskAbout(changed);
+}
+
+void CollisionWatch::TakeChanges() {
+  const absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
+  if (!piece.ok()) return EndWork(piece.status());
+  if (piece->waits) return EndWork(absl::OkStatus());
+  // There may be more.
+  Locked([this] { are_hulls_due_ = true; });
+  const absl::Status status = HandleChanges(*piece);
+  if (!status.ok()) return EndWork(status);
+  if (!is_telling_) return EndWork(absl::OkStatus());
+  answers_message_ = false;
+  Tell();
+}
+
+absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
+  std::vector<size_t> hulls;
+  for (const HullChange& change : piece.changes) {
+    const auto [begin, end] = hulls_of_.equal_range(change.record.hull_id);
+    for (auto hull = begin; hull != end; ++hull) hulls.push_back(hull->second);
+  }
+  if (hulls.empty()) return absl::OkStatus();
+  if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
+  revision_ = piece.revision;
+  std::vector<uint32_t> changed;
+  for (const size_t k : hulls) {
+    const std::span<const uint32_t> placements = table_.placements_of(k);
+    if (placements.empty() || !table_.hull_changed(placements.front())) continue;
+    const bool is_there = table_.hull(k).ok();
+    if (is_there) hulls_to_tell_.push_back(k);
+    for (const uint32_t i : placements) {
+      changed.push_back(i);
+      if (!is_there) problems_to_tell_.push_back(i);
+      pairs_.ForgetPoints(i);
+    }
+  }
+  return changed.empty() ? absl::OkStatus() : AskAbout(changed);
+}
+
+absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
+  if (absl::Status s = pairs_.AskAbout(changed, table_.placed()); !s.ok()) return s;
+  charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
+  if (absl::Status s = registry_.CheckMemory(); !s.ok()) return s;
+  call().AddPairs(pairs_.asked().size());
+  next_hull_ = next_problem_ = next_pair_ = 0;
+  is_telling_ = true;
+  return absl::OkStatus();
+}
+
+// Asks and tells until the round is told, a message is full, or it is the turn of others.
+void CollisionWatch::Tell() {
+  const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
+  bool is_full = !TellHulls();
+  const std::span<const uint32_t> asked = pairs_.asked();
+  while (!is_full && next_pair_ < asked.size()) {
+    const absl::Status status = TellPair(pairs_.pair(asked[next_pair_++]));
+    if (!status.ok()) return EndWork(status);
+    is_full = reply_bytes_ >= Config::kReplyMessageBytes;
+    if (next_pair_ % kPairsPerLook != 0) continue;
+    if (call().ShouldStop()) return EndWork(call().StopStatus());
+    if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { Tell(); });
+  }
+  call().metrics().CountPairs(std::exchange(rungs_, {}));
+  const bool is_told = !is_full;
+  if (is_told) {
+    pairs_.EndAsking();
+    hulls_to_tell_.clear();
+    problems_to_tell_.clear();
+    if (answers_message_) call().EndMessage();
+  }
+  EncodeHeader(registry_.store(), revision_, reply_.mutable_header());
+  reply_.set_update(messages_);
+  reply_.set_synced(is_told);
+  Locked([&] {
+    is_working_ = false;
+    is_telling_ = !is_told;
+    if (is_told && answers_message_) has_message_ = false;
+    const size_t bytes = std::exchange(reply_bytes_, 0) + 1;
+    Queue(std::exchange(reply_, {}), bytes);
+  });
+}
+
+// False when the message is full before all is told.
+bool CollisionWatch::TellHulls() {
+  while (next_hull_ < hulls_to_tell_.size() || next_problem_ < problems_to_tell_.size()) {
+    if (reply_bytes_ >= Config::kReplyMessageBytes) return false;
+    if (next_hull_ < hulls_to_tell_.size()) {
+      v1::HullVersion* const version = reply_.add_hulls();
+      table_.EncodeHull(hulls_to_tell_[next_hull_++], version);
+      reply_bytes_ += kEntryBytes + version->ByteSizeLong();
+    } else {
+      v1::PlacementProblem* const problem = reply_.add_placement_problems();
+      table_.EncodeProblem(problems_to_tell_[next_problem_++], problem);
+      reply_bytes_ += kEntryBytes + problem->ByteSizeLong();
+    }
+  }
+  return true;
+}
+
+absl::Status CollisionWatch::TellPair(WatchedPair& pair) {
+  if (!table_.is_answerable(pair.a) || !table_.is_answerable(pair.b)) {
+    if (pair.is_told()) AddEvent(v1::COLLISION_EVENT_KIND_LOST, pair);
+    pair.relation = v1::RELATION_SEPARATED;
+    pair.is_within_clearance = false;
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<Answer> answer =
+      CheckCollision(table_.placed()[pair.a], table_.placed()[pair.b], options_, &pair.cache);
+  if (!answer.ok()) return answer.status();
+  rungs_.Add(answer->rung);
+  const v1::Relation relation = EncodeRelation(answer->relation);
+  const bool is_within = answer->within_clearance.value_or(false);
+  const v1::CollisionEventKind kind = KindOf(pair, relation, is_within);
+  pair.relation = relation;
+  pair.is_within_clearance = is_within;
+  if (kind != v1::COLLISION_EVENT_KIND_UNSPECIFIED) AddEvent(kind, pair);
+  return absl::OkStatus();
+}
+
+void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair) {
+  v1::CollisionEvent* const event = reply_.add_events();
+  event->set_kind(kind);
+  event->set_placement_a(pair.a);
+  event->set_placement_b(pair.b);
+  if (kind != v1::COLLISION_EVENT_KIND_LOST) {
+    const auto revision_of = [this](uint32_t placement) {
+      return table_.hull(*table_.hull_of(placement))->record.revision;
+    };
+    event->set_relation(pair.relation);
+    event->set_revision_a(revision_of(pair.a));
+    event->set_revision_b(revision_of(pair.b));
+    if (options_.clearance.has_value()) event->set_within_clearance(pair.is_within_clearance);
+  }
+  reply_bytes_ += kEntryBytes + event->ByteSizeLong();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,125 @@
+#ifndef HULLD_SERVER_COLLISIONS_COLLISION_WATCH_H_
+#define HULLD_SERVER_COLLISIONS_COLLISION_WATCH_H_
+
+#include <absl/status/status.h>
+#include <grpcpp/grpcpp.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "core/query/collision.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/call/queued_stream.h"
+#include "server/collisions/placement_table.h"
+#include "server/collisions/watched_pairs.h"
+#include "server/process/task_pool.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// One WatchCollisions call. It works in rounds: each takes up one message of the client, or the
+// hulls that the registry says have changed, asks about the pairs that are concerned, and tells how
+// they are other than before. A round begins when the one before is told and its replies are
+// written. Meanwhile messages wait in gRPC's window, and changes in the registry, where the last
+// state of each hull wins; so a client that reads slowly costs a message of memory.
+//
+// The mutex guards which work is under way. What the work itself uses belongs to the one task that
+// runs.
+class CollisionWatch
+    : public ReadingStream<QueuedStream<grpc::ServerBidiReactor<v1::WatchCollisionsRequest,
+                                                                v1::WatchCollisionsResponse>,
+                                        v1::WatchCollisionsResponse>,
+                           v1::WatchCollisionsRequest> {
+ public:
+  static grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>* Start(
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool);
+
+ private:
+  CollisionWatch(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+                 WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
+      : ReadingStream(context, admission, Rpc::kWatchCollisions),
+        registry_(registry),
+        readers_(readers),
+        long_readers_(long_readers),
+        pool_(pool),
+        lane_(pool),
+        charge_(registry.memory()) {}
+
+  void Open() override {
+    Locked([] {});
+  }
+  void OnDone() override;
+
+  // The following require the mutex.
+  void StartWork() override;
+  bool IsWorking() const override { return is_working_; }
+  void OnMessage() override;
+  void OnNoMessage(const absl::Status& why) override;
+
+  // The following are the work.
+  void TakeMessage();
+  absl::Status HandleMessage();
+  absl::Status HandleOpen(const v1::CollisionWatchOpen& open);
+  absl::Status WatchHulls();
+  absl::Status HandleUpdate(const v1::CollisionWatchUpdate& update);
+  void TakeChanges();
+  absl::Status HandleChanges(const WatchPiece& piece);
+  absl::Status AskAbout(const std::vector<uint32_t>& changed);
+  void Tell();
+  bool TellHulls();
+  absl::Status TellPair(WatchedPair& pair);
+  void AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair);
+  // The task ends; `error`, if there is one, ends the call.
+  void EndWork(const absl::Status& error);
+
+  Registry& registry_;
+  WorkerPool& readers_;
+  WorkerPool& long_readers_;
+  TaskPool& pool_;
+  TaskPool::Lane lane_;
+
+  // Guarded by the mutex.
+  bool is_working_ = false;
+  // A message was read and waits to be taken up.
+  bool has_message_ = false;
+  bool has_said_all_ = false;
+  // The registry has changes, or has not been asked yet.
+  bool are_hulls_due_ = false;
+
+  // Belongs to the work. Written once, before hulls can be due.
+  std::shared_ptr<ChangeWatch> watch_;
+  // Covers placements and pairs.
+  MemoryCharge charge_;
+  bool is_open_ = false;
+  QueryOptions options_;
+  PlacementTable table_;
+  WatchedPairs pairs_;
+  // The hulls of each ID, as indices into the table's.
+  std::unordered_multimap<std::string, size_t> hulls_of_;
+  uint64_t messages_ = 0;
+  // Every change of a hull up to this one is taken into account.
+  uint64_t revision_ = 0;
+
+  // The round that is being told: what is next of hulls, problems and pairs.
+  bool is_telling_ = false;
+  bool answers_message_ = false;
+  std::vector<size_t> hulls_to_tell_;
+  std::vector<uint32_t> problems_to_tell_;
+  size_t next_hull_ = 0;
+  size_t next_problem_ = 0;
+  size_t next_pair_ = 0;
+  RungCounts rungs_;
+  v1::WatchCollisionsResponse reply_;
+  // The size of the reply, estimated.
+  size_t reply_bytes_ = 0;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_COLLISION_WATCH_H_

@@ -1,0 +1,60 @@
+#ifndef HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
+#define HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "core/query/scene.h"
+
+// Which pairs of a scene are asked about. Scene: a message with the groups and movers of a
+// v1::FindCollisionsRequest.
+namespace hulld::server {
+
+// INVALID_ARGUMENT: groups that do not fit the placements.
+template <typename Scene>
+absl::Status ValidateGroups(const Scene& scene, size_t placements) {
+  if (!scene.groups().empty() && static_cast<size_t>(scene.groups_size()) != placements) {
+    return absl::InvalidArgumentError(absl::StrCat("groups holds ", scene.groups_size(),
+                                                   " groups for ", placements,
+                                                   " placements; give one for each or none"));
+  }
+  if (scene.ignored_group_pairs_size() % 2 != 0) {
+    return absl::InvalidArgumentError(absl::StrCat("ignored_group_pairs holds ",
+                                                   scene.ignored_group_pairs_size(),
+                                                   " groups; each pair needs two"));
+  }
+  if (scene.groups().empty() &&
+      (scene.ignore_same_group() || !scene.ignored_group_pairs().empty())) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(scene.ignore_same_group() ? "ignore_same_group" : "ignored_group_pairs",
+                     " needs groups; give one for each placement"));
+  }
+  if (scene.movers() > placements) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("movers is ", scene.movers(), ", but placements holds ", placements));
+  }
+  return absl::OkStatus();
+}
+
+// The groups that are never asked about together.
+template <typename Scene>
+std::vector<GroupPair> IgnoredGroups(const Scene& scene) {
+  std::vector<GroupPair> ignored;
+  for (int i = 0; i < scene.ignored_group_pairs_size(); i += 2) {
+    ignored.push_back({scene.ignored_group_pairs(i), scene.ignored_group_pairs(i + 1)});
+  }
+  if (scene.ignore_same_group()) {
+    const std::set<uint32_t> groups(scene.groups().begin(), scene.groups().end());
+    for (const uint32_t group : groups) ignored.push_back({group, group});
+  }
+  return ignored;
+}
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_

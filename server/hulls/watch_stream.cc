@@ -1,0 +1,166 @@
+#include "server/hulls/watch_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/wire/encode.h"
+
+namespace hulld::server {
+namespace {
+
+// Whether its box has to be read from the store.
+bool WantsBox(const HullChange& change) {
+  return change.record.vertex_count > 0 && !change.has_box && !change.damaged;
+}
+
+v1::HullEventKind EncodeKind(ChangeKind kind) {
+  switch (kind) {
+    case ChangeKind::kPresent:
+      return v1::HULL_EVENT_KIND_PRESENT;
+    case ChangeKind::kCreated:
+      return v1::HULL_EVENT_KIND_CREATED;
+    case ChangeKind::kChanged:
+      return v1::HULL_EVENT_KIND_CHANGED;
+    case ChangeKind::kReplaced:
+      return v1::HULL_EVENT_KIND_REPLACED;
+    case ChangeKind::kDeleted:
+      return v1::HULL_EVENT_KIND_DELETED;
+  }
+  HULLD_UNREACHABLE();
+}
+
+void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
+  event->set_kind(EncodeKind(change.kind));
+  if (change.kind == ChangeKind::kDeleted) {
+    event->mutable_hull()->set_hull_id(change.record.hull_id);
+    event->mutable_hull()->set_revision(change.record.revision);
+    return;
+  }
+  EncodeRecord(change.record, event->mutable_hull());
+  event->mutable_hull()->set_damaged(change.damaged);
+  if (!change.has_box) return;
+  EncodeVector(change.low, event->mutable_box_min());
+  EncodeVector(change.high, event->mutable_box_max());
+}
+
+}  // namespace
+
+grpc::ServerWriteReactor<v1::WatchHullsResponse>* WatchStream::Start(
+    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+    WorkerPool& readers, const v1::WatchHullsRequest& request) {
+  return Launch(std::shared_ptr<WatchStream>(
+      new WatchStream(context, admission, registry, readers, request)));
+}
+
+void WatchStream::Open() {
+  const absl::StatusOr<WatchTarget> target = ReadTarget();
+  if (!target.ok()) return FinishCall(target.status());
+  const absl::StatusOr<WatchStart> start = ReadStart();
+  if (!start.ok()) return FinishCall(start.status());
+  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch =
+      registry_.OpenWatch(*target, *start, [this, self = shared_from_this()] { TellNext(); });
+  if (!watch.ok()) return FinishCall(watch.status());
+  watch_ = *std::move(watch);
+  RunOn(readers_, [this] { TellNext(); });
+}
+
+absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
+  if (request_.hull_id().empty()) {
+    absl::StatusOr<std::string> prefix = PrefixToList(call().caller(), request_.prefix());
+    if (!prefix.ok()) return prefix.status();
+    return WatchTarget{*std::move(prefix), {}};
+  }
+  if (!request_.prefix().empty()) {
+    return absl::InvalidArgumentError("prefix and hull_id are both set; give one of them");
+  }
+  const absl::Status valid = CheckHullId(call().caller(), request_.hull_id(), "hull_id");
+  if (!valid.ok()) return valid;
+  return WatchTarget{"", {request_.hull_id()}};
+}
+
+absl::StatusOr<WatchStart> WatchStream::ReadStart() const {
+  if (request_.after_revision() > 0 && request_.store_id().empty()) {
+    return absl::InvalidArgumentError(
+        "after_revision needs store_id; give that of the same header");
+  }
+  return WatchStart{true, request_.after_revision(), request_.store_id()};
+}
+
+// Sends what is next, or has the registry call this again. One at a time runs, or is due.
+void WatchStream::TellNext() {
+  while (true) {
+    if (call().ShouldStop()) return FinishCall(call().StopStatus());
+    absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
+    if (!piece.ok()) return FinishCall(piece.status());
+    // It may be called again by now.
+    if (piece->waits) return;
+    is_synced_ = piece->synced || (is_synced_ && !piece->anew);
+    const bool is_mark = piece->revision > sent_revision_;
+    if (piece->changes.empty() && !piece->synced && !piece->anew && !is_mark) continue;
+    if (!std::ranges::any_of(piece->changes, WantsBox)) return Tell(*piece);
+    return RunOn(readers_, [this, loaded = *std::move(piece)]() mutable {
+      const absl::Status status = LoadBoxes(&loaded);
+      if (!status.ok()) return FinishCall(OrStopped(status));
+      Tell(loaded);
+    });
+  }
+}
+
+// Reads what is missing from the store: of each hull as it is by now, and nothing of one that is
+// gone by now, which is told later. One hull after another, so that they need not be in memory
+// together.
+absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
+  std::vector<HullChange> loaded;
+  loaded.reserve(piece->changes.size());
+  for (HullChange& change : piece->changes) {
+    if (WantsBox(change)) {
+      const auto resolved =
+          registry_.Resolve(change.record.hull_id, [this] { return call().ShouldStop(); });
+      const absl::Status& status = resolved.status();
+      if (absl::IsNotFound(status)) continue;
+      if (!status.ok() && !absl::IsDataLoss(status)) return status;
+      change.damaged = !status.ok();
+      if (resolved.ok()) {
+        const HullView& view = resolved->second;
+        change.record = view.record;
+        change.has_box = !view.served->empty();
+        change.low = view.served->low();
+        change.high = view.served->high();
+      }
+    }
+    loaded.push_back(std::move(change));
+  }
+  piece->changes = std::move(loaded);
+  return absl::OkStatus();
+}
+
+void WatchStream::Tell(const WatchPiece& piece) {
+  sent_revision_ = piece.revision;
+  EncodeHeader(registry_.store(), piece.revision, reply().mutable_header());
+  reply().set_synced(piece.synced);
+  reply().set_anew(piece.anew);
+  for (const HullChange& change : piece.changes) EncodeEvent(change, reply().add_events());
+  Send();
+}
+
+void WatchStream::OnSent() {
+  reply().Clear();
+  if (is_synced_) return TellNext();
+  RunOn(readers_, [this] { TellNext(); });
+}
+
+void WatchStream::OnCancel() {
+  PulledStream::OnCancel();
+  if (watch_ != nullptr) registry_.NudgeWatch(watch_);
+}
+
+void WatchStream::OnDone() {
+  const auto self = shared_from_this();
+  PulledStream::OnDone();
+  if (watch_ == nullptr) return;
+  registry_.CloseWatch(watch_);
+  watch_.reset();
+}
+
+}  // namespace hulld::server

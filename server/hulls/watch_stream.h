@@ -1,0 +1,60 @@
+#ifndef HULLD_SERVER_HULLS_WATCH_STREAM_H_
+#define HULLD_SERVER_HULLS_WATCH_STREAM_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <grpcpp/grpcpp.h>
+
+#include <cstdint>
+#include <memory>
+
+#include "hulld/v1/hull.pb.h"
+#include "server/call/pulled_stream.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// One WatchHulls call: takes what is to be told next from the registry, sends it, and comes for
+// more once that was written. When there is nothing, the registry calls back; no thread waits.
+class WatchStream : public PulledStream<grpc::ServerWriteReactor<v1::WatchHullsResponse>,
+                                        v1::WatchHullsResponse> {
+ public:
+  // `request` must outlive the call, as gRPC's requests do.
+  static grpc::ServerWriteReactor<v1::WatchHullsResponse>* Start(
+      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+      WorkerPool& readers, const v1::WatchHullsRequest& request);
+
+ private:
+  WatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+              WorkerPool& readers, const v1::WatchHullsRequest& request)
+      : PulledStream(context, admission, Rpc::kWatchHulls),
+        registry_(registry),
+        readers_(readers),
+        request_(request) {}
+
+  void Open() override;
+  void OnSent() override;
+  void OnCancel() override;
+  void OnDone() override;
+
+  absl::StatusOr<WatchTarget> ReadTarget() const;
+  absl::StatusOr<WatchStart> ReadStart() const;
+  void TellNext();
+  absl::Status LoadBoxes(WatchPiece* piece);
+  void Tell(const WatchPiece& piece);
+
+  Registry& registry_;
+  WorkerPool& readers_;
+  const v1::WatchHullsRequest& request_;
+  // Written before anything else can happen.
+  std::shared_ptr<ChangeWatch> watch_;
+  // What was there has been told.
+  bool is_synced_ = false;
+  // Of the header that was sent last.
+  uint64_t sent_revision_ = 0;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_HULLS_WATCH_STREAM_H_

@@ -1,0 +1,380 @@
+#include "server/registry/change_feed.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/registry/registered_hull.h"
+
+namespace hulld::server {
+namespace {
+
+// A hull that changed.
+struct Changed {
+  std::string id;
+  // Null when it went.
+  std::shared_ptr<RegisteredHull> hull;
+  // Of the incarnation that is there, or that went.
+  uint64_t create_revision = 0;
+  // When the incarnation before that ended; 0 where all watches were told of that already.
+  uint64_t former_end = 0;
+};
+
+// With its places in the order of revisions and by ID. About what two nodes of maps take.
+uint64_t BytesOf(const std::string& id) { return 2 * id.size() + sizeof(Changed) + 160; }
+
+}  // namespace
+
+// What watches of one target were not told yet.
+struct WatchInterest {
+  WatchTarget target;
+  std::set<std::shared_ptr<ChangeWatch>> watches;
+  size_t armed = 0;
+  // In due_.
+  bool is_due = false;
+
+  // Each hull once, at its last change.
+  std::map<uint64_t, Changed> changes;
+  std::unordered_map<std::string, uint64_t> revision_of;
+  // Those of `changes` that went.
+  size_t deletions = 0;
+  uint64_t bytes = 0;
+  // Of the last change, whether it is kept or not. Watches whose cursors are before it are behind.
+  uint64_t last_revision = 0;
+  size_t behind = 0;
+  // What changed up to this one is known no more.
+  uint64_t lost_revision = 0;
+};
+
+ChangeFeed::ChangeFeed(std::mutex& order, MemoryBudget& budget,
+                       std::chrono::milliseconds mark_interval)
+    : order_(order), mark_interval_(mark_interval), charge_(budget), thread_([this] { Run(); }) {}
+
+ChangeFeed::~ChangeFeed() {
+  {
+    const std::lock_guard lock(order_);
+    HULLD_CHECK(watches_.empty());
+    ending_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+void ChangeFeed::Begin(uint64_t revision) { revision_ = deletions_begin_ = revision; }
+
+void ChangeFeed::NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
+  const HullRecord& record = hull->committed.record;
+  Note(locked, record.hull_id, record.revision, record.create_revision, hull, Life::kBegan);
+}
+
+void ChangeFeed::NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
+  const HullRecord& record = hull->committed.record;
+  Note(locked, record.hull_id, record.revision, record.create_revision, hull, Life::kChanged);
+}
+
+void ChangeFeed::NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
+  const HullRecord& record = hull->committed.record;
+  Note(locked, record.hull_id, record.revision, record.create_revision, hull, Life::kReplaced);
+}
+
+void ChangeFeed::NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision) {
+  RememberDeletion(record.hull_id, revision);
+  Note(locked, record.hull_id, revision, record.create_revision, nullptr, Life::kEnded);
+}
+
+void ChangeFeed::Note(Locked& locked, const std::string& id, uint64_t revision,
+                      uint64_t create_revision, const std::shared_ptr<RegisteredHull>& hull,
+                      Life life) {
+  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
+  revision_ = revision;
+  for (const auto& [length, count] : prefix_lengths_) {
+    if (length > id.size()) break;
+    const auto found = by_prefix_.find(std::string_view(id).substr(0, length));
+    if (found == by_prefix_.end()) continue;
+    NoteFor(locked, found->second, id, revision, create_revision, hull, life);
+  }
+  const auto found = by_id_.find(id);
+  if (found == by_id_.end()) return;
+  for (const auto& interest : found->second) {
+    NoteFor(locked, interest, id, revision, create_revision, hull, life);
+  }
+}
+
+void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& interest,
+                         const std::string& id, uint64_t revision, uint64_t create_revision,
+                         const std::shared_ptr<RegisteredHull>& hull, Life life) {
+  auto& changes = interest->changes;
+  const auto [place, is_new] = interest->revision_of.emplace(id, revision);
+  if (is_new) {
+    changes.emplace_hint(changes.end(), revision, Changed{id, nullptr, 0, 0});
+    Count(interest->bytes, interest->bytes + BytesOf(id));
+    interest->bytes += BytesOf(id);
+  } else {
+    auto node = changes.extract(std::exchange(place->second, revision));
+    const bool was_deleted = node.mapped().hull == nullptr;
+    if (was_deleted) --interest->deletions;
+    if (was_deleted && life == Life::kBegan) node.mapped().former_end = node.key();
+    node.key() = revision;
+    changes.insert(changes.end(), std::move(node));
+  }
+  Changed& changed = changes.rbegin()->second;
+  changed.hull = hull;
+  changed.create_revision = create_revision;
+  if (life == Life::kReplaced) changed.former_end = revision;
+  if (life == Life::kEnded) ++interest->deletions;
+
+  interest->last_revision = revision;
+  interest->behind = interest->watches.size();
+  if (interest->deletions > kMostDeletions) {
+    Forget(*interest);
+    interest->lost_revision = revision;
+  }
+  if (interest->armed == 0 || std::exchange(interest->is_due, true)) return;
+  due_.push_back(interest);
+  if (due_.size() == 1) locked.Afterwards([this] { wake_.notify_one(); });
+}
+
+void ChangeFeed::RememberDeletion(const std::string& id, uint64_t revision) {
+  uint64_t bytes = bytes_ + BytesOf(id);
+  deletions_.emplace_back(revision, id);
+  if (deletions_.size() > kMostDeletions) {
+    bytes -= BytesOf(deletions_.front().second);
+    deletions_begin_ = deletions_.front().first;
+    deletions_.pop_front();
+  }
+  Count(bytes_, bytes);
+}
+
+void ChangeFeed::Count(uint64_t before, uint64_t now) {
+  bytes_ += now - before;
+  charge_.Set(bytes_);
+}
+
+std::shared_ptr<WatchInterest> ChangeFeed::FindInterest(const WatchTarget& target) const {
+  if (target.ids.empty()) {
+    const auto found = by_prefix_.find(target.prefix);
+    return found == by_prefix_.end() ? nullptr : found->second;
+  }
+  // Only a single hull is likely to be watched by many.
+  const auto found = target.ids.size() == 1 ? by_id_.find(target.ids.front()) : by_id_.end();
+  if (found == by_id_.end()) return nullptr;
+  for (const auto& interest : found->second) {
+    if (interest->target == target) return interest;
+  }
+  return nullptr;
+}
+
+void ChangeFeed::AddInterest(const std::shared_ptr<WatchInterest>& interest) {
+  const WatchTarget& target = interest->target;
+  for (const std::string& id : target.ids) by_id_[id].push_back(interest);
+  if (!target.ids.empty()) return;
+  by_prefix_.emplace(target.prefix, interest);
+  ++prefix_lengths_[target.prefix.size()];
+}
+
+void ChangeFeed::RemoveInterest(const std::shared_ptr<WatchInterest>& interest) {
+  Forget(*interest);
+  const WatchTarget& target = interest->target;
+  for (const std::string& id : target.ids) {
+    const auto found = by_id_.find(id);
+    HULLD_CHECK(found != by_id_.end());
+    std::erase(found->second, interest);
+    if (found->second.empty()) by_id_.erase(found);
+  }
+  if (!target.ids.empty()) return;
+  by_prefix_.erase(target.prefix);
+  const auto length = prefix_lengths_.find(target.prefix.size());
+  if (--length->second == 0) prefix_lengths_.erase(length);
+}
+
+std::shared_ptr<ChangeWatch> ChangeFeed::Open(const WatchTarget& target,
+                                              std::function<void()> on_ready) {
+  auto watch = std::make_shared<ChangeWatch>();
+  watch->on_ready = std::move(on_ready);
+  watch->cursor = watch->told = revision_;
+  watch->is_exact = true;
+  watch->interest = FindInterest(target);
+  if (watch->interest == nullptr) {
+    watch->interest = std::make_shared<WatchInterest>();
+    watch->interest->target = target;
+    AddInterest(watch->interest);
+  }
+  watch->interest->watches.insert(watch);
+  watches_.insert(watch);
+  // The thread waits for marks only while there are watches.
+  if (watches_.size() == 1) wake_.notify_one();
+  return watch;
+}
+
+void ChangeFeed::Close(const std::shared_ptr<ChangeWatch>& watch) {
+  if (std::exchange(watch->is_armed, false)) --watch->interest->armed;
+  MoveCursor(*watch, revision_);
+  watches_.erase(watch);
+  const std::shared_ptr<WatchInterest> interest = watch->interest;
+  interest->watches.erase(watch);
+  if (interest->watches.empty()) RemoveInterest(interest);
+}
+
+// Drops what the interest knows once no watch of it is behind.
+void ChangeFeed::MoveCursor(ChangeWatch& watch, uint64_t revision) {
+  WatchInterest& interest = *watch.interest;
+  const bool was_behind = watch.cursor < interest.last_revision;
+  watch.cursor = revision;
+  if (!was_behind || revision < interest.last_revision) return;
+  HULLD_CHECK(interest.behind > 0);
+  if (--interest.behind == 0) Forget(interest);
+}
+
+void ChangeFeed::Forget(WatchInterest& interest) {
+  Count(interest.bytes, 0);
+  interest.bytes = 0;
+  interest.changes.clear();
+  interest.revision_of.clear();
+  interest.deletions = 0;
+}
+
+bool ChangeFeed::IsLost(const ChangeWatch& watch) const {
+  if (watch.stage == ChangeWatch::Stage::kDeletions && !Remembers(watch.last_deletion)) return true;
+  return watch.cursor < watch.interest->lost_revision;
+}
+
+const WatchTarget& ChangeFeed::TargetOf(const ChangeWatch& watch) { return watch.interest->target; }
+
+void ChangeFeed::StartAnew(ChangeWatch& watch) {
+  watch.stage = ChangeWatch::Stage::kPresent;
+  watch.after_revision = 0;
+  watch.last_id.clear();
+  MoveCursor(watch, revision_);
+  watch.synced_at.reset();
+  watch.is_exact = false;
+  watch.anew = true;
+}
+
+bool ChangeFeed::TakeDeletions(ChangeWatch& watch,
+                               const std::function<bool(const std::string&)>& is_there,
+                               WatchPiece* piece) {
+  const WatchTarget& target = watch.interest->target;
+  auto next = std::upper_bound(
+      deletions_.begin(), deletions_.end(), watch.last_deletion,
+      [](uint64_t revision, const auto& deletion) { return revision < deletion.first; });
+  for (size_t looked_at = 0; next != deletions_.end(); ++next) {
+    const auto& [revision, id] = *next;
+    if (revision > watch.cursor) return false;
+    if (looked_at++ == kMostPerPiece) return true;
+    watch.last_deletion = revision;
+    const bool is_watched =
+        target.ids.empty() ? id.starts_with(target.prefix) : id == target.ids.front();
+    if (!is_watched || is_there(id)) continue;
+    HullChange change;
+    change.kind = ChangeKind::kDeleted;
+    change.record.hull_id = id;
+    change.record.revision = revision;
+    piece->changes.push_back(std::move(change));
+  }
+  return false;
+}
+
+void ChangeFeed::TakeChanges(ChangeWatch& watch, WatchPiece* piece) {
+  const auto& changes = watch.interest->changes;
+  const uint64_t before = watch.cursor;
+  auto next = changes.upper_bound(before);
+  uint64_t revision = revision_;
+  for (size_t looked_at = 0; next != changes.end(); ++next) {
+    if (looked_at++ == kMostPerPiece) {
+      revision = std::prev(next)->first;
+      break;
+    }
+    const Changed& changed = next->second;
+    const bool is_known = changed.create_revision <= before;
+    const bool another_ended = changed.former_end > before;
+    if (changed.hull == nullptr) {
+      if (watch.is_exact && !is_known && !another_ended) continue;
+      HullChange change;
+      change.kind = ChangeKind::kDeleted;
+      change.record.hull_id = changed.id;
+      change.record.revision = next->first;
+      piece->changes.push_back(std::move(change));
+      continue;
+    }
+    HullChange change = changed.hull->Describe();
+    if (watch.is_exact) {
+      change.kind = is_known        ? ChangeKind::kChanged
+                    : another_ended ? ChangeKind::kReplaced
+                                    : ChangeKind::kCreated;
+    }
+    piece->changes.push_back(std::move(change));
+  }
+  watch.is_exact = next == changes.end();
+  MoveCursor(watch, revision);
+  piece->revision = revision;
+  piece->synced = watch.synced_at.has_value() && revision >= *watch.synced_at;
+  if (piece->synced) watch.synced_at.reset();
+  const bool is_nudged = std::exchange(watch.is_nudged, false);
+  if (!piece->changes.empty() || piece->synced || is_nudged || !watch.is_exact) {
+    watch.told = revision;
+    return;
+  }
+  piece->waits = true;
+  watch.is_armed = true;
+  ++watch.interest->armed;
+}
+
+void ChangeFeed::Nudge(Locked& locked, const std::shared_ptr<ChangeWatch>& watch) {
+  HULLD_CHECK(locked.Holds(order_));
+  watch->is_nudged = true;
+  if (!watch->is_armed) return;
+  MakeReady(watch);
+  locked.Afterwards([this] { wake_.notify_one(); });
+}
+
+void ChangeFeed::End(Locked& locked) {
+  has_ended_ = true;
+  for (const auto& watch : watches_) Nudge(locked, watch);
+}
+
+void ChangeFeed::MakeReady(const std::shared_ptr<ChangeWatch>& watch) {
+  HULLD_CHECK(std::exchange(watch->is_armed, false));
+  --watch->interest->armed;
+  ready_.push_back(watch);
+}
+
+void ChangeFeed::Run() {
+  Locked locked(order_);
+  auto next_marks = std::chrono::steady_clock::now() + mark_interval_;
+  while (!ending_) {
+    if (due_.empty() && ready_.empty()) {
+      if (watches_.empty()) {
+        wake_.wait(locked.lock());
+      } else {
+        wake_.wait_until(locked.lock(), next_marks);
+      }
+    }
+    for (const auto& interest : std::exchange(due_, {})) {
+      interest->is_due = false;
+      for (const auto& watch : interest->watches) {
+        if (watch->is_armed) MakeReady(watch);
+      }
+    }
+    if (const auto now = std::chrono::steady_clock::now(); now >= next_marks) {
+      next_marks = now + mark_interval_;
+      NudgeForMarks();
+    }
+    {
+      const auto ready = std::exchange(ready_, {});
+      locked.Unlock();
+      for (const auto& watch : ready) watch->on_ready();
+    }
+    locked.Lock();
+  }
+}
+
+// Of nothing that those who wait watch did anything change, or they would have been told.
+void ChangeFeed::NudgeForMarks() {
+  for (const auto& watch : watches_) {
+    if (!watch->is_armed || watch->told == revision_) continue;
+    watch->is_nudged = true;
+    MakeReady(watch);
+  }
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,194 @@
+#ifndef HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
+#define HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "server/registry/locked.h"
+#include "server/registry/memory_budget.h"
+#include "server/registry/registry_types.h"
+#include "server/store/hull_record.h"
+
+namespace hulld::server {
+
+struct WatchInterest;
+
+// One who wants to be told of changes. Guarded by the mutex of the feed.
+struct ChangeWatch {
+  enum class Stage {
+    // Resumes: is told what went since.
+    kDeletions,
+    // Is told what is there, in the order of IDs.
+    kPresent,
+    // Is told what changes.
+    kChanges,
+  };
+
+  std::shared_ptr<WatchInterest> interest;
+  // Called on the feed's thread, without any lock.
+  std::function<void()> on_ready;
+
+  Stage stage = Stage::kChanges;
+  // What is there is told where it changed after this revision.
+  uint64_t after_revision = 0;
+  // The last deletion that was told, by its revision; the last hull that was told, by its ID.
+  uint64_t last_deletion = 0;
+  std::string last_id;
+  // Every change up to this one was told, once the stages before kChanges are over.
+  uint64_t cursor = 0;
+  // The cursor when something was told last.
+  uint64_t told = 0;
+  // kChanges: `synced` is due once the cursor is there; none when it was told.
+  std::optional<uint64_t> synced_at;
+  // What was told is the state of the store at the cursor, so that it is known what is new.
+  bool is_exact = false;
+  bool anew = false;
+  // on_ready is due when something changes.
+  bool is_armed = false;
+  // The next piece does not wait, whatever there is to tell.
+  bool is_nudged = false;
+};
+
+// Tells watches which hulls changed. Guarded by its owner's mutex (the registry's), which
+// `Locked` shows; its thread takes that mutex, too.
+//
+// What changed is kept once for all watches of the same target, their interest: each hull at its
+// last change only, in the order of revisions. A watch is a cursor in that order. So a change costs
+// O(log n) for each target that the hull falls under, however many watch it; a slow watch costs
+// what its cursor is behind by in hulls, not in changes; and what all watches of an interest were
+// told is dropped. Targets are found by the ID, and by each length of a prefix that is watched.
+//
+// A watch that was told everything is armed. The first change after that makes its interest due:
+// O(1) under the mutex. The feed's thread then calls on_ready of all that were armed, without the
+// mutex; each comes for its next piece whenever it can send one, and is armed again when there is
+// none.
+//
+// What went leaves no trace in the store. A bounded number of deletions is remembered, for watches
+// that resume and, within an interest, for those that are behind. One that needs to know of more
+// starts anew.
+class ChangeFeed {
+ public:
+  // How many deletions are remembered; with IDs of the greatest length, 20 MiB.
+  static constexpr size_t kMostDeletions = 1 << 16;
+  // Hulls that are looked at, or told of, at a time: some 50 us under the mutex.
+  static constexpr size_t kMostPerPiece = 512;
+
+  // What is remembered counts against the budget. mark_interval: how often a watch is told that the
+  // revision moved on.
+  ChangeFeed(std::mutex& order, MemoryBudget& budget, std::chrono::milliseconds mark_interval);
+  ChangeFeed(const ChangeFeed&) = delete;
+  ChangeFeed& operator=(const ChangeFeed&) = delete;
+  // Requires that all watches are closed.
+  ~ChangeFeed();
+
+  // What the store holds is of this revision, and nothing is known of what went before; first of
+  // all.
+  void Begin(uint64_t revision);
+
+  // A change was committed. It was given the record's revision; of a deletion, `revision`.
+  // Cost: O(log n) for each target that the ID falls under, and a hash of the ID for each length of
+  // a watched prefix.
+  void NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
+  void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
+
+  // Starts at the stage kChanges, with what is committed from now on.
+  std::shared_ptr<ChangeWatch> Open(const WatchTarget& target, std::function<void()> on_ready);
+  // Nothing is to be told any more. An on_ready that is due by then still comes.
+  void Close(const std::shared_ptr<ChangeWatch>& watch);
+
+  static const WatchTarget& TargetOf(const ChangeWatch& watch);
+  // Whether all that went after this revision is remembered.
+  bool Remembers(uint64_t revision) const { return revision >= deletions_begin_; }
+  // Moves a watch back to where everything is told, and says so.
+  void StartAnew(ChangeWatch& watch);
+  // Some of what went after watch.last_deletion and up to the cursor. Returns false after the last.
+  bool TakeDeletions(ChangeWatch& watch, const std::function<bool(const std::string&)>& is_there,
+                     WatchPiece* piece);
+  // The watch is to be told of nothing that changed until now.
+  void SkipChanges(ChangeWatch& watch) { MoveCursor(watch, revision_); }
+  // Some of what changed after the cursor. Arms the watch where there is nothing to tell.
+  void TakeChanges(ChangeWatch& watch, WatchPiece* piece);
+  // Whether what changed after the cursor is known no more, so that the watch must start anew.
+  bool IsLost(const ChangeWatch& watch) const;
+
+  // Has a watch come for its next piece although nothing changed.
+  void Nudge(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
+  // Nudges all; there is nothing to tell from now on.
+  void End(Locked& locked);
+  bool has_ended() const { return has_ended_; }
+
+  // Bytes of what is kept for watches that are behind, and of deletions.
+  uint64_t MemoryBytes() const { return bytes_; }
+
+ private:
+  struct Hash {
+    using is_transparent = void;
+    size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
+  };
+  using Interests = std::vector<std::shared_ptr<WatchInterest>>;
+  enum class Life { kBegan, kChanged, kReplaced, kEnded };
+
+  void Note(Locked& locked, const std::string& id, uint64_t revision, uint64_t create_revision,
+            const std::shared_ptr<RegisteredHull>& hull, Life life);
+  void NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& interest,
+               const std::string& id, uint64_t revision, uint64_t create_revision,
+               const std::shared_ptr<RegisteredHull>& hull, Life life);
+  void RememberDeletion(const std::string& id, uint64_t revision);
+  std::shared_ptr<WatchInterest> FindInterest(const WatchTarget& target) const;
+  void AddInterest(const std::shared_ptr<WatchInterest>& interest);
+  void RemoveInterest(const std::shared_ptr<WatchInterest>& interest);
+  void MoveCursor(ChangeWatch& watch, uint64_t revision);
+  void Forget(WatchInterest& interest);
+  void Count(uint64_t before, uint64_t now);
+  void MakeReady(const std::shared_ptr<ChangeWatch>& watch);
+  // The thread.
+  void Run();
+  void NudgeForMarks();
+
+  std::mutex& order_;
+  const std::chrono::milliseconds mark_interval_;
+
+  // The rest is guarded by order_.
+  uint64_t revision_ = 0;
+  // In the order of revisions. What went up to deletions_begin_ is not remembered.
+  std::deque<std::pair<uint64_t, std::string>> deletions_;
+  uint64_t deletions_begin_ = 0;
+
+  // By a prefix, and by an ID: the interests in it.
+  std::unordered_map<std::string, std::shared_ptr<WatchInterest>, Hash, std::equal_to<>> by_prefix_;
+  // How many of by_prefix_ are of each length.
+  std::map<size_t, size_t> prefix_lengths_;
+  std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_id_;
+  std::set<std::shared_ptr<ChangeWatch>> watches_;
+
+  uint64_t bytes_ = 0;
+  MemoryCharge charge_;
+
+  // For the thread.
+  std::condition_variable wake_;
+  Interests due_;
+  std::vector<std::shared_ptr<ChangeWatch>> ready_;
+  bool has_ended_ = false;
+  bool ending_ = false;
+  std::thread thread_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_CHANGE_FEED_H_

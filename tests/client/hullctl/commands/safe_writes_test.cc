@@ -1,0 +1,91 @@
+// What commands that write do when there is nothing to write, or nothing to write to.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/formats/point_reading.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
+
+namespace hulld {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class SafeWrites : public HullctlOnServer {
+ protected:
+  bool Exists(const std::string& hull_id) { return Ask({"get", hull_id}).code == 0; }
+};
+
+TEST_F(SafeWrites, ReplaceByNoPointsIsRefusedUnlessItIsMeant) {
+  Put("h", server::Cube());
+  const TempFile empty("empty.xyz", "");
+  const TempFile only_nan("nan.xyz", "nan 0 0\n");
+  for (const std::vector<std::string>& files :
+       {std::vector<std::string>{empty.path()}, {empty.path(), empty.path()}, {only_nan.path()}}) {
+    std::vector<std::string> command = {"replace", "h", "--skip-nonfinite"};
+    command.insert(command.end(), files.begin(), files.end());
+    const Ran ran = Ask(command);
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, AllOf(HasSubstr("no points in " + files[0]), HasSubstr("--allow-empty")));
+    EXPECT_EQ(Get("h").hull().vertex_count(), 8U);
+  }
+  EXPECT_EQ(Ask({"replace", "new", empty.path(), "--create"}).code, 2);
+  EXPECT_FALSE(Exists("new"));
+  EXPECT_EQ(Ask({"replace", "h", empty.path(), "--allow-empty"}).code, 0);
+  EXPECT_EQ(Get("h").hull().vertex_count(), 0U);
+}
+
+TEST_F(SafeWrites, AppendCreatesNoHullOfAFileThatIsRefused) {
+  const TempFile malformed("a.xyz", "1 2 x\n");
+  const TempFile nan("b.xyz", "nan 1 2\n");
+  for (const TempFile* file : {&malformed, &nan}) {
+    const Ran ran = Ask({"append", "new", file->path(), "--create"});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, HasSubstr(file->path() + ":1: "));
+    EXPECT_EQ(ran.out, "");
+    EXPECT_FALSE(Exists("new"));
+  }
+}
+
+TEST_F(SafeWrites, AppendCreatesNoHullOfNoPoints) {
+  const TempFile empty("empty.xyz", "# nothing\n");
+  const Ran ran = Ask({"append", "new", empty.path(), "--create"});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("hold no points"), HasSubstr("hullctl create")));
+  EXPECT_FALSE(Exists("new"));
+  // To a hull that is there, nothing may be added.
+  Put("h", server::Cube());
+  EXPECT_EQ(Ask({"append", "h", empty.path(), "--create"}).code, 0);
+}
+
+TEST_F(SafeWrites, AppendRemovesTheHullThatItCreatedWhenTheServerRefusesItsPoints) {
+  server::Config config = TestConfig();
+  config.limits.max_points_per_chunk = 3;
+  Restart(config);
+  const TempFile file("a.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
+  Ran ran = Ask({"append", "new", file.path(), "--create"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("the limit is 3"));
+  EXPECT_FALSE(Exists("new"));
+  // One that was there, though empty, stays.
+  Create("mine");
+  EXPECT_EQ(Ask({"append", "mine", file.path(), "--create"}).code, 1);
+  EXPECT_TRUE(Exists("mine"));
+  // So do points that were taken.
+  ran = Ask({"append", "some", "--create", "--chunk-points", "2", file.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(Get("some").hull().vertex_count(), 4U);
+}
+
+TEST_F(SafeWrites, WhatIsNotThereIsNotToBeCreatedToBeDeleted) {
+  const Ran ran = Ask({"delete", "nope"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));
+  const TempFile file("scene", "place a nope\nplace b nope\npair a b\n");
+  EXPECT_THAT(Ask({"batch", file.path()}).out,
+              AllOf(HasSubstr("hull \"nope\" not found"), Not(HasSubstr("create"))));
+}
+
+}  // namespace
+}  // namespace hulld

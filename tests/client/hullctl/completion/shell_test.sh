@@ -1,0 +1,121 @@
+#!/bin/bash
+# hullctl as people have it: completed by a real shell, or on a terminal that asks and is asked.
+#
+#   shell_test.sh PROGRAMS bash|zsh|fish|terminal
+#
+# PROGRAMS: the directory of hulld and hullctl. Exit code 77: there is no such shell here.
+set -uo pipefail
+
+programs=$(cd "$1" && pwd) || exit 2
+kind=$2
+program=$kind
+[[ $kind == terminal ]] && program=script
+command -v "$program" >/dev/null || { echo "skipped: there is no $program"; exit 77; }
+
+work=$(mktemp -d)
+server=
+trap '[[ -z $server ]] || { kill "$server"; wait "$server"; }; rm -rf "$work"' EXIT
+export PATH=$programs:$PATH HOME=$work XDG_CONFIG_HOME=$work/config XDG_STATE_HOME=$work/state LC_ALL=C TERM=xterm
+unset HULLCTL_SERVER HULLCTL_CONTEXT HULLD_TOKEN NO_COLOR
+cd "$work" || exit 2
+
+hulld --store memory --listen 127.0.0.1:0 2>hulld.log &
+server=$!
+until address=$(sed -n 's/.*listening on //p' hulld.log) && [[ -n $address ]]; do
+  kill -0 "$server" || exit 1
+  sleep 0.1
+done
+hullctl context add here --server "$address" >/dev/null
+hullctl create arm/left >/dev/null
+hullctl create box >/dev/null
+echo "0 0 0" >points.xyz
+
+failures=0
+# expect LINE WANTED GOT: the words that are offered for a line.
+expect() {
+  [[ $2 == "$3" ]] && return 0
+  echo "FAILED: $1"
+  echo "  wanted: $2"
+  echo "  got:    $3"
+  failures=$((failures + 1))
+}
+
+# Lines, and what is offered for their last words.
+cases() {
+  expect "hullctl che" "check" "$(offers 'hullctl che')"
+  expect "hullctl get a" "arm/left" "$(offers 'hullctl get a')"
+  expect "hullctl check box b" "box" "$(offers 'hullctl check box b')"
+  expect "hullctl list --output w" "wide" "$(offers 'hullctl list --output w')"
+  expect "hullctl context use h" "here" "$(offers 'hullctl context use h')"
+  expect "hullctl append box po" "points.xyz" "$(offers 'hullctl append box po')"
+  expect "hullctl fly " "" "$(offers 'hullctl fly x')"
+}
+
+case $kind in
+  bash)
+    source <(hullctl completion bash)
+    offers() {
+      COMP_LINE=$1 COMP_POINT=${#1} COMPREPLY=()
+      _hullctl
+      echo "${COMPREPLY[*]}"
+    }
+    cases
+    # Bash replaces only what follows the "=" or ":".
+    expect "hullctl list --output=w" "wide" "$(offers 'hullctl list --output=w')"
+    expect "an alias" "arm/left" "$(offers 'h get a')"
+    expect "an assignment in front" "arm/left" "$(offers 'HULLCTL_CONTEXT=here hullctl get a')"
+    expect "a program that is typed with its path" "check" "$(offers "$programs/hullctl che")"
+    ;;
+  fish)
+    offers() {
+      fish -c 'hullctl completion fish | source; complete -C $argv[1]' "$1" | cut -f1 | paste -sd' '
+    }
+    cases
+    expect "hullctl list --output=w" "--output=wide" "$(offers 'hullctl list --output=w')"
+    ;;
+  zsh)
+    # A terminal of zsh's own, where a tab completes the line and a key prints what it is then.
+    cat >offers.zsh <<'EOF'
+zmodload zsh/zpty
+zpty -b shell zsh -f -i
+zpty -w shell 'PS1=; autoload -U compinit; compinit -D; source <(hullctl completion zsh); unsetopt beep'
+zpty -w shell 'show() { print -r -- "<<$BUFFER>>"; BUFFER=; zle accept-line }; zle -N show; bindkey "^X" show'
+zpty -w shell 'print READ''Y'
+zpty -r shell answer '*READY*'
+zpty -w -n shell "$1"$'\t\x18'
+zpty -r shell answer '*<<*>>*'
+answer=${answer##*<<}
+print -r -- ${answer%%>>*}
+EOF
+    offers() {
+      local line
+      line=$(timeout 20 zsh -f offers.zsh "$1")
+      line=${line% }
+      # What was not completed was not offered.
+      [[ $line == "$1" ]] || echo "${line##* }"
+    }
+    cases
+    ;;
+  terminal)
+    # on_terminal INPUT COMMAND: what it prints there.
+    on_terminal() { printf '%b' "$1" | timeout 20 script -qec "$2" /dev/null | tr -d '\r'; }
+    contains() { [[ $3 == *"$2"* ]] || expect "$1" "...$2..." "$3"; }
+    contains "the question before a delete" "Delete 1 hull (arm/left)? [y/N]" \
+      "$(on_terminal 'n\n' 'hullctl delete --prefix arm/')"
+    expect "a no" "arm/left" "$(hullctl list arm/ --output name)"
+    contains "a yes" "arm/left deleted" "$(on_terminal 'y\n' 'hullctl delete --prefix arm/')"
+    expect "a yes" "" "$(hullctl list arm/ --output name)"
+    contains "colours" $'\e[1mHULL\e[0m' "$(on_terminal '' 'hullctl list')"
+    expect "NO_COLOR" "0" "$(NO_COLOR=1 on_terminal '' 'hullctl list' | grep -c $'\e\\[1m')"
+    expect "a pipe" "0" "$(hullctl list | grep -c $'\e')"
+    said=$(on_terminal 'get bo\t\nexit\n' 'hullctl shell')
+    contains "completion in the shell" "dimension   -1" "$said"
+    contains "history" "get\\040box" "$(cat state/hullctl/history)"
+    expect "who may read the history" "600" "$(stat -c %a state/hullctl/history)"
+    expect "lines of a file" "box" "$(printf 'list --output name\n\n# nothing\n' | hullctl shell)"
+    printf 'get nope\n' | hullctl shell 2>/dev/null
+    expect "the exit code of the last line" "1" "$?"
+    ;;
+esac
+echo "$failures failures"
+((failures == 0))

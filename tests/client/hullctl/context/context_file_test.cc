@@ -1,0 +1,193 @@
+#include "client/hullctl/context/context_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "tests/client/hullctl/hullctl_on_server.h"
+
+namespace hulld {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+SettingsLayer Options(const ConnectionSettings& settings) { return {"", settings, false}; }
+
+TEST(Combine, EarlierLayersWinSettingBySetting) {
+  const auto chosen = Combine({Options({{"server", "a:1"}}),
+                               {"environment", {{"server", "b:1"}, {"ca-cert", "b.crt"}}, false},
+                               {"context c", {{"server", "a:1"}, {"cert", "c.crt"}}, true}});
+  EXPECT_EQ(chosen.at("server").value, "a:1");
+  EXPECT_EQ(chosen.at("server").source, "--server");
+  EXPECT_EQ(chosen.at("ca-cert").value, "b.crt");
+  EXPECT_EQ(chosen.at("cert").source, "context c");
+  EXPECT_EQ(Combine({}).at("server").source, "default");
+}
+
+TEST(Combine, AContextForAnotherServerIsLeftAsideWithItsToken) {
+  const SettingsLayer context{"context c", {{"server", "c:1"}, {"token-file", "c.token"}}, true};
+  EXPECT_FALSE(Combine({Options({{"server", "a:1"}}), context}).contains("token-file"));
+  EXPECT_TRUE(Combine({Options({{"server", "c:1"}}), context}).contains("token-file"));
+  EXPECT_TRUE(Combine({Options({}), context}).contains("token-file"));
+}
+
+TEST(Combine, OneTokenIsChosen) {
+  const ConnectionSettings both = {{"token", "t"}, {"token-file", "f"}};
+  const auto same = Combine({{"environment", both, false}});
+  EXPECT_FALSE(same.contains("token"));
+  EXPECT_EQ(same.at("token-file").value, "f");
+  const auto earlier =
+      Combine({{"environment", {{"token", "t"}}, false}, {"context", {{"token-file", "f"}}, true}});
+  EXPECT_FALSE(earlier.contains("token-file"));
+  EXPECT_EQ(earlier.at("token").value, "t");
+}
+
+class Contexts : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = ::testing::TempDir() + "/hulld_contexts_XXXXXX";
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    directory_ = pattern;
+    setenv("XDG_CONFIG_HOME", (directory_ + "/new/config").c_str(), 1);
+    for (const char* variable : {"HULLCTL_SERVER", "HULLCTL_CONTEXT", "HULLD_TOKEN"}) {
+      unsetenv(variable);
+    }
+  }
+  ~Contexts() override {
+    UseNoContexts();
+    unsetenv("HULLCTL_SERVER");
+    unsetenv("HULLCTL_CONTEXT");
+    std::filesystem::remove_all(directory_);
+  }
+
+  void Write(const std::string& text) {
+    std::filesystem::create_directories(std::filesystem::path(ContextFilePath()).parent_path());
+    std::ofstream(ContextFilePath()) << text;
+  }
+
+  std::string directory_;
+};
+
+TEST_F(Contexts, AFileIsReadBackAsItWasWritten) {
+  ASSERT_TRUE(ReadContextFile().ok());
+  EXPECT_TRUE(ReadContextFile()->contexts.empty());
+  const ContextFile file{"a",
+                         {{"a", {{"server", "a:1"}, {"tls", "true"}}},
+                          {"b", {{"server", "b:1"}, {"ca-cert", "/x \"y\"\\\n.crt"}}}}};
+  const absl::Status written = WriteContextFile(file);
+  ASSERT_TRUE(written.ok()) << written;
+  const auto read = ReadContextFile();
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->current, "a");
+  EXPECT_EQ(read->contexts, file.contexts);
+  struct stat info = {};
+  ASSERT_EQ(stat(ContextFilePath().c_str(), &info), 0);
+  EXPECT_EQ(info.st_mode & 0777, 0600u);
+  ASSERT_TRUE(WriteContextFile({}).ok());
+  // Nothing but the file is left in its folder.
+  int entries = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(
+           std::filesystem::path(ContextFilePath()).parent_path())) {
+    EXPECT_EQ(entry.path(), ContextFilePath());
+    ++entries;
+  }
+  EXPECT_EQ(entries, 1);
+}
+
+TEST_F(Contexts, DamagedFilesAreExplained) {
+  const auto problem = [this](const std::string& text) {
+    Write(text);
+    const Ran ran = RunTool({"list"});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, AllOf(HasSubstr(ContextFilePath()), HasSubstr("mend it, or remove it")));
+    EXPECT_EQ(std::count(ran.err.begin(), ran.err.end(), '\n'), 1) << ran.err;
+    return ran.err;
+  };
+  EXPECT_THAT(problem(""), HasSubstr("it is not JSON"));
+  EXPECT_THAT(problem("{\"contexts\":"), HasSubstr("it is not JSON"));
+  EXPECT_THAT(problem(R"({"current":"a"})"), HasSubstr("its current context \"a\" is not there"));
+  EXPECT_THAT(problem(R"({"contexts":[]})"), HasSubstr("\"contexts\" does not belong there"));
+  EXPECT_THAT(problem(R"({"contexts":{"a":{}}})"), HasSubstr("context \"a\" has no server"));
+  EXPECT_THAT(problem(R"({"contexts":{"a b":{"server":"a:1"}}})"), HasSubstr("a name is up to"));
+  EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","tls":"yes"}}})"),
+              HasSubstr("tls is not a true or false"));
+  // A token does not belong there, and is not repeated.
+  EXPECT_THAT(problem(R"({"contexts":{"a":{"server":"a:1","token":"hunter2"}}})"),
+              AllOf(HasSubstr("\"token\", which is no setting"), Not(HasSubstr("hunter2"))));
+  // Commands that talk to no server do not mind.
+  EXPECT_EQ(RunTool({"generate", "cube", "1"}).code, 0);
+  Write(R"({"contexts":{"a":{"server":"nowhere"}},"current":"a"})");
+  EXPECT_THAT(RunTool({"list"}).err,
+              HasSubstr("server of context a: \"nowhere\" is not HOST:PORT"));
+}
+
+TEST_F(Contexts, AreAddedUsedListedAndRemoved) {
+  EXPECT_EQ(RunTool({"context", "add", "a", "--server", "127.0.0.1:1"}).out,
+            "context a added, and used from now on\n");
+  EXPECT_EQ(RunTool({"context", "add", "b", "--server", "b.example:1", "--tls"}).out,
+            "context b added\n");
+  EXPECT_THAT(RunTool({"context", "add", "a", "--server", "127.0.0.1:2"}).err,
+              HasSubstr("say --replace"));
+  EXPECT_EQ(RunTool({"context", "list", "--output", "name"}).out, "a\nb\n");
+  EXPECT_EQ(RunTool({"context", "list"}).out,
+            "CONTEXT  SERVER       TLS  TOKEN FILE  USED\na        127.0.0.1:1  no   -           "
+            "yes\nb        b.example:1  yes  -           no\n");
+  EXPECT_THAT(RunTool({"context", "use", "bb"}).err,
+              HasSubstr("there is no context \"bb\"; did you mean \"b\"?"));
+  EXPECT_EQ(RunTool({"context", "use", "b"}).code, 0);
+  EXPECT_EQ(RunTool({"context", "show", "--output", "name"}).out, "b.example:1\n");
+  EXPECT_EQ(RunTool({"context", "show", "a", "--output", "name"}).out, "127.0.0.1:1\n");
+  EXPECT_EQ(RunTool({"context", "remove", "b"}).code, 0);
+  EXPECT_EQ(RunTool({"context", "show"}).out, "server  127.0.0.1:50551  (default)\n");
+  EXPECT_EQ(RunTool({"context", "remove", "b"}).code, 2);
+}
+
+TEST_F(Contexts, OptionThenEnvironmentThenContextThenDefault) {
+  const auto server = [](std::vector<std::string> options) {
+    options.insert(options.begin(), {"context", "show", "--output", "name"});
+    const Ran ran = RunTool(options);
+    return ran.code == 0 ? ran.out.substr(0, ran.out.size() - 1) : ran.err;
+  };
+  ASSERT_EQ(RunTool({"context", "add", "a", "--server", "a:1"}).code, 0);
+  ASSERT_EQ(RunTool({"context", "add", "b", "--server", "b:1"}).code, 0);
+  EXPECT_EQ(server({}), "a:1");
+  setenv("HULLCTL_CONTEXT", "b", 1);
+  EXPECT_EQ(server({}), "b:1");
+  EXPECT_EQ(server({"--context", "a"}), "a:1");
+  setenv("HULLCTL_SERVER", "env:1", 1);
+  EXPECT_EQ(server({}), "env:1");
+  EXPECT_EQ(server({"--context", "a"}), "a:1");
+  EXPECT_EQ(server({"--server", "c:1"}), "c:1");
+  EXPECT_THAT(server({"--server", "c:1", "--context", "a"}), HasSubstr("contradict each other"));
+  setenv("HULLCTL_CONTEXT", "nope", 1);
+  EXPECT_THAT(server({}), HasSubstr("$HULLCTL_CONTEXT: there is no context \"nope\""));
+}
+
+TEST_F(Contexts, WhatCannotWorkIsNotAdded) {
+  const std::string token = directory_ + "/token";
+  std::ofstream(token) << "secret\n";
+  chmod(token.c_str(), 0644);
+  const auto error = [](std::vector<std::string> options) {
+    options.insert(options.begin(), {"context", "add", "a"});
+    const Ran ran = RunTool(options);
+    EXPECT_EQ(ran.code, 2);
+    return ran.err;
+  };
+  EXPECT_THAT(error({}), HasSubstr("--server HOST:PORT"));
+  EXPECT_THAT(error({"--server", "a:1", "--token-file", token}), HasSubstr("chmod 600"));
+  chmod(token.c_str(), 0600);
+  EXPECT_THAT(error({"--server", "a:1", "--token-file", token}), HasSubstr("unencrypted"));
+  EXPECT_THAT(error({"--server", "a:1", "--ca-cert", "/no/such"}),
+              HasSubstr("--ca-cert: /no/such: No such file"));
+  EXPECT_TRUE(ReadContextFile()->contexts.empty());
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,150 @@
+#include "client/hullctl/view/protocol.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+
+namespace hulld {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Pair;
+
+uint32_t LengthOf(const std::string& frame) {
+  uint32_t length = 0;
+  std::memcpy(&length, frame.data(), sizeof(length));
+  return length;
+}
+
+std::string HeadOf(const std::string& frame) { return frame.substr(4, LengthOf(frame)); }
+
+// What follows the head, from a multiple of eight bytes on.
+std::string BodyOf(const std::string& frame) {
+  return frame.substr((4 + LengthOf(frame) + 7) / 8 * 8);
+}
+
+template <typename Number>
+Number NumberAt(const std::string& bytes, size_t offset) {
+  Number number;
+  std::memcpy(&number, bytes.data() + offset, sizeof(number));
+  return number;
+}
+
+std::string ErrorOf(const std::string& json) {
+  const auto message = ParsePageMessage(json);
+  return std::string(message.status().message());
+}
+
+TEST(Protocol, QuestionsKeepEveryBitOfAPose) {
+  const Pose7 pose = {0.1, -1e-308, 1e308, 5e-324, 1.0 / 3, -0.1, 12345678.900000001};
+  const auto message = ParsePageMessage(R"({"type":"question","update":7,"objects":[3],"poses":)" +
+                                        NumbersJson(pose.data(), pose.size()) +
+                                        R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
+  ASSERT_TRUE(message.ok()) << message.status();
+  ASSERT_TRUE(message->question.has_value());
+  const ViewQuestion& question = *message->question;
+  EXPECT_EQ(question.update, 7);
+  EXPECT_THAT(question.objects, ElementsAre(3));
+  ASSERT_EQ(question.poses.size(), 1);
+  for (size_t i = 0; i < pose.size(); ++i) {
+    EXPECT_EQ(question.poses[0][i], pose[i]) << i;
+  }
+  ASSERT_TRUE(question.pair.has_value());
+  EXPECT_THAT(*question.pair, Pair(3, 1));
+  EXPECT_EQ(question.tolerance, 0.25);
+  EXPECT_TRUE(question.rest);
+}
+
+TEST(Protocol, QuestionMayNameNoPair) {
+  const auto message = ParsePageMessage(R"({"type":"question","update":1,"pair":[]})");
+  ASSERT_TRUE(message.ok()) << message.status();
+  EXPECT_FALSE(message->question->pair.has_value());
+}
+
+TEST(Protocol, WishesForGeometryAreRead) {
+  const auto message = ParsePageMessage(R"({"type":"geometry","files":[0,2],"hullIds":["a/b"]})");
+  ASSERT_TRUE(message.ok()) << message.status();
+  ASSERT_EQ(message->geometry.size(), 3);
+  EXPECT_EQ(message->geometry[1].file, 2);
+  EXPECT_EQ(message->geometry[2].hull_id, "a/b");
+
+  const auto simpler = ParsePageMessage(
+      R"({"type":"simplify","hullId":"a","side":"outside","maxError":0.5,"maxVertices":8})");
+  ASSERT_TRUE(simpler.ok()) << simpler.status();
+  const auto& request = simpler->geometry.at(0).simplified;
+  ASSERT_TRUE(request.has_value());
+  EXPECT_EQ(request->simplification().side(), v1::SIMPLIFICATION_SIDE_OUTSIDE);
+  EXPECT_EQ(request->simplification().max_error(), 0.5);
+  EXPECT_EQ(request->simplification().max_vertices(), 8);
+}
+
+TEST(Protocol, MessagesThatAreWrongAreRefused) {
+  EXPECT_NE(ErrorOf("no json"), "");
+  EXPECT_NE(ErrorOf("[]"), "");
+  EXPECT_THAT(ErrorOf("{}"), HasSubstr("type"));
+  EXPECT_THAT(ErrorOf(R"({"type":"delete"})"), HasSubstr("none that the bridge knows"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[0],"poses":[1,2,3]})"),
+              HasSubstr("seven numbers"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[-1],"poses":[1,0,0,0,0,0,0]})"),
+              HasSubstr("not an index"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","objects":[0.5],"poses":[1,0,0,0,0,0,0]})"),
+              HasSubstr("not an index"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","pair":[4,4]})"), HasSubstr("not two objects"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","update":-1})"), HasSubstr("whole number"));
+  EXPECT_THAT(ErrorOf(R"({"type":"question","tolerance":"much"})"), HasSubstr("not a number"));
+}
+
+TEST(Protocol, FramesHoldHeadDoublesAndIndicesAligned) {
+  HullMesh mesh;
+  mesh.header.mutable_hull()->set_revision(42);
+  mesh.xyz = {0, 0, 0, 1, 0, 0, 0, 1, 0.1};
+  mesh.facet_sizes = {3};
+  mesh.facet_indices = {0, 1, 2};
+  // Heads of all lengths modulo eight.
+  for (const char* id : {"a", "ab", "abc", "abcd", "abcde", "abcdef", "abcdefg", "abcdefgh"}) {
+    const std::string frame = HullFrame(id, mesh);
+    EXPECT_THAT(HeadOf(frame), HasSubstr(R"("kind":"hull","hullId":")" + std::string(id) + '"'));
+    EXPECT_THAT(HeadOf(frame), HasSubstr(R"("vertices":3,"facets":1,"indices":3)"));
+    EXPECT_THAT(HeadOf(frame), HasSubstr(R"("revision":"42")"));
+    const std::string body = BodyOf(frame);
+    ASSERT_EQ(body.size(), 9 * 8 + 4 * 4);
+    EXPECT_EQ(NumberAt<double>(body, 8 * 8), 0.1);
+    EXPECT_EQ(NumberAt<uint32_t>(body, 9 * 8), 3);
+    EXPECT_EQ(NumberAt<uint32_t>(body, 9 * 8 + 3 * 4), 2);
+  }
+}
+
+TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
+  ViewScene scene;
+  scene.title = "two \"boxes\"";
+  scene.objects = {{"box", "cell/box", -1, {1, 0, 0, 0, 0.1, 0, 0}}};
+  const std::string json = SceneMessage(scene);
+  EXPECT_THAT(json, HasSubstr(R"("title":"two \"boxes\"")"));
+  EXPECT_THAT(
+      json, HasSubstr(R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0]})"));
+}
+
+// Bytes that are not UTF-8 would end the connection of the page.
+TEST(Protocol, NamesOfFilesAreUtf8) {
+  EXPECT_EQ(ShownName("/a/b/h\xc3\xbclle \xe2\x82\xac \xf0\x9f\x95\xb7.obj"),
+            "h\xc3\xbclle \xe2\x82\xac \xf0\x9f\x95\xb7.obj");
+  EXPECT_EQ(ShownName("h\xfclle.obj"), "h?lle.obj");
+  // Too long for its value, half of a pair, beyond the last, cut off.
+  EXPECT_EQ(ShownName("\xc0\xaf"), "??");
+  EXPECT_EQ(ShownName("\xed\xa0\x80"), "???");
+  EXPECT_EQ(ShownName("\xf5\x80\x80\x80"), "????");
+  EXPECT_EQ(ShownName("\xe2\x82"), "??");
+}
+
+TEST(Protocol, NumbersThatJsonHasNotBecomeNull) {
+  const double numbers[] = {std::numeric_limits<double>::infinity(), std::nan(""), 2};
+  EXPECT_EQ(NumbersJson(numbers, 3), "[null,null,2]");
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,447 @@
+"""The viewer's page in a real browser: what it shows is what the server says.
+
+    /usr/bin/python3 viewer_test.py BIN_DIRECTORY [TEST...]
+"""
+
+import json
+import pathlib
+import re
+import shlex
+import unittest
+
+import viewing
+
+viewing.skip_unless_browser()
+
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+AT_REST = "hulldViewer.model.answer?.rest && hulldViewer.model.answer.update === hulldViewer.update"
+
+
+class ViewerTest(unittest.TestCase):
+    """One server and one browser for all; each test has a viewer of its own."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.hulld = viewing.Hulld(PROGRAMS)
+        cls.browser = viewing.Browser()
+        cls.hulld.add_box("box")
+        cls.hulld.add_box("room/left")
+        cls.hulld.add_box("room/right", low=(2.0, 0.0, 0.0))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        cls.hulld.stop()
+
+    def setUp(self):
+        self.browser.resize(1440, 900)
+        self.browser.problems()
+
+    def tearDown(self):
+        self.assertEqual(self.browser.problems(), [])
+
+    def view(self, *arguments):
+        """Opens `hullctl view ARGUMENTS` in the browser."""
+        viewer = self.hulld.view(*arguments)
+
+        def leave():
+            # The page would complain that hullctl has ended.
+            self.browser.driver.get("about:blank")
+            self.assertEqual(viewer.stop(), 0, viewer.said)
+
+        self.addCleanup(leave)
+        self.browser.open(viewer.address)
+        return viewer
+
+    def canvas(self):
+        return self.browser.driver.find_element(By.ID, "canvas")
+
+    def pixels(self):
+        """The canvas as drawn: how many colours, and the part that is not ground."""
+        self.browser.wait("!hulldViewer.stage.waiting")
+        return self.browser.js("""(() => {
+          const {stage} = hulldViewer;
+          const gl = stage.renderer.getContext();
+          const [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+          const data = new Uint8Array(4 * w * h);
+          stage.renderer.render(stage.scene, stage.camera);
+          gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, data);
+          const counts = new Map();
+          for (let i = 0; i < data.length; i += 4) {
+            const colour = data[i] << 16 | data[i + 1] << 8 | data[i + 2];
+            counts.set(colour, (counts.get(colour) || 0) + 1);
+          }
+          return {colours: counts.size, drawn: 1 - Math.max(...counts.values()) / (w * h)};
+        })()""")
+
+    def keys(self, *keys):
+        ActionChains(self.browser.driver).send_keys(*keys).perform()
+
+    def assert_answers_as_api(self):
+        """At rest the page says, to the last bit, what the command that it shows says."""
+        self.browser.wait(AT_REST)
+        command = shlex.split(self.browser.text("#command"))
+        self.assertEqual(command[:2], ["hullctl", "check"])
+        answer = self.hulld.json(*command[1:])
+        words = {"RELATION_SEPARATED": "separated", "RELATION_TOUCHING": "touching",
+                 "RELATION_OVERLAPPING": "overlapping"}
+        self.assertIn(words[answer["relation"]], self.browser.text("#relation"))
+        fact = self.browser.fact
+        self.assertEqual(float(fact("separation")), answer["separation"]["value"])
+        self.assertEqual(float(fact("within")), answer["separation"]["bound"])
+        for name, point in (("point of A", "pointA"), ("point of B", "pointB")):
+            self.assertEqual([float(x) for x in fact(name).split()],
+                             [answer["witness"][point][k] for k in "xyz"])
+        if answer.get("axis"):
+            self.assertEqual([float(x) for x in fact("axis").split()],
+                             [answer["axis"]["direction"][k] for k in "xyz"])
+        self.assertEqual(fact("revisions"),
+                         f"{answer['hullA']['revision']} and {answer['hullB']['revision']}")
+        return answer
+
+    def drag_handle(self, right, up):
+        """Drags the handle of the plane that faces us by pixels, in several steps."""
+        x, y = self.browser.wait("""(() => {
+          const {stage, gizmo} = hulldViewer;
+          return stage.toScreen(gizmo.proxy.position.clone());
+        })()""")
+        width, height = self.browser.js(
+            "[hulldViewer.stage.canvas.clientWidth, hulldViewer.stage.canvas.clientHeight]")
+        chain = ActionChains(self.browser.driver)
+        chain.move_to_element_with_offset(self.canvas(), round(x - width / 2), round(y - height / 2))
+        chain.click_and_hold()
+        for _ in range(5):
+            chain.move_by_offset(right // 5, -up // 5)
+        chain.release().perform()
+
+    # --- Pictures ---
+
+    def test_canvas_is_not_blank_and_follows_what_is_shown(self):
+        self.view("room/")
+        full = self.pixels()
+        self.assertGreater(full["colours"], 20)
+        self.assertGreater(full["drawn"], 0.03)
+        self.browser.driver.find_element(By.TAG_NAME, "body").click()
+        self.keys("l")
+        for index in range(2):
+            self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-row='eye {index}']").click()
+        self.browser.wait("hulldViewer.model.objects.every((o) => !o.visible)")
+        self.assertLess(self.pixels()["drawn"], full["drawn"] / 3)
+
+    def test_points_mesh_and_hull_are_drawn_by_themselves_and_together(self):
+        self.view("/usr/share/assimp/models/OBJ/spider.obj")
+        drawn = {}
+        for shown in (["points"], ["mesh"], ["hull"], ["mesh", "hull", "edges"]):
+            self.browser.js("""(() => {
+              const {model} = hulldViewer;
+              for (const key of ['points', 'mesh', 'hull', 'edges']) model.show[key] = false;
+              for (const key of arguments[0]) model.show[key] = true;
+              model.show.labels = false;
+              model.select(null);
+              model.tell('shown');
+            })()""", shown)
+            drawn["+".join(shown)] = self.pixels()["drawn"]
+        self.assertGreater(drawn["points"], 0.001)
+        self.assertGreater(drawn["mesh"], drawn["points"])
+        # A hull hides the gaps of its mesh.
+        self.assertGreater(drawn["hull"], 1.3 * drawn["mesh"])
+        self.assertGreater(drawn["mesh+hull+edges"], 0.98 * drawn["hull"])
+        self.browser.js("hulldViewer.model.select(0)")
+        facts = self.browser.wait("document.querySelector('#object-facts').textContent")
+        self.assertIn("1\u2009368 triangles", facts)
+        self.assertRegex(facts, r"times the area of its mesh")
+
+    # --- Answers ---
+
+    def test_answers_are_those_of_the_api(self):
+        self.view("room/left", "room/right")
+        answer = self.assert_answers_as_api()
+        self.assertEqual(answer["relation"], "RELATION_SEPARATED")
+        self.assertAlmostEqual(answer["separation"]["value"], 1)
+
+    def test_drag_changes_the_answer_as_the_api_says(self):
+        self.view("room/left", "room/right")
+        self.assert_answers_as_api()
+        before = self.browser.js("hulldViewer.model.objects[1].pose")
+        self.browser.js("(globalThis.live = [], "
+                        "hulldViewer.connection.socket.addEventListener('message', ({data}) => "
+                        "typeof data === 'string' && live.push(JSON.parse(data))))")
+        self.drag_handle(-120, 40)
+        self.browser.wait("arguments[0].some((v, i) => v !== hulldViewer.model.objects[1].pose[i])",
+                          before)
+        self.assert_answers_as_api()
+        # While it moved, answers came too.
+        self.assertGreater(self.browser.js(
+            "live.filter((m) => m.type === 'answer' && !m.rest).length"), 0)
+        # A move leaves the rotation as it was, bit for bit.
+        self.assertEqual(self.browser.js("hulldViewer.model.objects[1].pose.slice(0, 4)"),
+                         [1, 0, 0, 0])
+
+    def test_turn_by_the_handles_is_answered(self):
+        self.view("room/left", "room/right")
+        self.assert_answers_as_api()
+        self.browser.driver.find_element(By.ID, "mode-turn").click()
+        self.drag_handle(60, 25)
+        self.browser.wait("hulldViewer.model.objects[1].pose[0] !== 1")
+        self.assert_answers_as_api()
+
+    def test_typed_pose_touches_exactly(self):
+        self.view("room/left", "room/right")
+        self.assert_answers_as_api()
+        for index, value in ((4, "-1"), (5, "0.1"), (6, "1e-300")):
+            field = self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-pose='{index}']")
+            field.clear()
+            field.send_keys(value, Keys.TAB)
+        self.browser.wait("hulldViewer.model.objects[1].pose[6] === 1e-300")
+        answer = self.assert_answers_as_api()
+        self.assertEqual(answer["relation"], "RELATION_TOUCHING")
+        self.browser.wait("document.querySelector('#collision-count').textContent === '1 pair collides'")
+        # By the smallest step of a double they are apart.
+        field = self.browser.driver.find_element(By.CSS_SELECTOR, "[data-pose='4']")
+        field.clear()
+        field.send_keys("-0.9999999999999999", Keys.TAB)
+        self.browser.wait("hulldViewer.model.objects[1].pose[4] !== -1")
+        self.assertEqual(self.assert_answers_as_api()["relation"], "RELATION_SEPARATED")
+        self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
+
+    def test_a_click_on_a_colliding_pair_flies_there(self):
+        scene = {"placements": [{"hullId": "box", "pose": {"translation": {"x": x, "y": 0, "z": 0}}}
+                                for x in (0, 100, 101, 200)]}
+        pathlib.Path(self.hulld.directory, "scene.json").write_text(json.dumps(scene))
+        self.view("scene.json")
+        pair = self.browser.wait("document.querySelector('#collisions li button')")
+        self.browser.js("arguments[0].click()", pair)
+        self.browser.wait(
+            "Math.abs(hulldViewer.stage.controls.target.x + hulldViewer.model.origin[0] - 100.5) < 1e-6")
+        answer = self.assert_answers_as_api()
+        self.assertAlmostEqual(answer["separation"]["value"], -1)
+
+    # --- What hulls do ---
+
+    def test_hulls_grow_appear_and_go(self):
+        self.hulld.add_box("live/a", size=1.0, low=(0.0, 0.0, 0.0))
+        self.view("live/")
+        self.browser.wait("hulldViewer.model.hulls.get('live/a')?.vertexCount === 8")
+        self.hulld.add("live/a", ["0.5 0.5 3"])
+        # Five corners of the box and the new one: the upper four stay, as they are outermost.
+        self.browser.wait("hulldViewer.model.hulls.get('live/a').vertexCount === 9")
+        self.browser.wait("hulldViewer.model.hulls.get('live/a').high[2] === 3")
+        self.hulld.add_box("live/b", size=1.0, low=(5.0, 0.0, 0.0))
+        self.browser.wait("[...document.querySelectorAll('.row')].some((r) => r.textContent.includes('b'))"
+                          " && hulldViewer.model.hulls.get('live/b')?.vertexCount === 8")
+        # They collide once one grows into the other, without anybody moving.
+        self.hulld.add("live/a", ["5.5 0.5 0.5"])
+        self.browser.wait("document.querySelector('#collision-count').textContent === '1 pair collides'")
+        self.hulld.hullctl("delete", "live/b")
+        self.browser.wait("document.querySelector('#tree').textContent.includes('deleted')")
+        self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
+
+    def test_new_vertices_flash(self):
+        self.hulld.add_box("flash")
+        self.view("flash")
+        self.browser.js("(hulldViewer.stage.frame = ((frame) => function(now) {"
+                        "  globalThis.flashes = Math.max(globalThis.flashes || 0, hulldViewer.views.get(0)"
+                        "    .group.children.filter((part) => part.userData.end).length);"
+                        "  return frame.call(this, now); })(hulldViewer.stage.frame))")
+        self.hulld.add("flash", ["0 0 5"])
+        self.browser.wait("globalThis.flashes === 1")
+        # They fade, and then nothing is drawn any more.
+        self.browser.wait("!hulldViewer.stage.waiting && "
+                          "hulldViewer.views.get(0).group.children.every((part) => !part.userData.end)")
+
+    def test_demo_has_eight_scenes_with_a_key_each(self):
+        self.view("--demo")
+        expected = {"0": "separated", "1": "overlapping", "2": "touching", "3": "touching",
+                    "4": "overlapping", "6": "separated"}
+        self.canvas().click()
+        for key in "12345670":
+            self.keys(key)
+            self.browser.wait("document.body.dataset.scene === arguments[0] && "
+                              "document.body.dataset.fitted === arguments[0]", key)
+            if key in expected:
+                self.browser.wait("document.querySelector('#relation')?.textContent.includes(arguments[0])",
+                                  expected[key])
+                self.assert_answers_as_api()
+            if key == "5":
+                self.browser.wait(
+                    "document.querySelector('#collision-count').textContent === '3 pairs collide'")
+            if key == "7":
+                self.browser.wait("hulldViewer.model.objects[0].name === 'live'")
+                self.browser.wait("document.querySelector('#collision-count').textContent"
+                                  " === '1 pair collides'", seconds=90)
+
+    def test_temporary_hulls_are_deleted_at_the_end(self):
+        viewer = self.hulld.view("/usr/share/assimp/models/OBJ/spider.obj")
+        self.assertIn("view/", self.hulld.hullctl("list", "view/"))
+        self.assertEqual(viewer.stop(), 0)
+        self.assertNotIn("view/", self.hulld.hullctl("list", "view/"))
+
+    # --- The page ---
+
+    def test_a_simpler_hull_is_shown_with_its_proven_error(self):
+        self.view("/usr/share/assimp/models/OBJ/spider.obj")
+        self.browser.js("(() => { const slider = document.querySelector('#simplify');"
+                        " slider.value = 30; slider.dispatchEvent(new Event('input')); })()")
+        self.browser.wait("hulldViewer.shell.group.children.length === 2")
+        facts = self.browser.wait("document.querySelector('#panel-object').textContent.match("
+                                  "/proven error([0-9.]+)/)?.[1]")
+        self.assertGreater(float(facts), 0)
+        # The hull lies within the shell: no vertex is farther out than the error.
+        self.assertTrue(self.browser.js("""(() => {
+          const {model, shell} = hulldViewer;
+          const position = shell.group.children[1].geometry.attributes.position.array;
+          const hull = model.hulls.get(model.objects[0].hullId);
+          const reach = (xyz, n, c) => {
+            let most = -Infinity;
+            for (let i = 0; i < xyz.length; i += 3) {
+              most = Math.max(most, xyz[i] + c[0]);
+            }
+            return most;
+          };
+          return reach(position, 0, shell.group.children[1].userData.centre) >=
+              reach(hull.xyz, 0, [0, 0, 0]) - 1e-4;
+        })()"""))
+
+    def test_usable_at_phone_and_desk_width(self):
+        self.view("room/")
+        for width, height in ((390, 844), (1440, 900), (768, 1024)):
+            self.browser.resize(width, height)
+            self.browser.wait("innerWidth === arguments[0]", width)
+            self.assertLessEqual(self.browser.js("document.documentElement.scrollWidth"), width)
+            self.assertGreater(self.browser.js("document.querySelector('#stage').clientHeight"), 250)
+            if width < 760:
+                for panel in ("objects", "answer", "object"):
+                    self.browser.driver.find_element(By.ID, f"tab-{panel}").click()
+                    self.browser.wait("document.querySelector('#panel-' + arguments[0]).clientHeight > 150",
+                                      panel)
+            unreachable = self.browser.js("""(() => {
+              const shown = [...document.querySelectorAll('button, input, select')]
+                  .filter((e) => e.offsetParent && !e.closest('dialog'));
+              return shown.filter((e) => {
+                e.scrollIntoView({block: 'nearest'});
+                const {left, right} = e.getBoundingClientRect();
+                return left < -1 || right > innerWidth + 1;
+              }).map((e) => e.outerHTML.slice(0, 80));
+            })()""")
+            self.assertEqual(unreachable, [])
+
+    def test_every_control_has_a_name(self):
+        self.view("room/")
+        self.browser.js("hulldViewer.model.select(0)")
+        self.browser.wait(AT_REST)
+        nameless = self.browser.js("""[...document.querySelectorAll('button, input, select')]
+            .filter((e) => !(e.textContent.trim() || e.getAttribute('aria-label') ||
+                             e.closest('label')?.textContent.trim()))
+            .map((e) => e.outerHTML)""")
+        self.assertEqual(nameless, [])
+
+    def test_keyboard_does_all(self):
+        self.view("room/")
+        self.browser.wait("hulldViewer.model.collisions.revision")
+        viewer = "hulldViewer.model."
+        self.keys(Keys.ESCAPE)
+        self.browser.wait(viewer + "selected === null")
+        self.keys("j")
+        self.browser.wait(viewer + "selected === 0")
+        self.keys("j")
+        self.browser.wait(viewer + "selected === 1")
+        self.browser.wait(AT_REST)
+        self.keys("x")
+        self.browser.wait(viewer + "objects[1].pose[4] > 0")
+        self.assert_answers_as_api()
+        self.keys(Keys.BACKSPACE)
+        self.browser.wait(viewer + "objects[1].pose[4] === 0")
+        for key, name in (("p", "points"), ("h", "hull"), ("e", "edges"), ("l", "labels")):
+            was = self.browser.js(f"{viewer}show.{name}")
+            self.keys(key)
+            self.browser.wait(f"{viewer}show.{name} !== arguments[0]", was)
+        self.keys("v")
+        self.browser.wait(f"!{viewer}objects[1].visible")
+        self.keys("r")
+        self.browser.wait("hulldViewer.gizmo.mode === 'rotate'")
+        theme = self.browser.js("document.documentElement.dataset.theme")
+        self.keys("d")
+        self.browser.wait("document.documentElement.dataset.theme !== arguments[0]", theme)
+        where = self.browser.js("hulldViewer.stage.camera.position.toArray()")
+        self.keys(Keys.ARROW_LEFT)
+        self.browser.wait("arguments[0].some((v, i) => v !== hulldViewer.stage.camera.position.toArray()[i])",
+                          where)
+        self.keys("/")
+        self.browser.wait("document.activeElement.id === 'search'")
+        self.keys("right", Keys.ENTER)
+        self.browser.wait("document.querySelectorAll('#tree .row[data-index]').length === 1")
+        self.keys(Keys.ESCAPE, "?")
+        self.browser.wait("document.querySelector('#keys').open")
+        self.keys(Keys.ESCAPE)
+        self.browser.wait("!document.querySelector('#keys').open")
+
+    def test_far_from_the_origin_nothing_jitters(self):
+        self.hulld.add_box("far/here")
+        scene = {"placements": [
+            {"hullId": "far/here", "pose": {"translation": {"x": 1e9, "y": -1e9, "z": 1e9}}},
+            {"hullId": "far/here", "pose": {"translation": {"x": 1e9 + 2.5, "y": -1e9, "z": 1e9}}}]}
+        pathlib.Path(self.hulld.directory, "far.json").write_text(json.dumps(scene))
+        self.view("far.json")
+        # What goes to the GPU is near 0, where float has its digits.
+        positions = self.browser.js(
+            "[...hulldViewer.views.values()].map((view) => view.group.position.toArray())")
+        self.assertEqual(positions, [[-1.25, 0, 0], [1.25, 0, 0]])
+        self.assertGreater(self.pixels()["drawn"], 0.03)
+        answer = self.assert_answers_as_api()
+        self.assertAlmostEqual(answer["separation"]["value"], 0.5)
+
+    def test_a_thousand_hulls_are_drawn_searched_and_picked(self):
+        side = 10
+        scene = {"packedPlacements": {
+            "hullIds": ["box"], "hulls": [0] * side**3,
+            "poses": [v for i in range(side**3) for v in
+                      (1, 0, 0, 0, 4 * (i % side), 4 * (i // side % side), 4 * (i // side**2))]}}
+        pathlib.Path(self.hulld.directory, "many.json").write_text(json.dumps(scene))
+        self.view("many.json")
+        self.browser.wait("hulldViewer.crowd?.group.children.length > 0")
+        self.assertGreater(self.pixels()["colours"], 20)
+        self.browser.wait("document.querySelector('#collision-count').textContent === 'No pair collides'")
+        self.canvas().click()
+        self.browser.wait("hulldViewer.model.selected !== null")
+        self.assert_answers_as_api()
+
+    def test_one_file_shows_all_without_a_server(self):
+        target = pathlib.Path(self.hulld.directory, "room.html")
+        self.hulld.hullctl("view", "room/left", "room/right", "--html", str(target))
+        self.browser.driver.get(target.as_uri())
+        self.browser.wait("document.body.dataset.fitted")
+        self.assertGreater(self.pixels()["drawn"], 0.03)
+        self.browser.wait("document.querySelector('#relation').textContent.includes('separated')")
+        self.assertAlmostEqual(float(self.browser.fact("separation")), 1)
+        # It may fetch nothing, and asks for nothing.
+        self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
+                                         ".filter(({name}) => !name.startsWith('data:')).length"), 0)
+        self.assertNotRegex(target.read_text(), r"\bview/[0-9a-f]{12}/")
+
+    def test_address_lets_one_browser_in_once(self):
+        viewer = self.hulld.view("box")
+        self.addCleanup(viewer.stop)
+        self.browser.open(viewer.address)
+        # The token has gone from the address, and scripts cannot read the cookie.
+        self.assertNotIn("token", self.browser.driver.current_url)
+        self.assertEqual(self.browser.js("document.cookie"), "")
+        port = viewer.address.split(":")[2].split("/")[0]
+        [cookie] = [c for c in self.browser.driver.get_cookies() if c["name"].endswith(port)]
+        self.assertTrue(cookie["httpOnly"])
+        self.assertEqual(cookie["sameSite"], "Strict")
+        self.browser.driver.refresh()
+        self.browser.wait("document.body.dataset.fitted")
+        self.browser.driver.delete_all_cookies()
+        self.browser.driver.get(viewer.address)
+        self.assertIn("worked once", self.browser.text("body"))
+        self.browser.driver.get("about:blank")
+        # Refusals are errors for the console.
+        self.browser.problems()
+
+
+if __name__ == "__main__":
+    PROGRAMS = viewing.bin_directory()
+    unittest.main(verbosity=2)
