@@ -141,7 +141,7 @@ absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* col
     if (answer.ok()) {
       counts.Add(answer->rung);
     } else {
-      answer = NameQueryLimit(answer.status());
+      answer = NameQueryLimit(answer.status(), options);
       call().CountLimit(answer.status());
     }
     columns->Add(answer, a, b);

@@ -133,7 +133,7 @@ absl::Status CollisionService::PairQuery::Place(Registry& registry,
 absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metrics& metrics,
                                                  v1::CheckCollisionResponse* response) const {
   const auto answer = hulld::CheckCollision(placed_a(), placed_b(), options);
-  if (!answer.ok()) return NameQueryLimit(answer.status());
+  if (!answer.ok()) return NameQueryLimit(answer.status(), options);
   RungCounts counts;
   counts.Add(answer->rung);
   metrics.CountPairs(counts);
