@@ -42,9 +42,9 @@ std::string ErrorOf(const std::string& json) {
 
 TEST(Protocol, QuestionsKeepEveryBitOfAPose) {
   const Pose7 pose = {0.1, -1e-308, 1e308, 5e-324, 1.0 / 3, -0.1, 12345678.900000001};
-  const auto message = ParsePageMessage(R"({"type":"question","scene":2,"update":7,"objects":[3],"poses":)" +
-                                        NumbersJson(pose.data(), pose.size()) +
-                                        R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
+  const auto message = ParsePageMessage(
+      R"({"type":"question","scene":2,"update":7,"objects":[3],"poses":)" +
+      NumbersJson(pose.data(), pose.size()) + R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
   ASSERT_TRUE(message.ok()) << message.status();
   ASSERT_TRUE(message->question.has_value());
   const ViewQuestion& question = *message->question;
