@@ -48,10 +48,9 @@ v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, 
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>*
-CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
-                      Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
-                      TaskPool& pool) {
+BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                   Registry& registry, WorkerPool& readers,
+                                   WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionWatch>(
       new CollisionWatch(context, admission, registry, readers, long_readers, pool)));
 }

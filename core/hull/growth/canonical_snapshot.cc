@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -26,12 +27,12 @@ void Sort(std::span<Ranked> vertices) {
   });
 }
 
-// Sorts into canonical order.
+// Sorts into canonical order, unless the poll says stop.
 //
 // Idea: the x of most hulls are spread out, so as many slices across x as there are vertices leave
 // few in each, and only these are compared. The slice of an x is a composition of rounded
 // operations that never decrease, so slices are in order whatever is rounded.
-std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices) {
+std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) {
   // Ends of a range whose length overflows, or is zero, have no slices.
   double least = INFINITY;
   double largest = -INFINITY;
@@ -58,6 +59,7 @@ std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices) {
   for (const Ranked& v : vertices) sorted[ends[slice_of(v)]++] = v;
   uint32_t first = 0;
   for (const uint32_t end : ends) {
+    if (poll.Step()) break;
     if (end - first > 1) Sort(std::span(sorted).subspan(first, end - first));
     first = end;
   }
@@ -70,15 +72,16 @@ struct Ranking {
   std::vector<uint32_t> index_of;
 };
 
-// Of all vertices that live.
-Ranking Rank(const VertexTable& vertices) {
+// Of all vertices that live. After the poll said stop, nothing holds.
+Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   std::vector<Ranked> ranked;
   ranked.reserve(vertices.size());
   for (VertexId id = 0; id < vertices.id_bound(); ++id) {
     if (vertices.IsAlive(id)) ranked.push_back({vertices[id], id});
   }
-  ranked = SortedByPoint(std::move(ranked));
+  ranked = SortedByPoint(std::move(ranked), poll);
   Ranking ranking;
+  if (poll.stopped()) return ranking;
   ranking.points.reserve(ranked.size());
   ranking.index_of.resize(vertices.id_bound());
   for (const Ranked& v : ranked) {
@@ -117,14 +120,15 @@ class FaceCollector {
   bool Run(StopPoll& poll) {
     FindFlatEdges(poll);
     if (poll.stopped()) return false;
-    TracePolygons();
+    TracePolygons(poll);
+    if (poll.stopped()) return false;
     CountDepartures();
     WriteDepartures(poll);
     return !poll.stopped();
   }
 
-  // Requires that Run was not stopped. Once.
-  Faces Assemble() {
+  // Requires that Run was not stopped. Once. Nothing when stopped.
+  std::optional<Faces> Assemble(StopPoll& poll) {
     Faces faces;
     // Reserved, as a snapshot stays as it is for long.
     faces.facet_starts.reserve(triangle_facets_ + polygon_starts_.size());
@@ -134,6 +138,7 @@ class FaceCollector {
     const auto vertex_count = static_cast<uint32_t>(ranking_.points.size());
     uint32_t first = 0;
     for (uint32_t tail = 0; tail < vertex_count; ++tail) {
+      if (poll.Step()) return std::nullopt;
       // Its departures were written, so this is where they end.
       const uint32_t end = departures_at_[tail];
       SortByHead(std::span(departures_).subspan(first, end - first));
@@ -194,13 +199,13 @@ class FaceCollector {
     });
   }
 
-  void TracePolygons() {
-    for (TriangleId id = 0; id < flags_.size(); ++id) {
+  void TracePolygons(StopPoll& poll) {
+    for (TriangleId id = 0; id < flags_.size() && !poll.stopped(); ++id) {
       if ((flags_[id] & kAnyFlat) == 0 || (flags_[id] & kVisited) != 0) continue;
       // A triangle all of whose edges are within its facet is met from its neighbours.
       uint32_t edge = 0;
       while (edge < 3 && IsFlat(id, edge)) ++edge;
-      if (edge < 3) TracePolygon(id, edge);
+      if (edge < 3) TracePolygon(id, edge, poll);
     }
   }
   bool IsFlat(TriangleId id, uint32_t edge) const { return (flags_[id] >> edge & 1) != 0; }
@@ -208,13 +213,14 @@ class FaceCollector {
   // Walks round one facet, from one edge of its boundary to the next through the triangles round
   // the vertex between them. All triangles of the facet are met, as each has its corners on the
   // boundary.
-  void TracePolygon(TriangleId first, uint32_t first_edge) {
+  void TracePolygon(TriangleId first, uint32_t first_edge, StopPoll& poll) {
     const size_t start = polygon_vertices_.size();
     TriangleId id = first;
     uint32_t edge = first_edge;
     // Steps of a walk that is right: through each corner of each triangle at most once.
     size_t steps_left = 3 * surface_.triangle_count();
     do {
+      if (poll.Step()) return;
       polygon_vertices_.push_back(ranking_.index_of[surface_.triangle(id).corners[edge]]);
       flags_[id] |= kVisited;
       edge = (edge + 1) % 3;
@@ -320,9 +326,11 @@ Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends)
   return Hull(dimension, std::move(points), {}, {}, std::move(edges));
 }
 
-Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop) {
+std::optional<Hull> SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop,
+                                      StopPoll& poll) {
   HULLD_CHECK(loop.size() >= 3);
-  Ranking ranking = Rank(vertices);
+  Ranking ranking = Rank(vertices, poll);
+  if (poll.stopped()) return std::nullopt;
   const auto n = static_cast<uint32_t>(loop.size());
   std::vector<uint32_t> facet;
   for (const VertexId id : loop) facet.push_back(ranking.index_of[id]);
@@ -339,12 +347,14 @@ Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> lo
 
 std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface,
                                StopPoll& poll) {
-  Ranking ranking = Rank(vertices);
+  Ranking ranking = Rank(vertices, poll);
+  if (poll.stopped()) return std::nullopt;
   FaceCollector collector(vertices, surface, ranking);
   if (!collector.Run(poll)) return std::nullopt;
-  Faces faces = collector.Assemble();
-  return Hull(3, std::move(ranking.points), std::move(faces.facet_starts),
-              std::move(faces.facet_vertices), std::move(faces.edges));
+  std::optional<Faces> faces = collector.Assemble(poll);
+  if (!faces) return std::nullopt;
+  return Hull(3, std::move(ranking.points), std::move(faces->facet_starts),
+              std::move(faces->facet_vertices), std::move(faces->edges));
 }
 
 }  // namespace hulld

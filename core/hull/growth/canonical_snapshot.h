@@ -13,14 +13,15 @@ namespace hulld {
 
 // Turn the stages of a builder into canonical snapshots: vertices sorted, coplanar triangles merged
 // exactly, facets and edges sorted. Cost: O(V log V), linear where the x of the vertices are spread
-// out, and an exact sign for each pair of neighbours with a common apex; that of a surface is
-// stopped by the poll, and nullopt then.
+// out, and an exact sign for each pair of neighbours with a common apex. Where there is a poll, it
+// stops them, and they return nullopt then.
 
 // Requires at most two vertices, in lexicographic order (unchecked: AuditHull sees it).
 Hull SnapshotOfEnds(const VertexTable& vertices, std::span<const VertexId> ends);
 // Requires at least three vertices of a strictly convex polygon, in order, either way round
 // (unchecked: AuditHull sees it).
-Hull SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop);
+std::optional<Hull> SnapshotOfPolygon(const VertexTable& vertices, std::span<const VertexId> loop,
+                                      StopPoll& poll);
 std::optional<Hull> SnapshotOf(const VertexTable& vertices, const Surface& surface, StopPoll& poll);
 
 }  // namespace hulld

@@ -175,7 +175,7 @@ class HullBuilder::State {
   // nullopt when stopped.
   std::optional<Hull> Snapshot(StopPoll& poll) const {
     if (surface_) return SnapshotOf(vertices_, *surface_, poll);
-    if (polygon_) return SnapshotOfPolygon(vertices_, polygon_->Loop());
+    if (polygon_) return SnapshotOfPolygon(vertices_, polygon_->Loop(), poll);
     return SnapshotOfEnds(vertices_, ends_);
   }
 

@@ -93,7 +93,7 @@ class HullBuilder {
   // to four tenths of what adding points that all are vertices costs.
   Hull Snapshot() const;
   // The same, but CANCELLED when should_stop, which may be empty, said so. It is polled every 1024
-  // triangles, twice over; sorting what they made is not interrupted.
+  // vertices and triangles, several times over.
   absl::StatusOr<Hull> Snapshot(const std::function<bool()>& should_stop) const;
 
  private:

@@ -124,6 +124,7 @@ class RoundsInsertion {
     }
     keys_.clear();
     for (const uint32_t i : members_) {
+      if (poll_.Step()) return;
       if (!directions->IsCertainlyInside(directions->PlaceOf(points_[i]))) {
         keys_.push_back(KeyOf(*directions, points_[i], i));
       }

@@ -72,8 +72,8 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
   return 3;
 }
 
-// How far the direction is within the triangle's cone, less than zero outside, in no unit: the least
-// of what EdgeTowards compares.
+// How far the direction is within the triangle's cone, less than zero outside, in no unit: the
+// least of what EdgeTowards compares.
 double Surface::LeastTurn(const VertexTable& vertices, TriangleId id,
                           const Vector& direction) const {
   const Vector& center = directions_->center();
@@ -277,7 +277,9 @@ void Surface::FinishInsertions(const VertexTable& vertices) {
   // A map that was made fine for a large block takes more memory than it saves time from here on.
   while (directions_ && 2 * directions_->cell_count() > alive_ && directions_->Coarsen()) {
   }
-  if (alive_ >= next_update_) Update(vertices);
+  // A centre is wanted now; to measure waits for the next single insertion, as a hull at rest would
+  // hold an unfinished map for nothing.
+  if (!directions_ && alive_ >= next_update_) Update(vertices);
 }
 
 }  // namespace hulld

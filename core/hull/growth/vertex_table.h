@@ -51,10 +51,9 @@ class VertexTable {
     free_.EndJournal();
     added_before_ = {};
   }
-  // What the journal holds.
+  // What the journal holds beyond what was there before.
   size_t JournalBytes() const {
-    return points_.JournalBytes() + counts_.JournalBytes() + free_.JournalBytes() +
-           added_before_.size() * sizeof(VertexId);
+    return points_.JournalBytes() + counts_.JournalBytes() + free_.JournalBytes();
   }
   // Gives back the memory of what came and went within the block. Cost: amortized by the vertices
   // that came.

@@ -37,6 +37,8 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
     case Rpc::kSaveBackup:
       return {grpc::FAILED_PRECONDITION};
+    case Rpc::kServerReflectionInfo:
+      return {grpc::INVALID_ARGUMENT};
     case Rpc::kGetStatus:
       return {};
   }

@@ -427,6 +427,77 @@ TEST(HullBuilder, CancellationChangesNothingWheneverItComes) {
   EXPECT_TRUE(SameBits(builder.Snapshot(), BuildHull(Concatenated(first, block))));
 }
 
+// What a block did before it was refused is undone, whichever stages it went through.
+TEST(HullBuilder, RefusedBlocksAreUndoneInEveryStage) {
+  const uint64_t seed = TestSeed(113);
+  Random random(seed);
+  int reached[4][4] = {};
+  for (int k = 0; k < 600; ++k) {
+    const int dimension = random.Below(4);
+    std::vector<Vector> first = RandomFlatPoints(random, 1 + random.Below(40), dimension);
+    if (k % 7 == 0) first.clear();
+    std::vector<Vector> second = first;
+    if (k % 3 != 0) {
+      for (int more = random.Below(30); more >= 0; --more) {
+        second.push_back(RandomLatticePoints(random, 1, 40)[0]);
+      }
+    } else {
+      for (const Vector& p : RandomFlatPoints(random, 30, 3)) second.push_back(p * 3);
+    }
+    HullBuilder builder;
+    ASSERT_TRUE(builder.Add(first).ok());
+    const Hull before = builder.Snapshot();
+    const size_t new_before = builder.NewVertices().size();
+    AddLimits none;
+    none.max_vertices = 0;
+    for (int again = 0; again < 2; ++again) {
+      EXPECT_TRUE(absl::IsResourceExhausted(builder.Add(second, none).status()));
+      EXPECT_GT(builder.undo_bytes() + second.size(), 0u);
+      ASSERT_TRUE(SameBits(builder.Snapshot(), before)) << "case " << k << " seed " << seed;
+      EXPECT_EQ(builder.NewVertices().size(), new_before);
+      EXPECT_EQ(builder.vertex_count(), before.vertices().size());
+    }
+    const auto counts = builder.Add(second);
+    HullBuilder untouched;
+    ASSERT_TRUE(untouched.Add(first).ok());
+    EXPECT_EQ(*counts, *untouched.Add(second)) << "case " << k << " seed " << seed;
+    ASSERT_TRUE(SameBits(builder.Snapshot(), untouched.Snapshot())) << "case " << k;
+    if (before.dimension() >= 0) ++reached[before.dimension()][builder.dimension()];
+  }
+  for (int from = 0; from < 4; ++from) EXPECT_GT(reached[from][3], 0) << from;
+}
+
+// A map of directions that was measured within a block that is undone would reject too much.
+TEST(HullBuilder, RefusedBlocksLeaveNoMap) {
+  Random random(114);
+  HullBuilder builder;
+  ASSERT_TRUE(builder.Add(RandomOnSphere(random, 3000, 1)).ok());
+  const Hull before = builder.Snapshot();
+  const std::vector<Vector> large = RandomInBall(random, 200000, 50);
+  for (const size_t limit : {size_t{10}, size_t{100}}) {
+    AddLimits limits;
+    limits.max_vertices = limit;
+    EXPECT_TRUE(absl::IsResourceExhausted(builder.Add(large, limits).status()));
+    ASSERT_TRUE(SameBits(builder.Snapshot(), before));
+  }
+  for (int allowed = 1; allowed < 100000; allowed = 2 * allowed + 1) {
+    int polls = 0;
+    AddLimits limits;
+    limits.should_stop = [&] { return ++polls > allowed; };
+    if (builder.Add(large, limits).ok()) {
+      EXPECT_GT(allowed, 20);
+      break;
+    }
+    ASSERT_TRUE(SameBits(builder.Snapshot(), before)) << allowed;
+    HullBuilder copy = builder;
+    const std::vector<Vector> slightly_larger = RandomOnSphere(random, 500, 1.5);
+    ASSERT_TRUE(copy.Add(slightly_larger).ok());
+    ASSERT_TRUE(SameBits(copy.Snapshot(), BuildHull(Concatenated(
+                                              {before.vertices().begin(), before.vertices().end()},
+                                              slightly_larger))));
+  }
+}
+
 TEST(HullBuilder, ASnapshotStopsWheneverItIsToldTo) {
   Random random(112);
   HullBuilder builder;
@@ -436,8 +507,8 @@ TEST(HullBuilder, ASnapshotStopsWheneverItIsToldTo) {
   const absl::StatusOr<Hull> whole = builder.Snapshot([&] { return ++polls < 0; });
   ASSERT_TRUE(whole.ok()) << whole.status();
   EXPECT_TRUE(SameBits(*whole, hull));
-  // Two passes over 2 V - 4 triangles.
-  EXPECT_EQ(polls, (2 * (2 * 20000 - 4) + 1023) / 1024);
+  // Two passes over 2 V - 4 triangles, and two over V vertices.
+  EXPECT_EQ(polls, (2 * (2 * 20000 - 4) + 2 * 20000 + 1023) / 1024);
   for (int last = 1; last <= polls; ++last) {
     int asked = 0;
     const absl::StatusOr<Hull> stopped = builder.Snapshot([&] { return ++asked == last; });
