@@ -367,14 +367,20 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
   for (const bool is_scene : {false, true}) {
     SCOPED_TRACE(is_scene);
     Truth truth;
+    const Coordinates start = Cube(-1, 2);
+    std::vector<Vector> start_points;
+    for (size_t i = 0; i < start.size(); i += 3) {
+      start_points.emplace_back(start[i], start[i + 1], start[i + 2]);
+    }
     v1::CollisionWatchOpen open;
     std::vector<std::string> ids;
     std::mt19937 random(is_scene ? 7 : 8);
     const auto coordinate = [](std::mt19937& source) { return static_cast<int>(source() % 7) - 3; };
     for (int h = 0; h < kHulls; ++h) {
       ids.push_back(absl::StrCat(is_scene ? "s" : "p", h));
-      Create(ids.back());
-      truth.Grow(ids.back(), Get(ids.back()).hull().revision(), {});
+      // Large enough to collide before they grow.
+      Append(ids.back(), 1, start);
+      truth.Grow(ids.back(), Get(ids.back()).hull().revision(), start_points);
       *open.add_placements() = PlacementOf(ids.back(), coordinate(random) * 2);
     }
     if (!is_scene) {
@@ -405,13 +411,12 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
     for (int h = 0; h < kHulls; ++h) {
       writers.emplace_back([&, h] {
         std::mt19937 own(100 + h);
-        std::vector<Vector> points;
+        std::vector<Vector> points = start_points;
         Appender appender(*hulls_, ids[h], "w");
         for (uint64_t i = 1; i <= kChunks; ++i) {
           Coordinates xyz;
           for (int k = 0; k < 3; ++k) xyz.push_back(coordinate(own) * (1 + 0.1 * double(i)));
           points.emplace_back(xyz[0], xyz[1], xyz[2]);
-          // Told before anyone can ask about it: the revision is not known yet.
           const auto ack = appender.Append(i, xyz);
           ASSERT_TRUE(ack.has_value());
           truth.Grow(ids[h], ack->hull_revision(), points);
@@ -436,7 +441,7 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
       updated = message.update();
       revision = message.header().revision();
     };
-    // A few updates are under way at a time: one round would answer them all otherwise.
+    // A few updates are under way at a time, so that hulls grow between them.
     for (size_t sent = 0; updated < kUpdates && !HasFatalFailure(); read()) {
       while (sent < kUpdates && sent < updated + 3) watch.Write(updates[sent++]);
     }
