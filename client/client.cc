@@ -305,6 +305,10 @@ std::unique_ptr<CollisionStream> Client::OpenCollisionStream() const {
   return std::make_unique<CollisionStream>(collisions_, options_.timeout);
 }
 
+std::unique_ptr<CollisionWatch> Client::WatchCollisions(v1::CollisionWatchOpen open) const {
+  return std::make_unique<CollisionWatch>(collisions_, std::move(open));
+}
+
 absl::StatusOr<v1::GetStatusResponse> Client::GetStatus() const {
   return Call(status_.get(), &v1::StatusService::Stub::GetStatus, v1::GetStatusRequest(), true);
 }

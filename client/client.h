@@ -17,6 +17,7 @@
 #include "client/collision_stream.h"
 #include "client/connection_security.h"
 #include "client/retry.h"
+#include "client/watch/collision_watch.h"
 #include "client/watch/hull_watch.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
@@ -125,6 +126,9 @@ class Client {
   using SceneReceiver = std::function<absl::Status(const v1::FindCollisionsResponse&)>;
   absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
                               const SceneReceiver& receive) const;
+
+  // Tells when pairs begin and end to collide. Lasts until it is ended.
+  std::unique_ptr<CollisionWatch> WatchCollisions(v1::CollisionWatchOpen open) const;
 
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;
 

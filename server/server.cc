@@ -1,10 +1,10 @@
 #include "server/server.h"
 
 #include <absl/status/status.h>
-#include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
 
 #include <algorithm>
+#include <iterator>
 #include <thread>
 #include <utility>
 
@@ -16,6 +16,18 @@
 
 namespace hulld::server {
 namespace {
+
+constexpr const char* kServices[] = {
+    v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
+    v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()};
+
+// With those of gRPC's own protocols.
+std::vector<std::string> AllServices() {
+  std::vector<std::string> names = {
+      "grpc.health.v1.Health", grpc::reflection::v1alpha::ServerReflection::service_full_name()};
+  names.insert(names.begin(), std::begin(kServices), std::end(kServices));
+  return names;
+}
 
 // At least two, so that one long task does not hold up all others.
 int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
@@ -50,7 +62,8 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       hull_service_(registry_, admission_, writers_, readers_, long_readers_),
       collision_service_(registry_, admission_, readers_, long_readers_, pool_, executor_),
       status_service_(registry_, admission_),
-      maintenance_service_(*store_, registry_, admission_, long_readers_) {
+      maintenance_service_(*store_, registry_, admission_, long_readers_),
+      reflection_service_(admission_, AllServices()) {
   admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog(
       [this] { return readers_.waiting() + long_readers_.waiting() + pool_.waiting(); });
@@ -101,7 +114,6 @@ absl::Status Server::Listen(const Config& config) {
   if (absl::Status s = CheckSocketFree(*address); !s.ok()) return s;
 
   grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
   int port = 0;
   builder.AddListeningPort(config.listen, guard_->credentials(), &port);
@@ -110,15 +122,14 @@ absl::Status Server::Listen(const Config& config) {
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
   builder.RegisterService(&maintenance_service_);
+  builder.RegisterService(&reflection_service_);
   grpc_server_ = builder.BuildAndStart();
   if (grpc_server_ == nullptr || (port == 0 && !address->is_unix())) {
     return ExplainBindFailure(*address);
   }
   address_ = address->Format(port);
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
-  for (const char* service :
-       {v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
-        v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()}) {
+  for (const char* const service : kServices) {
     health->SetServingStatus(service, true);
   }
   if (config.metrics_address.empty()) return absl::OkStatus();

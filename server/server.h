@@ -10,6 +10,7 @@
 
 #include "server/access/guard.h"
 #include "server/admin/maintenance_service.h"
+#include "server/admin/reflection_service.h"
 #include "server/admin/status_service.h"
 #include "server/call/admission.h"
 #include "server/collisions/collision_service.h"
@@ -80,6 +81,7 @@ class Server {
   CollisionService collision_service_;
   StatusService status_service_;
   MaintenanceService maintenance_service_;
+  ReflectionService reflection_service_;
   std::string address_;
   std::unique_ptr<grpc::Server> grpc_server_;
   // Reads from all of the above.

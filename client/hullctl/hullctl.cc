@@ -143,41 +143,64 @@ int CompleteWords(const std::vector<std::string>& words, CommandLine* command_li
   return static_cast<int>(ExitCode::kDone);
 }
 
-int Run(const CommandLine& command_line, Invocation* invocation) {
-  invocation->program = &command_line.description();
-  invocation->run_line = [invocation](const std::vector<std::string>& arguments) {
-    return RunHullctl(arguments, invocation->out, invocation->err);
-  };
+// What the options of a shell said holds for its lines. A line that names a server gets nothing
+// that was meant for another one.
+void Inherit(const Invocation& session, Invocation* line) {
+  if (!line->flags.contains("server") && line->context.empty()) {
+    line->flags.insert(session.flags.begin(), session.flags.end());
+    line->context = session.context;
+  }
+  if (session.given_timeout.has_value() && !line->given_timeout.has_value()) {
+    line->timeout = session.timeout;
+    line->given_timeout = session.given_timeout;
+  }
+}
+
+ExitCode Act(Invocation* invocation) {
   if (invocation->needs_server) {
     const absl::Status resolved = ResolveConnection(invocation);
-    if (!resolved.ok()) return static_cast<int>(invocation->FailUsage(resolved));
+    if (!resolved.ok()) return invocation->FailUsage(resolved);
   }
   // What is for other programs has no colours.
   if (invocation->json() || invocation->names()) invocation->paint = Painter();
   const ExitCode code = invocation->action();
   invocation->out.flush();
-  if (!invocation->out) {
-    invocation->err << "hullctl: cannot write the answer; is the disk full or the pipe closed?\n";
-    return static_cast<int>(ExitCode::kUsage);
-  }
-  return static_cast<int>(code);
+  if (invocation->out) return code;
+  invocation->err << "hullctl: cannot write the answer; is the disk full or the pipe closed?\n";
+  return ExitCode::kUsage;
 }
 
-}  // namespace
-
-int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
+// One command line; of a shell, unless `session` is null.
+int Run(const std::vector<std::string>& arguments, const Invocation* session, std::ostream& out,
+        std::ostream& err) {
   CommandLine command_line(
       "hullctl", HULLD_VERSION,
       "Keeps convex hulls on a hulld server and asks it whether they collide.");
   Invocation invocation(out, err);
   invocation.paint = Painter(WantsColour("auto", &out == &std::cout && isatty(STDOUT_FILENO) != 0));
   invocation.shows_progress = &err == &std::cerr && isatty(STDERR_FILENO) != 0;
+  if (session != nullptr) {
+    invocation.form = session->form;
+    invocation.paint = session->paint;
+  }
   AddProgram(command_line.root(), &invocation);
   if (!arguments.empty() && arguments.front() == kCompleteCommand) {
     return CompleteWords({arguments.begin() + 1, arguments.end()}, &command_line, &invocation);
   }
   const std::optional<ExitCode> ended = command_line.Parse(WithoutHelpCommand(arguments), out, err);
-  return ended.has_value() ? static_cast<int>(*ended) : Run(command_line, &invocation);
+  if (ended.has_value()) return static_cast<int>(*ended);
+  if (session != nullptr) Inherit(*session, &invocation);
+  invocation.program = &command_line.description();
+  invocation.run_line = [&invocation](const std::vector<std::string>& line) {
+    return Run(line, &invocation, invocation.out, invocation.err);
+  };
+  return static_cast<int>(Act(&invocation));
+}
+
+}  // namespace
+
+int RunHullctl(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
+  return Run(arguments, nullptr, out, err);
 }
 
 }  // namespace hulld

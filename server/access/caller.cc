@@ -24,6 +24,8 @@ absl::Status OutsidePrefix(const Caller& caller, const std::string& field,
 
 const char* RoleName(Permission permission) {
   switch (permission) {
+    case Permission::kNone:
+      return "none";
     case Permission::kRead:
       return "read-only";
     case Permission::kWrite:
@@ -36,6 +38,8 @@ const char* RoleName(Permission permission) {
 
 Permission PermissionFor(Rpc rpc) {
   switch (rpc) {
+    case Rpc::kServerReflectionInfo:
+      return Permission::kNone;
     case Rpc::kGetHull:
     case Rpc::kGetHullMesh:
     case Rpc::kListHulls:

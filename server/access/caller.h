@@ -12,6 +12,8 @@ enum class Rpc;
 
 // What a caller may do; each includes those before it.
 enum class Permission {
+  // Needs no token.
+  kNone,
   // Asks; changes nothing.
   kRead,
   // Creates, changes and deletes hulls.
@@ -20,7 +22,8 @@ enum class Permission {
   kAdmin,
 };
 
-// The name of the role that has this permission: "read-only", "read-write" or "admin".
+// The name of the role that has this permission: "read-only", "read-write" or "admin"; "none" has
+// none.
 const char* RoleName(Permission permission);
 
 // What a call needs: the one table of that.

@@ -27,11 +27,11 @@ absl::Status CheckSeesAll(const Caller& caller) {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::SaveBackupResponse>* BackupStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Store& store,
-    const Registry& registry, WorkerPool& readers) {
+WriteReactor* BackupStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                  Store& store, const Registry& registry, WorkerPool& readers,
+                                  const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BackupStream>(
-      new BackupStream(context, admission, store, registry, readers)));
+      new BackupStream(context, admission, store, registry, readers, request)));
 }
 
 BackupStream::~BackupStream() {

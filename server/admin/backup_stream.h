@@ -20,20 +20,20 @@ namespace hulld::server {
 
 // One SaveBackup call: makes a copy of the store, sends its files piece by piece, each read when
 // the one before is sent, and removes the copy.
-class BackupStream : public PulledStream<grpc::ServerWriteReactor<v1::SaveBackupResponse>,
-                                         v1::SaveBackupResponse> {
+class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBackupResponse>,
+                                          v1::SaveBackupRequest> {
  public:
   // Removes the copy.
   ~BackupStream() override;
 
-  static grpc::ServerWriteReactor<v1::SaveBackupResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Store& store,
-      const Registry& registry, WorkerPool& readers);
+  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                             Store& store, const Registry& registry, WorkerPool& readers,
+                             const grpc::ByteBuffer& request);
 
  private:
   BackupStream(grpc::CallbackServerContext& context, Admission& admission, Store& store,
-               const Registry& registry, WorkerPool& readers)
-      : PulledStream(context, admission, Rpc::kSaveBackup),
+               const Registry& registry, WorkerPool& readers, const grpc::ByteBuffer& request)
+      : RequestStream(request, context, admission, Rpc::kSaveBackup),
         store_(store),
         registry_(registry),
         readers_(readers) {}

@@ -4,9 +4,9 @@
 
 namespace hulld::server {
 
-grpc::ServerWriteReactor<v1::SaveBackupResponse>* MaintenanceService::SaveBackup(
-    grpc::CallbackServerContext* context, const v1::SaveBackupRequest*) {
-  return BackupStream::Start(*context, admission_, store_, registry_, readers_);
+WriteReactor* MaintenanceService::SaveBackup(grpc::CallbackServerContext* context,
+                                             const grpc::ByteBuffer* request) {
+  return BackupStream::Start(*context, admission_, store_, registry_, readers_, *request);
 }
 
 }  // namespace hulld::server

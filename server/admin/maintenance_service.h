@@ -5,6 +5,7 @@
 
 #include "hulld/v1/maintenance.grpc.pb.h"
 #include "server/call/admission.h"
+#include "server/call/call_stream.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 #include "server/store/store.h"
@@ -12,15 +13,16 @@
 namespace hulld::server {
 
 // hulld.v1.MaintenanceService: the contract in maintenance.proto.
-class MaintenanceService : public v1::MaintenanceService::CallbackService {
+class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_SaveBackup<
+                               v1::MaintenanceService::Service> {
  public:
   // Backups are read on `readers`. All must outlive this.
   MaintenanceService(Store& store, const Registry& registry, Admission& admission,
                      WorkerPool& readers)
       : store_(store), registry_(registry), admission_(admission), readers_(readers) {}
 
-  grpc::ServerWriteReactor<v1::SaveBackupResponse>* SaveBackup(
-      grpc::CallbackServerContext* context, const v1::SaveBackupRequest* request) override;
+  WriteReactor* SaveBackup(grpc::CallbackServerContext* context,
+                           const grpc::ByteBuffer* request) override;
 
  private:
   Store& store_;

@@ -8,44 +8,50 @@
 namespace hulld::server {
 
 grpc::ServerUnaryReactor* StatusService::GetStatus(grpc::CallbackServerContext* context,
-                                                   const v1::GetStatusRequest*,
-                                                   v1::GetStatusResponse* response) {
-  return UnaryCall::Answer(*context, admission_, Rpc::kGetStatus, [&](const Call& call) {
-    const RegistrySizes sizes = registry_.Sizes();
-    EncodeHeader(registry_.store(), sizes.store_revision, response->mutable_header());
-    response->set_version(HULLD_VERSION);
-    const auto started = started_.time_since_epoch();
-    const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(started);
-    response->mutable_started()->set_seconds(seconds.count());
-    response->mutable_started()->set_nanos(static_cast<int32_t>(
-        std::chrono::duration_cast<std::chrono::nanoseconds>(started - seconds).count()));
-    EncodeDuration(std::chrono::steady_clock::now() - started_steady_, response->mutable_uptime());
-    response->set_store_kind(registry_.store().kind());
-    if (call.caller().sees_all()) {
-      response->set_hull_count(sizes.hull_count);
-      response->set_vertex_count(sizes.vertex_count);
-    }
-    const Limits& limits = registry_.limits();
-    v1::Limits* message = response->mutable_limits();
-    message->set_max_points_per_chunk(limits.max_points_per_chunk);
-    message->set_max_vertices_per_hull(limits.max_vertices_per_hull);
-    message->set_max_hulls(limits.max_hulls);
-    message->set_max_pairs_per_batch(limits.max_pairs_per_batch);
-    message->set_max_textbook_axes(limits.max_textbook_axes);
-    message->set_max_writers_per_hull(limits.max_writers_per_hull);
-    message->set_memory_limit_bytes(limits.memory_limit);
-    message->set_max_message_bytes(limits.max_message_bytes);
-    message->set_max_points_per_hull(limits.max_points_per_hull);
-    message->set_max_placements(limits.max_placements);
-    message->set_max_calls(limits.max_calls);
-    message->set_max_waiting_calls(limits.max_waiting_calls);
-    message->set_max_streams_per_client(limits.max_streams_per_client);
-    message->set_max_concurrent_batches(limits.max_concurrent_batches);
-    if (limits.max_request_time > std::chrono::milliseconds::zero()) {
-      EncodeDuration(limits.max_request_time, message->mutable_max_request_time());
-    }
-    return absl::OkStatus();
-  });
+                                                   const grpc::ByteBuffer* request,
+                                                   grpc::ByteBuffer* response) {
+  using StatusCall = UnaryCall<v1::GetStatusRequest, v1::GetStatusResponse>;
+  return StatusCall::Start(*context, admission_, Rpc::kGetStatus, {request, response},
+                           [this](StatusCall* call) {
+                             Fill(call->call().caller(), &call->response());
+                             call->End(absl::OkStatus());
+                           });
+}
+
+void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) const {
+  const RegistrySizes sizes = registry_.Sizes();
+  EncodeHeader(registry_.store(), sizes.store_revision, response->mutable_header());
+  response->set_version(HULLD_VERSION);
+  const auto started = started_.time_since_epoch();
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(started);
+  response->mutable_started()->set_seconds(seconds.count());
+  response->mutable_started()->set_nanos(static_cast<int32_t>(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(started - seconds).count()));
+  EncodeDuration(std::chrono::steady_clock::now() - started_steady_, response->mutable_uptime());
+  response->set_store_kind(registry_.store().kind());
+  if (caller.sees_all()) {
+    response->set_hull_count(sizes.hull_count);
+    response->set_vertex_count(sizes.vertex_count);
+  }
+  const Limits& limits = registry_.limits();
+  v1::Limits* message = response->mutable_limits();
+  message->set_max_points_per_chunk(limits.max_points_per_chunk);
+  message->set_max_vertices_per_hull(limits.max_vertices_per_hull);
+  message->set_max_hulls(limits.max_hulls);
+  message->set_max_pairs_per_batch(limits.max_pairs_per_batch);
+  message->set_max_textbook_axes(limits.max_textbook_axes);
+  message->set_max_writers_per_hull(limits.max_writers_per_hull);
+  message->set_memory_limit_bytes(limits.memory_limit);
+  message->set_max_message_bytes(limits.max_message_bytes);
+  message->set_max_points_per_hull(limits.max_points_per_hull);
+  message->set_max_placements(limits.max_placements);
+  message->set_max_calls(limits.max_calls);
+  message->set_max_waiting_calls(limits.max_waiting_calls);
+  message->set_max_streams_per_client(limits.max_streams_per_client);
+  message->set_max_concurrent_batches(limits.max_concurrent_batches);
+  if (limits.max_request_time > std::chrono::milliseconds::zero()) {
+    EncodeDuration(limits.max_request_time, message->mutable_max_request_time());
+  }
 }
 
 }  // namespace hulld::server

@@ -6,22 +6,26 @@
 #include <chrono>
 
 #include "hulld/v1/status.grpc.pb.h"
+#include "server/access/caller.h"
 #include "server/call/admission.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
 
 // hulld.v1.StatusService: the contract in status.proto.
-class StatusService : public v1::StatusService::CallbackService {
+class StatusService
+    : public v1::StatusService::WithRawCallbackMethod_GetStatus<v1::StatusService::Service> {
  public:
   StatusService(Registry& registry, Admission& admission)
       : registry_(registry), admission_(admission) {}
 
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
-                                      const v1::GetStatusRequest* request,
-                                      v1::GetStatusResponse* response) override;
+                                      const grpc::ByteBuffer* request,
+                                      grpc::ByteBuffer* response) override;
 
  private:
+  void Fill(const Caller& caller, v1::GetStatusResponse* response) const;
+
   Registry& registry_;
   Admission& admission_;
   const std::chrono::system_clock::time_point started_ = std::chrono::system_clock::now();

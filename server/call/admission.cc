@@ -41,6 +41,7 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kSaveBackup:
     case Rpc::kWatchHulls:
     case Rpc::kWatchCollisions:
+    case Rpc::kServerReflectionInfo:
       return CallKind::kStream;
   }
   HULLD_UNREACHABLE();
@@ -57,7 +58,10 @@ Admission::Ticket::~Ticket() {
   if (admission_ != nullptr) admission_->Leave(*this);
 }
 
-Admission::Admission(const Limits& limits, Metrics& metrics) : limits_(limits), metrics_(metrics) {
+Admission::Admission(const Limits& limits, Metrics& metrics)
+    : limits_(limits), metrics_(metrics), request_memory_(limits.request_memory) {
+  metrics_.AddGauge("hulld_request_bytes", "Bytes that requests under way take.",
+                    [this] { return static_cast<double>(request_memory_.taken_bytes()); });
   metrics_.AddGauge("hulld_requests_running", "Calls that run now, open streams included.",
                     [this] { return static_cast<double>(running()); });
   if (limits_.max_request_time > std::chrono::milliseconds::zero()) {

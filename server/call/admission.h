@@ -16,6 +16,7 @@
 #include <thread>
 #include <unordered_map>
 
+#include "server/call/request_memory.h"
 #include "server/contract/rpc.h"
 #include "server/process/metrics.h"
 #include "server/settings/config.h"
@@ -82,6 +83,9 @@ class Admission {
   const Limits& limits() const { return limits_; }
   Metrics& metrics() { return metrics_; }
 
+  // What the requests that were let in take.
+  RequestMemory& request_memory() { return request_memory_; }
+
   // What waits for a thread, bounded by --max-waiting-calls. Set before the first call.
   void SetBacklog(std::function<size_t()> backlog) { backlog_ = std::move(backlog); }
 
@@ -109,6 +113,7 @@ class Admission {
 
   const Limits limits_;
   Metrics& metrics_;
+  RequestMemory request_memory_;
   std::function<size_t()> backlog_;
 
   const Authenticator* authenticator_ = nullptr;

@@ -59,7 +59,9 @@ const std::string& Call::request_id() const {
 }
 
 absl::Status Call::Authenticate() {
-  if (admission_.authenticator() == nullptr) return absl::OkStatus();
+  if (admission_.authenticator() == nullptr || PermissionFor(rpc_) == Permission::kNone) {
+    return absl::OkStatus();
+  }
   absl::StatusOr<Caller> caller =
       admission_.authenticator()->Authenticate(context_.client_metadata(), rpc_);
   if (!caller.ok()) return caller.status();

@@ -41,6 +41,7 @@ class Call {
   // call that is logged or fails, or whose client gave one.
   const std::string& request_id() const;
   Metrics& metrics() const { return admission_.metrics(); }
+  RequestMemory& request_memory() const { return admission_.request_memory(); }
 
   const CallLifetime& lifetime() const { return lifetime_; }
   bool ShouldStop() const { return lifetime_.ShouldStop(); }

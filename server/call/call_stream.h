@@ -10,13 +10,19 @@
 #include "core/base/check.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"
-#include "server/call/stream_message.h"
+#include "server/call/message_bytes.h"
+#include "server/call/request_memory.h"
 #include "server/contract/rpc.h"
 
 namespace hulld::server {
 
+// gRPC's reactors for the kinds of streams: of bytes, as message_bytes.h says.
+using ReadReactor = grpc::ServerReadReactor<grpc::ByteBuffer>;
+using WriteReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
+using BidiReactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
+
 // What every streaming call has: it owns itself until gRPC is done with it, is admitted before
-// anything else, and finishes exactly once. Reactor: gRPC's, for the kind of stream.
+// anything else, and finishes exactly once. Reactor: one of those above.
 //
 // PulledStream and QueuedStream build on this: replies made one at a time, or queued.
 template <typename Reactor>
@@ -25,7 +31,8 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   // Admits the call of a new stream and opens it; a call that is not admitted ends at once.
   static Reactor* Launch(const std::shared_ptr<CallStream>& stream) {
     stream->self_ = stream;
-    const absl::Status begun = stream->call_.Begin();
+    absl::Status begun = stream->call_.Begin();
+    if (begun.ok()) begun = stream->Receive();
     if (begun.ok()) {
       stream->Open();
     } else {
@@ -43,6 +50,8 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   Call& call() { return call_; }
   const Call& call() const { return call_; }
 
+  // Parses the request, where the client sends one that comes with the call.
+  virtual absl::Status Receive() { return absl::OkStatus(); }
   // Starts the first step, on gRPC's thread: neither waits nor computes for long.
   virtual void Open() = 0;
 
@@ -83,8 +92,29 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   std::shared_ptr<CallStream> self_;
 };
 
-// Reads messages into one request, one at a time, and tells the end of the client's stream from a
-// message that is malformed. Stream: a CallStream whose reactor reads.
+// A stream that answers one request. Stream: a CallStream whose reactor writes.
+template <typename Stream, typename Request>
+class RequestStream : public Stream {
+ protected:
+  // bytes: the request as gRPC holds it until the call ends; taken from there. args: for Stream.
+  template <typename... Args>
+  explicit RequestStream(const grpc::ByteBuffer& bytes, Args&&... args)
+      : Stream(std::forward<Args>(args)...), bytes_(TakenFrom(bytes)) {}
+
+  // Requires that the call was let in.
+  const Request& request() const { return request_; }
+
+ private:
+  absl::Status Receive() final {
+    return ParseRequest(bytes_, this->call().request_memory(), &request_, share_);
+  }
+
+  grpc::ByteBuffer bytes_;
+  RequestMemory::Share share_;
+  Request request_;
+};
+
+// Reads messages into one request, one at a time. Stream: a CallStream whose reactor reads.
 template <typename Stream, typename Request>
 class ReadingStream : public Stream {
  protected:
@@ -94,8 +124,9 @@ class ReadingStream : public Stream {
   // finished.
   void Read() {
     HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
-    PrepareToRead(&request_);
-    this->StartRead(&request_);
+    if (share_.bytes() > kKeptBytes) request_ = Request();
+    share_.GiveBack();
+    this->StartRead(&bytes_);
   }
   bool reading() const { return reading_; }
   // The message that was read. Requires that none is being read.
@@ -110,21 +141,31 @@ class ReadingStream : public Stream {
 
   // What follows a read, as Stream::React runs it.
   virtual void OnMessage() = 0;
-  // OK: the client has said all, or is gone. INVALID_ARGUMENT: its last message was malformed.
+  // OK: the client has said all, or is gone. Otherwise as ParseRequest says of its last message.
   virtual void OnNoMessage(const absl::Status& why) = 0;
 
  private:
+  // What a request may hold on to while the next one is awaited, uncounted.
+  static constexpr uint64_t kKeptBytes = 64 << 10;
+
   void OnReadDone(bool ok) final {
-    this->React([this, ok] {
+    absl::Status parsed;
+    if (ok) {
+      parsed = ParseRequest(bytes_, this->call().request_memory(), &request_, share_);
+    }
+    this->React([this, ok, &parsed] {
       HULLD_CHECK(std::exchange(reading_, false));
-      if (ok) {
+      if (ok && parsed.ok()) {
         OnMessage();
       } else {
-        OnNoMessage(WhyNotRead(request_));
+        OnNoMessage(parsed);
       }
     });
   }
 
+  // What gRPC reads into.
+  grpc::ByteBuffer bytes_;
+  RequestMemory::Share share_;
   Request request_;
   bool reading_ = false;
 };

@@ -24,7 +24,8 @@ class PulledStream : public CallStream<Reactor> {
   // Sends the reply. Requires that nothing else is under way.
   void Send() {
     HULLD_CHECK(!std::exchange(writing_, true));
-    this->StartWrite(&reply_);
+    bytes_ = SerializeReply(reply_);
+    this->StartWrite(&bytes_);
   }
 
   // The reply was written, and is still there, so that its memory can be used again: clears it, and
@@ -35,6 +36,7 @@ class PulledStream : public CallStream<Reactor> {
   void OnWriteDone(bool ok) final {
     this->React([this, ok] {
       HULLD_CHECK(std::exchange(writing_, false));
+      bytes_.Clear();
       if (this->call().ShouldStop()) return this->FinishCall(this->call().StopStatus());
       if (!ok) return this->FinishCall(absl::CancelledError("the client is gone"));
       OnSent();
@@ -42,6 +44,8 @@ class PulledStream : public CallStream<Reactor> {
   }
 
   Reply reply_;
+  // The reply as gRPC sends it.
+  grpc::ByteBuffer bytes_;
   bool writing_ = false;
 };
 

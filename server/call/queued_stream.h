@@ -97,7 +97,8 @@ class QueuedStream : public CallStream<Reactor> {
   void OnWriteDone(bool ok) final {
     Locked([this, ok] {
       HULLD_CHECK(std::exchange(writing_, false));
-      unsent_bytes_ -= in_flight_.bytes;
+      unsent_bytes_ -= bytes_in_flight_;
+      bytes_.Clear();
       if (!ok) Abandon();
     });
   }
@@ -118,9 +119,10 @@ class QueuedStream : public CallStream<Reactor> {
     if (!end_.has_value()) StartWork();
     if (!writing_ && !waiting_.empty()) {
       writing_ = true;
-      in_flight_ = std::move(waiting_.front());
+      bytes_ = SerializeReply(waiting_.front().reply);
+      bytes_in_flight_ = waiting_.front().bytes;
       waiting_.pop_front();
-      this->StartWrite(&in_flight_.reply);
+      this->StartWrite(&bytes_);
     }
     if (end_.has_value() && !writing_ && !IsWorking()) this->FinishCall(*end_);
   }
@@ -129,7 +131,9 @@ class QueuedStream : public CallStream<Reactor> {
   std::atomic<std::thread::id> holder_ = std::thread::id();
   // The rest is guarded by the mutex.
   std::deque<Waiting> waiting_;
-  Waiting in_flight_;
+  // The reply that is being written, as gRPC sends it, and the size that it was queued with.
+  grpc::ByteBuffer bytes_;
+  size_t bytes_in_flight_ = 0;
   size_t unsent_bytes_ = 0;
   bool writing_ = false;
   // Set once nothing more is to come.

@@ -4,40 +4,68 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
-#include <functional>
-#include <optional>
+#include <utility>
 
 #include "server/call/call.h"
+#include "server/call/message_bytes.h"
+#include "server/call/request_memory.h"
 #include "server/process/worker_pool.h"
 
 namespace hulld::server {
 
+// The request that a unary call brought and where its response goes, as gRPC holds them until the
+// call ends.
+struct UnaryBytes {
+  const grpc::ByteBuffer* request;
+  grpc::ByteBuffer* response;
+};
+
 // One unary call, answered on any thread; it owns itself until gRPC is done with it.
+template <typename Request, typename Response>
 class UnaryCall : public grpc::ServerUnaryReactor {
  public:
-  // Admits a call and hands it to `start`, which must see to it that End is called exactly once,
-  // now or later. A call that is not admitted ends at once.
+  // Admits a call, parses its request, and hands it to `start`, which must see to it that End is
+  // called exactly once, now or later. A call that is not admitted, or malformed, ends at once.
+  template <typename Step>
   static grpc::ServerUnaryReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                                         Rpc rpc, const std::function<void(UnaryCall*)>& start);
+                                         Rpc rpc, const UnaryBytes& bytes, Step&& start) {
+    auto* call = new UnaryCall(context, admission, rpc, bytes.response);
+    absl::Status begun = call->call_.Begin();
+    if (begun.ok()) {
+      grpc::ByteBuffer request = TakenFrom(*bytes.request);
+      begun = ParseRequest(request, admission.request_memory(), &call->request_, call->share_);
+    }
+    if (begun.ok()) {
+      start(call);
+    } else {
+      call->End(begun);
+    }
+    return call;
+  }
 
-  // Starts a call that `work` answers here and now; for work of microseconds.
-  static grpc::ServerUnaryReactor* Answer(grpc::CallbackServerContext& context,
-                                          Admission& admission, Rpc rpc,
-                                          const std::function<absl::Status(const Call&)>& work);
+  // Ends the call with what `work` gives, on `pool`. Requires that it did not end.
+  template <typename Work>
+  void EndOn(WorkerPool& pool, Work work) {
+    pool.Submit(
+        [this, work = std::move(work)] { End(call_.ShouldStop() ? call_.StopStatus() : work()); });
+  }
 
-  // Starts a call that `work` answers on `pool`.
-  static grpc::ServerUnaryReactor* AnswerOn(WorkerPool& pool, grpc::CallbackServerContext& context,
-                                            Admission& admission, Rpc rpc,
-                                            std::function<absl::Status(const Call&)> work);
-
-  // Sends the reply; the call, its request and its response must not be touched afterwards.
-  void End(const absl::Status& status);
+  // Sends the response, or the error; the call must not be touched afterwards.
+  void End(const absl::Status& status) {
+    // What stopped the work is better known here than where it was noticed.
+    const bool stopped = status.code() == absl::StatusCode::kCancelled && call_.ShouldStop();
+    if (status.ok()) *response_bytes_ = SerializeReply(response_);
+    Finish(call_.End(stopped ? call_.StopStatus() : status));
+  }
 
   const Call& call() const { return call_; }
+  const Request& request() const { return request_; }
+  Response& response() { return response_; }
 
  private:
-  UnaryCall(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc)
-      : call_(context, admission, rpc) {}
+  UnaryCall(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc,
+            grpc::ByteBuffer* response)
+      : call_(context, admission, rpc), response_bytes_(response) {}
 
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { delete this; }
@@ -47,6 +75,10 @@ class UnaryCall : public grpc::ServerUnaryReactor {
   bool InternalInlineable() override { return true; }
 
   Call call_;
+  grpc::ByteBuffer* const response_bytes_;
+  RequestMemory::Share share_;
+  Request request_;
+  Response response_;
 };
 
 }  // namespace hulld::server

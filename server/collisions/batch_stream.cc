@@ -29,40 +29,41 @@ void Append(const v1::BatchCheckCollisionsResponse& next,
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, TaskPool& pool, Executor& executor,
-    const v1::BatchCheckCollisionsRequest& request) {
+WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                 Registry& registry, WorkerPool& readers, TaskPool& pool,
+                                 Executor& executor, const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BatchStream>(
       new BatchStream(context, admission, registry, readers, pool, executor, request)));
 }
 
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
-                         Executor& executor, const v1::BatchCheckCollisionsRequest& request)
-    : PiecedReplies(context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
-                    {kFirstPairs, kMostPairs,
-                     request.placements_size() + request.packed_placements().hulls_size() <=
-                         kMostShortPlacements}),
+                         Executor& executor, const grpc::ByteBuffer& request)
+    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
+                    {kFirstPairs, kMostPairs}),
       registry_(registry),
       team_threads_(executor.threads()),
-      team_lane_(executor.opener()),
-      request_(request),
-      pair_count_(static_cast<uint64_t>(request.pairs_size()) / 2) {}
+      team_lane_(executor.opener()) {}
+
+bool BatchStream::IsShort() const {
+  return request().placements_size() + request().packed_placements().hulls_size() <=
+         kMostShortPlacements;
+}
 
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(request_.method(), request_.wanted(), request_.tolerance(),
+      MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
                        registry_.limits(), call().lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request_.placements(), request_.packed_placements(), call().caller(),
+      PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
+  pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
   call().AddPairs(pair_count_);
-  return ValidatePairs(request_.pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
+  return ValidatePairs(request().pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
                        "the batch");
 }
 
@@ -86,7 +87,7 @@ uint64_t BatchStream::Begin() {
 }
 
 PlacedPair BatchStream::PairAt(uint64_t i) const {
-  return {request_.pairs(static_cast<int>(2 * i)), request_.pairs(static_cast<int>(2 * i + 1))};
+  return {request().pairs(static_cast<int>(2 * i)), request().pairs(static_cast<int>(2 * i + 1))};
 }
 
 bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
@@ -112,7 +113,7 @@ void BatchStream::Submit(PairsPiece& piece) {
 }
 
 absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
-  BatchColumns columns({}, request_.wanted(), piece.next);
+  BatchColumns columns({}, request().wanted(), piece.next);
   do {
     const uint64_t until = std::min(piece.end, piece.next + kPairsPerLook);
     if (absl::Status s = Answer(piece.next, until, &columns); !s.ok()) return s;
@@ -140,7 +141,7 @@ absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* col
     if (answer.ok()) {
       counts.Add(answer->rung);
     } else {
-      answer = NameQueryLimit(answer.status());
+      answer = NameQueryLimit(answer.status(), options);
       call().CountLimit(answer.status());
     }
     columns->Add(answer, a, b);
@@ -151,9 +152,14 @@ absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* col
 
 void BatchStream::Deliver(PairsPiece& piece) {
   if (has_head_ && !piece.replies.empty()) {
-    Append(piece.replies.front(), &head_);
-    piece.replies.front() = std::move(head_);
-    piece.reply_bytes.front() = piece.replies.front().ByteSizeLong();
+    const size_t bytes = head_.ByteSizeLong();
+    if (bytes + piece.reply_bytes.front() > Config::kReplyMessageBytes) {
+      Queue(std::move(head_), bytes);
+    } else {
+      Append(piece.replies.front(), &head_);
+      piece.replies.front() = std::move(head_);
+      piece.reply_bytes.front() = piece.replies.front().ByteSizeLong();
+    }
     has_head_ = false;
   }
   DeliverReplies(piece);

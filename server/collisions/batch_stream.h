@@ -22,22 +22,22 @@ namespace hulld::server {
 
 // One BatchCheckCollisions call: resolves every hull once, on a reader thread, then answers ranges
 // of pairs on all threads of the pool.
-class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
-                                         Piece<v1::BatchCheckCollisionsResponse>> {
+class BatchStream
+    : public PiecedReplies<v1::BatchCheckCollisionsRequest, v1::BatchCheckCollisionsResponse,
+                           Piece<v1::BatchCheckCollisionsResponse>> {
  public:
-  // `request` must outlive the call, as gRPC's requests do.
-  static grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, TaskPool& pool, Executor& executor,
-      const v1::BatchCheckCollisionsRequest& request);
+  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                             Registry& registry, WorkerPool& readers, TaskPool& pool,
+                             Executor& executor, const grpc::ByteBuffer& request);
 
  private:
   using PairsPiece = Piece<v1::BatchCheckCollisionsResponse>;
 
   BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               WorkerPool& readers, TaskPool& pool, Executor& executor,
-              const v1::BatchCheckCollisionsRequest& request);
+              const grpc::ByteBuffer& request);
 
+  bool IsShort() const override;
   absl::Status Validate() override;
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
@@ -60,10 +60,9 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsResponse,
   // The size of the team, and the turns of this call on it.
   const int team_threads_;
   TaskPool::Lane team_lane_;
-  const v1::BatchCheckCollisionsRequest& request_;
-  const uint64_t pair_count_;
 
   // Written before the first piece.
+  uint64_t pair_count_ = 0;
   QueryOptions options_;
   PlacementTable table_;
 

@@ -133,7 +133,7 @@ absl::Status CollisionService::PairQuery::Place(Registry& registry,
 absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metrics& metrics,
                                                  v1::CheckCollisionResponse* response) const {
   const auto answer = hulld::CheckCollision(placed_a(), placed_b(), options);
-  if (!answer.ok()) return NameQueryLimit(answer.status());
+  if (!answer.ok()) return NameQueryLimit(answer.status(), options);
   RungCounts counts;
   counts.Add(answer->rung);
   metrics.CountPairs(counts);
@@ -153,30 +153,36 @@ absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metri
 }
 
 grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
-                                                           const v1::CheckCollisionRequest* request,
-                                                           v1::CheckCollisionResponse* response) {
-  return UnaryCall::Start(*context, admission_, Rpc::kCheckCollision, [&](UnaryCall* call) {
-    pool_.NoteSingleCall();
-    absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), *request);
-    if (!query.ok()) return call->End(query.status());
-    std::optional<Resolved> ready = registry_.TryResolve(HullIds(*request));
-    if (ready.has_value() && AreReady(*ready, query->options)) {
-      const absl::Status placed = query->Place(registry_, *std::move(ready), response);
-      if (!placed.ok()) return call->End(placed);
-      return Compute(*std::move(query), request->wanted(), call, response);
-    }
-    // Waits for the store, or for canonical snapshots to be made.
-    readers_.Submit([this, call, request, response, query = *std::move(query)]() mutable {
-      const absl::Status placed = query.Place(
-          registry_, registry_.Resolve(HullIds(*request), query.options.should_stop), response);
-      if (!placed.ok()) return call->End(placed);
-      Compute(std::move(query), request->wanted(), call, response);
-    });
+                                                           const grpc::ByteBuffer* request,
+                                                           grpc::ByteBuffer* response) {
+  return CheckCall::Start(*context, admission_, Rpc::kCheckCollision, {request, response},
+                          [this](CheckCall* call) { Check(call); });
+}
+
+void CollisionService::Check(CheckCall* call) {
+  pool_.NoteSingleCall();
+  const v1::CheckCollisionRequest& request = call->request();
+  absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), request);
+  if (!query.ok()) return call->End(query.status());
+  std::optional<Resolved> ready = registry_.TryResolve(HullIds(request));
+  if (ready.has_value() && AreReady(*ready, query->options)) {
+    const absl::Status placed = query->Place(registry_, *std::move(ready), &call->response());
+    if (!placed.ok()) return call->End(placed);
+    return Compute(*std::move(query), call);
+  }
+  // Waits for the store, or for canonical snapshots to be made.
+  readers_.Submit([this, call, query = *std::move(query)]() mutable {
+    const absl::Status placed = query.Place(
+        registry_, registry_.Resolve(HullIds(call->request()), query.options.should_stop),
+        &call->response());
+    if (!placed.ok()) return call->End(placed);
+    Compute(std::move(query), call);
   });
 }
 
-void CollisionService::Compute(PairQuery query, const v1::Wanted& wanted, UnaryCall* call,
-                               v1::CheckCollisionResponse* response) {
+void CollisionService::Compute(PairQuery query, CheckCall* call) {
+  const v1::Wanted& wanted = call->request().wanted();
+  v1::CheckCollisionResponse* const response = &call->response();
   Metrics& metrics = call->call().metrics();
   if (query.options.WantsRelationOnly() && query.IsQuick()) {
     return call->End(query.Answer(wanted, metrics, response));
@@ -184,30 +190,28 @@ void CollisionService::Compute(PairQuery query, const v1::Wanted& wanted, UnaryC
   const bool is_for_team = query.IsForTeam();
   if (is_for_team) query.options.threads = executor_.threads();
   TaskPool& pool = is_for_team ? executor_.opener() : pool_;
-  // The request, hence `wanted`, lives until the call ends.
+  // `wanted` lives until the call ends.
   pool.Submit([call, response, &wanted, &metrics, query = std::move(query)] {
     call->End(query.Answer(wanted, metrics, response));
   });
 }
 
-grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* CollisionService::BatchCheckCollisions(
-    grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest* request) {
+WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
+                                                     const grpc::ByteBuffer* request) {
   return BatchStream::Start(*context, admission_, registry_, long_readers_, pool_, executor_,
                             *request);
 }
 
-grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
-CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
+BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
   return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
 }
 
-grpc::ServerWriteReactor<v1::FindCollisionsResponse>* CollisionService::FindCollisions(
-    grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) {
+WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
+                                               const grpc::ByteBuffer* request) {
   return SceneStream::Start(*context, admission_, registry_, long_readers_, pool_, *request);
 }
 
-grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>*
-CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
+BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
   return CollisionWatch::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
 }
 

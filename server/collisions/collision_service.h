@@ -5,6 +5,7 @@
 
 #include "hulld/v1/collision.grpc.pb.h"
 #include "server/call/admission.h"
+#include "server/call/call_stream.h"
 #include "server/call/unary_call.h"
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
@@ -13,13 +14,21 @@
 
 namespace hulld::server {
 
+// The generated service; its methods take and give bytes (message_bytes.h).
+using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_CheckCollision<
+    v1::CollisionService::WithRawCallbackMethod_BatchCheckCollisions<
+        v1::CollisionService::WithRawCallbackMethod_StreamCollisions<
+            v1::CollisionService::WithRawCallbackMethod_FindCollisions<
+                v1::CollisionService::WithRawCallbackMethod_WatchCollisions<
+                    v1::CollisionService::Service>>>>>;
+
 // hulld.v1.CollisionService: the contract in collision.proto over core's queries. A single pair is
 // answered where it arrives, on gRPC's thread, when only its relation is wanted and its hulls are
 // of moderate size and ready. Everything else is computed by `pool`: single pairs and the steps of
 // streams ahead of slices of batches, scenes and long steps. What may wait for the store, and what
 // makes canonical snapshots, runs on `readers`, hulls of one pair, or `long_readers`, hulls of
 // many. Pairs for TEXTBOOK_SAT whose loop over axes is worth a team of threads go to the executor.
-class CollisionService : public v1::CollisionService::CallbackService {
+class CollisionService : public CollisionServiceOfBytes {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
                    WorkerPool& long_readers, TaskPool& pool, Executor& executor)
@@ -31,24 +40,22 @@ class CollisionService : public v1::CollisionService::CallbackService {
         executor_(executor) {}
 
   grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
-                                           const v1::CheckCollisionRequest* request,
-                                           v1::CheckCollisionResponse* response) override;
-  grpc::ServerWriteReactor<v1::BatchCheckCollisionsResponse>* BatchCheckCollisions(
-      grpc::CallbackServerContext* context,
-      const v1::BatchCheckCollisionsRequest* request) override;
-  grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
-  StreamCollisions(grpc::CallbackServerContext* context) override;
-  grpc::ServerWriteReactor<v1::FindCollisionsResponse>* FindCollisions(
-      grpc::CallbackServerContext* context, const v1::FindCollisionsRequest* request) override;
-  grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>* WatchCollisions(
-      grpc::CallbackServerContext* context) override;
+                                           const grpc::ByteBuffer* request,
+                                           grpc::ByteBuffer* response) override;
+  WriteReactor* BatchCheckCollisions(grpc::CallbackServerContext* context,
+                                     const grpc::ByteBuffer* request) override;
+  BidiReactor* StreamCollisions(grpc::CallbackServerContext* context) override;
+  WriteReactor* FindCollisions(grpc::CallbackServerContext* context,
+                               const grpc::ByteBuffer* request) override;
+  BidiReactor* WatchCollisions(grpc::CallbackServerContext* context) override;
 
  private:
+  using CheckCall = UnaryCall<v1::CheckCollisionRequest, v1::CheckCollisionResponse>;
   struct PairQuery;
 
+  void Check(CheckCall* call);
   // Answers the query on the thread that suits it.
-  void Compute(PairQuery query, const v1::Wanted& wanted, UnaryCall* call,
-               v1::CheckCollisionResponse* response);
+  void Compute(PairQuery query, CheckCall* call);
 
   Registry& registry_;
   Admission& admission_;

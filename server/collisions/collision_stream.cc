@@ -8,7 +8,6 @@
 
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
-#include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
@@ -29,10 +28,9 @@ constexpr size_t kIndexBytes = 5;
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>*
-CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                       Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
-                       TaskPool& pool) {
+BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                    Registry& registry, WorkerPool& readers,
+                                    WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionStream>(
       new CollisionStream(context, admission, registry, readers, long_readers, pool)));
 }
@@ -247,7 +245,7 @@ void CollisionStream::AnswerSlice() {
   }
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (next_asked_ < asked_.size()) {
-    if (reply_bytes_ >= Config::kReplyMessageBytes) break;
+    if (reply_bytes_ >= FullMessageBytes(wanted_)) break;
     AddAnswer(asked_[next_asked_++]);
     if (next_asked_ % kPairsPerLook != 0) continue;
     if (call().ShouldStop()) break;

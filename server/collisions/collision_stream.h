@@ -27,14 +27,12 @@ namespace hulld::server {
 // Long answers are computed in slices, between which other calls get their turn, and sent in
 // pieces.
 class CollisionStream
-    : public ReadingStream<PulledStream<grpc::ServerBidiReactor<v1::StreamCollisionsRequest,
-                                                                v1::StreamCollisionsResponse>,
-                                        v1::StreamCollisionsResponse>,
+    : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
  public:
-  static grpc::ServerBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool);
+  static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
+                            TaskPool& pool);
 
  private:
   // What is kept of a pair from one answer to the next.

@@ -48,10 +48,9 @@ v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, 
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>*
-CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
-                      Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
-                      TaskPool& pool) {
+BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                   Registry& registry, WorkerPool& readers,
+                                   WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionWatch>(
       new CollisionWatch(context, admission, registry, readers, long_readers, pool)));
 }
@@ -104,6 +103,7 @@ void CollisionWatch::EndWork(const absl::Status& error) {
 void CollisionWatch::TakeMessage() {
   const absl::Status status = HandleMessage();
   if (!status.ok()) return EndWork(status);
+  request().Clear();
   answers_message_ = true;
   Tell();
 }
@@ -182,7 +182,8 @@ absl::Status CollisionWatch::WatchHulls() {
     if (!hulls_of_.contains(id)) target.ids.push_back(id);
     hulls_of_.emplace(id, k);
   }
-  if (target.ids.empty()) return registry_.CheckMemory();
+  // No hull has this ID; the watch ends when the server drains, like any other.
+  if (target.ids.empty()) target.ids.emplace_back();
   absl::StatusOr<std::shared_ptr<ChangeWatch>> watch = registry_.OpenWatch(
       target, {}, [this, self = shared_from_this()] { Locked([this] { are_hulls_due_ = true; }); });
   if (!watch.ok()) return watch.status();
@@ -197,8 +198,12 @@ absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update
   std::vector<uint32_t> changed;
   changed.reserve(moves->size());
   for (const auto& [placement, pose] : *moves) {
+    const absl::Status before = table_.problem(placement);
     table_.Move(placement, pose);
     changed.push_back(placement);
+    // It may lack a hull, too.
+    const absl::Status& now = table_.problem(placement);
+    if (!now.ok() && now != before) problems_to_tell_.push_back(placement);
   }
   return AskAbout(changed);
 }
@@ -218,26 +223,36 @@ void CollisionWatch::TakeChanges() {
 
 absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
   std::vector<size_t> hulls;
-  for (const HullChange& change : piece.changes) {
+  if (piece.anew) {
+    // Which of them changed is not known.
+    hulls.resize(table_.hull_ids().size());
+    std::iota(hulls.begin(), hulls.end(), size_t{0});
+  }
+  for (size_t n = 0; n < piece.changes.size() && !piece.anew; ++n) {
+    const HullChange& change = piece.changes[n];
     const auto [begin, end] = hulls_of_.equal_range(change.record.hull_id);
     for (auto hull = begin; hull != end; ++hull) hulls.push_back(hull->second);
   }
-  if (hulls.empty()) return absl::OkStatus();
+  if (hulls.empty() && piece.revision <= revision_) return absl::OkStatus();
   if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
-  revision_ = piece.revision;
+  revision_ = std::max(revision_, piece.revision);
   std::vector<uint32_t> changed;
   for (const size_t k : hulls) {
     const std::span<const uint32_t> placements = table_.placements_of(k);
-    if (placements.empty() || !table_.hull_changed(placements.front())) continue;
+    if (placements.empty()) continue;
+    if (table_.query_hull_changed(placements.front())) {
+      for (const uint32_t i : placements) pairs_.ForgetPoints(i);
+    }
+    if (!table_.hull_changed(placements.front())) continue;
     const bool is_there = table_.hull(k).ok();
     if (is_there) hulls_to_tell_.push_back(k);
     for (const uint32_t i : placements) {
       changed.push_back(i);
       if (!is_there) problems_to_tell_.push_back(i);
-      pairs_.ForgetPoints(i);
     }
   }
-  return changed.empty() ? absl::OkStatus() : AskAbout(changed);
+  // Where nothing changed any more, the revision moved on, which is told.
+  return AskAbout(changed);
 }
 
 absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {

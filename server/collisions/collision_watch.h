@@ -30,15 +30,12 @@ namespace hulld::server {
 //
 // The mutex guards which work is under way. What the work itself uses belongs to the one task that
 // runs.
-class CollisionWatch
-    : public ReadingStream<QueuedStream<grpc::ServerBidiReactor<v1::WatchCollisionsRequest,
-                                                                v1::WatchCollisionsResponse>,
-                                        v1::WatchCollisionsResponse>,
-                           v1::WatchCollisionsRequest> {
+class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchCollisionsResponse>,
+                                            v1::WatchCollisionsRequest> {
  public:
-  static grpc::ServerBidiReactor<v1::WatchCollisionsRequest, v1::WatchCollisionsResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool);
+  static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
+                            TaskPool& pool);
 
  private:
   CollisionWatch(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,

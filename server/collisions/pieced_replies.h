@@ -55,10 +55,10 @@ struct Piece {
 // a client that does not read holds up no other.
 //
 // Work: what a piece keeps from one slice to the next, derived from Piece<Reply>.
-template <typename Reply, typename Work>
-class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply> {
+template <typename Request, typename Reply, typename Work>
+class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Request> {
  protected:
-  using Base = QueuedStream<grpc::ServerWriteReactor<Reply>, Reply>;
+  using Base = RequestStream<QueuedStream<WriteReactor, Reply>, Request>;
   using Clock = std::chrono::steady_clock;
 
   // Bytes that may wait for the client before no slice is started. A choice: some messages, so that
@@ -75,23 +75,23 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
     WorkerPool& readers;
     TaskPool& pool;
   };
-  // How pieces grow, and whether preparing takes about a slice when nothing has to be waited for.
+  // How pieces grow.
   struct Shape {
     uint64_t first_units;
     uint64_t most_units;
-    bool is_short;
   };
 
-  PiecedReplies(grpc::CallbackServerContext& context, Admission& admission, Rpc rpc,
-                const Threads& threads, const Shape& shape)
-      : Base(context, admission, rpc),
+  PiecedReplies(const grpc::ByteBuffer& request, grpc::CallbackServerContext& context,
+                Admission& admission, Rpc rpc, const Threads& threads, const Shape& shape)
+      : Base(request, context, admission, rpc),
         readers_(threads.readers),
-        is_short_(shape.is_short),
         lane_(threads.pool),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
         piece_units_(shape.first_units) {}
 
+  // Whether preparing takes about a slice when nothing has to be waited for.
+  virtual bool IsShort() const = 0;
   // The call is prepared step by step, without the mutex, on one thread at a time.
   virtual absl::Status Validate() = 0;
   // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
@@ -162,7 +162,7 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
  private:
   // A short call whose hulls are ready need not wait for another thread.
   void Open() final {
-    if (is_short_) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
+    if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
     this->RunOn(readers_, [this] { OpenWith(Validate(), true); });
   }
 
@@ -228,7 +228,6 @@ class PiecedReplies : public QueuedStream<grpc::ServerWriteReactor<Reply>, Reply
   }
 
   WorkerPool& readers_;
-  const bool is_short_;
   TaskPool::Lane lane_;
   const size_t most_pieces_;
   const uint64_t most_units_;

@@ -50,6 +50,8 @@ class PlacementTable {
   size_t MemoryBytes() const;
   std::span<const PlacedHull> placed() const { return placed_; }
   bool is_answerable(size_t i) const { return problem(i).ok(); }
+  // Why not, else OK. Requires that the hulls were resolved.
+  const absl::Status& problem(size_t i) const;
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
   bool hull_changed(size_t i) const;
   // Whether it gave it another QueryHull, perhaps of the same hull: what was found before must not
@@ -103,7 +105,6 @@ class PlacementTable {
 
   void Take(const Registry& registry, Resolved resolved, bool canonical);
   void SortByHull();
-  const absl::Status& problem(size_t i) const;
   PlacedHull Place(size_t i) const;
 
   std::vector<Entry> entries_;

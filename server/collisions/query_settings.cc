@@ -65,9 +65,9 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
   return axes * static_cast<double>(a.vertices().size() + b.vertices().size()) > kTeamProjections;
 }
 
-absl::Status NameQueryLimit(const absl::Status& status) {
+absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
-  return AtLimit(status, "max-textbook-axes");
+  return AtLimit(status, options.max_textbook_axes, "max-textbook-axes");
 }
 
 }  // namespace hulld::server

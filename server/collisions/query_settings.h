@@ -26,8 +26,9 @@ bool IsQuickToRelate(const QueryHull& hull);
 // size of the hulls.
 bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& a, const PlacedHull& b);
 
-// An error of core's query in the words of the server: RESOURCE_EXHAUSTED names the limit's flag.
-absl::Status NameQueryLimit(const absl::Status& status);
+// An error of a query with these options in the words of the server: RESOURCE_EXHAUSTED names the
+// limit and its flag.
+absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options);
 
 }  // namespace hulld::server
 

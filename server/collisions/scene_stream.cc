@@ -6,7 +6,6 @@
 
 #include "server/collisions/query_settings.h"
 #include "server/collisions/scene_groups.h"
-#include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 
 namespace hulld::server {
@@ -49,38 +48,40 @@ void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::FindCollisionsResponse>* SceneStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, TaskPool& pool, const v1::FindCollisionsRequest& request) {
+WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                 Registry& registry, WorkerPool& readers, TaskPool& pool,
+                                 const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<SceneStream>(
       new SceneStream(context, admission, registry, readers, pool, request)));
 }
 
 SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
-                         const v1::FindCollisionsRequest& request)
-    : PiecedReplies(context, admission, Rpc::kFindCollisions, {readers, pool},
-                    {kFirstPlacements, kMostPlacements,
-                     request.placements_size() + request.packed_placements().hulls_size() <=
-                         kMostShortPlacements}),
-      registry_(registry),
-      request_(request) {}
+                         const grpc::ByteBuffer& request)
+    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, {readers, pool},
+                    {kFirstPlacements, kMostPlacements}),
+      registry_(registry) {}
+
+bool SceneStream::IsShort() const {
+  return request().placements_size() + request().packed_placements().hulls_size() <=
+         kMostShortPlacements;
+}
 
 absl::Status SceneStream::Validate() {
   absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, request_.wanted(), request_.tolerance(),
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, request().wanted(), request().tolerance(),
                        registry_.limits(), call().lifetime());
   if (!options.ok()) return options.status();
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request_.placements(), request_.packed_placements(), call().caller(),
+      PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
-  if (absl::Status s = ValidateGroups(request_, table_.size()); !s.ok()) return s;
-  ignored_groups_ = IgnoredGroups(request_);
+  if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
+  ignored_groups_ = IgnoredGroups(request());
   options_.ignored_groups = ignored_groups_;
-  options_.groups = {request_.groups().data(), static_cast<size_t>(request_.groups_size())};
-  if (request_.has_movers()) options_.movers = request_.movers();
+  options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
+  if (request().has_movers()) options_.movers = request().movers();
   options_.query = *std::move(options);
   return absl::OkStatus();
 }
@@ -137,7 +138,7 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
     if (answer.ok()) piece.rungs.Add(answer->rung);
     if (answer.ok() && !search_->IsFound(*answer)) continue;
     reply_bytes += AddFound(a, b, answer, piece, &reply);
-    if (reply_bytes < Config::kReplyMessageBytes) continue;
+    if (reply_bytes < FullMessageBytes(request().wanted())) continue;
     piece.Add(std::exchange(reply, {}));
     reply_bytes = 0;
   }
@@ -151,7 +152,7 @@ size_t SceneStream::AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer
   const int position = reply->pairs_size() / 2;
   reply->add_pairs(a);
   reply->add_pairs(b);
-  const size_t bytes = AddAnswer(answer, table_.placed()[a], table_.placed()[b], request_.wanted(),
+  const size_t bytes = AddAnswer(answer, table_.placed()[a], table_.placed()[b], request().wanted(),
                                  reply->mutable_columns());
   Count(reply->columns().relations(position), &piece.totals);
   return kPairBytes + bytes;

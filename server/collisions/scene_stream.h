@@ -33,17 +33,18 @@ struct ScenePiece : Piece<v1::FindCollisionsResponse> {
 
 // One FindCollisions call: resolves every hull once and builds the tree of boxes, on a reader
 // thread, then searches ranges of placements on all threads of the pool.
-class SceneStream : public PiecedReplies<v1::FindCollisionsResponse, ScenePiece> {
+class SceneStream
+    : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
-  // `request` must outlive the call, as gRPC's requests do.
-  static grpc::ServerWriteReactor<v1::FindCollisionsResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, TaskPool& pool, const v1::FindCollisionsRequest& request);
+  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                             Registry& registry, WorkerPool& readers, TaskPool& pool,
+                             const grpc::ByteBuffer& request);
 
  private:
   SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-              WorkerPool& readers, TaskPool& pool, const v1::FindCollisionsRequest& request);
+              WorkerPool& readers, TaskPool& pool, const grpc::ByteBuffer& request);
 
+  bool IsShort() const override;
   absl::Status Validate() override;
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
@@ -60,7 +61,6 @@ class SceneStream : public PiecedReplies<v1::FindCollisionsResponse, ScenePiece>
                   v1::FindCollisionsResponse* reply);
 
   Registry& registry_;
-  const v1::FindCollisionsRequest& request_;
 
   // Written before the first piece.
   SceneOptions options_;

@@ -17,9 +17,9 @@ constexpr char kRetryPayload[] = "hulld/retry-ms";
 
 }  // namespace
 
-absl::Status AtLimit(const absl::Status& status, const std::string& flag) {
+absl::Status AtLimit(const absl::Status& status, uint64_t limit, const std::string& flag) {
   return WithReason(absl::ResourceExhaustedError(absl::StrCat(status.message(), " (--", flag, ")")),
-                    v1::ERROR_REASON_LIMIT_EXCEEDED, {{kFlag, flag}});
+                    v1::ERROR_REASON_LIMIT_EXCEEDED, {{kFlag, flag}, {kLimit, limit}});
 }
 
 absl::Status LimitExceeded(const std::string& what, const std::string& limit,

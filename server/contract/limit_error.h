@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -21,7 +22,7 @@ absl::Status Overloaded(const std::string& what, uint64_t limit, const std::stri
                         std::chrono::milliseconds retry);
 
 // LimitExceeded for a limit that core was given: core's words, followed by the flag.
-absl::Status AtLimit(const absl::Status& status, const std::string& flag);
+absl::Status AtLimit(const absl::Status& status, uint64_t limit, const std::string& flag);
 
 // The flag whose limit caused this error, if one did.
 std::optional<std::string> ExceededLimit(const absl::Status& status);

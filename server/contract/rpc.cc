@@ -36,6 +36,8 @@ const char* RpcName(Rpc rpc) {
       return "WatchHulls";
     case Rpc::kWatchCollisions:
       return "WatchCollisions";
+    case Rpc::kServerReflectionInfo:
+      return "ServerReflectionInfo";
   }
   HULLD_UNREACHABLE();
 }

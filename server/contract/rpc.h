@@ -22,9 +22,11 @@ enum class Rpc {
   kSaveBackup,
   kWatchHulls,
   kWatchCollisions,
+  // Of gRPC's own protocol.
+  kServerReflectionInfo,
 };
 
-inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kWatchCollisions) + 1;
+inline constexpr size_t kRpcCount = static_cast<size_t>(Rpc::kServerReflectionInfo) + 1;
 
 // As in the contract: "CheckCollision".
 const char* RpcName(Rpc rpc);

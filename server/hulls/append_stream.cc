@@ -34,8 +34,8 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 
 }  // namespace
 
-grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Registry& registry) {
+BidiReactor* AppendStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                 Registry& registry) {
   return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, registry)));
 }
 

@@ -20,14 +20,11 @@ namespace hulld::server {
 // memory; what was built waits for its commit without its points. An ack that cannot be sent yet
 // because the one before is still on its way is merged with the next. Reading does not wait for
 // writing, so a client that sends everything before it reads an ack is served too.
-class AppendStream
-    : public ReadingStream<
-          QueuedStream<grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>,
-                       v1::AppendPointsResponse>,
-          v1::AppendPointsRequest> {
+class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPointsResponse>,
+                                          v1::AppendPointsRequest> {
  public:
-  static grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry);
+  static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                            Registry& registry);
 
  private:
   AppendStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry)

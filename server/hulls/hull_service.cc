@@ -28,71 +28,75 @@ void EncodeBox(const ServedHull& hull, v1::GetHullResponse* response) {
 }  // namespace
 
 grpc::ServerUnaryReactor* HullService::CreateHull(grpc::CallbackServerContext* context,
-                                                  const v1::CreateHullRequest* request,
-                                                  v1::CreateHullResponse* response) {
-  return UnaryCall::Start(*context, admission_, Rpc::kCreateHull,
-                          [&](UnaryCall* call) { Create(*request, response, call); });
+                                                  const grpc::ByteBuffer* request,
+                                                  grpc::ByteBuffer* response) {
+  return CreateCall::Start(*context, admission_, Rpc::kCreateHull, {request, response},
+                           [this](CreateCall* call) { Create(call); });
 }
 
-grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>*
-HullService::AppendPoints(grpc::CallbackServerContext* context) {
+BidiReactor* HullService::AppendPoints(grpc::CallbackServerContext* context) {
   return AppendStream::Start(*context, admission_, registry_);
 }
 
-grpc::ServerReadReactor<v1::ReplaceHullRequest>* HullService::ReplaceHull(
-    grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) {
+ReadReactor* HullService::ReplaceHull(grpc::CallbackServerContext* context,
+                                      grpc::ByteBuffer* response) {
   return ReplaceStream::Start(*context, admission_, registry_, writers_, response);
 }
 
 grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* context,
-                                               const v1::GetHullRequest* request,
-                                               v1::GetHullResponse* response) {
-  // An audit takes as long as the hull is large.
-  return UnaryCall::AnswerOn(
-      request->audit() ? long_readers_ : readers_, *context, admission_, Rpc::kGetHull,
-      [this, request, response](const Call& call) { return Get(*request, call, response); });
+                                               const grpc::ByteBuffer* request,
+                                               grpc::ByteBuffer* response) {
+  return GetCall::Start(
+      *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
+        // An audit takes as long as the hull is large.
+        call->EndOn(call->request().audit() ? long_readers_ : readers_,
+                    [this, call] { return Get(call->request(), call->call(), &call->response()); });
+      });
 }
 
-grpc::ServerWriteReactor<v1::GetHullMeshResponse>* HullService::GetHullMesh(
-    grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) {
+WriteReactor* HullService::GetHullMesh(grpc::CallbackServerContext* context,
+                                       const grpc::ByteBuffer* request) {
   return MeshStream::Start(*context, admission_, registry_, long_readers_, *request);
 }
 
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
-                                                 const v1::ListHullsRequest* request,
-                                                 v1::ListHullsResponse* response) {
-  return UnaryCall::Answer(*context, admission_, Rpc::kListHulls,
-                           [&](const Call& call) { return List(*request, call, response); });
+                                                 const grpc::ByteBuffer* request,
+                                                 grpc::ByteBuffer* response) {
+  return ListCall::Start(*context, admission_, Rpc::kListHulls, {request, response},
+                         [this](ListCall* call) {
+                           call->End(List(call->request(), call->call(), &call->response()));
+                         });
 }
 
 grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
-                                                  const v1::DeleteHullRequest* request,
-                                                  v1::DeleteHullResponse* response) {
-  return UnaryCall::Start(*context, admission_, Rpc::kDeleteHull,
-                          [&](UnaryCall* call) { Delete(*request, response, call); });
+                                                  const grpc::ByteBuffer* request,
+                                                  grpc::ByteBuffer* response) {
+  return DeleteCall::Start(*context, admission_, Rpc::kDeleteHull, {request, response},
+                           [this](DeleteCall* call) { Delete(call); });
 }
 
-grpc::ServerWriteReactor<v1::WatchHullsResponse>* HullService::WatchHulls(
-    grpc::CallbackServerContext* context, const v1::WatchHullsRequest* request) {
+WriteReactor* HullService::WatchHulls(grpc::CallbackServerContext* context,
+                                      const grpc::ByteBuffer* request) {
   return WatchStream::Start(*context, admission_, registry_, readers_, *request);
 }
 
-void HullService::Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,
-                         UnaryCall* call) {
+void HullService::Create(CreateCall* call) {
+  const v1::CreateHullRequest& request = call->request();
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
   registry_.Create(request.hull_id(), request.if_absent(),
-                   [this, response, call](const absl::StatusOr<CreateResult>& created) {
+                   [this, call](const absl::StatusOr<CreateResult>& created) {
                      if (!created.ok()) return call->End(created.status());
                      const HullRecord& hull = created->hull;
                      if (created->created) {
                        call->call().Log(LogLevel::kInfo, "hull created", {{"hull", hull.hull_id}});
                      }
+                     v1::CreateHullResponse& response = call->response();
                      EncodeHeader(registry_.store(), created->store_revision,
-                                  response->mutable_header());
-                     EncodeRecord(hull, response->mutable_hull());
-                     response->set_created(created->created);
+                                  response.mutable_header());
+                     EncodeRecord(hull, response.mutable_hull());
+                     response.set_created(created->created);
                      call->End(absl::OkStatus());
                    });
 }
@@ -144,19 +148,18 @@ absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& 
   return absl::OkStatus();
 }
 
-void HullService::Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
-                         UnaryCall* call) {
+void HullService::Delete(DeleteCall* call) {
+  const v1::DeleteHullRequest& request = call->request();
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
   registry_.Delete(
-      request.hull_id(), if_revision,
-      [this, &request, response, call](const absl::StatusOr<uint64_t>& revision) {
+      request.hull_id(), if_revision, [this, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
-        call->call().Log(LogLevel::kInfo, "hull deleted", {{"hull", request.hull_id()}});
-        EncodeHeader(registry_.store(), *revision, response->mutable_header());
+        call->call().Log(LogLevel::kInfo, "hull deleted", {{"hull", call->request().hull_id()}});
+        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
         call->End(absl::OkStatus());
       });
 }

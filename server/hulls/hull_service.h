@@ -6,11 +6,23 @@
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"
+#include "server/call/call_stream.h"
 #include "server/call/unary_call.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
+
+// The generated service; its methods take and give bytes (message_bytes.h).
+using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
+    v1::HullService::WithRawCallbackMethod_AppendPoints<
+        v1::HullService::WithRawCallbackMethod_ReplaceHull<
+            v1::HullService::WithRawCallbackMethod_GetHull<
+                v1::HullService::WithRawCallbackMethod_GetHullMesh<
+                    v1::HullService::WithRawCallbackMethod_ListHulls<
+                        v1::HullService::WithRawCallbackMethod_DeleteHull<
+                            v1::HullService::WithRawCallbackMethod_WatchHulls<
+                                v1::HullService::Service>>>>>>>>;
 
 // hulld.v1.HullService: the contract in hull.proto over the registry. Calls that only look into
 // records are answered where they arrive; those that need a snapshot, on `readers`,
@@ -18,7 +30,7 @@ namespace hulld::server {
 // `writers`, as the registry builds chunks.
 // Watches look into records where they are told of changes, and read boxes from the store on
 // `readers`.
-class HullService : public v1::HullService::CallbackService {
+class HullService : public HullServiceOfBytes {
  public:
   HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
               WorkerPool& long_readers)
@@ -29,36 +41,38 @@ class HullService : public v1::HullService::CallbackService {
         long_readers_(long_readers) {}
 
   grpc::ServerUnaryReactor* CreateHull(grpc::CallbackServerContext* context,
-                                       const v1::CreateHullRequest* request,
-                                       v1::CreateHullResponse* response) override;
-  grpc::ServerBidiReactor<v1::AppendPointsRequest, v1::AppendPointsResponse>* AppendPoints(
-      grpc::CallbackServerContext* context) override;
-  grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceHull(
-      grpc::CallbackServerContext* context, v1::ReplaceHullResponse* response) override;
+                                       const grpc::ByteBuffer* request,
+                                       grpc::ByteBuffer* response) override;
+  BidiReactor* AppendPoints(grpc::CallbackServerContext* context) override;
+  ReadReactor* ReplaceHull(grpc::CallbackServerContext* context,
+                           grpc::ByteBuffer* response) override;
   grpc::ServerUnaryReactor* GetHull(grpc::CallbackServerContext* context,
-                                    const v1::GetHullRequest* request,
-                                    v1::GetHullResponse* response) override;
-  grpc::ServerWriteReactor<v1::GetHullMeshResponse>* GetHullMesh(
-      grpc::CallbackServerContext* context, const v1::GetHullMeshRequest* request) override;
+                                    const grpc::ByteBuffer* request,
+                                    grpc::ByteBuffer* response) override;
+  WriteReactor* GetHullMesh(grpc::CallbackServerContext* context,
+                            const grpc::ByteBuffer* request) override;
   grpc::ServerUnaryReactor* ListHulls(grpc::CallbackServerContext* context,
-                                      const v1::ListHullsRequest* request,
-                                      v1::ListHullsResponse* response) override;
+                                      const grpc::ByteBuffer* request,
+                                      grpc::ByteBuffer* response) override;
   grpc::ServerUnaryReactor* DeleteHull(grpc::CallbackServerContext* context,
-                                       const v1::DeleteHullRequest* request,
-                                       v1::DeleteHullResponse* response) override;
-  grpc::ServerWriteReactor<v1::WatchHullsResponse>* WatchHulls(
-      grpc::CallbackServerContext* context, const v1::WatchHullsRequest* request) override;
+                                       const grpc::ByteBuffer* request,
+                                       grpc::ByteBuffer* response) override;
+  WriteReactor* WatchHulls(grpc::CallbackServerContext* context,
+                           const grpc::ByteBuffer* request) override;
 
  private:
+  using CreateCall = UnaryCall<v1::CreateHullRequest, v1::CreateHullResponse>;
+  using GetCall = UnaryCall<v1::GetHullRequest, v1::GetHullResponse>;
+  using ListCall = UnaryCall<v1::ListHullsRequest, v1::ListHullsResponse>;
+  using DeleteCall = UnaryCall<v1::DeleteHullRequest, v1::DeleteHullResponse>;
+
   // Create and Delete end the call once the change is committed.
-  void Create(const v1::CreateHullRequest& request, v1::CreateHullResponse* response,
-              UnaryCall* call);
+  void Create(CreateCall* call);
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
   absl::Status List(const v1::ListHullsRequest& request, const Call& call,
                     v1::ListHullsResponse* response);
-  void Delete(const v1::DeleteHullRequest& request, v1::DeleteHullResponse* response,
-              UnaryCall* call);
+  void Delete(DeleteCall* call);
 
   Registry& registry_;
   Admission& admission_;

@@ -19,9 +19,9 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::GetHullMeshResponse>* MeshStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, const v1::GetHullMeshRequest& request) {
+WriteReactor* MeshStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                Registry& registry, WorkerPool& readers,
+                                const grpc::ByteBuffer& request) {
   return Launch(
       std::shared_ptr<MeshStream>(new MeshStream(context, admission, registry, readers, request)));
 }
@@ -36,17 +36,17 @@ void MeshStream::Open() {
 }
 
 absl::Status MeshStream::MakeHeader() {
-  absl::Status valid = CheckHullId(call().caller(), request_.hull_id(), "hull_id");
+  absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const auto resolved = registry_.Resolve(request_.hull_id(), should_stop);
+  const auto resolved = registry_.Resolve(request().hull_id(), should_stop);
   if (!resolved.ok()) return resolved.status();
   const absl::StatusOr<const Hull*> hull = registry_.Canonical(resolved->second, should_stop);
   if (!hull.ok()) return hull.status();
   mesh_ = std::shared_ptr<const Hull>(resolved->second.served, *hull);
   v1::MeshHeader* header = reply().mutable_header();
-  if (request_.has_simplification()) {
-    const absl::Status simplified = Simplify(request_.simplification(), header);
+  if (request().has_simplification()) {
+    const absl::Status simplified = Simplify(request().simplification(), header);
     if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
   EncodeHeader(registry_.store(), resolved->first, header->mutable_header());

@@ -16,21 +16,19 @@
 namespace hulld::server {
 
 // One GetHullMesh call: a header, then pieces of one snapshot of the hull.
-class MeshStream : public PulledStream<grpc::ServerWriteReactor<v1::GetHullMeshResponse>,
-                                       v1::GetHullMeshResponse> {
+class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMeshResponse>,
+                                        v1::GetHullMeshRequest> {
  public:
-  // `request` must outlive the call, as gRPC's requests do.
-  static grpc::ServerWriteReactor<v1::GetHullMeshResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, const v1::GetHullMeshRequest& request);
+  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                             Registry& registry, WorkerPool& readers,
+                             const grpc::ByteBuffer& request);
 
  private:
   MeshStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-             WorkerPool& readers, const v1::GetHullMeshRequest& request)
-      : PulledStream(context, admission, Rpc::kGetHullMesh),
+             WorkerPool& readers, const grpc::ByteBuffer& request)
+      : RequestStream(request, context, admission, Rpc::kGetHullMesh),
         registry_(registry),
-        readers_(readers),
-        request_(request) {}
+        readers_(readers) {}
 
   void Open() override;
   void OnSent() override;
@@ -44,7 +42,6 @@ class MeshStream : public PulledStream<grpc::ServerWriteReactor<v1::GetHullMeshR
 
   Registry& registry_;
   WorkerPool& readers_;
-  const v1::GetHullMeshRequest& request_;
   // What is sent: the hull itself, or what stands for it.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;

@@ -12,9 +12,9 @@
 
 namespace hulld::server {
 
-grpc::ServerReadReactor<v1::ReplaceHullRequest>* ReplaceStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& writers, v1::ReplaceHullResponse* response) {
+ReadReactor* ReplaceStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                  Registry& registry, WorkerPool& writers,
+                                  grpc::ByteBuffer* response) {
   return Launch(std::shared_ptr<ReplaceStream>(
       new ReplaceStream(context, admission, registry, writers, response)));
 }
@@ -109,10 +109,12 @@ void ReplaceStream::Commit() {
     call().Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
                {{"hull", result->hull.hull_id}});
     call().metrics().CountPoints(result->hull.counts);
-    EncodeHeader(registry_.store(), result->store_revision, response_->mutable_header());
-    EncodeRecord(result->hull, response_->mutable_hull());
-    response_->set_created(result->created);
-    response_->set_durability(EncodeDurability(registry_.store().durability()));
+    v1::ReplaceHullResponse response;
+    EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());
+    EncodeRecord(result->hull, response.mutable_hull());
+    response.set_created(result->created);
+    response.set_durability(EncodeDurability(registry_.store().durability()));
+    *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
   });
 }

@@ -18,17 +18,15 @@ namespace hulld::server {
 // One ReplaceHull call: builds a hull apart, message by message on a thread of the writers, and
 // hands it to the registry when the client has said all. One thing at a time is under way, a read
 // or the building of what was read, so the state needs no mutex.
-class ReplaceStream
-    : public ReadingStream<CallStream<grpc::ServerReadReactor<v1::ReplaceHullRequest>>,
-                           v1::ReplaceHullRequest> {
+class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
-  static grpc::ServerReadReactor<v1::ReplaceHullRequest>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& writers, v1::ReplaceHullResponse* response);
+  // response: as gRPC holds it until the call ends.
+  static ReadReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                            Registry& registry, WorkerPool& writers, grpc::ByteBuffer* response);
 
  private:
   ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-                WorkerPool& writers, v1::ReplaceHullResponse* response)
+                WorkerPool& writers, grpc::ByteBuffer* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
         registry_(registry),
         writers_(writers),
@@ -46,7 +44,7 @@ class ReplaceStream
 
   Registry& registry_;
   WorkerPool& writers_;
-  v1::ReplaceHullResponse* response_;
+  grpc::ByteBuffer* const response_;
   // Covers the builder until the registry has it.
   MemoryCharge charge_;
   Replacement replacement_;

@@ -46,9 +46,9 @@ void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
 
 }  // namespace
 
-grpc::ServerWriteReactor<v1::WatchHullsResponse>* WatchStream::Start(
-    grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-    WorkerPool& readers, const v1::WatchHullsRequest& request) {
+WriteReactor* WatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
+                                 Registry& registry, WorkerPool& readers,
+                                 const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<WatchStream>(
       new WatchStream(context, admission, registry, readers, request)));
 }
@@ -66,25 +66,25 @@ void WatchStream::Open() {
 }
 
 absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
-  if (request_.hull_id().empty()) {
-    absl::StatusOr<std::string> prefix = PrefixToList(call().caller(), request_.prefix());
+  if (request().hull_id().empty()) {
+    absl::StatusOr<std::string> prefix = PrefixToList(call().caller(), request().prefix());
     if (!prefix.ok()) return prefix.status();
     return WatchTarget{*std::move(prefix), {}};
   }
-  if (!request_.prefix().empty()) {
+  if (!request().prefix().empty()) {
     return absl::InvalidArgumentError("prefix and hull_id are both set; give one of them");
   }
-  const absl::Status valid = CheckHullId(call().caller(), request_.hull_id(), "hull_id");
+  const absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
-  return WatchTarget{"", {request_.hull_id()}};
+  return WatchTarget{"", {request().hull_id()}};
 }
 
 absl::StatusOr<WatchStart> WatchStream::ReadStart() const {
-  if (request_.after_revision() > 0 && request_.store_id().empty()) {
+  if (request().after_revision() > 0 && request().store_id().empty()) {
     return absl::InvalidArgumentError(
         "after_revision needs store_id; give that of the same header");
   }
-  return WatchStart{true, request_.after_revision(), request_.store_id()};
+  return WatchStart{true, request().after_revision(), request().store_id()};
 }
 
 // Sends what is next, or has the registry call this again. One at a time runs, or is due.

@@ -17,21 +17,19 @@ namespace hulld::server {
 
 // One WatchHulls call: takes what is to be told next from the registry, sends it, and comes for
 // more once that was written. When there is nothing, the registry calls back; no thread waits.
-class WatchStream : public PulledStream<grpc::ServerWriteReactor<v1::WatchHullsResponse>,
-                                        v1::WatchHullsResponse> {
+class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHullsResponse>,
+                                         v1::WatchHullsRequest> {
  public:
-  // `request` must outlive the call, as gRPC's requests do.
-  static grpc::ServerWriteReactor<v1::WatchHullsResponse>* Start(
-      grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-      WorkerPool& readers, const v1::WatchHullsRequest& request);
+  static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
+                             Registry& registry, WorkerPool& readers,
+                             const grpc::ByteBuffer& request);
 
  private:
   WatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
-              WorkerPool& readers, const v1::WatchHullsRequest& request)
-      : PulledStream(context, admission, Rpc::kWatchHulls),
+              WorkerPool& readers, const grpc::ByteBuffer& request)
+      : RequestStream(request, context, admission, Rpc::kWatchHulls),
         registry_(registry),
-        readers_(readers),
-        request_(request) {}
+        readers_(readers) {}
 
   void Open() override;
   void OnSent() override;
@@ -46,7 +44,6 @@ class WatchStream : public PulledStream<grpc::ServerWriteReactor<v1::WatchHullsR
 
   Registry& registry_;
   WorkerPool& readers_;
-  const v1::WatchHullsRequest& request_;
   // Written before anything else can happen.
   std::shared_ptr<ChangeWatch> watch_;
   // What was there has been told.

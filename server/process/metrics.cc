@@ -19,8 +19,8 @@ using Buckets = prometheus::Histogram::BucketBoundaries;
 // The names of rungs, in the order of the enum.
 constexpr std::array<const char*, kRungCount> kRungNames = {"bounds", "cached", "floating_point",
                                                             "exact"};
-constexpr std::array<Rpc, 3> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
-                                              Rpc::kStreamCollisions};
+constexpr std::array<Rpc, 4> kStreamedRpcs = {Rpc::kAppendPoints, Rpc::kReplaceHull,
+                                              Rpc::kStreamCollisions, Rpc::kWatchCollisions};
 
 // Seconds: from what a loopback round trip takes to what a patient client waits.
 Buckets LatencyBuckets() {

@@ -135,14 +135,10 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& i
 }
 
 void ChangeFeed::RememberDeletion(const std::string& id, uint64_t revision) {
-  uint64_t bytes = bytes_ + BytesOf(id);
   deletions_.emplace_back(revision, id);
-  if (deletions_.size() > kMostDeletions) {
-    bytes -= BytesOf(deletions_.front().second);
-    deletions_begin_ = deletions_.front().first;
-    deletions_.pop_front();
-  }
-  Count(bytes_, bytes);
+  if (deletions_.size() <= kMostDeletions) return;
+  deletions_begin_ = deletions_.front().first;
+  deletions_.pop_front();
 }
 
 void ChangeFeed::Count(uint64_t before, uint64_t now) {

@@ -82,13 +82,14 @@ struct ChangeWatch {
 // starts anew.
 class ChangeFeed {
  public:
-  // How many deletions are remembered; with IDs of the greatest length, 20 MiB.
+  // How many deletions are remembered; with IDs of the greatest length, 20 MiB, which no budget
+  // counts.
   static constexpr size_t kMostDeletions = 1 << 16;
   // Hulls that are looked at, or told of, at a time: some 50 us under the mutex.
   static constexpr size_t kMostPerPiece = 512;
 
-  // What is remembered counts against the budget. mark_interval: how often a watch is told that the
-  // revision moved on.
+  // What watches were not told yet counts against the budget. mark_interval: how often a watch is
+  // told that the revision moved on.
   ChangeFeed(std::mutex& order, MemoryBudget& budget, std::chrono::milliseconds mark_interval);
   ChangeFeed(const ChangeFeed&) = delete;
   ChangeFeed& operator=(const ChangeFeed&) = delete;
@@ -133,9 +134,6 @@ class ChangeFeed {
   void End(Locked& locked);
   bool has_ended() const { return has_ended_; }
 
-  // Bytes of what is kept for watches that are behind, and of deletions.
-  uint64_t MemoryBytes() const { return bytes_; }
-
  private:
   struct Hash {
     using is_transparent = void;
@@ -177,6 +175,7 @@ class ChangeFeed {
   std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_id_;
   std::set<std::shared_ptr<ChangeWatch>> watches_;
 
+  // What is kept for watches that are behind.
   uint64_t bytes_ = 0;
   MemoryCharge charge_;
 

@@ -194,6 +194,8 @@ class Parser {
         "pairs of streams may hold, beside messages of calls and the store's own buffers; 0: half "
         "of what the machine or the control group has",
         kAny, 0);
+    AddLimit("request-memory", limits.request_memory,
+             "Bytes that requests under way may take, and as many again those that arrive", kAny);
     AddLimit("max-message-bytes", limits.max_message_bytes, "Bytes of one message from a client",
              kMaxGrpcMessageBytes);
     AddLimit("max-points-per-hull", limits.max_points_per_hull,

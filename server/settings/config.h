@@ -36,6 +36,9 @@ struct Limits {
   // or stored, and the placements and pairs of streams; beside messages of calls and the store's
   // own buffers. 0: half of what the machine or the control group of the process has.
   uint64_t memory_limit = 0;
+  // Bytes that requests may take from when they are parsed until they are answered, and the same
+  // again for those that are on their way.
+  uint64_t request_memory = 128 << 20;
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
@@ -98,9 +101,6 @@ struct Config {
   // Lists: hulls per page when the request says 0, and at most.
   static constexpr uint32_t kDefaultPageSize = 100;
   static constexpr uint32_t kMaxPageSize = 1000;
-  // What gRPC may hold of messages that are on their way, before it slows down or ends their
-  // calls; more where --max-message-bytes is large.
-  static constexpr size_t kTransportBytes = size_t{256} << 20;
   // Calls that one connection may have open; its client makes others wait.
   static constexpr int kCallsPerConnection = 1024;
   // Long replies are cut into messages of about this size.

@@ -7,6 +7,7 @@
 
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
+#include "server/settings/config.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
@@ -79,6 +80,10 @@ size_t AddRow(v1::Relation relation, v1::Rung rung, const v1::Wanted& wanted,
 }
 
 }  // namespace
+
+size_t FullMessageBytes(const v1::Wanted& wanted) {
+  return wanted.axis() ? Config::kReplyMessageBytes / 4 : Config::kReplyMessageBytes;
+}
 
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   const size_t bytes = AddRow(v1::RELATION_UNSPECIFIED, v1::RUNG_UNSPECIFIED, wanted, columns);

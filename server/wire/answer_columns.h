@@ -11,6 +11,11 @@
 
 namespace hulld::server {
 
+// The size at which a message of such rows is full. The row that exceeds it may be as large as an
+// answer can be (Config::kMaxFeatureVertices); the message still stays under the 4 MiB that every
+// gRPC client takes.
+size_t FullMessageBytes(const v1::Wanted& wanted);
+
 // Both functions add one row: an entry to each column that is wanted. They return the bytes that
 // the row adds to the message, estimated from above, framing counted.
 

@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 
 namespace hulld::server {
@@ -15,7 +14,7 @@ BatchColumns::BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Want
 }
 
 v1::AnswerColumns* BatchColumns::ColumnsForNext() {
-  if (bytes_ >= Config::kReplyMessageBytes) {
+  if (bytes_ >= FullMessageBytes(wanted_)) {
     messages_.emplace_back().set_first_pair(next_pair_);
     bytes_ = 0;
   }

@@ -375,6 +375,21 @@ function live_service(   line, fields, row, reader) {
   measured()
 }
 
+# p99 is left out where there are too few times for it.
+function live_work(   line, fields, row, enough) {
+  head("| work | | p50 | p99 | p50 / first | p99 / first | a second |")
+  while ((getline line < ("results/server_live_work_" machine ".csv")) > 0) {
+    split_row(line, fields)
+    if (row++ == 0) continue
+    enough = fields[3] + 0 >= 20
+    printf "| %s | %s | %s | %s | %.2f | %s | %s |\n", fields[1], fields[2], unit(1000 * fields[4]),
+           (enough ? unit(1000 * fields[5]) : "-"), fields[6], (enough ? sprintf("%.2f", fields[7]) : "-"),
+           sprintf(fields[8] + 0 < 100 ? "%.3g" : "%.0f", fields[8])
+  }
+  files = "[`server_live_work_" machine ".csv`](" results "server_live_work_" machine ".csv)"
+  measured()
+}
+
 function busy(   line, fields, row) {
   head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
   while ((getline line < ("results/server_busy_" machine ".csv")) > 0) {
@@ -464,6 +479,7 @@ BEGIN {
   else if (table == "busy") busy()
   else if (table == "live") live()
   else if (table == "live-service") live_service()
+  else if (table == "live-work") live_work()
   else if (table == "summary") summary()
   else {
     print "tables.awk: no table " table > "/dev/stderr"

@@ -86,11 +86,6 @@ Option& Option::Needs(const Option& other) {
   return *this;
 }
 
-Option& Option::Excludes(const Option& other) {
-  option_->excludes(other.option_);
-  return *this;
-}
-
 OptionDescription* Command::Describe(const std::string& names, const std::string& help) {
   OptionDescription& option = description_->options.emplace_back();
   option.names = absl::StrSplit(names, ',');

@@ -41,8 +41,6 @@ class Option {
   Option& Check(std::function<std::string(const std::string&)> check);
   // Allowed only together with `other`.
   Option& Needs(const Option& other);
-  // Not together with `other`.
-  Option& Excludes(const Option& other);
 
  private:
   friend class Command;

@@ -1,39 +1,58 @@
 #include "client/hullctl/command_line/interrupt.h"
 
-#include <poll.h>
 #include <sys/eventfd.h>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cerrno>
+#include <cstdint>
 #include <utility>
 
 namespace hulld {
+namespace {
+
+// What is counted in the event: a signal, or the end.
+constexpr uint64_t kSignal = 1;
+constexpr uint64_t kEnd = uint64_t{1} << 32;
+
+// Where the handler, which may do little, tells of a signal.
+std::atomic<int> event = -1;
+
+void Count(uint64_t what) {
+  const int before = errno;
+  [[maybe_unused]] const auto written = write(event, &what, sizeof what);
+  errno = before;
+}
+
+extern "C" void TellOfSignal(int) { Count(kSignal); }
+
+}  // namespace
 
 Interrupt::Interrupt(std::function<void()> on_interrupt) {
-  sigset_t taken;
-  sigemptyset(&taken);
-  sigaddset(&taken, SIGINT);
-  sigaddset(&taken, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &taken, &before_);
-  signals_ = signalfd(-1, &taken, SFD_CLOEXEC);
-  end_ = eventfd(0, EFD_CLOEXEC);
-  thread_ = std::thread([this, call = std::move(on_interrupt)] {
+  event = eventfd(0, EFD_CLOEXEC);
+  thread_ = std::thread([call = std::move(on_interrupt)] {
     while (true) {
-      pollfd ready[] = {{signals_, POLLIN, 0}, {end_, POLLIN, 0}};
-      if (poll(ready, 2, -1) < 0) continue;
-      if (ready[1].revents != 0) return;
-      signalfd_siginfo which;
-      if (read(signals_, &which, sizeof which) == sizeof which) call();
+      uint64_t counted = 0;
+      if (read(event, &counted, sizeof counted) != sizeof counted) continue;
+      if (counted % kEnd > 0) call();
+      if (counted >= kEnd) return;
     }
   });
+  struct sigaction action = {};
+  action.sa_handler = TellOfSignal;
+  // The second one finds what was there before.
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  sigaction(SIGINT, &action, &before_int_);
+  sigaction(SIGTERM, &action, &before_term_);
 }
 
 Interrupt::~Interrupt() {
-  eventfd_write(end_, 1);
+  sigaction(SIGINT, &before_int_, nullptr);
+  sigaction(SIGTERM, &before_term_, nullptr);
+  Count(kEnd);
   thread_.join();
-  close(end_);
-  close(signals_);
-  pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  close(event);
+  event = -1;
 }
 
 }  // namespace hulld

@@ -9,8 +9,8 @@
 namespace hulld {
 
 // While this lives, SIGINT (Ctrl-C) and SIGTERM do not end the process but call a function, on a
-// thread of its own, so that a command which lasts until then can end as it should. Make it before
-// any other thread: those that are there already still take the signals.
+// thread of its own, so that a command which lasts until then can end as it should. A second signal
+// ends the process. One at a time.
 class Interrupt {
  public:
   explicit Interrupt(std::function<void()> on_interrupt);
@@ -19,10 +19,8 @@ class Interrupt {
   Interrupt& operator=(const Interrupt&) = delete;
 
  private:
-  sigset_t before_;
-  int signals_;
-  // Readable once this ends.
-  int end_;
+  struct sigaction before_int_;
+  struct sigaction before_term_;
   std::thread thread_;
 };
 

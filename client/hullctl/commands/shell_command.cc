@@ -1,4 +1,3 @@
-#include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
 #include <cstdlib>
@@ -24,46 +23,7 @@ std::string HistoryFile() {
   return absl::StrCat(home, "/.local/state/hullctl/history");
 }
 
-// The options that this shell was started with, for each of its lines.
-std::vector<std::string> SharedOptions(const Invocation& run) {
-  std::vector<std::string> options;
-  for (const ConnectionSetting& setting : kConnectionSettings) {
-    const auto found = run.flags.find(setting.name);
-    if (found == run.flags.end()) continue;
-    options.push_back(absl::StrCat("--", setting.name));
-    if (setting.kind != SettingKind::kFlag) options.push_back(found->second);
-  }
-  if (!run.context.empty()) options.insert(options.end(), {"--context", run.context});
-  if (run.given_timeout) {
-    options.insert(options.end(), {"--timeout", absl::StrCat(run.given_timeout->count(), "ms")});
-  }
-  return options;
-}
-
-// A line's own options come behind the shared ones, of which it may name another value.
-std::vector<std::string> WithShared(const std::vector<std::string>& words,
-                                    const std::vector<std::string>& shared) {
-  std::vector<std::string> arguments = words;
-  for (size_t i = 0; i < shared.size(); ++i) {
-    const bool takes_value = i + 1 < shared.size() && !absl::StartsWith(shared[i + 1], "--");
-    const bool named = std::any_of(words.begin(), words.end(), [&](const std::string& word) {
-      const std::string name = word == "-s" ? "--server" : word.substr(0, word.find('='));
-      // Each of the two says which server is meant.
-      const bool is_server = name == "--server" || name == "--context";
-      const bool was_server = shared[i] == "--server" || shared[i] == "--context";
-      return name == shared[i] || (is_server && was_server);
-    });
-    if (!named) {
-      arguments.push_back(shared[i]);
-      if (takes_value) arguments.push_back(shared[i + 1]);
-    }
-    if (takes_value) ++i;
-  }
-  return arguments;
-}
-
 ExitCode Shell(Invocation* run) {
-  const std::vector<std::string> shared = SharedOptions(*run);
   LineEditor editor("hullctl", "hullctl> ", HistoryFile(), [run](const std::string& line) {
     std::vector<std::string> texts;
     for (const Candidate& candidate :
@@ -92,7 +52,7 @@ ExitCode Shell(Invocation* run) {
       last = run->FailUsage(absl::InvalidArgumentError("this is a shell already"));
       continue;
     }
-    last = static_cast<ExitCode>(run->run_line(WithShared(*words, shared)));
+    last = static_cast<ExitCode>(run->run_line(*words));
     run->out << std::flush;
   }
   return last;
@@ -104,8 +64,9 @@ void AddShellCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("shell", "Type commands one after another");
   command.SetDetails(
       "Lines are commands of hullctl without its name. Tab completes, arrows and Ctrl-R bring\n"
-      "earlier lines back, Ctrl-D ends. Options such as --server hold for all lines. Lines may\n"
-      "also come from a file; the exit code is that of the last one.");
+      "earlier lines back, Ctrl-C gives a line up, Ctrl-D ends. Options such as --server and\n"
+      "--output hold for all lines; a line that names another server has none of those that say\n"
+      "where the server is. Lines may also come from a file; the exit code is that of the last.");
   command.SetExamples({{"", "hullctl shell --server hulls.example:50551 --tls"},
                        {"", "hullctl shell < commands.txt"}});
   command.OnGiven([=] { invocation->action = [=] { return Shell(invocation); }; });

@@ -1,14 +1,14 @@
 #include <absl/strings/str_cat.h>
 #include <fcntl.h>
-#include <pthread.h>
 #include <spawn.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
+#include <atomic>
 #include <filesystem>
 #include <memory>
 
+#include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/view/bridge/bridge.h"
@@ -31,30 +31,6 @@ struct ViewArguments {
   bool no_open = false;
   std::string html_file;
   std::string up = "y";
-};
-
-// Holds SIGINT and SIGTERM back while it lives, in this thread and those that it starts, so that
-// what was put on the server is removed at the end.
-class HeldSignals {
- public:
-  HeldSignals() {
-    sigemptyset(&signals_);
-    sigaddset(&signals_, SIGINT);
-    sigaddset(&signals_, SIGTERM);
-    pthread_sigmask(SIG_BLOCK, &signals_, &before_);
-  }
-  ~HeldSignals() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
-  HeldSignals(const HeldSignals&) = delete;
-  HeldSignals& operator=(const HeldSignals&) = delete;
-
-  void WaitForOne() const {
-    int signal = 0;
-    sigwait(&signals_, &signal);
-  }
-
- private:
-  sigset_t signals_;
-  sigset_t before_;
 };
 
 // A file that only this user can read and that sends a browser to the address. Other users see the
@@ -209,13 +185,18 @@ class Viewing {
       address = std::make_unique<AddressFile>((*bridge)->Address());
       OpenInBrowser(address->path());
     }
-    signals_.WaitForOne();
+    interrupted_.wait(false);
     return ExitCode::kDone;
   }
 
   const Invocation& run_;
   const ViewArguments& arguments_;
-  const HeldSignals signals_;
+  // Until the end, so that what was put on the server is removed. Before all that starts threads.
+  std::atomic_flag interrupted_;
+  const Interrupt interrupt_{[this] {
+    interrupted_.test_and_set();
+    interrupted_.notify_all();
+  }};
   ViewProgram program_;
   TemporaryHulls temporary_;
   std::unique_ptr<GrowingHull> growing_;

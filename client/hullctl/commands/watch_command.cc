@@ -1,14 +1,19 @@
-// watch: hulls as they come, change and go.
+// watch: hulls as they come, change and go; pairs as they begin and end to collide.
 #include <absl/strings/str_cat.h>
 #include <absl/strings/strip.h>
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
-#include <mutex>
+#include <string>
+#include <utility>
 
+#include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 namespace {
@@ -16,6 +21,8 @@ namespace {
 struct WatchOptions {
   std::string prefix;
   bool exact = false;
+  // A file; empty: hulls are watched.
+  std::string scene;
   bool until_synced = false;
   // 0: no end.
   uint64_t events = 0;
@@ -27,6 +34,10 @@ std::string CornerText(const v1::Vector3& p) {
 
 std::string KindText(v1::HullEventKind kind) {
   return std::string(absl::StripPrefix(v1::HullEventKind_Name(kind), "HULL_EVENT_KIND_"));
+}
+
+std::string KindText(v1::CollisionEventKind kind) {
+  return std::string(absl::StripPrefix(v1::CollisionEventKind_Name(kind), "COLLISION_EVENT_KIND_"));
 }
 
 std::string EventText(const v1::HullEvent& event) {
@@ -41,69 +52,153 @@ std::string EventText(const v1::HullEvent& event) {
 }
 
 void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
-  if (run.json()) {
-    run.out << MessageJson(message) << "\n" << std::flush;
-    return;
-  }
   if (message.anew()) run.out << "# anew: forget what is above\n";
   for (const v1::HullEvent& event : message.events()) {
     run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
   }
   if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
-  run.out << std::flush;
 }
 
-ExitCode Watch(const Invocation& run, const WatchOptions& options) {
+// A watch that ends at Ctrl-C.
+template <typename Watch>
+class Ending {
+ public:
+  explicit Ending(std::unique_ptr<Watch> watch)
+      : watch_(std::move(watch)), interrupt_([this] {
+          is_ended_ = true;
+          watch_->Cancel();
+        }) {}
+
+  Watch& watch() { return *watch_; }
+  bool is_ended() const { return is_ended_; }
+
+ private:
+  const std::unique_ptr<Watch> watch_;
+  std::atomic<bool> is_ended_ = false;
+  // Last, so that nothing is called when the watch goes.
+  const Interrupt interrupt_;
+};
+
+// Tells of what comes until the watch ends, `tell` says that it is enough, or Ctrl-C.
+template <typename Watch, typename Tell>
+ExitCode TellAll(const Invocation& run, std::unique_ptr<Watch> watch, const Tell& tell) {
+  Ending<Watch> ending(std::move(watch));
+  while (true) {
+    const auto message = ending.watch().Next();
+    if (!message.ok()) return ending.is_ended() ? ExitCode::kDone : run.Fail(message.status());
+    if (run.json()) run.out << MessageJson(*message) << "\n";
+    const bool is_enough = tell(*message);
+    run.out << std::flush;
+    if (is_enough) return ExitCode::kDone;
+  }
+}
+
+ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
   v1::WatchHullsRequest request;
   (options.exact ? request.mutable_hull_id() : request.mutable_prefix())->assign(options.prefix);
-  HullWatch* ended = nullptr;
-  std::mutex mutex;
-  bool interrupted = false;
-  const Interrupt interrupt([&] {
-    const std::lock_guard lock(mutex);
-    interrupted = true;
-    if (ended != nullptr) ended->Cancel();
-  });
-  const std::unique_ptr<HullWatch> watch = run.MakeClient().WatchHulls(request);
-  {
-    const std::lock_guard lock(mutex);
-    ended = watch.get();
-    if (interrupted) watch->Cancel();
+  uint64_t events = 0;
+  const auto tell = [&](const v1::WatchHullsResponse& message) {
+    if (!run.json()) Print(message, run);
+    events += static_cast<uint64_t>(message.events_size());
+    return (options.events > 0 && events >= options.events) ||
+           (options.until_synced && message.synced());
+  };
+  return TellAll(run, run.MakeClient().WatchHulls(request), tell);
+}
+
+// What is watched of a scene: its poses stay.
+v1::CollisionWatchOpen OpenOf(const Scene& scene) {
+  const v1::FindCollisionsRequest& request = scene.request;
+  v1::CollisionWatchOpen open;
+  *open.mutable_placements() = request.placements();
+  *open.mutable_packed_placements() = request.packed_placements();
+  if (request.wanted().has_clearance()) open.set_clearance(request.wanted().clearance());
+  if (scene.pairs.has_value()) {
+    open.mutable_pairs()->Assign(scene.pairs->begin(), scene.pairs->end());
+    return open;
   }
-  for (uint64_t events = 0; options.events == 0 || events < options.events;) {
-    const absl::StatusOr<v1::WatchHullsResponse> message = watch->Next();
-    if (!message.ok()) {
-      const std::lock_guard lock(mutex);
-      return interrupted ? ExitCode::kDone : run.Fail(message.status());
+  *open.mutable_groups() = request.groups();
+  open.set_ignore_same_group(request.ignore_same_group());
+  *open.mutable_ignored_group_pairs() = request.ignored_group_pairs();
+  if (request.has_movers()) open.set_movers(request.movers());
+  return open;
+}
+
+ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
+  const auto source = ByteSource::Open(options.scene);
+  if (!source.ok()) return run.FailUsage(source.status());
+  const auto scene = ReadScene(source->get());
+  if (!scene.ok()) return run.FailUsage(scene.status());
+  if (absl::Status rest = RefuseUpdates(source->get(), "watch"); !rest.ok()) {
+    return run.FailUsage(rest);
+  }
+  const auto name = [&](uint32_t placement) {
+    return scene->HullOf(placement) == nullptr ? absl::StrCat(placement) : scene->NameOf(placement);
+  };
+  uint64_t events = 0;
+  bool is_synced = false;
+  const auto tell = [&](const v1::WatchCollisionsResponse& message) {
+    for (const v1::PlacementProblem& problem : message.placement_problems()) {
+      run.err << "hullctl: placement " << name(problem.placement()) << ": " << problem.message()
+              << "\n";
     }
-    Print(*message, run);
-    if (options.until_synced && message->synced()) break;
-    events += static_cast<uint64_t>(message->events_size());
-  }
-  return ExitCode::kDone;
+    for (const v1::CollisionEvent& event : message.events()) {
+      if (run.json()) break;
+      run.out << KindText(event.kind()) << "\t" << name(event.placement_a()) << "\t"
+              << name(event.placement_b());
+      if (event.kind() != v1::COLLISION_EVENT_KIND_LOST) {
+        run.out << "\t" << event.revision_a() << "\t" << event.revision_b();
+      }
+      run.out << "\n";
+    }
+    const bool was_synced = std::exchange(is_synced, is_synced || message.synced());
+    if (is_synced && !was_synced && !run.json()) {
+      run.out << "# synced at revision " << message.header().revision() << "\n";
+    }
+    events += static_cast<uint64_t>(message.events_size());
+    return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);
+  };
+  return TellAll(run, run.MakeClient().WatchCollisions(OpenOf(*scene)), tell);
 }
 
 }  // namespace
 
 void AddWatchCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<WatchOptions>();
-  Command command = program.AddCommand("watch", "Tell of hulls as they come, change and go");
-  command.AddText("PREFIX", &options->prefix, "Only names that start with it")
+  Command command = program.AddCommand("watch", "Tell of hulls, or of a scene, as they change");
+  command.AddText("PREFIX", &options->prefix, "Only hulls whose names start with it")
       .Completes(ValueKind::kHull);
   command.AddFlag("--exact", &options->exact, "Only the hull of this very name");
+  command
+      .AddText("--scene", &options->scene,
+               "Tell instead when pairs of a scene begin and end to collide")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
   command.AddFlag("--until-synced", &options->until_synced, "End once what is there has been told");
   command.AddNumber("--events", 1, kAnyNumber, "End after N events, or a few more at once",
                     [options](uint64_t number) { options->events = number; });
   command.SetDetails(
       "Prints a line for each event: what happened, name, revision, vertices and points, box.\n"
       "First come all hulls (PRESENT) and a line '# synced'; then what is CREATED, CHANGED,\n"
-      "REPLACED and DELETED, the last state of each hull where many changes come at once.\n"
-      "With --output json each message of the contract is one line. Ctrl-C ends it. A watch\n"
-      "that loses the server looks for it during --timeout and goes on where it was.");
+      "REPLACED and DELETED, the last state of each hull where many changes come at once. A\n"
+      "watch that loses the server looks for it during --timeout and goes on where it was.\n"
+      "With --scene: what happened (ENTER, TOUCH, EXIT, with a clearance NEAR and FAR, LOST\n"
+      "when a hull goes), the two placements, and the revisions of their hulls. FILE is as in\n"
+      "'hullctl scene' and 'hullctl batch'; poses stay, hulls grow.\n"
+      "With --output json each message of the contract is one line. Ctrl-C ends it.");
   command.SetExamples(
       {{"Those of one cell", "hullctl watch cell-3/"},
-       {"What is there, for a script", "hullctl watch --until-synced --output json"}});
-  command.OnGiven([=] { invocation->action = [=] { return Watch(*invocation, *options); }; });
+       {"What is there, for a script", "hullctl watch --until-synced --output json"},
+       {"What collides while hulls grow", "hullctl watch --scene scene.txt"}});
+  command.OnGiven([=] {
+    invocation->action = [=] {
+      const Invocation& run = *invocation;
+      if (options->scene.empty()) return WatchHulls(run, *options);
+      if (options->prefix.empty() && !options->exact) return WatchScene(run, *options);
+      return run.FailUsage(absl::InvalidArgumentError(
+          "--scene names what is watched; leave out PREFIX and --exact"));
+    };
+  });
 }
 
 }  // namespace hulld

@@ -194,8 +194,9 @@ AnswerFeed::~AnswerFeed() {
   thread_.join();
 }
 
-void AnswerFeed::Show(const ViewScene& scene) {
+void AnswerFeed::Show(const ViewScene& scene, uint64_t number) {
   const std::lock_guard lock(mutex_);
+  scene_ = number;
   question_ = Question();
   question_.objects = scene.objects;
   question_.rules = scene.rules;
@@ -203,16 +204,17 @@ void AnswerFeed::Show(const ViewScene& scene) {
   asked_ = false;
 }
 
-void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects) {
+void AnswerFeed::AddObjects(const std::vector<ViewObject>& objects, uint64_t scene) {
   const std::lock_guard lock(mutex_);
+  if (scene != scene_) return;
   question_.objects.insert(question_.objects.end(), objects.begin(), objects.end());
 }
 
 void AnswerFeed::Ask(const ViewQuestion& question) {
   {
     const std::lock_guard lock(mutex_);
+    if (question.scene != scene_) return;
     for (size_t i = 0; i < question.objects.size(); ++i) {
-      // The page may speak of a scene that was replaced meanwhile.
       if (question.objects[i] >= question_.objects.size()) continue;
       question_.objects[question.objects[i]].pose = question.poses[i];
     }

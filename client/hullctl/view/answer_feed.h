@@ -25,9 +25,11 @@ class AnswerFeed {
   // Waits for the answer that is under way.
   ~AnswerFeed();
 
-  // Another scene: forgets objects and questions.
-  void Show(const ViewScene& scene);
-  void AddObjects(const std::vector<ViewObject>& objects);
+  // Another scene, by its number: forgets objects and questions.
+  void Show(const ViewScene& scene, uint64_t number);
+  // Passed over when they are of another scene.
+  void AddObjects(const std::vector<ViewObject>& objects, uint64_t scene);
+  // Passed over when it is about another scene.
   void Ask(const ViewQuestion& question);
   // Some hull changed: the last question is answered anew.
   void HullsChanged();
@@ -64,6 +66,7 @@ class AnswerFeed {
   std::condition_variable changed_;
   // The rest is guarded by the mutex.
   Question question_;
+  uint64_t scene_ = 0;
   bool asked_ = false;
   bool ended_ = false;
   std::thread thread_;

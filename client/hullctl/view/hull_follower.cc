@@ -5,13 +5,10 @@
 #include <chrono>
 #include <utility>
 
-#include "client/connection_security.h"
-#include "client/grpc_status.h"
-
 namespace hulld {
 namespace {
 
-constexpr std::chrono::seconds kPauseBetweenCalls{1};
+constexpr std::chrono::seconds kPauseBetweenWatches{1};
 
 }  // namespace
 
@@ -21,53 +18,56 @@ HullFollower::HullFollower(const Client& client, v1::WatchHullsRequest request, 
       request_(std::move(request)),
       receive_(std::move(receive)),
       complain_(std::move(complain)),
-      thread_([this] { Run(); }) {}
+      thread_([this] {
+        Run();
+        finished_ = true;
+      }) {}
 
 HullFollower::~HullFollower() {
+  Cancel();
+  thread_.join();
+}
+
+void HullFollower::Cancel() {
   {
     const std::lock_guard lock(mutex_);
     ended_ = true;
-    if (context_ != nullptr) context_->TryCancel();
+    if (watch_ != nullptr) watch_->Cancel();
   }
   changed_.notify_all();
-  thread_.join();
 }
 
 void HullFollower::Run() {
   std::string last_complaint;
   while (true) {
-    const absl::Status status = Follow();
-    std::unique_lock lock(mutex_);
-    if (ended_) return;
+    {
+      const std::lock_guard lock(mutex_);
+      if (ended_) return;
+      watch_ = client_.WatchHulls(request_);
+    }
+    const absl::Status status = Follow(watch_.get());
     const bool is_unknown = absl::IsUnimplemented(status);
     const std::string complaint =
         absl::StrCat("Changes of hulls are not followed at present: ",
                      is_unknown ? "this hulld does not know WatchHulls" : status.message());
-    if (!status.ok() && complaint != std::exchange(last_complaint, complaint)) complain_(complaint);
+    {
+      const std::lock_guard lock(mutex_);
+      if (ended_) return;
+    }
+    // May wait, and so must not hold up Cancel.
+    if (complaint != std::exchange(last_complaint, complaint)) complain_(complaint);
     if (is_unknown) return;
-    if (changed_.wait_for(lock, kPauseBetweenCalls, [this] { return ended_; })) return;
+    std::unique_lock lock(mutex_);
+    if (changed_.wait_for(lock, kPauseBetweenWatches, [this] { return ended_; })) return;
   }
 }
 
-absl::Status HullFollower::Follow() {
-  const ClientOptions& options = client_.options();
-  const auto stub = v1::HullService::NewStub(OpenChannel(options.server, options.security, {}));
-  grpc::ClientContext context;
-  {
-    const std::lock_guard lock(mutex_);
-    if (ended_) return absl::CancelledError();
-    context_ = &context;
+absl::Status HullFollower::Follow(HullWatch* watch) {
+  while (true) {
+    const auto response = watch->Next();
+    if (!response.ok()) return response.status();
+    Take(*response);
   }
-  const auto reader = stub->WatchHulls(&context, request_);
-  v1::WatchHullsResponse response;
-  while (reader->Read(&response)) {
-    Take(response);
-    response.Clear();
-  }
-  const grpc::Status status = reader->Finish();
-  const std::lock_guard lock(mutex_);
-  context_ = nullptr;
-  return FromGrpcStatus(status);
 }
 
 void HullFollower::Take(const v1::WatchHullsResponse& response) {

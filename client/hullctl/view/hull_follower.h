@@ -1,8 +1,7 @@
 #ifndef HULLD_CLIENT_HULLCTL_VIEW_HULL_FOLLOWER_H_
 #define HULLD_CLIENT_HULLCTL_VIEW_HULL_FOLLOWER_H_
 
-#include <grpcpp/client_context.h>
-
+#include <atomic>
 #include <condition_variable>
 #include <functional>
 #include <memory>
@@ -15,9 +14,9 @@
 
 namespace hulld {
 
-// Follows hulls as they change, on a thread of its own: a WatchHulls call that is opened anew when
-// it breaks, and resumes where it ended. Where it must start from the beginning, hulls that went
-// meanwhile are told of as DELETED.
+// Follows hulls as they change, on a thread of its own, for as long as it lives: when a watch ends
+// because its server is gone for long, another one resumes where it ended. Where a watch starts
+// anew, hulls that went meanwhile are told of as DELETED.
 class HullFollower {
  public:
   // `synced`: what was there has been told.
@@ -27,13 +26,18 @@ class HullFollower {
 
   HullFollower(const Client& client, v1::WatchHullsRequest request, Receiver receive,
                Complaint complain);
-  // Ends the call and waits for the thread.
+  // Cancels and waits for the thread, which may be within a call of the receiver.
   ~HullFollower();
+
+  // Has the thread end soon; does not wait.
+  void Cancel();
+  // Whether the thread has ended, so that the destructor does not wait.
+  bool finished() const { return finished_; }
 
  private:
   void Run();
-  // One call, until it ends; returns why.
-  absl::Status Follow();
+  // One watch, until it ends; returns why.
+  absl::Status Follow(HullWatch* watch);
   void Take(const v1::WatchHullsResponse& response);
 
   const Client& client_;
@@ -47,9 +51,10 @@ class HullFollower {
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  // Guarded by the mutex. The context of the call under way, if any.
-  grpc::ClientContext* context_ = nullptr;
+  // Guarded by the mutex where they change.
+  std::unique_ptr<HullWatch> watch_;
   bool ended_ = false;
+  std::atomic<bool> finished_ = false;
   std::thread thread_;
 };
 

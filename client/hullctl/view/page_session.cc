@@ -81,30 +81,33 @@ void PageSession::Show(const std::string& key) {
     page_->SendText(ProblemMessage(absl::StrCat("There is no scene \"", key, "\".")));
     return;
   }
-  // No event of the former scene comes once its follower has ended.
-  follower_.reset();
+  std::erase_if(followers_, [](const auto& follower) { return follower->finished(); });
+  if (!followers_.empty()) followers_.back()->Cancel();
+  uint64_t number = 0;
   {
     const std::lock_guard lock(mutex_);
+    number = ++scene_;
     prefixes_ = scene->prefixes;
     known_.clear();
     for (const ViewObject& object : scene->objects) known_.insert(object.hull_id);
   }
-  answers_.Show(*scene);
+  answers_.Show(*scene, number);
   geometry_.Show(scene->files);
-  page_->SendText(SceneMessage(*scene));
+  page_->SendText(SceneMessage(*scene, number));
   if (program_.on_show) program_.on_show(key);
   if (scene->prefixes.empty() && known_.empty()) return;
-  follower_ = std::make_unique<HullFollower>(
+  followers_.push_back(std::make_unique<HullFollower>(
       program_.client, WatchFor(*scene),
-      [this](const v1::HullEvent& event, bool synced) { TakeHull(event, synced); },
-      [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); });
+      [this, number](const v1::HullEvent& event, bool synced) { TakeHull(number, event, synced); },
+      [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); }));
 }
 
-void PageSession::TakeHull(const v1::HullEvent& event, bool synced) {
+void PageSession::TakeHull(uint64_t scene, const v1::HullEvent& event, bool synced) {
   const std::string& hull_id = event.hull().hull_id();
   bool is_new = false;
   {
     const std::lock_guard lock(mutex_);
+    if (scene != scene_) return;
     const auto starts_so = [&hull_id](const std::string& prefix) {
       return hull_id.starts_with(prefix);
     };
@@ -117,11 +120,11 @@ void PageSession::TakeHull(const v1::HullEvent& event, bool synced) {
   }
   if (is_new) {
     const std::vector<ViewObject> objects = {{hull_id, hull_id, -1, kIdentityPose}};
-    answers_.AddObjects(objects);
-    page_->SendText(TextMessage("objects", {{"objects", ObjectsJson(objects)}}));
+    answers_.AddObjects(objects, scene);
+    page_->SendText(TextMessage(
+        "objects", {{"scene", std::to_string(scene)}, {"objects", ObjectsJson(objects)}}));
   }
-  page_->SendText(
-      TextMessage("hull", {{"event", MessageJson(event)}, {"synced", synced ? "true" : "false"}}));
+  page_->SendText(TextMessage("hull", {{"event", MessageJson(event)}}));
   // What is there at the start, the page knows already.
   if (synced || is_new) answers_.HullsChanged();
 }

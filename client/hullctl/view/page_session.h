@@ -1,6 +1,7 @@
 #ifndef HULLD_CLIENT_HULLCTL_VIEW_PAGE_SESSION_H_
 #define HULLD_CLIENT_HULLCTL_VIEW_PAGE_SESSION_H_
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -42,8 +43,8 @@ class PageSession final : public PageHandler {
 
  private:
   void Show(const std::string& key);
-  // Called by the follower's thread.
-  void TakeHull(const v1::HullEvent& event, bool synced);
+  // Called by the thread of the follower of scene number `scene`.
+  void TakeHull(uint64_t scene, const v1::HullEvent& event, bool synced);
 
   const ViewProgram& program_;
   const std::shared_ptr<PageChannel> page_;
@@ -51,12 +52,14 @@ class PageSession final : public PageHandler {
   GeometryFeed geometry_;
 
   std::mutex mutex_;
-  // Guarded by the mutex: the scene on show and what of it is known by ID.
+  // Guarded by the mutex: which scene is on show, counted, and what of it is known by ID.
+  uint64_t scene_ = 0;
   std::vector<std::string> prefixes_;
   std::unordered_set<std::string> known_;
 
-  // Last: its thread uses the others.
-  std::unique_ptr<HullFollower> follower_;
+  // Last: their threads use the others. The last one follows the scene on show; those before it
+  // were cancelled. The bridge's thread must not wait for them, as they may wait for it to send.
+  std::vector<std::unique_ptr<HullFollower>> followers_;
 };
 
 }  // namespace hulld

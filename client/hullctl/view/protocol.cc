@@ -84,6 +84,7 @@ class Reader {
 
 ViewQuestion ReadQuestion(Reader* reader) {
   ViewQuestion question;
+  question.scene = reader->Count("scene");
   question.update = reader->Count("update");
   question.objects = reader->Indices("objects");
   const ListValue& poses = reader->List("poses");
@@ -215,13 +216,14 @@ std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from) {
   return json + "]";
 }
 
-std::string SceneMessage(const ViewScene& scene) {
+std::string SceneMessage(const ViewScene& scene, uint64_t number) {
   std::string files = "[";
   for (size_t i = 0; i < scene.files.size(); ++i) {
     absl::StrAppend(&files, i > 0 ? "," : "",
                     JsonObject().Add("name", scene.files[i]->name).Close());
   }
-  return TextMessage("scene", {{"key", QuoteJson(scene.key)},
+  return TextMessage("scene", {{"number", std::to_string(number)},
+                               {"key", QuoteJson(scene.key)},
                                {"title", QuoteJson(scene.title)},
                                {"note", QuoteJson(scene.note)},
                                {"files", files + "]"},

@@ -27,20 +27,20 @@ namespace hulld {
 //   show       {key}: shows a scene of `hello`. The bridge answers with `scene`.
 //   geometry   {hullIds, files}: asks for hulls by ID and files by index; a frame answers each.
 //   simplify   {hullId, side: "inside"|"outside", maxError, maxVertices}: a frame answers it.
-//   question   {update, objects, poses, pair, tolerance, rest}: the new poses of some objects
-//   (seven
-//              numbers each, as in Pose), the pair to tell all about (two indices, or none), the
-//              tolerance of the scene, and whether nothing moves now. While a question waits, the
-//              next one takes its place, its poses added. `answer` and `collisions` answer it.
+//   question   {scene, update, objects, poses, pair, tolerance, rest}: of the scene of that number,
+//              the new poses of some objects (seven numbers each, as in Pose), the pair to tell all
+//              about (two indices, or none), the tolerance of the scene, and whether nothing moves
+//              now. While a question waits, the next one takes its place, its poses added. `answer`
+//              and `collisions` answer it.
 //
 // The bridge to the page:
 //   hello      {server, version, up, scenes: [{key, title}]}, first.
-//   scene      {key, title, note, files: [{name}], objects: [OBJECT]}: forget what was there.
-//   OBJECT
+//   scene      {number, key, title, note, files: [{name}], objects: [OBJECT]}: forget what was
+//   there. OBJECT
 //              is {name, hullId, file, pose}: hullId is "" and file -1 where there is none. Other
 //              messages name objects and files by their index here.
-//   objects    {objects}: more objects, behind those that are there.
-//   hull       {event, synced}: a HullEvent of the contract: a hull changed, appeared or went.
+//   objects    {scene, objects}: more objects of that scene, behind those that are there.
+//   hull       {event}: a HullEvent of the contract: a hull changed, appeared or went.
 //   answer     {update, rest, pair, poses, hullA, hullB, relation, rung, axis, certificate,
 //              separation, witness} or {update, pair, problem}: of the pair that was asked for. At
 //              rest this is what CheckCollision says, and else what StreamCollisions says.
@@ -63,6 +63,7 @@ namespace hulld {
 
 // A message of the page, understood.
 struct ViewQuestion {
+  uint64_t scene = 0;
   uint64_t update = 0;
   std::vector<uint32_t> objects;
   std::vector<Pose7> poses;
@@ -91,7 +92,8 @@ std::string TextMessage(const std::string& type,
 
 std::string ProblemMessage(const std::string& message);
 std::string ObjectsJson(const std::vector<ViewObject>& objects, size_t from = 0);
-std::string SceneMessage(const ViewScene& scene);
+// `number` counts the scenes that the page was shown.
+std::string SceneMessage(const ViewScene& scene, uint64_t number);
 
 // Frames.
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh);

@@ -54,7 +54,7 @@ absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewSc
   if (!answers.ok()) return answers.status();
   return JsonObject()
       .AddJson("hello", HelloMessage(program))
-      .AddJson("scene", SceneMessage(scene))
+      .AddJson("scene", SceneMessage(scene, 1))
       .AddJson("frames", frames + "]")
       .AddJson("collisions", *collisions)
       .AddJson("answers", *answers)

@@ -1,18 +1,21 @@
 #ifndef HULLD_CORE_HULL_GROWTH_CHUNKED_VECTOR_H_
 #define HULLD_CORE_HULL_GROWTH_CHUNKED_VECTOR_H_
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/base/check.h"
 
 namespace hulld {
 
-// A vector that grows in chunks of 256 elements and never moves one: no single push_back costs
-// more than a chunk, however long the vector, and nothing is held in reserve for a doubling.
+// A vector that grows in chunks of 256 elements: no single push_back costs more than a chunk,
+// however long the vector, and nothing is held in reserve for a doubling. Only a first chunk that
+// is not full yet grows by doubling, so that small vectors stay small; then its elements move.
 //
 // It can keep a journal of what changes, to undo it: the old value of each element, when it is
 // changed for the first time. That costs as much as what changes, not as what is there.
@@ -26,9 +29,14 @@ class ChunkedVector {
     if (this == &other) return *this;
     HULLD_CHECK(journal_end_ == 0 && other.journal_end_ == 0);
     chunks_.clear();
-    for (size_t first = 0; first < other.size_; first += kMask + 1) {
-      chunks_.push_back(std::make_unique<Chunk>(*other.chunks_[first >> kBits]));
+    for (size_t first = 0; first < other.size_; first += kChunk) {
+      const size_t capacity = first == 0 ? other.first_capacity_ : kChunk;
+      const T* const from = other.chunks_[first >> kBits].get();
+      chunks_.push_back(std::make_unique_for_overwrite<T[]>(capacity));
+      std::copy_n(from, std::min(kChunk, other.size_ - first), chunks_.back().get());
     }
+    noted_.assign(chunks_.size(), Noted{});
+    first_capacity_ = chunks_.empty() ? 0 : other.first_capacity_;
     size_ = other.size_;
     return *this;
   }
@@ -36,12 +44,11 @@ class ChunkedVector {
   ChunkedVector& operator=(ChunkedVector&&) noexcept = default;
 
   size_t size() const { return size_; }
-  const T& operator[](size_t i) const { return chunks_[i >> kBits]->elements[i & kMask]; }
+  const T& operator[](size_t i) const { return chunks_[i >> kBits][i & kMask]; }
   // The element, to be changed; where a journal is kept, that notes what it was.
   T& Mutable(size_t i) {
-    Chunk& chunk = *chunks_[i >> kBits];
-    if (i < journal_end_) Note(chunk, i);
-    return chunk.elements[i & kMask];
+    if (i < journal_end_) Note(i);
+    return chunks_[i >> kBits][i & kMask];
   }
 
   bool empty() const { return size_ == 0; }
@@ -50,15 +57,23 @@ class ChunkedVector {
   void pop_back() { --size_; }
   // The journal included.
   size_t MemoryBytes() const {
-    return chunks_.size() * sizeof(Chunk) + chunks_.capacity() * sizeof(chunks_[0]) +
-           journal_.capacity() * sizeof(Change);
+    const size_t elements = chunks_.empty() ? 0 : first_capacity_ + (chunks_.size() - 1) * kChunk;
+    return elements * sizeof(T) + chunks_.capacity() * sizeof(chunks_[0]) +
+           noted_.capacity() * sizeof(Noted) + journal_.capacity() * sizeof(Change);
   }
 
-  void push_back(const T& value) { Mutable(Extend()) = value; }
+  void push_back(const T& value) {
+    const T copy = value;  // may be an element that moves
+    Mutable(Extend()) = copy;
+  }
   // Appends an element that is still to be assigned, by Mutable; returns its index.
   size_t Extend() {
-    if (size_ >> kBits == chunks_.size())
-      chunks_.push_back(std::make_unique_for_overwrite<Chunk>());
+    if (size_ < kChunk) {
+      if (size_ == first_capacity_) GrowFirst();
+    } else if (size_ >> kBits == chunks_.size()) {
+      chunks_.push_back(std::make_unique_for_overwrite<T[]>(kChunk));
+      noted_.emplace_back();
+    }
     return size_++;
   }
 
@@ -71,16 +86,18 @@ class ChunkedVector {
   // Makes everything as it was when the journal was started, and ends it. Cost: the changes.
   void Undo() {
     for (const Change& change : journal_) {
-      chunks_[change.index >> kBits]->elements[change.index & kMask] = change.before;
+      chunks_[change.index >> kBits][change.index & kMask] = change.before;
     }
     size_ = size_before_;
     EndJournal();
     chunks_.resize((size_ + kMask) >> kBits);
+    noted_.resize(chunks_.size());
+    if (chunks_.empty()) first_capacity_ = 0;
   }
   // Ends the journal and keeps what changed. Cost: the changes.
   void EndJournal() {
     for (const Change& change : journal_) {
-      chunks_[change.index >> kBits]->noted[(change.index & kMask) / 64] = 0;
+      noted_[change.index >> kBits][(change.index & kMask) / 64] = 0;
     }
     journal_ = {};
     journal_end_ = 0;
@@ -90,26 +107,41 @@ class ChunkedVector {
 
  private:
   static constexpr int kBits = 8;
-  static constexpr size_t kMask = (size_t{1} << kBits) - 1;
-  struct Chunk {
-    T elements[kMask + 1];
-    // By element, a bit: the journal has it.
-    std::array<uint64_t, (kMask + 1) / 64> noted{};
-  };
+  static constexpr size_t kChunk = size_t{1} << kBits;
+  static constexpr size_t kMask = kChunk - 1;
+  static constexpr size_t kLeastCapacity = 8;
+  // By element of a chunk, a bit: the journal has it.
+  using Noted = std::array<uint64_t, kChunk / 64>;
   struct Change {
     size_t index;
     T before;
   };
 
-  void Note(Chunk& chunk, size_t i) {
-    uint64_t& noted = chunk.noted[(i & kMask) / 64];
+  void GrowFirst() {
+    const size_t capacity = std::max(kLeastCapacity, 2 * size_);
+    auto grown = std::make_unique_for_overwrite<T[]>(capacity);
+    if (chunks_.empty()) {
+      chunks_.emplace_back();
+      noted_.emplace_back();
+    }
+    std::copy_n(chunks_[0].get(), size_, grown.get());
+    chunks_[0] = std::move(grown);
+    first_capacity_ = capacity;
+  }
+
+  void Note(size_t i) {
+    uint64_t& noted = noted_[i >> kBits][(i & kMask) / 64];
     const uint64_t bit = uint64_t{1} << (i % 64);
     if ((noted & bit) != 0) return;
     noted |= bit;
-    journal_.push_back({i, chunk.elements[i & kMask]});
+    journal_.push_back({i, chunks_[i >> kBits][i & kMask]});
   }
 
-  std::vector<std::unique_ptr<Chunk>> chunks_;
+  std::vector<std::unique_ptr<T[]>> chunks_;
+  // By chunk.
+  std::vector<Noted> noted_;
+  // Elements that the first chunk has room for.
+  size_t first_capacity_ = 0;
   size_t size_ = 0;
   // The journal is about elements below this; 0 when there is none.
   size_t journal_end_ = 0;

@@ -277,7 +277,9 @@ void Surface::FinishInsertions(const VertexTable& vertices) {
   // A map that was made fine for a large block takes more memory than it saves time from here on.
   while (directions_ && 2 * directions_->cell_count() > alive_ && directions_->Coarsen()) {
   }
-  if (alive_ >= next_update_) Update(vertices);
+  // A centre is wanted now; to measure waits for the next single insertion, as a hull at rest would
+  // hold an unfinished map for nothing.
+  if (!directions_ && alive_ >= next_update_) Update(vertices);
 }
 
 }  // namespace hulld

@@ -1,6 +1,7 @@
 #include "core/query/placed/center_bounds.h"
 
 #include <array>
+#include <bit>
 #include <span>
 #include <vector>
 
@@ -16,7 +17,9 @@ constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 // Cells along a side of a face, a power of two so that corners are exact. A choice: with it half of
 // the pairs of round hulls of 512 vertices a few percent apart are settled, and nearly all that are
 // deep in each other (observed: relation/ of tests/bench/queries/query_benchmark).
-uint32_t SideFor(size_t vertices) { return vertices < 24 ? 2 : 8; }
+constexpr uint32_t kCoarseSide = 2;
+constexpr uint32_t kFineSide = 8;
+uint32_t SideFor(size_t vertices) { return vertices < 24 ? kCoarseSide : kFineSide; }
 // With more cells than this along a side the gauge is made at every other corner.
 constexpr uint32_t kMostGaugedCells = 4;
 
@@ -30,9 +33,52 @@ constexpr double kLeastGain = 0x1p-8;
 // a portal, 5 to 13 to refine it, for 64 to 10000 points.
 constexpr int kMostSteps = 64;
 
+// How far apart the directions are along which a portal is guessed, about: the distance between
+// points on a sphere.
+constexpr double kTilt = 4;
+constexpr double kMostTilt = 0.7;
+
 float RoundedUp(double value) {
   const auto rounded = static_cast<float>(value);
-  return static_cast<double>(rounded) < value ? std::nextafter(rounded, kInfinity) : rounded;
+  if (!(static_cast<double>(rounded) < value)) return rounded;
+  // Of positive numbers the next one has the next bits.
+  return rounded > 0 ? std::bit_cast<float>(std::bit_cast<uint32_t>(rounded) + 1)
+                     : std::nextafter(rounded, kInfinity);
+}
+
+// A corner of a cell: its direction, and the first corner that has the same one, on another face
+// where faces meet.
+struct CornerPlace {
+  Vector direction;
+  uint32_t twin;
+};
+
+// The corners of a cube map, face by face, row by row.
+std::vector<CornerPlace> CornersOf(uint32_t side) {
+  const uint32_t row = side + 1;
+  const double half = 0.5 * side;
+  std::vector<CornerPlace> corners;
+  corners.reserve(size_t{6} * row * row);
+  std::vector<uint32_t> first(size_t{row} * row * row, UINT32_MAX);
+  for (uint32_t face = 0; face < 6; ++face) {
+    for (uint32_t i = 0; i < row; ++i) {
+      for (uint32_t j = 0; j < row; ++j) {
+        const Vector n = CubeDirection(face, i / half - 1, j / half - 1);
+        const auto place = [&](int axis) { return static_cast<uint32_t>((n[axis] + 1) * half); };
+        uint32_t& twin = first[(place(0) * row + place(1)) * row + place(2)];
+        twin = std::min(twin, static_cast<uint32_t>(corners.size()));
+        corners.push_back({n, twin});
+      }
+    }
+  }
+  return corners;
+}
+
+// Made once, as they are the same for all hulls.
+std::span<const CornerPlace> Corners(uint32_t side) {
+  static const auto& fine = *new std::vector<CornerPlace>(CornersOf(kFineSide));
+  static const auto& coarse = *new std::vector<CornerPlace>(CornersOf(kCoarseSide));
+  return side == kFineSide ? fine : coarse;
 }
 
 // Whether p is in the tetrahedron of a point o strictly inside a hull and a triangle of a facet.
@@ -54,7 +100,16 @@ bool IsInTetrahedron(const std::array<Vector, 4>& t, const Vector& p) {
 class Lookout {
  public:
   Lookout(std::span<const Vector> points, const Vector& o, const SupportMap& support)
-      : points_(points), o_(o), support_(support) {}
+      : points_(points),
+        o_(o),
+        support_(support),
+        tilt_(std::min(kMostTilt, kTilt / std::sqrt(static_cast<double>(points.size())))) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vector n = Vector::Unit(axis);
+      const double width = support.Farthest(n).value + support.Farthest(Vector(-n)).value;
+      per_width_[axis] = 1 / width;
+    }
+  }
 
   // Whether o is in the hull: in a tetrahedron of its points, exactly. May say false of a point
   // near the boundary.
@@ -97,7 +152,7 @@ class Lookout {
     const Vector across = kBeside * d.cross(Vector(0.9, 0.7, 0.4));
     for (const Vector& off : {beside, Vector(-beside), across, Vector(-across)}) {
       const PlainVector ray = Vector(d + off);
-      if (!Sees(ray) && !FindPortal(ray)) continue;
+      if (!Sees(ray) && !GuessPortal(ray) && !FindPortal(ray)) continue;
       if (!RefinePortal(ray)) continue;
       const PlainVector normal = NormalOfPortal();
       const double t = Dot(normal, p_) / Dot(normal, PlainVector(d));
@@ -140,6 +195,24 @@ class Lookout {
     return found_ && Turn(p_, q_, d) > 0 && Turn(q_, r_, d) > 0 && Turn(r_, p_, d) > 0;
   }
   PlainVector NormalOfPortal() const { return Cross(q_ - p_, r_ - p_); }
+
+  // Tries the farthest points along three directions around the one that an ellipsoid of the hull's
+  // widths would have as its normal where the ray leaves it.
+  bool GuessPortal(const PlainVector& d) {
+    // On a sphere, to which widths scale that ellipsoid.
+    const Vector n = Vector(d.x, d.y, d.z).cwiseProduct(per_width_).normalized();
+    const Vector u = tilt_ * AnyPerpendicularTo(n).normalized();
+    const Vector v = n.cross(u);
+    const auto look_up = [&](double along_u, double along_v, int corner, PlainVector& y) {
+      LookUp(Vector((n + along_u * u + along_v * v).cwiseProduct(per_width_)), corner, y);
+    };
+    // An equilateral triangle.
+    look_up(1, 0, 0, p_);
+    look_up(-0.5, 0.866, 1, q_);
+    look_up(-0.5, -0.866, 2, r_);
+    found_ = true;
+    return Sees(d);
+  }
 
   // Finds a triangle that the ray passes through: a point p along the ray, q and r on either side
   // of the plane through p and the ray, moved until their segment passes beyond the ray.
@@ -195,6 +268,9 @@ class Lookout {
   const std::span<const Vector> points_;
   const Vector o_;
   const SupportMap& support_;
+  // How far GuessPortal looks to the sides.
+  const double tilt_;
+  Vector per_width_;
   // The portal: points of the hull and, relative to o, where they are; turning left seen from
   // outside.
   bool found_ = false;
@@ -220,63 +296,42 @@ CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const 
   unit_ = std::ldexp(1.0, std::ilogb(radius));
   per_unit_ = 1 / unit_;
   corners_.resize(size_t{6} * (side_ + 1) * (side_ + 1), {kInfinity, kUnknown});
-  const std::vector<uint32_t> twins = Twins();
-  AddSupports(center, radius, support, twins);
-  AddGauges(points, center, max_abs, support, twins);
+  AddSupports(center, radius, support);
+  AddGauges(points, center, max_abs, support);
 }
 
-std::vector<uint32_t> CenterBounds::Twins() const {
-  const uint32_t row = side_ + 1;
-  std::vector<uint32_t> first(size_t{row} * row * row, UINT32_MAX);
-  std::vector<uint32_t> twins(corners_.size());
-  for (uint32_t i = 0; i < twins.size(); ++i) {
-    const Vector n = (DirectionOf(i) + Vector::Ones()) * half_;
-    const auto place = [&](int axis) { return static_cast<uint32_t>(n[axis]); };
-    uint32_t& twin = first[(place(0) * row + place(1)) * row + place(2)];
-    twin = std::min(twin, i);
-    twins[i] = twin;
-  }
-  return twins;
-}
-
-Vector CenterBounds::DirectionOf(uint32_t corner) const {
-  const uint32_t row = side_ + 1;
-  const double s = (corner / row % row) / half_ - 1;
-  const double t = (corner % row) / half_ - 1;
-  return CubeDirection(corner / (row * row), s, t);
-}
-
-void CenterBounds::AddSupports(const Vector& center, double radius, const SupportMap& support,
-                               std::span<const uint32_t> twins) {
+void CenterBounds::AddSupports(const Vector& center, double radius, const SupportMap& support) {
   const double margin = kCenterMargin * radius;
+  const std::span<const CornerPlace> places = Corners(side_);
   for (uint32_t i = 0; i < corners_.size(); ++i) {
-    if (twins[i] != i) {
-      corners_[i].support = corners_[twins[i]].support;
+    const auto& [n, twin] = places[i];
+    if (twin != i) {
+      corners_[i].support = corners_[twin].support;
       continue;
     }
-    const Vector n = DirectionOf(i);
     const double reach = support.Farthest(n).value - n.dot(center);
     corners_[i].support = RoundedUp((reach + margin) * per_unit_);
   }
 }
 
 void CenterBounds::AddGauges(std::span<const Vector> points, const Vector& center, double max_abs,
-                             const SupportMap& support, std::span<const uint32_t> twins) {
+                             const SupportMap& support) {
   Lookout lookout(points, center, support);
   if (!lookout.IsInside()) return;
+  const std::span<const CornerPlace> places = Corners(side_);
   const uint32_t row = side_ + 1;
   const uint32_t step = side_ > kMostGaugedCells ? 2 : 1;
   double least = std::numeric_limits<double>::infinity();
-  for (uint32_t i = 0; i < corners_.size(); ++i) {
-    if (i / row % row % step != 0 || i % row % step != 0) continue;
-    if (twins[i] != i) {
-      corners_[i].gauge = corners_[twins[i]].gauge;
-      continue;
+  for (uint32_t line = 0; line < 6 * row && least > 0; line += line % row == side_ ? 1 : step) {
+    for (uint32_t i = line * row; i <= line * row + side_ && least > 0; i += step) {
+      if (places[i].twin != i) {
+        corners_[i].gauge = corners_[places[i].twin].gauge;
+        continue;
+      }
+      const double t = lookout.Reach(places[i].direction);
+      least = std::min(least, t);
+      if (t > 0) corners_[i].gauge = RoundedUp((1 + kCenterMargin) * unit_ / t);
     }
-    const double t = lookout.Reach(DirectionOf(i));
-    least = std::min(least, t);
-    if (!(t > 0)) break;
-    corners_[i].gauge = RoundedUp((1 + kCenterMargin) * unit_ / t);
   }
   // All or none: only a centre that is surrounded is strictly inside, up to rounding.
   if (!(least >= kCenterLeastRadius * max_abs)) {

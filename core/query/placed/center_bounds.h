@@ -74,13 +74,9 @@ class CenterBounds {
     float gauge;
   };
 
-  // Of each corner the first one with the same direction, on another face where the faces meet.
-  std::vector<uint32_t> Twins() const;
-  void AddSupports(const Vector& center, double radius, const SupportMap& support,
-                   std::span<const uint32_t> twins);
+  void AddSupports(const Vector& center, double radius, const SupportMap& support);
   void AddGauges(std::span<const Vector> points, const Vector& center, double max_abs,
-                 const SupportMap& support, std::span<const uint32_t> twins);
-  Vector DirectionOf(uint32_t corner) const;
+                 const SupportMap& support);
 
   // (side_ + 1)^2 corners for each of the six faces.
   std::vector<Corner> corners_;

@@ -202,8 +202,8 @@ class SupportMap::Filling {
     most_cells_ = map_.cells_.size() + kMostCellsPerPoint * map_.points_.size();
     const uint32_t side = map_.side_;
     for (uint32_t face = 0; face < 6; ++face) {
-      const FacePoints points = PointsOn(face);
-      FillRange(points, {face * side * side, side, -1, -1, 2.0 / side}, {0, side, 0, side}, 0);
+      SeeFrom(face);
+      FillRange(seen_, {face * side * side, side, -1, -1, 2.0 / side}, {0, side, 0, side}, 0);
     }
   }
 
@@ -223,7 +223,8 @@ class SupportMap::Filling {
     uint32_t j_end;
   };
 
-  FacePoints PointsOn(uint32_t face) const {
+  // All points, as they are seen on a face.
+  void SeeFrom(uint32_t face) {
     const uint32_t axis = face / 2;
     const uint32_t first = kCubeAxisAfter[axis];
     const uint32_t second = kCubeAxisAfter[axis + 1];
@@ -231,18 +232,16 @@ class SupportMap::Filling {
     // A direction is scaled by what coordinates are divided by: powers of two.
     const Vector scale = map_.scale_;
     const Vector per_scale = scale.cwiseInverse();
-    FacePoints points;
-    points.Reserve(map_.points_.size());
-    points.size = map_.points_.size();
-    for (size_t i = 0; i < points.size; ++i) {
+    seen_.Reserve(map_.points_.size());
+    seen_.size = map_.points_.size();
+    for (size_t i = 0; i < seen_.size; ++i) {
       const Vector& p = map_.points_[i];
-      points.a[i] = p[first] * per_scale[first];
-      points.b[i] = p[second] * per_scale[second];
-      points.c[i] = sign * p[axis] * per_scale[axis];
-      points.ids[i] = static_cast<uint32_t>(i);
+      seen_.a[i] = p[first] * per_scale[first];
+      seen_.b[i] = p[second] * per_scale[second];
+      seen_.c[i] = sign * p[axis] * per_scale[axis];
+      seen_.ids[i] = static_cast<uint32_t>(i);
     }
-    points.Pad();
-    return points;
+    seen_.Pad();
   }
 
   static Square Widened(const Grid& grid, const Range& range) {
@@ -288,22 +287,24 @@ class SupportMap::Filling {
     if (found.size <= kMostCompared) CompareEach(found, Widened(grid, range));
     if (found.size <= 4) return FillAll(found, grid, range);
     Cell& cell = map_.cells_[grid.first + range.i_begin * grid.side + range.j_begin];
-    const bool divides = found.size > kMostListed && grid.width > kLeastWidth * kPartsASide &&
+    const bool divides = found.size > kMostListed && grid.width > 2 * kLeastWidth &&
                          map_.cells_.size() < most_cells_;
     // Beyond, ids would not tell points, lists and parts apart.
     HULLD_CHECK(map_.cells_.size() < kDivided - kLong && map_.lists_.size() < kDivided - kLong);
     if (!divides) {
+      const auto others = found.ids.begin() + 3;
+      std::copy(found.ids.begin(), others, cell.ids);
       cell.ids[3] = kLong + static_cast<uint32_t>(map_.lists_.size());
-      map_.lists_.push_back(static_cast<uint32_t>(found.size));
-      map_.lists_.insert(map_.lists_.end(), found.ids.begin(), found.ids.begin() + found.size);
+      map_.lists_.push_back(static_cast<uint32_t>(found.size - 3));
+      map_.lists_.insert(map_.lists_.end(), others, found.ids.begin() + found.size);
       return;
     }
     const auto first = static_cast<uint32_t>(map_.cells_.size());
     cell.ids[3] = kDivided + first;
-    map_.cells_.resize(first + kPartsASide * kPartsASide);
-    const Grid parts = {first, kPartsASide, grid.s + grid.width * range.i_begin,
-                        grid.t + grid.width * range.j_begin, grid.width / kPartsASide};
-    FillRange(found, parts, {0, kPartsASide, 0, kPartsASide}, depth + 1);
+    map_.cells_.resize(first + 4);
+    const Grid quarters = {first, 2, grid.s + grid.width * range.i_begin,
+                           grid.t + grid.width * range.j_begin, 0.5 * grid.width};
+    FillRange(found, quarters, {0, 2, 0, 2}, depth + 1);
   }
 
   // Drops those that another is ahead of all over the square.
@@ -328,6 +329,8 @@ class SupportMap::Filling {
   SupportMap& map_;
   double bound_ = 0;
   size_t most_cells_ = 0;
+  // All points, on the face that is being filled.
+  FacePoints seen_;
   // One for each depth.
   std::vector<std::unique_ptr<FacePoints>> lists_;
 };
@@ -385,35 +388,36 @@ void SupportMap::BuildBlocks() {
   }
 }
 
-// Calls visit(id) for each point that the cell of n lists, some of them more than once.
-template <typename Visit>
-void SupportMap::VisitCell(const PlainVector& n, Visit visit) const {
-  Place place = PlaceOf(n);
-  const Cell* cell = &CellAt(place);
-  while (cell->ids[3] >= kDivided) {
-    const auto part = [](double& x) {
-      x = (x - std::floor(x)) * kPartsASide;
-      return std::min(static_cast<uint32_t>(x), kPartsASide - 1);
-    };
-    const uint32_t i = part(place.s);
-    const uint32_t j = part(place.t);
-    cell = &cells_[(cell->ids[3] - kDivided) + i * kPartsASide + j];
-  }
-  if (cell->ids[3] < kLong) {
-    for (const uint32_t id : cell->ids) visit(id);
-    return;
-  }
-  const uint32_t* const list = lists_.data() + (cell->ids[3] - kLong);
-  for (uint32_t k = 1; k <= list[0]; ++k) visit(list[k]);
+// Where within a cell a coordinate lies, as bits: the first one tells the half, and so on.
+uint32_t BitsWithin(double coordinate) {
+  return static_cast<uint32_t>((coordinate - std::floor(coordinate)) * 0x1p32);
 }
 
-SupportMap::Support SupportMap::LookUpDeep(const PlainVector& n) const {
-  Support best{0, -INFINITY};
-  VisitCell(n, [&](uint32_t id) {
+const SupportMap::Cell& SupportMap::QuarterAt(const Cell& divided, const Place& place) const {
+  uint32_t s = BitsWithin(place.s);
+  uint32_t t = BitsWithin(place.t);
+  const Cell* cell = &divided;
+  do {
+    cell = &cells_[(cell->ids[3] - kDivided) + 2 * (s >> 31) + (t >> 31)];
+    s <<= 1;
+    t <<= 1;
+  } while (cell->ids[3] >= kDivided);
+  return *cell;
+}
+
+SupportMap::Support SupportMap::LookUpDeep(const Cell& cell, const Place& place,
+                                           const PlainVector& n) const {
+  const Cell& found = cell.ids[3] >= kDivided ? QuarterAt(cell, place) : cell;
+  if (found.ids[3] < kLong) return BestOfFour(found, n);
+  Support best{found.ids[0], ValueOf(found.ids[0], n)};
+  const auto consider = [&](uint32_t id) {
     const double value = ValueOf(id, n);
-    // NaN, of a direction beyond all ranges, still gives some point.
-    if (value > best.value || best.value == -INFINITY) best = {id, value};
-  });
+    best.vertex = value > best.value ? id : best.vertex;
+    best.value = std::max(best.value, value);
+  };
+  consider(found.ids[1]);
+  consider(found.ids[2]);
+  for (const uint32_t id : OthersOf(found)) consider(id);
   return best;
 }
 
@@ -429,7 +433,15 @@ void SupportMap::AppendCandidates(const PlainVector& n, double error, double lea
     for (uint32_t i = 0; i < points_.size(); ++i) consider(i);
     return;
   }
-  VisitCell(n, consider);
+  const Place place = PlaceOf(n);
+  const Cell& top = CellAt(place);
+  const Cell& cell = top.ids[3] >= kDivided ? QuarterAt(top, place) : top;
+  for (const uint32_t id : std::span(cell.ids).first(3)) consider(id);
+  if (cell.ids[3] < kLong) {
+    consider(cell.ids[3]);
+  } else {
+    for (const uint32_t id : OthersOf(cell)) consider(id);
+  }
   std::sort(candidates.begin() + begin, candidates.end());
   candidates.erase(std::unique(candidates.begin() + begin, candidates.end()), candidates.end());
 }
@@ -437,8 +449,9 @@ void SupportMap::AppendCandidates(const PlainVector& n, double error, double lea
 std::vector<uint32_t> SupportMap::Listed() const {
   std::vector<char> is_listed(points_.size(), scans());
   for (const Cell& cell : cells_) {
-    if (cell.ids[3] >= kLong) continue;
-    for (const uint32_t id : cell.ids) is_listed[id] = 1;
+    if (cell.ids[3] >= kDivided) continue;
+    for (const uint32_t id : std::span(cell.ids).first(3)) is_listed[id] = 1;
+    if (cell.ids[3] < kLong) is_listed[cell.ids[3]] = 1;
   }
   for (size_t at = 0; at < lists_.size(); at += lists_[at] + 1) {
     for (uint32_t k = 1; k <= lists_[at]; ++k) is_listed[lists_[at + k]] = 1;

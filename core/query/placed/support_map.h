@@ -71,23 +71,28 @@ class SupportMap {
   size_t MemoryBytes() const;
 
  private:
-  // The points of a cell, repeated where there are fewer than four. Where there are more, ids[3] is
-  // kLong plus where in lists_ their number and they begin. Where the cell is divided, ids[3] is
-  // kDivided plus where in cells_ its parts begin, kPartsASide rows of as many.
+  // The points of a cell, repeated where there are fewer than four. Where there are more, three of
+  // them, and ids[3] is kLong plus where in lists_ the others begin, after their number. Where the
+  // cell is divided, ids[3] is kDivided plus where in cells_ its four quarters begin.
   struct Cell {
     uint32_t ids[4];
   };
   static constexpr uint32_t kLong = uint32_t{1} << 31;
   static constexpr uint32_t kDivided = uint32_t{3} << 30;
-  static constexpr uint32_t kPartsASide = 4;
   class Filling;
+  struct Place;
 
   void BuildBlocks();
   Support Scan(const PlainVector& n) const;
-  template <typename Visit>
-  void VisitCell(const PlainVector& n, Visit visit) const;
+  const Cell& QuarterAt(const Cell& divided, const Place& place) const;
+  // The other points of a cell that lists more than four.
+  std::span<const uint32_t> OthersOf(const Cell& cell) const {
+    const size_t at = cell.ids[3] - kLong;
+    return std::span(lists_).subspan(at + 1, lists_[at]);
+  }
   Support LookUp(const PlainVector& n) const;
-  Support LookUpDeep(const PlainVector& n) const;
+  Support BestOfFour(const Cell& cell, const PlainVector& n) const;
+  Support LookUpDeep(const Cell& cell, const Place& place, const PlainVector& n) const;
   double ValueOf(uint32_t vertex, const PlainVector& n) const {
     const Vector& v = points_[vertex];
     return SupportValue(n, v.x(), v.y(), v.z());
@@ -132,8 +137,12 @@ inline SupportMap::Place SupportMap::PlaceOf(const PlainVector& n) const {
 }
 
 inline SupportMap::Support SupportMap::LookUp(const PlainVector& n) const {
-  const Cell& cell = CellAt(PlaceOf(n));
-  if (cell.ids[3] >= kLong) return LookUpDeep(n);
+  const Place place = PlaceOf(n);
+  const Cell& cell = CellAt(place);
+  return cell.ids[3] < kLong ? BestOfFour(cell, n) : LookUpDeep(cell, place, n);
+}
+
+inline SupportMap::Support SupportMap::BestOfFour(const Cell& cell, const PlainVector& n) const {
   const double v0 = ValueOf(cell.ids[0], n);
   const double v1 = ValueOf(cell.ids[1], n);
   const double v2 = ValueOf(cell.ids[2], n);

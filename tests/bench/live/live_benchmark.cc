@@ -45,11 +45,17 @@ struct Workload {
   int points;
   int questions;
   bool inside = false;
+  // Each step begins with the points alone, as when a hull was read from disk.
+  bool cold = false;
 };
 constexpr Workload kWorkloads[] = {
-    {"1 point, 1 question", 1, 1},        {"30 points, 1 question", 30, 1},
-    {"1000 points, 1 question", 1000, 1}, {"1 point, 30 questions", 1, 30},
-    {"1 point, 1000 questions", 1, 1000}, {"1 inside point, 1 question", 1, 1, true},
+    {"1 point, 1 question", 1, 1},
+    {"30 points, 1 question", 30, 1},
+    {"1000 points, 1 question", 1000, 1},
+    {"1 point, 30 questions", 1, 30},
+    {"1 point, 1000 questions", 1, 1000},
+    {"1 inside point, 1 question", 1, 1, true},
+    {"first question, cold", 0, 1, false, true},
 };
 constexpr int kProbeVertices = 64;
 constexpr double kProbeRadius = 1;
@@ -139,9 +145,13 @@ class Run {
     HULLD_CHECK(start.Add(points).ok());
     const auto begin = Clock::now();
     // The hull stays about as large as it was: it starts anew when it has grown by a half.
-    const int most_steps = std::max(1, vertices_ / 2 / workload_.points);
+    const int most_steps = std::max(1, vertices_ / 2 / std::max(1, workload_.points));
     do {
-      Grow(start, points, std::min(most_steps, 20000));
+      if (workload_.cold) {
+        AskCold(start.Vertices());
+      } else {
+        Grow(start, points, std::min(most_steps, 20000));
+      }
     } while (Microseconds(Clock::now() - begin) < seconds_ * 1e6);
     Row("hulld", hulld_, moved_ / static_cast<double>(hulld_.step.size()));
     if (!peer_.step.empty()) Row("Bullet", peer_, 0);
@@ -183,6 +193,28 @@ class Run {
     }
     preparer_.Wait();
     moved_ += static_cast<double>(live.points_moved() - moved);
+  }
+
+  void AskCold(std::vector<Vector> points) {
+    Pose pose;
+    pose.q = random_.Rotation();
+    pose.t = OnSphere(1 + kProbeRadius + random_.Between(-0.1, 0.1));
+    // To take in the points is a part of the peer's step.
+    const std::unique_ptr<GrowingPeer> peer = MakeGrowingPeer({});
+    const int peer_colliding = peer == nullptr ? 0 : StepPeer(*peer, points, {pose});
+    const auto start = Clock::now();
+    const LiveHull live(std::move(points), 3);
+    const auto taken = Clock::now();
+    const std::shared_ptr<const QueryHull> version = live.VersionAt(live.Now());
+    const absl::StatusOr<Answer> answer =
+        CheckCollision(PlacedHull(*version, Pose()), PlacedHull(*query_probe_, pose));
+    const auto end = Clock::now();
+    const int colliding = answer->relation != Relation::kSeparated;
+    if (peer != nullptr) disagreements_ += std::abs(peer_colliding - colliding);
+    hulld_.step.push_back(Microseconds(end - start));
+    hulld_.add.push_back(Microseconds(taken - start));
+    hulld_.ask.push_back(Microseconds(end - taken));
+    hulld_.with_box.push_back(Microseconds(end - start));
   }
 
   int StepHulld(HullBuilder& builder, LiveHull& live, LiveHull::Mark& mark,

@@ -2,27 +2,25 @@
 //
 //   live_service_benchmark [HULLD [VERTICES...]]
 //
-// For each number of vertices (64, 1000, 10000 and 100000 where none is given): starts a hulld of
-// its own on a durable store and asks single questions about a hull of so many vertices and a probe
-// near it: at rest; right after each acknowledged chunk of one outside point; while another
-// connection streams such chunks at full rate; about another hull meanwhile, which tells what the
-// machine's load alone costs; and as the first question after a restart. One row of CSV per case:
-// the questions' percentiles, their ratios to those at rest, and the writer's rate, which the row
-// "writer alone" has without any reader. The cases take turns, so that drifts of the machine's
-// speed meet all of them.
+// For each number of vertices (64 to 1000000, in tens from 1000 on, where none is given): starts a
+// hulld of its own on a durable store and asks single questions about a hull of so many vertices
+// and a probe near it: at rest; right after each acknowledged chunk of one outside point; while
+// another connection streams such chunks at full rate; about another hull meanwhile, which tells
+// what the machine's load alone costs; and as the first question after a restart. One row of CSV
+// per case: the questions' percentiles, their ratios to those at rest, and the writer's rate, which
+// the row "writer alone" has without any reader. The cases take turns, so that drifts of the
+// machine's speed meet all of them.
 
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <thread>
@@ -33,6 +31,7 @@
 #include "hulld/v1/hull.grpc.pb.h"
 #include "tests/bench/service/ball_hull.h"
 #include "tests/bench/service/child_server.h"
+#include "tests/bench/service/growing_writer.h"
 
 namespace hulld::bench {
 namespace {
@@ -49,68 +48,12 @@ constexpr std::chrono::seconds kMostPerTurn(2);
 // Chunks on their way, as a client has that does not wait for each.
 constexpr uint64_t kWindow = 32;
 
-std::shared_ptr<grpc::Channel> Connect(const std::string& address) {
-  grpc::ChannelArguments own;  // a connection of its own
-  own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), own);
-}
-
-// One stream of chunks of one point. Each point lies a little farther out than the one in the same
-// direction before, which it takes into the hull, so that the number of vertices stays.
-class Writer {
- public:
-  explicit Writer(const std::string& address, const std::string& writer_id)
-      : stub_(v1::HullService::NewStub(Connect(address))), stream_(stub_->AppendPoints(&context_)) {
-    v1::AppendPointsRequest open;
-    open.mutable_open()->set_hull_id(kHull);
-    open.mutable_open()->set_writer_id(writer_id);
-    v1::AppendPointsResponse reply;
-    if (!stream_->Write(open) || !stream_->Read(&reply)) std::abort();
-  }
-  ~Writer() {
-    stream_->WritesDone();
-    Require(stream_->Finish(), "AppendPoints");
-  }
-
-  void Send() {
-    constexpr int kDirections = 16;
-    static std::atomic<int> count = 0;
-    const int i = count++;
-    const double angle = 2 * std::numbers::pi * (i % kDirections) / kDirections;
-    const double radius = 1.1 + 1e-7 * i;
-    v1::AppendPointsRequest request;
-    request.mutable_chunk()->set_sequence(++sent_);
-    for (const double x : {radius * std::cos(angle), radius * std::sin(angle), 0.0}) {
-      request.mutable_chunk()->mutable_points()->add_xyz(x);
-    }
-    if (!stream_->Write(request)) std::abort();
-  }
-  void Receive() {
-    v1::AppendPointsResponse reply;
-    if (!stream_->Read(&reply)) std::abort();
-    const v1::PointCounts& counts = reply.ack().counts();
-    if (counts.outside() != counts.received()) std::abort();
-    // One acknowledgement may stand for several chunks.
-    received_ = reply.ack().sequence();
-  }
-  uint64_t waiting() const { return sent_ - received_; }
-  uint64_t received() const { return received_; }
-
- private:
-  std::unique_ptr<v1::HullService::Stub> stub_;
-  grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientReaderWriter<v1::AppendPointsRequest, v1::AppendPointsResponse>>
-      stream_;
-  uint64_t sent_ = 0;
-  uint64_t received_ = 0;
-};
-
 // A writer at full rate, until this goes.
 class StreamingWriter {
  public:
   StreamingWriter(const std::string& address, const std::string& writer_id)
       : thread_([this, address, writer_id] {
-          Writer writer(address, writer_id);
+          GrowingWriter writer(ConnectAlone(address), kHull, writer_id);
           while (!ending_) {
             while (writer.waiting() < kWindow) writer.Send();
             writer.Receive();
@@ -176,11 +119,6 @@ void Count(const StreamingWriter& writer, const std::function<void()>& meanwhile
   row->chunks += static_cast<double>(writer.received() - before);
 }
 
-double Percentile(const std::vector<double>& sorted, double p) {
-  return sorted[std::min(sorted.size() - 1,
-                         static_cast<size_t>(p * static_cast<double>(sorted.size())))];
-}
-
 void Print(int vertices, Row* row, const std::vector<double>* rest) {
   std::printf("%d,%s,%zu,", vertices, row->name, row->times.size());
   if (row->times.empty()) {
@@ -211,23 +149,20 @@ void Measure(const std::string& program, int vertices) {
   Row cold = {"first after a restart"};
   {
     const ChildServer server(command);
-    const auto hulls = v1::HullService::NewStub(Connect(server.address()));
+    const auto hulls = v1::HullService::NewStub(ConnectAlone(server.address()));
     MakeBallHull(*hulls, kHull, vertices, 1);
     MakeBallHull(*hulls, kResting, vertices, 1.1);
     MakeBallHull(*hulls, kProbe, 64, 0.5);
     const auto nothing = [] {};
     const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(500)); };
-    const auto stub = v1::CollisionService::NewStub(Connect(server.address()));
+    const auto stub = v1::CollisionService::NewStub(ConnectAlone(server.address()));
     for (int i = 0; i < 1000; ++i) Ask(*stub, kHull, i);  // warm up, and all is prepared that pays
     for (int round = 0; round < kRounds; ++round) {
       const std::string number = std::to_string(round);
       MeasureTurn(*stub, kHull, nothing, &rest);
       {
-        Writer writer(server.address(), "after" + number);
-        const auto append = [&] {
-          writer.Send();
-          writer.Receive();
-        };
+        GrowingWriter writer(ConnectAlone(server.address()), kHull, "after" + number);
+        const auto append = [&] { writer.SendAndReceive(); };
         MeasureTurn(*stub, kHull, append, &after);
       }
       const StreamingWriter writer(server.address(), "beside" + number);
@@ -240,7 +175,7 @@ void Measure(const std::string& program, int vertices) {
   }
   for (int i = 0; i < kRestarts; ++i) {
     const ChildServer server(command);
-    const auto channel = Connect(server.address());
+    const auto channel = ConnectAlone(server.address());
     // Somebody else's question, which opens the connection.
     grpc::ClientContext context;
     context.set_wait_for_ready(true);
@@ -257,7 +192,7 @@ int Run(int argc, char** argv) {
   const std::string program = argc > 1 ? argv[1] : HULLD_PROGRAM;
   std::vector<int> counts;
   for (int i = 2; i < argc; ++i) counts.push_back(std::atoi(argv[i]));
-  if (counts.empty()) counts = {64, 1000, 10'000, 100'000};
+  if (counts.empty()) counts = {64, 1000, 10'000, 100'000, 1'000'000};
   std::printf("vertices,case,questions,p50_us,p99_us,p50_ratio,p99_ratio,writer_chunks_per_s\n");
   for (const int vertices : counts) Measure(program, vertices);
   return 0;

@@ -45,7 +45,18 @@ class MalformedMessage : public testing::Test {
 
 // These streams ended OK, as if the client had said all.
 TEST_F(MalformedMessage, FirstOfAStreamIsRefused) {
-  for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions}) {
+  for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions, Rpc::kWatchCollisions}) {
+    const grpc::Status status = Send(rpc, {kCutShort});
+    EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT) << server::RpcName(rpc);
+    EXPECT_THAT(status.error_message(), HasSubstr("a message is malformed"));
+  }
+}
+
+// These ended UNIMPLEMENTED, as gRPC parsed them.
+TEST_F(MalformedMessage, OfACallWithOneRequestIsRefused) {
+  for (const Rpc rpc : {Rpc::kCreateHull, Rpc::kGetHull, Rpc::kGetHullMesh, Rpc::kListHulls,
+                        Rpc::kDeleteHull, Rpc::kCheckCollision, Rpc::kBatchCheckCollisions,
+                        Rpc::kFindCollisions, Rpc::kGetStatus, Rpc::kSaveBackup}) {
     const grpc::Status status = Send(rpc, {kCutShort});
     EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT) << server::RpcName(rpc);
     EXPECT_THAT(status.error_message(), HasSubstr("a message is malformed"));
@@ -72,7 +83,7 @@ TEST_F(MalformedMessage, InAStreamIsRefusedAndWhatCameBeforeStands) {
 
 // An empty message is a message, and none at all is an end.
 TEST_F(MalformedMessage, IsNeitherAnEmptyOneNorNone) {
-  for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions}) {
+  for (const Rpc rpc : {Rpc::kAppendPoints, Rpc::kStreamCollisions, Rpc::kWatchCollisions}) {
     EXPECT_EQ(Send(rpc, {}).error_code(), grpc::OK) << server::RpcName(rpc);
     EXPECT_THAT(Send(rpc, {""}).error_message(), HasSubstr("the message is empty"));
   }

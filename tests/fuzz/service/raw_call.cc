@@ -18,8 +18,9 @@ using google::protobuf::ServiceDescriptor;
 
 // Of the services that the program is linked with.
 const MethodDescriptor* FindMethod(server::Rpc rpc) {
-  for (const char* service : {"hulld.v1.HullService", "hulld.v1.CollisionService",
-                              "hulld.v1.StatusService", "hulld.v1.MaintenanceService"}) {
+  for (const char* service :
+       {"hulld.v1.HullService", "hulld.v1.CollisionService", "hulld.v1.StatusService",
+        "hulld.v1.MaintenanceService", "grpc.reflection.v1alpha.ServerReflection"}) {
     const ServiceDescriptor* const found =
         DescriptorPool::generated_pool()->FindServiceByName(service);
     if (found == nullptr) continue;
@@ -96,6 +97,8 @@ bool Wait(grpc::CompletionQueue& queue) {
 
 }  // namespace
 
+bool LastsUntilCancelled(server::Rpc rpc) { return rpc == server::Rpc::kWatchHulls; }
+
 RawCall DecodeRawCall(ByteReader& in, const MessageHints& hints) {
   RawCall call;
   call.rpc = static_cast<server::Rpc>(in.Below(server::kRpcCount));
@@ -130,6 +133,7 @@ grpc::Status MakeRawCall(grpc::GenericStub& stub, grpc::ClientContext& context,
     grpc::ByteBuffer reply;
     stream->Read(&reply, nullptr);
     more = Wait(queue);
+    if (more && LastsUntilCancelled(call.rpc)) context.TryCancel();
   }
   grpc::Status status;
   stream->Finish(&status, nullptr);

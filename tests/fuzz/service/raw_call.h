@@ -25,7 +25,11 @@ struct RawCall {
 // deeper than protobuf reads, messages of more bytes than the server takes, or none at all.
 RawCall DecodeRawCall(ByteReader& in, const MessageHints& hints);
 
-// Sends them, reads whatever comes, and returns how the call ended.
+// Whether such a call has no end of its own.
+bool LastsUntilCancelled(server::Rpc rpc);
+
+// Sends them, reads whatever comes, and returns how the call ended. One that has no end of its own
+// is cancelled after its first reply.
 grpc::Status MakeRawCall(grpc::GenericStub& stub, grpc::ClientContext& context,
                          const RawCall& call);
 

@@ -28,6 +28,8 @@ Codes CodesOf(Rpc rpc) {
     case Rpc::kBatchCheckCollisions:
     case Rpc::kStreamCollisions:
     case Rpc::kFindCollisions:
+    case Rpc::kWatchHulls:
+    case Rpc::kWatchCollisions:
       return {grpc::INVALID_ARGUMENT};
     case Rpc::kDeleteHull:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
@@ -35,6 +37,8 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
     case Rpc::kSaveBackup:
       return {grpc::FAILED_PRECONDITION};
+    case Rpc::kServerReflectionInfo:
+      return {grpc::INVALID_ARGUMENT};
     case Rpc::kGetStatus:
       return {};
   }

@@ -635,6 +635,7 @@ void ServiceProgram::SendRaw() {
   grpc::ClientContext context;
   CallManner manner;
   manner.raw = true;
+  manner.cancelled = LastsUntilCancelled(call.rpc);
   Hurry(context, manner);
   const grpc::Status status = MakeRawCall(*service_.generic_, context, call);
   if (Ended(call.rpc, manner, status) && call.malformed) {

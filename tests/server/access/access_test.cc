@@ -105,6 +105,8 @@ const std::map<std::string, CallRule>& Rules() {
         CallRule::kByStatus}},
       {"hulld.v1.HullService.DeleteHull",
        {Permission::kWrite, WithHullId<v1::DeleteHullRequest>, CallRule::kByStatus}},
+      {"hulld.v1.HullService.WatchHulls",
+       {Permission::kRead, WithHullId<v1::WatchHullsRequest>, CallRule::kByStatus}},
       {"hulld.v1.CollisionService.CheckCollision",
        {Permission::kRead,
         [](const std::string& hull_id) {
@@ -149,6 +151,15 @@ const std::map<std::string, CallRule>& Rules() {
           *request.add_placements() = PlacementOf("cell-1/own");
           *request.add_placements() = PlacementOf(hull_id);
           return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kInReply}},
+      {"hulld.v1.CollisionService.WatchCollisions",
+       {Permission::kRead,
+        [](const std::string& hull_id) {
+          v1::WatchCollisionsRequest open;
+          *open.mutable_open()->add_placements() = PlacementOf("cell-1/own");
+          *open.mutable_open()->add_placements() = PlacementOf(hull_id);
+          return std::vector{open.SerializeAsString()};
         },
         CallRule::kInReply}},
       {"hulld.v1.StatusService.GetStatus",
@@ -233,6 +244,8 @@ class Access : public ServerTest {
       grpc::ByteBuffer reply;
       stream->Read(&reply, nullptr);
       more = done();
+      // It would last.
+      if (more && method.ends_with("WatchHulls")) context.TryCancel();
       std::vector<grpc::Slice> slices;
       if (!more || !reply.Dump(&slices).ok()) continue;
       for (const grpc::Slice& slice : slices) {
@@ -357,6 +370,41 @@ TEST_F(Access, ListsShowWhatIsTheCallersAlone) {
     EXPECT_THAT(ListedBy("cell's secret", prefix), ElementsAre("cell-1/own")) << prefix;
   }
   EXPECT_THAT(ListedBy("cell's secret", "cell-1/x"), ElementsAre());
+}
+
+TEST_F(Access, AWatchTellsWhatIsTheCallersAlone) {
+  int n = 0;
+  for (const char* prefix : {"", "c", "cell-1/"}) {
+    ++n;
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer cell's secret");
+    v1::WatchHullsRequest request;
+    request.set_prefix(prefix);
+    const auto reader = hulls_->WatchHulls(&context, request);
+    std::vector<std::string> ids;
+    v1::WatchHullsResponse message;
+    const auto read_to = [&](const std::string& last) {
+      while ((ids.empty() || ids.back() != last) && reader->Read(&message)) {
+        for (const v1::HullEvent& event : message.events()) ids.push_back(event.hull().hull_id());
+      }
+    };
+    read_to("cell-1/own");
+    const std::string theirs = absl::StrCat("cell-10/of", n);
+    const std::string own = absl::StrCat("cell-1/of", n);
+    for (const std::string& id : {theirs, own}) {
+      ASSERT_TRUE(Do("hulld.v1.HullService.CreateHull", "robot's secret", id).status.ok());
+    }
+    read_to(own);
+    for (const std::string& id : ids) EXPECT_TRUE(id.starts_with("cell-1/")) << id;
+    context.TryCancel();
+    reader->Finish();
+  }
+  grpc::ClientContext context;
+  context.AddMetadata("authorization", "Bearer cell's secret");
+  v1::WatchHullsRequest request;
+  request.set_prefix("cell-10/");
+  const auto reader = hulls_->WatchHulls(&context, request);
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::PERMISSION_DENIED);
 }
 
 TEST_F(Access, TheStoreAsAWholeIsNotForThoseWithAPrefix) {

@@ -107,6 +107,19 @@ TEST_F(ErrorReasons, LimitsNameTheirFlagAndTheirNumber) {
   EXPECT_TRUE(running.Finish().ok());
 }
 
+TEST_F(ErrorReasons, ALimitOfAQueryNamesItsNumberToo) {
+  Config config = TestConfig();
+  config.limits.max_textbook_axes = 155;
+  Restart(config);
+  Put("cube", Cube());
+  v1::CheckCollisionRequest pair;
+  *pair.mutable_a() = PlacementOf("cube");
+  *pair.mutable_b() = PlacementOf("cube", 3);
+  pair.set_method(v1::METHOD_TEXTBOOK_SAT);
+  Expect(MakeClient().CheckCollision(pair).status(), absl::StatusCode::kResourceExhausted,
+         v1::ERROR_REASON_LIMIT_EXCEEDED, {{"flag", "max-textbook-axes"}, {"limit", "155"}});
+}
+
 TEST_F(ErrorReasons, DrainingAndAStoreInMemoryHaveReasonsOfTheirOwn) {
   const Client client = MakeClient();
   Expect(client.SaveBackup([](const auto&) { return absl::OkStatus(); }),

@@ -33,7 +33,7 @@ struct Signal {
 };
 
 // Replies are numbered by first_pair.
-class TestQueue : public QueuedStream<grpc::ServerWriteReactor<Batch>, Batch> {
+class TestQueue : public QueuedStream<WriteReactor, Batch> {
  public:
   using Script = std::function<void(const std::shared_ptr<TestQueue>&)>;
 
@@ -78,7 +78,7 @@ class TestQueue : public QueuedStream<grpc::ServerWriteReactor<Batch>, Batch> {
 };
 
 // Makes `count` replies, and notes how many it made.
-class TestPull : public PulledStream<grpc::ServerWriteReactor<Mesh>, Mesh> {
+class TestPull : public PulledStream<WriteReactor, Mesh> {
  public:
   TestPull(grpc::CallbackServerContext& context, Admission& admission, size_t count, size_t bytes,
            const absl::Status& end, std::atomic<size_t>& made)
@@ -107,16 +107,18 @@ class TestPull : public PulledStream<grpc::ServerWriteReactor<Mesh>, Mesh> {
   std::atomic<size_t>& made_;
 };
 
-class StreamBases : public ::testing::Test,
-                    public v1::CollisionService::CallbackService,
-                    public v1::HullService::CallbackService {
+using Collisions =
+    v1::CollisionService::WithRawCallbackMethod_BatchCheckCollisions<v1::CollisionService::Service>;
+using Hulls = v1::HullService::WithRawCallbackMethod_GetHullMesh<v1::HullService::Service>;
+
+class StreamBases : public ::testing::Test, public Collisions, public Hulls {
  protected:
   void SetUp() override {
     grpc::ServerBuilder builder;
     int port = 0;
     builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port);
-    builder.RegisterService(static_cast<v1::CollisionService::CallbackService*>(this));
-    builder.RegisterService(static_cast<v1::HullService::CallbackService*>(this));
+    builder.RegisterService(static_cast<Collisions*>(this));
+    builder.RegisterService(static_cast<Hulls*>(this));
     server_ = builder.BuildAndStart();
     const auto channel = grpc::CreateChannel("127.0.0.1:" + std::to_string(port),
                                              grpc::InsecureChannelCredentials());
@@ -129,13 +131,13 @@ class StreamBases : public ::testing::Test,
     EXPECT_TRUE(admission_.WaitIdle(std::chrono::steady_clock::time_point::max()));
   }
 
-  grpc::ServerWriteReactor<Batch>* BatchCheckCollisions(
-      grpc::CallbackServerContext* context, const v1::BatchCheckCollisionsRequest*) override {
+  WriteReactor* BatchCheckCollisions(grpc::CallbackServerContext* context,
+                                     const grpc::ByteBuffer*) override {
     return TestQueue::Launch(std::make_shared<TestQueue>(*context, admission_, script_, gone_));
   }
 
-  grpc::ServerWriteReactor<Mesh>* GetHullMesh(grpc::CallbackServerContext* context,
-                                              const v1::GetHullMeshRequest*) override {
+  WriteReactor* GetHullMesh(grpc::CallbackServerContext* context,
+                            const grpc::ByteBuffer*) override {
     return TestPull::Launch(
         std::make_shared<TestPull>(*context, admission_, count_, bytes_, end_, made_));
   }

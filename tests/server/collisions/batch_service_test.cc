@@ -515,5 +515,59 @@ TEST_F(BatchCall, BatchesTakeTurns) {
   EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
 }
 
+// An axis across wide facets came in one message with the answers before it, and with the table of
+// hulls, and no client could read it.
+TEST_F(BatchCall, MessagesStayBelowFourMebibytesWhateverTheAnswers) {
+  constexpr int kCorners = Config::kMaxFeatureVertices;
+  Create("wide");
+  Appender writer(*hulls_, "wide", "w");
+  Coordinates parabola;
+  for (int i = 0; i < kCorners; ++i) {
+    parabola.insert(parabola.end(), {i - 0.5 * kCorners, (i - 0.5 * kCorners) * i, 0.0});
+  }
+  ASSERT_TRUE(writer.Append(1, parabola).has_value());
+  ASSERT_TRUE(writer.Finish().ok());
+  Put("cube", Cube());
+  const std::string long_id(Config::kMaxIdCharacters, 'c');
+  Put(long_id, Cube());
+
+  v1::BatchCheckCollisionsRequest request;
+  request.mutable_wanted()->set_axis(true);
+  *request.add_placements() = PlacementOf("wide");
+  *request.add_placements() = PlacementOf("wide", 0, 0, 1);
+  *request.add_placements() = PlacementOf("cube");
+  *request.add_placements() = PlacementOf("cube", 2);
+  // A table of about 1 MiB.
+  for (int i = 0; i < 3000; ++i) *request.add_placements() = PlacementOf(long_id);
+  AddPair(&request, 0, 1);
+  // Answers of about 1 MiB.
+  for (int i = 0; i < 4000; ++i) AddPair(&request, 2, 3);
+  AddPair(&request, 0, 1);
+  const Batch batch = Run(request);
+  ASSERT_TRUE(batch.status.ok()) << batch.status.error_message();
+  ASSERT_EQ(batch.axes.size(), 4002u);
+  EXPECT_EQ(batch.axes.front().feature_a().vertex_indices_size(), kCorners);
+  EXPECT_EQ(batch.axes.back().feature_b().vertex_indices_size(), kCorners);
+  EXPECT_GT(batch.largest_message, 3u << 20);
+  EXPECT_LT(batch.largest_message, 4u << 20);
+
+  v1::StreamCollisionsRequest open;
+  *open.mutable_open()->mutable_placements() = request.placements();
+  *open.mutable_open()->mutable_pairs() = request.pairs();
+  *open.mutable_open()->mutable_wanted() = request.wanted();
+  grpc::ClientContext context;
+  const auto stream = collisions_->StreamCollisions(&context);
+  ASSERT_TRUE(stream->Write(open));
+  v1::StreamCollisionsResponse part;
+  int answers = 0;
+  while (stream->Read(&part)) {
+    answers += part.pairs_size();
+    EXPECT_LT(part.ByteSizeLong(), 4u << 20);
+    if (part.last()) stream->WritesDone();
+  }
+  EXPECT_TRUE(stream->Finish().ok());
+  EXPECT_EQ(answers, 4002);
+}
+
 }  // namespace
 }  // namespace hulld::server

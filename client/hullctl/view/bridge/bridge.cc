@@ -48,6 +48,7 @@ struct Shared {
   BridgeOptions options;
   SessionGuard guard;
   size_t connections = 0;
+  std::thread::id io_thread;
   std::vector<std::weak_ptr<PageConnection>> pages;
   // Each destroys the handler of a page that has gone: that waits for threads of the handler, which
   // may wait for an answer of hulld, and other pages must not wait for it.
@@ -114,8 +115,11 @@ class PageConnection final : public PageChannel,
 
   bool Enqueue(Message message) {
     std::unique_lock lock(mutex_);
-    room_.wait(lock,
-               [this] { return closed_ || queued_bytes_ <= shared_->options.max_queued_bytes; });
+    // The io thread writes what is queued: it must not wait for itself.
+    if (std::this_thread::get_id() != shared_->io_thread) {
+      room_.wait(lock,
+                 [this] { return closed_ || queued_bytes_ <= shared_->options.max_queued_bytes; });
+    }
     if (closed_) return false;
     queued_bytes_ += message.bytes.size();
     queue_.push_back(std::move(message));
@@ -303,7 +307,10 @@ class BeastBridge final : public Bridge {
     address_ = guard.Address();
     shared_ = std::make_shared<Shared>(std::move(options), std::move(guard));
     Accept();
-    thread_ = std::thread([this] { context_.run(); });
+    thread_ = std::thread([this] {
+      shared_->io_thread = std::this_thread::get_id();
+      context_.run();
+    });
   }
 
   std::string Address() const override { return address_; }

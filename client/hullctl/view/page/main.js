@@ -17,6 +17,8 @@ import {Stage} from 'hulld/stage.js';
 import {Tree} from 'hulld/tree.js';
 
 const $ = (id) => document.getElementById(id);
+// Revisions are 64-bit numbers as text; none is older than any.
+const isNewer = (a, b) => BigInt(a || 0) > BigInt(b || 0);
 
 class Viewer {
   constructor() {
@@ -32,13 +34,13 @@ class Viewer {
     this.crowd = null;
     this.update = 0;
     this.moved = new Set();
-    // Hulls that were asked for and did not come yet; true: it changed meanwhile.
-    this.awaited = new Map();
+    // Hulls that were asked for and did not come yet.
+    this.awaited = new Set();
     this.connection = connect({
       hello: (message) => this.hello(message),
       scene: (message) => this.scene(message),
-      objects: (message) => this.moreObjects(message.objects),
-      hull: (message) => this.hullChanged(message.event, message.synced),
+      objects: (message) => this.moreObjects(message),
+      hull: (message) => this.hullChanged(message.event),
       answer: (message) => this.answer(message),
       collisions: (message) => this.collisions(message),
       problem: (message) => this.say(message.message),
@@ -131,6 +133,8 @@ class Viewer {
     this.moved = new Set(model.objects.map(({index}) => index));
     this.awaited.clear();
     this.fitted = false;
+    // Answers to earlier questions are about another scene.
+    this.firstUpdate = this.connection.live ? this.update + 1 : 0;
     this.clearViews();
     this.shell.clear();
     this.syncShown();
@@ -141,8 +145,9 @@ class Viewer {
     this.updateStatus();
   }
 
-  moreObjects(objects) {
+  moreObjects({scene, objects}) {
     const {model} = this;
+    if (scene !== model.number) return;
     const before = model.objects.length;
     const wasCrowd = model.isCrowd;
     model.addObjects(objects);
@@ -156,16 +161,12 @@ class Viewer {
   }
 
   fetchHulls(ids) {
-    const wanted = [];
-    for (const id of ids) {
-      if (this.awaited.has(id)) this.awaited.set(id, true);
-      else wanted.push(id);
-    }
-    for (const id of wanted) this.awaited.set(id, false);
+    const wanted = [...ids].filter((id) => !this.awaited.has(id));
+    for (const id of wanted) this.awaited.add(id);
     if (wanted.length) this.connection.send({type: 'geometry', files: [], hullIds: wanted});
   }
 
-  hullChanged({kind, hull}, synced) {
+  hullChanged({kind, hull}) {
     const {model} = this;
     const gone = kind === 'HULL_EVENT_KIND_DELETED';
     model.info.set(hull.hullId, gone ? undefined : hull);
@@ -176,8 +177,13 @@ class Viewer {
       }
     }
     this.updateStatus(hull.revision);
-    const known = model.hulls.get(hull.hullId);
-    if (!gone && synced && known?.revision !== hull.revision) this.fetchHulls([hull.hullId]);
+    if (!gone) this.fetchIfOlder(hull.hullId);
+  }
+
+  // A hull that changed while its shape was on its way comes once more.
+  fetchIfOlder(id) {
+    const told = this.model.info.get(id)?.revision;
+    if (isNewer(told, this.model.hulls.get(id)?.revision)) this.fetchHulls([id]);
   }
 
   frame(frame) {
@@ -206,9 +212,8 @@ class Viewer {
     const {model} = this;
     const before = model.hulls.get(id);
     model.hulls.set(id, hull);
-    const again = this.awaited.get(id);
     this.awaited.delete(id);
-    if (again) this.fetchHulls([id]);
+    this.fetchIfOlder(id);
     this.updateStatus(hull.revision);
     if (!before || model.isCrowd) return;
     const fresh = newVertices(before, hull);
@@ -271,14 +276,14 @@ class Viewer {
 
   answer(message) {
     const {pair} = this.model;
-    if (!pair || message.pair[0] !== pair[0] || message.pair[1] !== pair[1]) return;
+    if (!pair || message.update < this.firstUpdate || message.pair[0] !== pair[0] || message.pair[1] !== pair[1]) return;
     this.model.answer = message;
     this.marks.rebuild();
     this.answerPanel.update();
   }
 
   collisions(message) {
-    if (!this.model.objects.length) return;
+    if (message.update < this.firstUpdate) return;
     if (message.revision !== '0') this.updateStatus(message.revision);
     this.model.setCollisions(message);
   }
@@ -298,6 +303,7 @@ class Viewer {
     this.moved.clear();
     this.connection.send({
       type: 'question',
+      scene: model.number,
       update: ++this.update,
       objects,
       poses: objects.flatMap((index) => model.objects[index].pose),
@@ -370,8 +376,7 @@ class Viewer {
   // --- The bar and the tools ---
 
   updateStatus(revision = undefined) {
-    const newer = (a, b) => (BigInt(a || 0) > BigInt(b || 0) ? a : b);
-    if (revision !== undefined) this.revision = newer(revision, this.revision);
+    if (isNewer(revision, this.revision)) this.revision = revision;
     if ($('status').dataset.live === 'lost') return;
     const count = this.model.objects.filter(({gone}) => !gone).length;
     const objects = count === 1 ? '1 object' : `${grouped(count)} objects`;

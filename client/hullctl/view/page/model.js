@@ -40,8 +40,9 @@ export class Model extends EventTarget {
     for (const type of types.split(' ')) this.addEventListener(type, (e) => listener(e.detail));
   }
 
-  load({files, objects}) {
+  load({number, files, objects}) {
     this.clear();
+    this.number = number;
     this.files = files;
     this.addObjects(objects);
     this.show.mesh = files.length > 0;

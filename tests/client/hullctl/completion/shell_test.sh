@@ -21,7 +21,7 @@ cd "$work" || exit 2
 
 hulld --store memory --listen 127.0.0.1:0 2>hulld.log &
 server=$!
-until address=$(sed -n 's/.*listening on //p' hulld.log) && [[ -n $address ]]; do
+until address=$(sed -n 's/.*listening on //p' hulld.log 2>/dev/null) && [[ -n $address ]]; do
   kill -0 "$server" || exit 1
   sleep 0.1
 done
@@ -113,6 +113,9 @@ EOF
     contains "history" "get\\040box" "$(cat state/hullctl/history)"
     expect "who may read the history" "600" "$(stat -c %a state/hullctl/history)"
     expect "lines of a file" "box" "$(printf 'list --output name\n\n# nothing\n' | hullctl shell)"
+    expect "options for all lines" "box" "$(hullctl shell --server "$address" --output name <<<list)"
+    expect "a line for another server" "server  127.0.0.1:1  (--server)" \
+      "$(hullctl shell --server "$address" --tls <<<'context show --server 127.0.0.1:1')"
     printf 'get nope\n' | hullctl shell 2>/dev/null
     expect "the exit code of the last line" "1" "$?"
     ;;

@@ -42,12 +42,13 @@ std::string ErrorOf(const std::string& json) {
 
 TEST(Protocol, QuestionsKeepEveryBitOfAPose) {
   const Pose7 pose = {0.1, -1e-308, 1e308, 5e-324, 1.0 / 3, -0.1, 12345678.900000001};
-  const auto message = ParsePageMessage(R"({"type":"question","update":7,"objects":[3],"poses":)" +
-                                        NumbersJson(pose.data(), pose.size()) +
-                                        R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
+  const auto message = ParsePageMessage(
+      R"({"type":"question","scene":2,"update":7,"objects":[3],"poses":)" +
+      NumbersJson(pose.data(), pose.size()) + R"(,"pair":[3,1],"tolerance":0.25,"rest":true})");
   ASSERT_TRUE(message.ok()) << message.status();
   ASSERT_TRUE(message->question.has_value());
   const ViewQuestion& question = *message->question;
+  EXPECT_EQ(question.scene, 2);
   EXPECT_EQ(question.update, 7);
   EXPECT_THAT(question.objects, ElementsAre(3));
   ASSERT_EQ(question.poses.size(), 1);
@@ -123,7 +124,8 @@ TEST(Protocol, ScenesNameObjectsAndTheirPoses) {
   ViewScene scene;
   scene.title = "two \"boxes\"";
   scene.objects = {{"box", "cell/box", -1, {1, 0, 0, 0, 0.1, 0, 0}}};
-  const std::string json = SceneMessage(scene);
+  const std::string json = SceneMessage(scene, 3);
+  EXPECT_THAT(json, HasSubstr(R"("number":3)"));
   EXPECT_THAT(json, HasSubstr(R"("title":"two \"boxes\"")"));
   EXPECT_THAT(
       json, HasSubstr(R"({"name":"box","hullId":"cell/box","file":-1,"pose":[1,0,0,0,0.1,0,0]})"));

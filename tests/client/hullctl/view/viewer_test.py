@@ -226,7 +226,6 @@ class ViewerTest(unittest.TestCase):
         self.view("live/")
         self.browser.wait("hulldViewer.model.hulls.get('live/a')?.vertexCount === 8")
         self.hulld.add("live/a", ["0.5 0.5 3"])
-        # Five corners of the box and the new one: the upper four stay, as they are outermost.
         self.browser.wait("hulldViewer.model.hulls.get('live/a').vertexCount === 9")
         self.browser.wait("hulldViewer.model.hulls.get('live/a').high[2] === 3")
         self.hulld.add_box("live/b", size=1.0, low=(5.0, 0.0, 0.0))

@@ -1,0 +1,216 @@
+#include "server/call/message_layout.h"
+
+#include <google/protobuf/message.h>
+#include <google/protobuf/wire_format_lite.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::io::CodedInputStream;
+using WireFormat = google::protobuf::internal::WireFormatLite;
+
+// What the allocator adds to an allocation, at most, for its sizes and rounding.
+constexpr uint64_t kAllocation = 16;
+// Lists grow by doubling, so up to half of what they hold is free.
+constexpr uint64_t kSlack = 2;
+constexpr uint64_t kListedPointer = kSlack * sizeof(void*);
+constexpr uint64_t kText = sizeof(std::string) + 2 * kAllocation;
+// What a list allocates for its first elements.
+constexpr uint64_t kFirstElements = 64;
+// One entry of an UnknownFieldSet, and the string that it may point to.
+constexpr uint64_t kUnknown = 2 * 16 + kText;
+// The set itself, which each message may have.
+constexpr uint64_t kUnknownSet = 48;
+// As deep as protobuf parses.
+constexpr int kDeepest = 100;
+// Field numbers of the contract are small; a larger one counts as unknown, which takes more.
+constexpr int kLargestNumber = 255;
+
+bool IsVarint(FieldDescriptor::Type type) {
+  switch (type) {
+    case FieldDescriptor::TYPE_DOUBLE:
+    case FieldDescriptor::TYPE_FLOAT:
+    case FieldDescriptor::TYPE_FIXED64:
+    case FieldDescriptor::TYPE_FIXED32:
+    case FieldDescriptor::TYPE_SFIXED32:
+    case FieldDescriptor::TYPE_SFIXED64:
+      return false;
+    default:
+      return true;
+  }
+}
+
+uint32_t ElementBytes(FieldDescriptor::CppType type) {
+  switch (type) {
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+    case FieldDescriptor::CPPTYPE_INT64:
+    case FieldDescriptor::CPPTYPE_UINT64:
+      return 8;
+    case FieldDescriptor::CPPTYPE_BOOL:
+      return 1;
+    default:
+      return 4;
+  }
+}
+
+// Passes over `length` bytes and counts those that end a varint. False: there are fewer.
+bool CountVarints(CodedInputStream& input, uint64_t length, uint64_t& count) {
+  while (length > 0) {
+    const void* data = nullptr;
+    int size = 0;
+    if (!input.GetDirectBufferPointer(&data, &size)) return false;
+    const auto taken = static_cast<int>(std::min<uint64_t>(length, static_cast<uint64_t>(size)));
+    const auto* bytes = static_cast<const uint8_t*>(data);
+    count += static_cast<uint64_t>(
+        std::count_if(bytes, bytes + taken, [](uint8_t byte) { return byte < 0x80; }));
+    if (!input.Skip(taken)) return false;
+    length -= static_cast<uint64_t>(taken);
+  }
+  return true;
+}
+
+}  // namespace
+
+const MessageLayout& MessageLayout::Of(const Descriptor& type) {
+  // Recursive: a layout asks for those of its fields. Types that contain themselves would need
+  // more; the contract has none.
+  static std::recursive_mutex mutex;
+  static auto& layouts = *new std::map<const Descriptor*, std::unique_ptr<const MessageLayout>>;
+  const std::lock_guard lock(mutex);
+  const auto known = layouts.find(&type);
+  if (known != layouts.end()) {
+    HULLD_CHECK(known->second != nullptr);
+    return *known->second;
+  }
+  layouts[&type] = nullptr;
+  std::unique_ptr<const MessageLayout> made(new MessageLayout(type));
+  return *(layouts[&type] = std::move(made));
+}
+
+MessageLayout::MessageLayout(const Descriptor& type) {
+  const google::protobuf::Message* const empty =
+      google::protobuf::MessageFactory::generated_factory()->GetPrototype(&type);
+  HULLD_CHECK(empty != nullptr);
+  own_bytes_ = empty->SpaceUsedLong() + kAllocation + kUnknownSet;
+  for (int i = 0; i < type.field_count(); ++i) {
+    const FieldDescriptor& described = *type.field(i);
+    if (described.number() > kLargestNumber) continue;
+    const auto number = static_cast<size_t>(described.number());
+    if (number >= fields_.size()) fields_.resize(number + 1);
+    Field& field = fields_[number];
+    field.is_repeated = described.is_repeated();
+    if (field.is_repeated) own_bytes_ += kFirstElements;
+    switch (described.cpp_type()) {
+      case FieldDescriptor::CPPTYPE_STRING:
+        field.kind = Field::Kind::kText;
+        break;
+      case FieldDescriptor::CPPTYPE_MESSAGE:
+        field.kind = Field::Kind::kMessage;
+        field.message = &Of(*described.message_type());
+        break;
+      default:
+        field.kind = Field::Kind::kNumber;
+        field.is_varint = IsVarint(described.type());
+        field.element_bytes = ElementBytes(described.cpp_type());
+        break;
+    }
+  }
+}
+
+const MessageLayout::Field& MessageLayout::FieldAt(int number) const {
+  static const Field kNone;
+  return static_cast<size_t>(number) < fields_.size() ? fields_[static_cast<size_t>(number)]
+                                                      : kNone;
+}
+
+uint64_t MessageLayout::ParsedBytes(CodedInputStream& input, uint64_t most) const {
+  uint64_t bytes = own_bytes_;
+  Count(input, most, 0, bytes);
+  return bytes;
+}
+
+void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
+                          uint64_t& bytes) const {
+  // Within a group, which no type of the contract has, everything is unknown.
+  int groups = 0;
+  while (bytes <= most) {
+    const uint32_t tag = input.ReadTag();
+    if (tag == 0) return;
+    static const Field kNone;
+    const Field& field = groups > 0 ? kNone : FieldAt(WireFormat::GetTagFieldNumber(tag));
+    const bool is_number = field.kind == Field::Kind::kNumber;
+    // A list takes numbers one by one, too. A number in the wrong form is kept as unknown.
+    const uint64_t number_bytes =
+        !is_number ? kUnknown : (field.is_repeated ? kSlack * field.element_bytes : 0);
+    switch (WireFormat::GetTagWireType(tag)) {
+      case WireFormat::WIRETYPE_VARINT: {
+        uint64_t value = 0;
+        if (!input.ReadVarint64(&value)) return;
+        bytes += is_number && field.is_varint ? number_bytes : kUnknown;
+        break;
+      }
+      case WireFormat::WIRETYPE_FIXED64:
+        if (!input.Skip(8)) return;
+        bytes +=
+            is_number && !field.is_varint && field.element_bytes == 8 ? number_bytes : kUnknown;
+        break;
+      case WireFormat::WIRETYPE_FIXED32:
+        if (!input.Skip(4)) return;
+        bytes +=
+            is_number && !field.is_varint && field.element_bytes == 4 ? number_bytes : kUnknown;
+        break;
+      case WireFormat::WIRETYPE_START_GROUP:
+        bytes += kUnknown;
+        ++groups;
+        break;
+      case WireFormat::WIRETYPE_END_GROUP:
+        if (--groups < 0) return;
+        break;
+      case WireFormat::WIRETYPE_LENGTH_DELIMITED: {
+        // Parsing allocates before it finds that a length is malformed.
+        const bool is_message = field.kind == Field::Kind::kMessage;
+        bytes += is_message ? field.message->own_bytes_ : kAllocation;
+        if (field.is_repeated && !is_number) bytes += kListedPointer;
+        uint32_t length = 0;
+        if (!input.ReadVarint32(&length) || length > INT32_MAX) return;
+        if (is_message) {
+          if (depth >= kDeepest) return;
+          const CodedInputStream::Limit limit = input.PushLimit(static_cast<int>(length));
+          field.message->Count(input, most, depth + 1, bytes);
+          if (input.BytesUntilLimit() != 0) return;
+          input.PopLimit(limit);
+          break;
+        }
+        if (is_number && field.is_repeated && field.is_varint) {
+          uint64_t count = 0;
+          const bool whole = CountVarints(input, length, count);
+          bytes += kSlack * count * field.element_bytes;
+          if (!whole) return;
+          break;
+        }
+        if (is_number && field.is_repeated) {
+          bytes += kSlack * length;
+        } else if (field.kind == Field::Kind::kText) {
+          bytes += kText + length;
+        } else {
+          bytes += kUnknown + length;
+        }
+        if (!input.Skip(static_cast<int>(length))) return;
+        break;
+      }
+      default:
+        return;
+    }
+  }
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,36 @@
+#include "server/call/request_memory.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <chrono>
+
+#include "server/contract/limit_error.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr char kFlag[] = "request-memory";
+// Requests that hold much take about as long as a batch.
+constexpr std::chrono::milliseconds kRetry(1000);
+
+}  // namespace
+
+absl::Status RequestMemory::Take(uint64_t bytes, Share& share) {
+  share.GiveBack();
+  if (bytes > limit_bytes_) {
+    return LimitExceeded(absl::StrCat("the message would take more than ", limit_bytes_,
+                                      " bytes of memory; send it in parts"),
+                         limit_bytes_, kFlag);
+  }
+  const uint64_t taken = taken_.fetch_add(bytes, std::memory_order_relaxed) + bytes;
+  if (taken > limit_bytes_) {
+    taken_.fetch_sub(bytes, std::memory_order_relaxed);
+    return Overloaded("the requests under way leave no memory for another", limit_bytes_, kFlag,
+                      kRetry);
+  }
+  share.memory_ = this;
+  share.bytes_ = bytes;
+  return absl::OkStatus();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,148 @@
+// What callers can make the program hold before it knows who they are, and after.
+
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/impl/codegen/client_callback.h>
+#include <grpcpp/support/byte_buffer.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "grpc/reflection/v1alpha/reflection.grpc.pb.h"
+#include "hulld/v1/collision.grpc.pb.h"
+#include "tests/server/harness/hulld_process.h"
+#include "tests/server/harness/test_certificates.h"
+
+namespace hulld::server {
+namespace {
+
+// A field of /proc/PID/status, in KiB.
+long StatusField(pid_t pid, const std::string& name) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/status");
+  std::string line;
+  while (std::getline(file, line)) {
+    if (line.starts_with(name + ":")) return std::stol(line.substr(name.size() + 1));
+  }
+  ADD_FAILURE() << "no " << name;
+  return 0;
+}
+
+// Empty placements, two bytes each: parsed they take forty times as much.
+grpc::ByteBuffer EmptyPlacements() {
+  std::string bytes;
+  while (bytes.size() < (16u << 20) - 64) bytes.append("\x0a\x00", 2);
+  const grpc::Slice slice(bytes);
+  return grpc::ByteBuffer(&slice, 1);
+}
+
+// Sends the bytes as a batch, on a connection of its own; how that ended.
+grpc::StatusCode SendBatch(const std::string& address, const grpc::ByteBuffer& request) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  const auto channel =
+      grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+  const grpc::internal::RpcMethod method("/hulld.v1.CollisionService/BatchCheckCollisions",
+                                         grpc::internal::RpcMethod::SERVER_STREAMING, channel);
+  grpc::ClientContext context;
+  const std::unique_ptr<grpc::ClientReader<v1::BatchCheckCollisionsResponse>> reader(
+      grpc::internal::ClientReaderFactory<v1::BatchCheckCollisionsResponse>::Create(
+          channel.get(), method, &context, request));
+  v1::BatchCheckCollisionsResponse response;
+  while (reader->Read(&response)) {
+  }
+  return reader->Finish().error_code();
+}
+
+class HostileRequest : public ::testing::Test {
+ protected:
+  // Many callers at once: what the program holds, at most, above what it held at rest.
+  static void ExpectLittleMemory(const std::vector<std::string>& settings,
+                                 grpc::StatusCode expected) {
+#ifdef __SANITIZE_ADDRESS__
+    static_cast<void>(settings), static_cast<void>(expected);
+    GTEST_SKIP() << "AddressSanitizer keeps what was freed";
+#else
+    constexpr int kCallers = 64;
+    std::vector<std::string> arguments = {"--store",     "memory",       "--listen",
+                                          "127.0.0.1:0", "--log-format", "json"};
+    arguments.insert(arguments.end(), settings.begin(), settings.end());
+    Process hulld(arguments);
+    const std::string address = AddressIn(hulld.ReadLineWith("listening on "));
+    const grpc::ByteBuffer request = EmptyPlacements();
+    const long before = StatusField(hulld.pid(), "VmRSS");
+    std::vector<std::thread> callers;
+    for (int i = 0; i < kCallers; ++i) {
+      callers.emplace_back([&] {
+        const grpc::StatusCode code = SendBatch(address, request);
+        // gRPC itself ends calls whose bytes it has no room for.
+        EXPECT_TRUE(code == expected || code == grpc::RESOURCE_EXHAUSTED ||
+                    code == grpc::UNAVAILABLE)
+            << code;
+      });
+    }
+    for (std::thread& caller : callers) caller.join();
+    const long peak = (StatusField(hulld.pid(), "VmHWM") - before) >> 10;
+    std::printf("%d callers took %ld MiB\n", kCallers, peak);
+    EXPECT_LT(peak, 300);
+#endif
+  }
+};
+
+TEST_F(HostileRequest, OfCallersWithoutATokenTakesLittleMemory) {
+  std::string pattern = ::testing::TempDir() + "/hulld_hostile_XXXXXX";
+  ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+  WriteSecret(pattern + "/tokens", "robot read-only * sha256:" + std::string(64, '0') + "\n");
+  ExpectLittleMemory({"--tokens-file", pattern + "/tokens"}, grpc::UNAUTHENTICATED);
+  std::filesystem::remove_all(pattern);
+}
+
+TEST_F(HostileRequest, OfCallersWhoMayCallTakesLittleMemory) {
+  ExpectLittleMemory({}, grpc::RESOURCE_EXHAUSTED);
+}
+
+// gRPC's own service took a thread for each stream, without a token.
+TEST_F(HostileRequest, SilentReflectionStreamsTakeNoThreads) {
+  using grpc::reflection::v1alpha::ServerReflection;
+  using grpc::reflection::v1alpha::ServerReflectionRequest;
+  using grpc::reflection::v1alpha::ServerReflectionResponse;
+  constexpr int kStreams = 200;
+  Process hulld({"--store", "memory", "--listen", "127.0.0.1:0", "--log-format", "json",
+                 "--max-streams-per-client", std::to_string(kStreams)});
+  const auto stub = ServerReflection::NewStub(grpc::CreateChannel(
+      AddressIn(hulld.ReadLineWith("listening on ")), grpc::InsecureChannelCredentials()));
+  struct Stream {
+    grpc::ClientContext context;
+    std::unique_ptr<grpc::ClientReaderWriter<ServerReflectionRequest, ServerReflectionResponse>>
+        call;
+  };
+  const auto open = [&stub](Stream& stream) {
+    stream.call = stub->ServerReflectionInfo(&stream.context);
+    ServerReflectionRequest request;
+    request.set_file_containing_symbol("hulld.v1.HullService.GetHull");
+    ServerReflectionResponse response;
+    if (!stream.call->Write(request) || !stream.call->Read(&response)) return 0;
+    return response.file_descriptor_response().file_descriptor_proto_size();
+  };
+  std::vector<std::unique_ptr<Stream>> streams;
+  streams.push_back(std::make_unique<Stream>());
+  EXPECT_EQ(open(*streams.back()), 2);  // hull.proto, and geometry.proto, which it needs
+  const long before = StatusField(hulld.pid(), "Threads");
+  while (streams.size() < kStreams) {
+    streams.push_back(std::make_unique<Stream>());
+    EXPECT_EQ(open(*streams.back()), 2);
+  }
+  EXPECT_LT(StatusField(hulld.pid(), "Threads") - before, 20);
+  Stream one_more;
+  EXPECT_EQ(open(one_more), 0);
+  EXPECT_EQ(one_more.call->Finish().error_code(), grpc::RESOURCE_EXHAUSTED);
+  for (const auto& stream : streams) stream->context.TryCancel();
+}
+
+}  // namespace
+}  // namespace hulld::server
