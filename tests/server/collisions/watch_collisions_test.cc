@@ -271,7 +271,7 @@ TEST_F(WatchCollisions, RefusesWhatIsMalformed) {
   expect(Refused(both), "pairs are set, and groups or movers too");
   v1::CollisionWatchOpen clearance = open;
   clearance.set_clearance(-1);
-  expect(Refused(clearance), "clearance");
+  expect(Refused(clearance), "open: clearance is -1");
   v1::CollisionWatchOpen groups = open;
   groups.add_groups(1);
   expect(Refused(groups), "groups holds 1 groups for 2 placements");

@@ -91,7 +91,8 @@ class SharedText : public std::stringbuf {
     return std::stringbuf::overflow(c);
   }
 
-  std::mutex mutex_;
+  // A write may call another.
+  std::recursive_mutex mutex_;
 };
 
 TEST_F(HullctlWatch, EndsAtCtrlC) {
