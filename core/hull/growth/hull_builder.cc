@@ -139,7 +139,10 @@ class HullBuilder::State {
   // Inserts all points. Returns false, with some of them inserted, when the poll said stop.
   bool InsertAll(std::span<const Vector> points, StopPoll& poll) {
     if (points.size() < kWorthOrdering) {
-      for (const Vector& point : points) Insert(point);
+      for (const Vector& point : points) {
+        if (poll.Step(1 + TakeSteps())) return false;
+        Insert(point);
+      }
       return true;
     }
     std::vector<uint32_t> done;
@@ -180,6 +183,7 @@ class HullBuilder::State {
   }
 
  private:
+  uint64_t TakeSteps() { return surface_ ? surface_->TakeSteps() : 0; }
   void GrowToPoint(const Vector& point) { ends_.push_back(vertices_.Add(point)); }
 
   void GrowToSegment(const Vector& point) {
@@ -259,7 +263,8 @@ absl::StatusOr<PointCounts> HullBuilder::Add(std::span<const Vector> points,
   state_->BeginBlock();
   const std::function<bool()> never;
   StopPoll poll(may_stop ? limits.should_stop : never, kInsertionsPerPoll);
-  const bool is_done = state_->InsertAll(points, poll);
+  // Whatever noticed the stop may have left points out.
+  const bool is_done = state_->InsertAll(points, poll) && !poll.stopped();
   const size_t reached = vertex_count();
   undo_bytes_ = may_fail ? state_->JournalBytes() : 0;
   if (!is_done || reached > limits.max_vertices) {

@@ -152,7 +152,7 @@ class RoundsInsertion {
       if (poll_.Step(1 + surface_.TakeSteps())) return false;
       surface_.Insert(vertices_, point);
     }
-    return true;
+    return !poll_.stopped();
   }
 
   Surface& surface_;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/hull/audit.h"
+#include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 
@@ -495,6 +496,28 @@ TEST(HullBuilder, RefusedBlocksLeaveNoMap) {
     ASSERT_TRUE(SameBits(copy.Snapshot(), BuildHull(Concatenated(
                                               {before.vertices().begin(), before.vertices().end()},
                                               slightly_larger))));
+  }
+}
+
+// A stop that is noticed while the order of insertion is chosen leaves no points out.
+TEST(HullBuilder, NoBlockEndsWellAfterAStop) {
+  for (const Extreme& extreme : Extremes()) {
+    const std::vector<Vector> points = extreme.make(600);
+    const std::span<const Vector> first = std::span(points).first(100);
+    const std::span<const Vector> rest = std::span(points).subspan(100);
+    HullBuilder builder;
+    ASSERT_TRUE(builder.Add(first).ok());
+    const Hull before = builder.Snapshot();
+    const Hull whole = BuildHull(points);
+    for (int last = 1; last <= 4; ++last) {
+      int polls = 0;
+      AddLimits limits;
+      limits.should_stop = [&] { return ++polls == last; };
+      HullBuilder copy = builder;
+      const auto counts = copy.Add(rest, limits);
+      EXPECT_EQ(absl::IsCancelled(counts.status()), polls >= last) << extreme.name;
+      ASSERT_TRUE(SameBits(copy.Snapshot(), counts.ok() ? whole : before)) << extreme.name;
+    }
   }
 }
 
