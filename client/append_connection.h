@@ -9,7 +9,7 @@
 #include <memory>
 #include <mutex>
 
-#include "client/retry.h"
+#include "client/calls/retry.h"
 #include "hulld/v1/hull.grpc.pb.h"
 
 namespace hulld {

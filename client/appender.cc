@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "client/append_connection.h"
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 namespace hulld {
 namespace {

@@ -11,7 +11,7 @@
 #include <memory>
 #include <string>
 
-#include "client/retry.h"
+#include "client/calls/retry.h"
 #include "hulld/v1/hull.grpc.pb.h"
 
 namespace hulld {

@@ -7,7 +7,7 @@
 #include <future>
 #include <utility>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 namespace hulld {
 namespace {

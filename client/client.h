@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "client/appender.h"
+#include "client/calls/retry.h"
 #include "client/collision_stream.h"
 #include "client/connection_security.h"
-#include "client/retry.h"
 #include "client/watch/collision_watch.h"
 #include "client/watch/hull_watch.h"
 #include "hulld/v1/collision.grpc.pb.h"

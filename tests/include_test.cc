@@ -89,6 +89,8 @@ constexpr std::string_view kRooms[] = {
     "server/collisions",
     "server/admin",
     "server",
+    "client/calls",
+    "client/watch",
     "client",
     "client/formats",
     "client/verify",

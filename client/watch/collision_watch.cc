@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 namespace hulld {
 

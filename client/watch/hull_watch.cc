@@ -3,7 +3,7 @@
 #include <limits>
 #include <utility>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 namespace hulld {
 

@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "client/calls/grpc_status.h"
 #include "client/client.h"
-#include "client/grpc_status.h"
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {

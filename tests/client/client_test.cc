@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/calls/grpc_status.h"
 #include "client/connection_security.h"
-#include "client/grpc_status.h"
 #include "tests/client/fake_hulld.h"
 
 namespace hulld {

@@ -5,8 +5,8 @@
 
 #include <vector>
 
+#include "client/calls/grpc_status.h"
 #include "client/client.h"
-#include "client/grpc_status.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld {

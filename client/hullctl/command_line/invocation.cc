@@ -2,7 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 #include "client/hullctl/command_line/tls_diagnosis.h"
 
 namespace hulld {

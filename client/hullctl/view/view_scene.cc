@@ -9,7 +9,7 @@
 #include "client/formats/byte_source.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
-#include "client/hullctl/printing/json.h"
+#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 namespace {
@@ -140,36 +140,20 @@ Pose7 NumbersOf(const v1::Pose& pose) {
 }
 
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
-  const absl::StatusOr<std::string> text = ReadText(path);
-  if (!text.ok()) return text.status();
-  v1::FindCollisionsRequest& request = scene->rules;
-  const auto wrong = [&path](absl::string_view message) {
-    return absl::InvalidArgumentError(absl::StrCat(path, ": ", message));
-  };
-  if (absl::Status s = ParseJson(*text, UnknownFields::kRefuse, &request); !s.ok()) {
-    return wrong(s.message());
+  const auto source = ByteSource::Open(path);
+  if (!source.ok()) return source.status();
+  absl::StatusOr<Scene> file = ReadScene(source->get());
+  if (!file.ok()) return file.status();
+  for (uint32_t i = 0; i < file->size(); ++i) {
+    const std::string& hull_id = *file->HullOf(i);
+    const std::string& name = file->names.empty() ? hull_id : file->names[i];
+    scene->objects.push_back({name, hull_id, -1, NumbersOf(file->PlacementOf(i).pose())});
   }
-  const v1::PackedPlacements& packed = request.packed_placements();
-  if (packed.poses_size() != 7 * packed.hulls_size()) {
-    return wrong("packedPlacements needs seven numbers in poses for each of hulls");
-  }
-  for (const v1::Placement& placement : request.placements()) {
-    scene->objects.push_back(
-        {placement.hull_id(), placement.hull_id(), -1, NumbersOf(placement.pose())});
-  }
-  for (int i = 0; i < packed.hulls_size(); ++i) {
-    if (packed.hulls(i) >= static_cast<uint32_t>(packed.hull_ids_size())) {
-      return wrong(absl::StrCat("packedPlacements.hulls[", i, "] is not the index of a hull ID"));
-    }
-    const std::string& hull_id = packed.hull_ids(static_cast<int>(packed.hulls(i)));
-    ViewObject object{hull_id, hull_id, -1, kIdentityPose};
-    std::copy_n(packed.poses().begin() + 7 * i, 7, object.pose.begin());
-    scene->objects.push_back(std::move(object));
-  }
-  request.clear_placements();
-  request.clear_packed_placements();
+  scene->rules = std::move(file->request);
+  scene->rules.clear_placements();
+  scene->rules.clear_packed_placements();
   // The page shows relations alone here.
-  request.clear_wanted();
+  scene->rules.clear_wanted();
   return absl::OkStatus();
 }
 

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 namespace hulld::fuzz {
 namespace {
@@ -61,8 +61,8 @@ std::string CheckStatus(Rpc rpc, const CallManner& manner, const grpc::Status& s
   // gRPC says these itself.
   if (manner.hurried && code == grpc::DEADLINE_EXCEEDED) return {};
   if (manner.cancelled && code == grpc::CANCELLED) return {};
-  if (manner.raw && code == grpc::UNIMPLEMENTED) return {};
   Codes codes = CodesOf(rpc);
+  if (manner.raw) codes.insert(grpc::INVALID_ARGUMENT);
   codes.insert(grpc::RESOURCE_EXHAUSTED);
   if (codes.count(code) > 0 && !status.error_message().empty()) return CheckReason(rpc, status);
   return absl::StrCat(server::RpcName(rpc), " ended ", CodeName(code), ": \"",

@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
+#include "client/calls/grpc_status.h"
 #include "client/client.h"
-#include "client/grpc_status.h"
 #include "server/access/caller.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/collision.h"
 #include "tests/server/harness/test_server.h"

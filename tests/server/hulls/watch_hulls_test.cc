@@ -12,7 +12,7 @@
 #include <string>
 #include <thread>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 #include "client/watch/hull_watch.h"
 #include "tests/server/harness/test_server.h"
 

@@ -1,5 +1,5 @@
-#ifndef HULLD_CLIENT_RETRY_H_
-#define HULLD_CLIENT_RETRY_H_
+#ifndef HULLD_CLIENT_CALLS_RETRY_H_
+#define HULLD_CLIENT_CALLS_RETRY_H_
 
 #include <absl/status/status.h>
 
@@ -40,4 +40,4 @@ absl::Status CallWithRetries(const RetryPolicy& policy, Deadline deadline,
 
 }  // namespace hulld
 
-#endif  // HULLD_CLIENT_RETRY_H_
+#endif  // HULLD_CLIENT_CALLS_RETRY_H_

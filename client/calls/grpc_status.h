@@ -1,5 +1,5 @@
-#ifndef HULLD_CLIENT_GRPC_STATUS_H_
-#define HULLD_CLIENT_GRPC_STATUS_H_
+#ifndef HULLD_CLIENT_CALLS_GRPC_STATUS_H_
+#define HULLD_CLIENT_CALLS_GRPC_STATUS_H_
 
 #include <absl/status/status.h>
 #include <grpcpp/client_context.h>
@@ -37,4 +37,4 @@ std::optional<std::chrono::milliseconds> RetryHintOf(const absl::Status& status)
 
 }  // namespace hulld
 
-#endif  // HULLD_CLIENT_GRPC_STATUS_H_
+#endif  // HULLD_CLIENT_CALLS_GRPC_STATUS_H_

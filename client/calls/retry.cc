@@ -1,9 +1,9 @@
-#include "client/retry.h"
+#include "client/calls/retry.h"
 
 #include <algorithm>
 #include <thread>
 
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 namespace hulld {
 

@@ -1,4 +1,4 @@
-#include "client/grpc_status.h"
+#include "client/calls/grpc_status.h"
 
 #include <absl/strings/cord.h>
 #include <absl/strings/numbers.h>

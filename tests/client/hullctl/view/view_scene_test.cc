@@ -1,0 +1,39 @@
+#include "client/hullctl/view/view_scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/formats/point_reading.h"
+
+namespace hulld {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+TEST(ViewScene, TakesEachFormatOfAScene) {
+  const TempFile text("text.json", "place left cube\nplace right cube 1 2 3\n");
+  const TempFile json("scene.json", R"({"placements":[{"hullId":"cube"},{"hullId":"cube",
+      "pose":{"translation":{"x":1,"y":2,"z":3}}}],"groups":[4,5]})");
+  const TempFile packed("packed.json", R"({"packedPlacements":{"hullIds":["cube"],"hulls":[0,0],
+      "poses":[1,0,0,0,0,0,0, 1,0,0,0,1,2,3]}})");
+  for (const TempFile* file : {&text, &json, &packed}) {
+    ViewScene scene;
+    const absl::Status added = AddSceneFile(file->path(), &scene);
+    ASSERT_TRUE(added.ok()) << added;
+    ASSERT_EQ(scene.objects.size(), 2U);
+    EXPECT_EQ(scene.objects[1].hull_id, "cube");
+    EXPECT_THAT(scene.objects[1].pose, ElementsAre(1, 0, 0, 0, 1, 2, 3));
+    EXPECT_EQ(scene.objects[1].name, file == &text ? "right" : "cube");
+    // Placements are the page's to move; the rules are the file's.
+    EXPECT_EQ(scene.rules.placements_size() + scene.rules.packed_placements().hulls_size(), 0);
+    EXPECT_EQ(scene.rules.groups_size(), file == &json ? 2 : 0);
+  }
+  const TempFile wrong("wrong.json", "{\"placement\":[]}\n");
+  ViewScene scene;
+  EXPECT_THAT(std::string(AddSceneFile(wrong.path(), &scene).message()),
+              HasSubstr(wrong.path() + ":1: "));
+}
+
+}  // namespace
+}  // namespace hulld
