@@ -19,6 +19,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <memory>
@@ -145,7 +146,7 @@ class Board {
  private:
   std::mutex mutex_;
   std::condition_variable all_;
-  uint64_t awaited_ = 0;
+  uint64_t awaited_ = UINT64_MAX;
   std::vector<char> heard_;
   std::vector<Clock::time_point> times_;
 };
