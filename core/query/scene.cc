@@ -104,7 +104,9 @@ SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOpti
   const auto count = static_cast<uint32_t>(placements.size());
   boxes_.resize(count);
 #pragma omp parallel for schedule(static) num_threads(std::max(1, options.threads))
-  for (uint32_t i = 0; i < count; ++i) boxes_[i] = BoundingBox(placements_[i]);
+  for (uint32_t i = 0; i < count; ++i) {
+    boxes_[i] = IsBody(i) ? BoundingBox(options.bodies[i]) : BoundingBox(placements_[i]);
+  }
   tree_ = BoxTree(boxes_);
   pairs_ = CountPairs();
   size_ = options.movers ? std::min(*options.movers, count) : count;
@@ -117,6 +119,7 @@ absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placem
                                                    " groups for ", placements.size(),
                                                    " placements; give one each, or none"));
   }
+  HULLD_CHECK(options.bodies.empty() || options.bodies.size() == placements.size());
   return SceneSearch(placements, options);
 }
 
@@ -160,12 +163,23 @@ bool SceneSearch::IsFound(const Answer& answer) const {
   return answer.relation != Relation::kSeparated;
 }
 
-absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b) const {
-  absl::StatusOr<Answer> answer = CheckCollision(placements_[a], placements_[b], first_look_);
+absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
+                                            std::optional<PiecePair>* pieces) const {
+  if (!IsBody(a) && !IsBody(b)) return CheckCollision(placements_[a], placements_[b], options);
+  absl::StatusOr<BodyAnswer> answer =
+      CheckBodies(options_->bodies[a], options_->bodies[b], options);
+  if (!answer.ok()) return answer.status();
+  if (pieces != nullptr) *pieces = answer->pieces;
+  return std::move(answer->answer);
+}
+
+absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b,
+                                        std::optional<PiecePair>* pieces) const {
+  absl::StatusOr<Answer> answer = AskWith(a, b, first_look_, pieces);
   if (!options_->query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
   QueryOptions options = options_->query;
   options.threads = 1;
-  return CheckCollision(placements_[a], placements_[b], options);
+  return AskWith(a, b, options, pieces);
 }
 
 absl::StatusOr<SceneTotals> FindCollisions(

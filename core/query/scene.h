@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "core/query/batch.h"
+#include "core/query/body/body_search.h"
+#include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/answer.h"
@@ -35,6 +37,8 @@ struct SceneOptions {
   std::span<const uint32_t> groups;
   // Pairs of groups that are never asked about.
   std::span<const GroupPair> ignored_groups;
+  // Empty, or each placement as a body: those that are no hulls are asked about in this form.
+  std::span<const PlacedBody> bodies;
   // One against many: only pairs with at least one of the first so many placements.
   std::optional<uint32_t> movers;
   // OpenMP threads.
@@ -60,8 +64,9 @@ struct SceneTotals {
 // placement, and of each candidate Ask. Const functions may be called by several threads at once.
 class SceneSearch {
  public:
-  // Both must outlive this. Cost: O(n log n); boxes are computed on options.threads.
-  // INVALID_ARGUMENT: `groups` is neither empty nor one for each placement.
+  // Both must outlive this; bodies, if there are any, are one for each placement. Cost: O(n log n);
+  // boxes are computed on options.threads. INVALID_ARGUMENT: `groups` is neither empty nor one for
+  // each placement.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
 
@@ -74,9 +79,12 @@ class SceneSearch {
   // groups leave, ascending. Requires a < size(). Cost: O(log n) beyond what it finds.
   void Candidates(uint32_t a, std::vector<uint32_t>& candidates) const;
 
-  // The answer of a candidate, and what else is wanted of it if it is found. CANCELLED: should_stop
-  // said so.
-  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b) const;
+  // The answer of a candidate, and what else is wanted of it if it is found. pieces: where not
+  // null, becomes the pair that decided of a candidate with a body (BodyAnswer::pieces). CANCELLED:
+  // should_stop said so. INVALID_ARGUMENT: a candidate with a body, and what ValidateBodyOptions
+  // refuses.
+  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b,
+                             std::optional<PiecePair>* pieces = nullptr) const;
   // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.
   bool IsFound(const Answer& answer) const;
 
@@ -84,6 +92,11 @@ class SceneSearch {
   SceneSearch(std::span<const PlacedHull> placements, const SceneOptions& options);
 
   bool IsIgnored(uint32_t a, uint32_t b) const;
+  bool IsBody(uint32_t placement) const {
+    return !options_->bodies.empty() && !options_->bodies[placement].body().is_hull();
+  }
+  absl::StatusOr<Answer> AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
+                                 std::optional<PiecePair>* pieces) const;
   uint64_t CountPairs() const;
 
   std::span<const PlacedHull> placements_;
