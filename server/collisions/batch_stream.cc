@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
 
@@ -95,6 +96,7 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
 }
 
 bool BatchStream::IsForTeam(const PlacedPair& pair) const {
+  if (table_.is_body(pair.a) || table_.is_body(pair.b)) return false;
   return IsTextbookForTeam(options_, table_.placed()[pair.a], table_.placed()[pair.b]);
 }
 
@@ -130,21 +132,22 @@ absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* col
   for (uint64_t i = begin; i < end; ++i) {
     const PlacedPair pair = PairAt(i);
     if (!IsAnswerable(pair)) {
-      columns->AddUnanswered();
+      columns->Add(
+          [&](v1::AnswerColumns* to) { return AddUnansweredPair(table_, request().wanted(), to); });
       continue;
     }
-    const PlacedHull& a = table_.placed()[pair.a];
-    const PlacedHull& b = table_.placed()[pair.b];
     options.threads = IsForTeam(pair) ? team_threads_ : 1;
-    absl::StatusOr<hulld::Answer> answer = CheckCollision(a, b, options);
-    if (absl::IsCancelled(answer.status())) return answer.status();
-    if (answer.ok()) {
-      counts.Add(answer->rung);
+    PlacedAnswer answer = AskPlaced(table_, pair.a, pair.b, options, nullptr);
+    if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
+    if (answer.answer.ok()) {
+      counts.Add(answer.answer->rung);
     } else {
-      answer = NameQueryLimit(answer.status(), options);
-      call().CountLimit(answer.status());
+      answer.answer = NameQueryLimit(answer.answer.status(), options);
+      call().CountLimit(answer.answer.status());
     }
-    columns->Add(answer, a, b);
+    columns->Add([&](v1::AnswerColumns* to) {
+      return AddPlacedAnswer(table_, pair.a, pair.b, answer, request().wanted(), to);
+    });
   }
   call().metrics().CountPairs(counts);
   return absl::OkStatus();

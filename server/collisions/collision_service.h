@@ -54,6 +54,8 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
+  void Answer(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call);
+  void AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call);
   // Answers the query on the thread that suits it.
   void Compute(PairQuery query, CheckCall* call);
 

@@ -97,6 +97,7 @@ absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
 absl::Status SceneStream::Prepare() {
   // What is known goes out while the tree is built.
   Locked([this] { QueueHead(); });
+  options_.bodies = table_.bodies();
   absl::StatusOr<SceneSearch> search = SceneSearch::Make(table_.placed(), options_);
   if (!search.ok()) return search.status();
   search_ = *std::move(search);
@@ -132,11 +133,12 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
       continue;
     }
     const uint32_t b = piece.candidates[piece.next_candidate++];
-    const absl::StatusOr<Answer> answer = search_->Ask(a, b);
-    if (absl::IsCancelled(answer.status())) return answer.status();
+    PlacedAnswer answer;
+    answer.answer = search_->Ask(a, b, &answer.pieces);
+    if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
     piece.totals.set_candidates(piece.totals.candidates() + 1);
-    if (answer.ok()) piece.rungs.Add(answer->rung);
-    if (answer.ok() && !search_->IsFound(*answer)) continue;
+    if (answer.answer.ok()) piece.rungs.Add(answer.answer->rung);
+    if (answer.answer.ok() && !search_->IsFound(*answer.answer)) continue;
     reply_bytes += AddFound(a, b, answer, piece, &reply);
     if (reply_bytes < FullMessageBytes(request().wanted())) continue;
     piece.Add(std::exchange(reply, {}));
@@ -147,13 +149,13 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   return absl::OkStatus();
 }
 
-size_t SceneStream::AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer,
-                             ScenePiece& piece, v1::FindCollisionsResponse* reply) {
+size_t SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece,
+                             v1::FindCollisionsResponse* reply) {
   const int position = reply->pairs_size() / 2;
   reply->add_pairs(a);
   reply->add_pairs(b);
-  const size_t bytes = AddAnswer(answer, table_.placed()[a], table_.placed()[b], request().wanted(),
-                                 reply->mutable_columns());
+  const size_t bytes =
+      AddPlacedAnswer(table_, a, b, answer, request().wanted(), reply->mutable_columns());
   Count(reply->columns().relations(position), &piece.totals);
   return kPairBytes + bytes;
 }

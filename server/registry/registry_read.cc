@@ -61,7 +61,7 @@ bool Registry::Lookup::Find() {
     if (wanted.hull == nullptr || wanted.hull->state.gone()) {
       wanted = {};
       wanted.hull = registry_.FindVisible(ids_[i]);
-      if (wanted.hull == nullptr) wanted.failure = HullNotFound(ids_[i]);
+      if (wanted.hull == nullptr) wanted.failure = registry_.NoSuchHull(ids_[i]);
     }
     if (wanted.hull != nullptr && wanted.hull->state.damaged()) {
       wanted.failure = wanted.hull->state.damage();
@@ -146,7 +146,7 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
   for (const std::string& id : ids) {
     const HullPointer hull = FindVisible(id);
     if (hull == nullptr) {
-      resolved.hulls.emplace_back(HullNotFound(id));
+      resolved.hulls.emplace_back(NoSuchHull(id));
       continue;
     }
     if (hull->state.damaged()) {

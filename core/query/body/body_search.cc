@@ -93,9 +93,7 @@ absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames&
   }
   if (options.want_certificate) {
     return absl::InvalidArgumentError(
-        absl::StrCat(names.certificate,
-                     " is for pairs of hulls, not of bodies; ask it of the pair of pieces "
-                     "that an answer names, or leave it out"));
+        absl::StrCat(names.certificate, " is for pairs of hulls, not of bodies; leave it out"));
   }
   return ValidateOptions(options, names);
 }
