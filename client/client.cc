@@ -69,20 +69,20 @@ absl::Status CheckConsistent(const HullMesh& mesh) {
 
 // Follows the pages of a list; `items` are those of a page.
 template <typename Request, typename Response, typename Items, typename ListPage>
-absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit, Items items,
+absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit, const Items& items,
                                  const ListPage& list_page) {
   constexpr uint64_t kLargestPage = 1000;
   Response all;
   Request request;
   request.set_prefix(prefix);
-  const auto count = [&] { return static_cast<uint64_t>((all.*items)()->size()); };
+  const auto count = [&] { return static_cast<uint64_t>(items(all)->size()); };
   do {
     const uint64_t missing = limit == 0 ? kLargestPage : limit - count();
     request.set_page_size(static_cast<uint32_t>(std::min(missing, kLargestPage)));
     absl::StatusOr<Response> page = list_page(request);
     if (!page.ok()) return page.status();
     *all.mutable_header() = page->header();
-    (all.*items)()->MergeFrom(*((*page).*items)());
+    items(all)->MergeFrom(*items(*page));
     if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
       return absl::InternalError("the server answered a page that continues with itself");
     }
@@ -247,7 +247,7 @@ absl::StatusOr<v1::ListHullsResponse> Client::ListHulls(const v1::ListHullsReque
 absl::StatusOr<v1::ListHullsResponse> Client::ListAllHulls(const std::string& prefix,
                                                            uint64_t limit) const {
   return ListAll<v1::ListHullsRequest, v1::ListHullsResponse>(
-      prefix, limit, &v1::ListHullsResponse::mutable_hulls,
+      prefix, limit, [](v1::ListHullsResponse& page) { return page.mutable_hulls(); },
       [this](const v1::ListHullsRequest& request) { return ListHulls(request); });
 }
 
@@ -269,7 +269,7 @@ absl::StatusOr<v1::ListBodiesResponse> Client::ListBodies(
 absl::StatusOr<v1::ListBodiesResponse> Client::ListAllBodies(const std::string& prefix,
                                                              uint64_t limit) const {
   return ListAll<v1::ListBodiesRequest, v1::ListBodiesResponse>(
-      prefix, limit, &v1::ListBodiesResponse::mutable_bodies,
+      prefix, limit, [](v1::ListBodiesResponse& page) { return page.mutable_bodies(); },
       [this](const v1::ListBodiesRequest& request) { return ListBodies(request); });
 }
 

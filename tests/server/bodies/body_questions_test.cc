@@ -62,7 +62,8 @@ TEST_F(BodyQuestions, DetailsAreThoseOfTheNearestOrDeepestPair) {
   EXPECT_NEAR(apart->separation().value(), 1.5, apart->separation().bound());
   EXPECT_TRUE(apart->has_witness());
   EXPECT_TRUE(apart->within_clearance());
-  EXPECT_EQ(apart->piece_a().index() + apart->piece_b().index(), 0u + apart->piece_a().index());
+  EXPECT_EQ(apart->piece_a().hull().hull_id(), "cube");
+  EXPECT_EQ(apart->piece_b().hull().hull_id(), "cube");
   EXPECT_EQ(apart->axis().feature_a().vertex_indices_size(), 4);
   EXPECT_EQ(apart->analysis().size_a().vertices(), 8u);
 
@@ -75,8 +76,8 @@ TEST_F(BodyQuestions, DetailsAreThoseOfTheNearestOrDeepestPair) {
 // Two cubes of one turned body share a face: only the exact product of the poses says so.
 TEST_F(BodyQuestions, PosesComposeExactly) {
   Put("cube", Cube());
-  ASSERT_TRUE(PutBody("left", {PlacementOf("cube", 0.1, 0.2, 0.3)}).ok());
-  ASSERT_TRUE(PutBody("right", {PlacementOf("cube", 1.1, 0.2, 0.3)}).ok());
+  ASSERT_TRUE(PutBody("left", {PlacementOf("cube", 0.25, 0.2, 0.3)}).ok());
+  ASSERT_TRUE(PutBody("right", {PlacementOf("cube", 1.25, 0.2, 0.3)}).ok());
   v1::Placement left = PlacementOf("left", 17.3, -4.1, 1e6);
   v1::Quaternion* const q = left.mutable_pose()->mutable_rotation();
   q->set_w(0.3);
