@@ -13,6 +13,7 @@
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/chunked_vector.h"
 #include "core/hull/growth/direction_map.h"
+#include "core/hull/growth/kept_before.h"
 #include "core/hull/growth/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
@@ -326,7 +327,7 @@ class Surface {
   uint32_t mark_ = 0;
   // See TakeSteps.
   uint64_t steps_ = 0;
-  std::optional<Before> before_;
+  KeptBefore<Before> before_;
   // Where the last insertion was.
   TriangleId last_ = 0;
 };
