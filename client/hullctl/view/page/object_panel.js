@@ -32,7 +32,8 @@ export class ObjectPanel {
       return;
     }
     this.shownIndex = object.index;
-    this.factsBlock = element('div', {className: 'block', id: 'object-facts'}, ...this.factRows(object));
+    this.factsBlock =
+        element('div', {className: 'block', id: 'object-facts'}, ...this.factRows(object));
     const blocks = [this.factsBlock];
     if (object.hullId) blocks.push(this.poseBlock(object));
     if (object.hullId && this.live && this.model.hullOf(object)?.info.dimension === 3) {
@@ -57,7 +58,11 @@ export class ObjectPanel {
       ['facets', hull && grouped(hull.facetCount)],
       ['points', info?.counts && grouped(info.counts.received)],
       ['volume', hull?.info.dimension === 3 ? exact(hull.measures.volume) : null],
-      ['box', hull && !hull.isEmpty ? hull.high.map((h, k) => short(h - hull.low[k])).join(' \u00d7 ') : null],
+      [
+        'box',
+        hull && !hull.isEmpty ? hull.high.map((h, k) => short(h - hull.low[k])).join(' \u00d7 ') :
+                                null
+      ],
       ...this.meshRows(hull, mesh, object),
     ]));
     return rows;
@@ -67,34 +72,50 @@ export class ObjectPanel {
     if (!mesh) return [];
     const rows = [['file', this.model.files[object.file].name]];
     if (!mesh.triangles.length) {
-      const drawn = mesh.vertexCount < mesh.pointCount ? `, ${grouped(mesh.vertexCount)} drawn` : '';
+      const drawn =
+          mesh.vertexCount < mesh.pointCount ? `, ${grouped(mesh.vertexCount)} drawn` : '';
       return [...rows, ['in it', `${grouped(mesh.pointCount)} points${drawn}`]];
     }
-    rows.push(['mesh', `${grouped(mesh.vertexCount)} vertices, ${grouped(mesh.triangles.length / 3)} triangles`]);
+    rows.push([
+      'mesh',
+      `${grouped(mesh.vertexCount)} vertices, ${grouped(mesh.triangles.length / 3)} triangles`
+    ]);
     if (!hull || hull.info.dimension !== 3) return rows;
     const {volume, area} = mesh.measures;
     if (volume) {
-      rows.push(['mesh volume', exact(volume)],
-                ['hull is', `${short(hull.measures.volume / volume)} times as large as its mesh`]);
+      rows.push(
+          ['mesh volume', exact(volume)],
+          ['hull is', `${short(hull.measures.volume / volume)} times as large as its mesh`]);
     } else {
-      rows.push(['mesh volume', 'none: the mesh is not closed'],
-                ['hull has', `${short(hull.measures.area / area)} times the area of its mesh`]);
+      rows.push(
+          ['mesh volume', 'none: the mesh is not closed'],
+          ['hull has', `${short(hull.measures.area / area)} times the area of its mesh`]);
     }
     return rows;
   }
 
   poseBlock(object) {
-    this.inputs = object.pose.map((value, i) => element('input', {
-      type: 'text', inputMode: 'decimal', value: String(value), autocomplete: 'off', spellcheck: false,
-      readOnly: !this.live, 'data-pose': i,
-      'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
-      onchange: () => this.typed(object),
-    }));
-    const fields = (from, to) => element('div', {className: 'pose'},
-      ...this.inputs.slice(from, to).flatMap((input, i) => [element('b', {className: 'quiet'}, POSE_NAMES[from + i]), input]));
-    return element('div', {className: 'block'},
-      element('h2', {}, 'Translation'), fields(4, 7),
-      element('details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'), fields(0, 4)));
+    this.inputs =
+        object.pose.map((value, i) => element('input', {
+                          type: 'text',
+                          inputMode: 'decimal',
+                          value: String(value),
+                          autocomplete: 'off',
+                          spellcheck: false,
+                          readOnly: !this.live,
+                          'data-pose': i,
+                          'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
+                          onchange: () => this.typed(object),
+                        }));
+    const fields = (from, to) => element(
+        'div', {className: 'pose'},
+        ...this.inputs.slice(from, to).flatMap(
+            (input, i) => [element('b', {className: 'quiet'}, POSE_NAMES[from + i]), input]));
+    return element(
+        'div', {className: 'block'}, element('h2', {}, 'Translation'), fields(4, 7),
+        element(
+            'details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'),
+            fields(0, 4)));
   }
 
   typed(object) {
@@ -122,29 +143,42 @@ export class ObjectPanel {
     this.result = element('div', {'aria-live': 'polite'});
     const ask = () => {
       const size = this.model.radiusOf(object);
-      const maxError = this.steps === 0 ? 0 : Number((size * 10 ** ((this.steps - 40) / 13) / 2).toPrecision(3));
+      const maxError =
+          this.steps === 0 ? 0 : Number((size * 10 ** ((this.steps - 40) / 13) / 2).toPrecision(3));
       this.output.textContent = this.steps === 0 ? 'off' : `error up to ${short(maxError)}`;
       if (this.steps === 0) this.result.replaceChildren();
       this.simplify(object, this.side, maxError);
     };
-    return element('div', {className: 'block'},
-      element('h2', {}, 'A simpler hull'),
-      element('div', {className: 'slider'},
-        element('label', {}, 'Simplify ', this.output,
-          element('input', {
-            type: 'range', min: 0, max: 40, value: 0, id: 'simplify', oninput: ({target}) => {
-              this.steps = Number(target.value);
-              ask();
-            },
-          })),
-        element('select', {
-          'aria-label': 'Side', onchange: ({target}) => {
-            this.side = target.value;
-            ask();
-          },
-        }, element('option', {value: 'inside', selected: this.side === 'inside'}, 'inside: a subset of the vertices'),
-           element('option', {value: 'outside', selected: this.side === 'outside'}, 'outside: encloses the hull'))),
-      this.result);
+    return element(
+        'div', {className: 'block'}, element('h2', {}, 'A simpler hull'),
+        element(
+            'div', {className: 'slider'},
+            element('label', {}, 'Simplify ', this.output, element('input', {
+                      type: 'range',
+                      min: 0,
+                      max: 40,
+                      value: 0,
+                      id: 'simplify',
+                      oninput: ({target}) => {
+                        this.steps = Number(target.value);
+                        ask();
+                      },
+                    })),
+            element(
+                'select', {
+                  'aria-label': 'Side',
+                  onchange: ({target}) => {
+                    this.side = target.value;
+                    ask();
+                  },
+                },
+                element(
+                    'option', {value: 'inside', selected: this.side === 'inside'},
+                    'inside: a subset of the vertices'),
+                element(
+                    'option', {value: 'outside', selected: this.side === 'outside'},
+                    'outside: encloses the hull'))),
+        this.result);
   }
 
   simplified(hull) {

@@ -1,8 +1,8 @@
-// One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the middle
-// of the object's box, turned as the pose says.
+// One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the
+// middle of the object's box, turned as the pose says.
 import {MARK_COLOURS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
-import {THREE, discTexture} from 'hulld/three.js';
+import {discTexture, THREE} from 'hulld/three.js';
 
 const FLASH_MS = 1200;
 
@@ -23,8 +23,14 @@ export function geometryOf(shape, kind) {
 }
 
 const surface = (colour, options) => new THREE.MeshPhongMaterial({
-  color: colour, flatShading: true, shininess: 12, specular: 0x222222,
-  polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, ...options,
+  color: colour,
+  flatShading: true,
+  shininess: 12,
+  specular: 0x222222,
+  polygonOffset: true,
+  polygonOffsetFactor: 1,
+  polygonOffsetUnits: 1,
+  ...options,
 });
 
 // The lines of a larger hull would cover all of it, and both of its sides cost twice.
@@ -69,8 +75,10 @@ export class ObjectView {
     if (cloud && (show.points || (mesh && !mesh.triangles.length && show.mesh))) {
       this.addPoints(cloud);
     }
-    if (hull && show.hull && !hull.isEmpty) this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
-    if (hull && show.edges && !hull.isEmpty && !isHuge(hull) && (show.hull || !(mesh && show.mesh))) {
+    if (hull && show.hull && !hull.isEmpty)
+      this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
+    if (hull && show.edges && !hull.isEmpty && !isHuge(hull) &&
+        (show.hull || !(mesh && show.mesh))) {
       this.addEdges(hull);
     }
     this.place();
@@ -90,7 +98,11 @@ export class ObjectView {
   addPoints(shape) {
     const size = shape.vertexCount > 20000 ? 1.5 : 4;
     const material = new THREE.PointsMaterial({
-      color: this.stage.theme.edge, size, sizeAttenuation: false, map: discTexture(), alphaTest: 0.5,
+      color: this.stage.theme.edge,
+      size,
+      sizeAttenuation: false,
+      map: discTexture(),
+      alphaTest: 0.5,
     });
     const points = new THREE.Points(geometryOf(shape, 'points'), material);
     points.renderOrder = 2;
@@ -101,10 +113,12 @@ export class ObjectView {
   addHull(hull, isBeside) {
     const flat = hull.info.dimension < 3;
     const sides = flat ? [THREE.DoubleSide] :
-        isHuge(hull) ? [THREE.FrontSide] : [THREE.BackSide, THREE.FrontSide];
+        isHuge(hull)   ? [THREE.FrontSide] :
+                         [THREE.BackSide, THREE.FrontSide];
     for (const side of sides) {
       const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
-      const material = surface(this.object.colour, {side, ...(isHuge(hull) && !isBeside ? {} : glass)});
+      const material =
+          surface(this.object.colour, {side, ...(isHuge(hull) && !isBeside ? {} : glass)});
       const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
       part.renderOrder = side === THREE.FrontSide ? 4 : 3;
       this.shift(part, hull);
@@ -140,7 +154,11 @@ export class ObjectView {
     });
     geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
     const material = new THREE.PointsMaterial({
-      color: MARK_COLOURS.flash, size: 11, sizeAttenuation: false, transparent: true, depthTest: false,
+      color: MARK_COLOURS.flash,
+      size: 11,
+      sizeAttenuation: false,
+      transparent: true,
+      depthTest: false,
       map: discTexture(),
     });
     const points = new THREE.Points(geometry, material);

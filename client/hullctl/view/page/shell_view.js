@@ -1,5 +1,5 @@
-// Draws a simpler hull in place of the selected one with the shell of its proven error, or the shell
-// of the tolerance.
+// Draws a simpler hull in place of the selected one with the shell of its proven error, or the
+// shell of the tolerance.
 import {MARK_COLOURS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 import {shellGeometry} from 'hulld/shell.js';
@@ -71,7 +71,12 @@ export class ShellView {
 
   add(geometry, centre, {color, opacity}) {
     const part = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({
-      color, opacity, transparent: true, depthWrite: false, flatShading: true, side: THREE.DoubleSide,
+      color,
+      opacity,
+      transparent: true,
+      depthWrite: false,
+      flatShading: true,
+      side: THREE.DoubleSide,
     }));
     part.renderOrder = 6;
     part.userData.centre = centre;
