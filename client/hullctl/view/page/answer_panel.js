@@ -115,10 +115,22 @@ export class AnswerPanel {
       ['point of B', witness && vector(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
       ['certificate', certificate && this.certificateText(certificate)],
       ['decided by', RUNGS[answer.rung]],
+      ...this.tolerantRows(answer),
       ['revisions', `${answer.hullA.revision} and ${answer.hullB.revision}`],
     ]);
     list.id = 'answer-facts';
     return list;
+  }
+
+  // What the tolerance makes of it: perhaps a lesser answer, by a cheaper rung.
+  tolerantRows({tolerant}) {
+    if (!tolerant) return [];
+    const {word, sign} = RELATIONS[tolerant.relation];
+    return [
+      ['tolerance', exact(tolerant.tolerance)],
+      ['with it', `${sign} ${word}`],
+      ['decided then by', RUNGS[tolerant.rung]],
+    ];
   }
 
   certificateText({direction, integerDirection, pairs}) {
@@ -207,7 +219,7 @@ export class AnswerPanel {
       max: 60,
       value: 0,
       id: 'tolerance',
-      'aria-label': 'Tolerance of the list',
+      'aria-label': 'Tolerance',
       oninput: () => {
         const radius = model.bounds()?.radius || 1;
         const steps = Number(input.value);
@@ -217,8 +229,6 @@ export class AnswerPanel {
         model.tell('tolerance');
       },
     });
-    return element(
-        'div', {className: 'slider'},
-        element('label', {}, 'Tolerance of this list ', output, input));
+    return element('div', {className: 'slider'}, element('label', {}, 'Tolerance ', output, input));
   }
 }

@@ -11,6 +11,7 @@ import {Model} from 'hulld/model.js';
 import {ObjectPanel} from 'hulld/object_panel.js';
 import {ObjectView} from 'hulld/object_view.js';
 import {pick} from 'hulld/picking.js';
+import {keepPicture} from 'hulld/picture.js';
 import {HullShape, MeshShape, newVertices} from 'hulld/shape.js';
 import {ShellView} from 'hulld/shell_view.js';
 import {Stage} from 'hulld/stage.js';
@@ -44,16 +45,19 @@ class Viewer {
       answer: (message) => this.answer(message),
       collisions: (message) => this.collisions(message),
       problem: (message) => this.say(message.message),
+      edited: (message) => this.edited(message),
       frame: (frame) => this.frame(frame),
       lost: () => this.lost(),
     });
     this.answerPanel = new AnswerPanel(this.model, this.marks, this.connection.live);
-    this.objectPanel =
-        new ObjectPanel(this.model, this.connection.live, (...wish) => this.simplify(...wish));
+    this.objectPanel = new ObjectPanel(
+        this.model, this.connection.live, (...wish) => this.simplify(...wish),
+        (edit) => this.connection.send({type: 'edit', ...edit}));
     this.listen();
     this.bindControls();
     this.stage.beforeFrame(
         (now) => [...this.views.values()].reduce((any, view) => view.fade(now) || any, false));
+    if (document.body.classList.contains('picture')) keepPicture(this.stage);
     document.body.dataset.ready = 'yes';
   }
 
@@ -110,8 +114,9 @@ class Viewer {
 
   // --- Messages ---
 
-  hello({server, version, up, scenes}) {
+  hello({server, version, up, edit, scenes}) {
     this.server = server;
+    this.objectPanel.mayEdit = edit && this.connection.live;
     this.stage.setUp(up);
     this.gizmo.handles.camera = this.stage.camera;
     const choice = $('scene-choice');
@@ -294,6 +299,10 @@ class Viewer {
     if (message.update < this.firstUpdate) return;
     if (message.revision !== '0') this.updateStatus(message.revision);
     this.model.setCollisions(message);
+  }
+
+  edited(message) {
+    if (!this.objectPanel.edited(message)) this.say(message.message);
   }
 
   lost() {

@@ -4,10 +4,13 @@ import {element, exact, facts, grouped, short} from 'hulld/dom.js';
 const POSE_NAMES = ['w', 'x', 'y', 'z', 'x', 'y', 'z'];
 
 export class ObjectPanel {
-  constructor(model, live, simplify) {
+  constructor(model, live, simplify, edit) {
     this.model = model;
     this.live = live;
     this.simplify = simplify;
+    this.edit = edit;
+    // The bridge says so.
+    this.mayEdit = false;
     this.root = document.getElementById('object');
     this.side = 'inside';
     this.steps = 0;
@@ -27,7 +30,7 @@ export class ObjectPanel {
     }
     // Typing must not be disturbed by an object that changes.
     if (this.root.contains(document.activeElement) && this.shownIndex === object.index &&
-        document.activeElement.matches('input')) {
+        document.activeElement.matches('input, textarea, button')) {
       this.factsBlock.replaceChildren(...this.factRows(object));
       return;
     }
@@ -39,6 +42,7 @@ export class ObjectPanel {
     if (object.hullId && this.live && this.model.hullOf(object)?.info.dimension === 3) {
       blocks.push(this.simplifyBlock(object));
     }
+    if (this.mayEdit && object.hullId && !object.gone) blocks.push(this.editBlock(object));
     this.root.replaceChildren(...blocks);
   }
 
@@ -179,6 +183,64 @@ export class ObjectPanel {
                     'option', {value: 'outside', selected: this.side === 'outside'},
                     'outside: encloses the hull'))),
         this.result);
+  }
+
+  // Points to append, and an end to the hull.
+  editBlock(object) {
+    // What was typed, and what came of it, stays while the object does.
+    if (this.editing?.object === object) return this.editing.block;
+    const points = element('textarea', {
+      id: 'edit-points',
+      rows: 3,
+      spellcheck: false,
+      placeholder: 'x y z, one point a line',
+      'aria-label': `Points to append to ${object.hullId}`,
+    });
+    const append = element(
+        'button', {type: 'button', id: 'edit-append', onclick: () => this.append(object, points)},
+        'Append points');
+    const remove = element('button', {type: 'button', id: 'edit-delete'}, 'Delete this hull');
+    // A second press, of other words, so that a slip deletes nothing.
+    remove.addEventListener('click', () => {
+      if (remove.dataset.sure) {
+        this.edit({action: 'delete', hullId: object.hullId, points: []});
+      } else {
+        remove.dataset.sure = 'yes';
+        remove.textContent = `Really delete ${object.hullId}, for everyone`;
+      }
+    });
+    remove.addEventListener('blur', () => {
+      delete remove.dataset.sure;
+      remove.textContent = 'Delete this hull';
+    });
+    this.editResult = element('p', {className: 'quiet', id: 'edit-result', 'aria-live': 'polite'});
+    const block = element(
+        'div', {className: 'block'}, element('h2', {}, 'Change it'), points,
+        element('div', {className: 'buttons'}, append, remove), this.editResult);
+    this.editing = {object, block};
+    return block;
+  }
+
+  append({hullId}, area) {
+    const lines = area.value.split('\n').map((line) => line.trim()).filter(Boolean);
+    const points = lines.map((line) => line.split(/[\s,;]+/).map(Number));
+    const wrong = points.findIndex((point) => point.length !== 3 || !point.every(Number.isFinite));
+    area.setAttribute('aria-invalid', String(wrong >= 0 || !lines.length));
+    if (wrong >= 0 || !lines.length) {
+      this.editResult.textContent =
+          lines.length ? `"${lines[wrong]}" is not three numbers.` : 'There are no points yet.';
+      return;
+    }
+    this.sent = area;
+    this.edit({action: 'append', hullId, points: points.flat()});
+  }
+
+  // Whether it was told here.
+  edited({hullId, done, message}) {
+    if (this.object?.hullId !== hullId || !this.editResult?.isConnected) return false;
+    this.editResult.textContent = message;
+    if (done && this.sent?.isConnected) this.sent.value = '';
+    return true;
   }
 
   simplified(hull) {

@@ -85,8 +85,8 @@ export class Stage {
     this.fitDepth();
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
-    for (const update of this.after) update();
     this.drawTriad();
+    for (const update of this.after) update();
     if (more) this.draw();
   }
 
