@@ -42,40 +42,10 @@ std::string EditedMessage(const ViewEdit& edit, const absl::StatusOr<std::string
 }  // namespace
 
 EditFeed::EditFeed(const Client& client, std::shared_ptr<PageChannel> page)
-    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
-
-EditFeed::~EditFeed() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
-
-void EditFeed::Ask(ViewEdit edit) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (edits_.size() >= kMostEdits) return;
-    edits_.push_back(std::move(edit));
-  }
-  changed_.notify_all();
-}
-
-void EditFeed::Run() {
-  while (true) {
-    ViewEdit edit;
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return !edits_.empty() || ended_; });
-      if (ended_) return;
-      edit = std::move(edits_.front());
-      edits_.pop_front();
-    }
-    const auto outcome =
-        edit.action == ViewEdit::Action::kDelete ? Delete(client_, edit) : Append(client_, edit);
-    if (!page_->SendText(EditedMessage(edit, outcome))) return;
-  }
-}
+    : worker_(kMostEdits, [&client, page = std::move(page)](const ViewEdit& edit) {
+        const bool is_delete = edit.action == ViewEdit::Action::kDelete;
+        const auto outcome = is_delete ? Delete(client, edit) : Append(client, edit);
+        return page->SendText(EditedMessage(edit, outcome));
+      }) {}
 
 }  // namespace hulld

@@ -1,14 +1,12 @@
 #ifndef HULLD_CLIENT_HULLCTL_VIEW_EDIT_FEED_H_
 #define HULLD_CLIENT_HULLCTL_VIEW_EDIT_FEED_H_
 
-#include <condition_variable>
-#include <deque>
 #include <memory>
-#include <mutex>
-#include <thread>
+#include <utility>
 
 #include "client/client.h"
 #include "client/hullctl/view/bridge/bridge.h"
+#include "client/hullctl/view/ordered_worker.h"
 #include "client/hullctl/view/protocol.h"
 
 namespace hulld {
@@ -19,23 +17,12 @@ namespace hulld {
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Waits for the change that is under way; those behind it are dropped.
-  ~EditFeed();
 
-  void Ask(ViewEdit edit);
+  void Ask(ViewEdit edit) { worker_.Ask(std::move(edit)); }
 
  private:
-  void Run();
-
-  const Client& client_;
-  const std::shared_ptr<PageChannel> page_;
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  // The rest is guarded by the mutex.
-  std::deque<ViewEdit> edits_;
-  bool ended_ = false;
-  std::thread thread_;
+  // Waits for the change that is under way; those behind it are dropped.
+  OrderedWorker<ViewEdit> worker_;
 };
 
 }  // namespace hulld

@@ -1,26 +1,16 @@
 // Draws what an answer says: the separating plane and its axis, the witness points, and the vertex
 // pairs of the certificate.
+import {DrawnGroup} from 'hulld/drawn_group.js';
 import {MARK_COLOURS} from 'hulld/palette.js';
 import {toWorld} from 'hulld/pose.js';
 import {discTexture, THREE} from 'hulld/three.js';
 
 const number = ({x, y, z}) => [Number(x), Number(y), Number(z)];
 
-export class Marks {
+export class Marks extends DrawnGroup {
   constructor(model, stage) {
-    this.model = model;
-    this.stage = stage;
+    super(model, stage);
     this.on = {plane: true, axis: true, witness: true, certificate: true};
-    this.group = new THREE.Group();
-    stage.scene.add(this.group);
-  }
-
-  clear() {
-    this.group.traverse((part) => {
-      part.geometry?.dispose();
-      part.material?.dispose();
-    });
-    this.group.remove(...this.group.children);
   }
 
   rebuild() {

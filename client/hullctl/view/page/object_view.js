@@ -1,5 +1,6 @@
 // One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the
 // middle of the object's box, turned as the pose says.
+import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
 import {MARK_COLOURS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 import {discTexture, THREE} from 'hulld/three.js';
@@ -22,42 +23,16 @@ export function geometryOf(shape, kind) {
   return kinds[kind];
 }
 
-const surface = (colour, options) => new THREE.MeshPhongMaterial({
-  color: colour,
-  flatShading: true,
-  shininess: 12,
-  specular: 0x222222,
-  polygonOffset: true,
-  polygonOffsetFactor: 1,
-  polygonOffsetUnits: 1,
-  ...options,
-});
-
 // The lines of a larger hull would cover all of it, and both of its sides cost twice.
 const isHuge = (hull) => hull.facetCount > 200000;
 
 // Many lines hide what they stand on.
 const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
 
-export class ObjectView {
+export class ObjectView extends DrawnGroup {
   constructor(model, stage, object) {
-    this.model = model;
-    this.stage = stage;
+    super(model, stage);
     this.object = object;
-    this.group = new THREE.Group();
-    stage.scene.add(this.group);
-  }
-
-  dispose() {
-    this.clear();
-    this.stage.scene.remove(this.group);
-  }
-
-  clear() {
-    for (const part of [...this.group.children]) {
-      part.material.dispose();
-      this.group.remove(part);
-    }
   }
 
   // Builds what is to be drawn anew; cheap, as geometries are shared.
@@ -87,11 +62,12 @@ export class ObjectView {
   // Parts of other shapes than the hull have centres of their own.
   shift(part, shape) {
     part.position.set(...shape.centre.map((value, k) => value - this.centre[k]));
+    part.userData.sharesGeometry = true;
     this.group.add(part);
   }
 
   addMesh(mesh) {
-    const material = surface(this.object.colour, {side: THREE.DoubleSide});
+    const material = facetMaterial({color: this.object.colour, side: THREE.DoubleSide});
     this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles'), material), mesh);
   }
 
@@ -117,8 +93,8 @@ export class ObjectView {
                          [THREE.BackSide, THREE.FrontSide];
     for (const side of sides) {
       const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
-      const material =
-          surface(this.object.colour, {side, ...(isHuge(hull) && !isBeside ? {} : glass)});
+      const material = facetMaterial(
+          {color: this.object.colour, side, ...(isHuge(hull) && !isBeside ? {} : glass)});
       const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
       part.renderOrder = side === THREE.FrontSide ? 4 : 3;
       this.shift(part, hull);
@@ -165,6 +141,7 @@ export class ObjectView {
     points.renderOrder = 6;
     points.userData.end = performance.now() + FLASH_MS;
     this.shift(points, hull);
+    points.userData.sharesGeometry = false;
     this.stage.draw();
   }
 
