@@ -50,6 +50,7 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
 
 void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell) {
   const double size = SizeWith(vertices, point);
+  const uint64_t work_before = work_;
   std::optional<Location> location;
   if (directions_) {
     location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
@@ -58,6 +59,7 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
     location = Scan(vertices, point, size);
     work_ += triangles_.size();
   }
+  steps_ += (work_ - work_before) / kTrianglesPerStep;
   last_ = location->triangle;
   if (location->side == Side::kInside) {
     // A point equal to a vertex lies in the cones of that vertex's triangles alone.

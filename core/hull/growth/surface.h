@@ -120,7 +120,7 @@ class Surface {
   std::optional<VertexId> CornerAt(const VertexTable& vertices, TriangleId id,
                                    const Vector& point) const;
   // Steps of insertions since this was last asked, for a poll: one for each, and more for those
-  // that change many triangles.
+  // that change many triangles, or look for their place among many.
   uint64_t TakeSteps() { return std::exchange(steps_, 0); }
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
