@@ -35,7 +35,7 @@ absl::Status ReadPieces(const std::string& path, Pieces* pieces) {
   if (!source.ok()) return source.status();
   std::string text;
   std::string_view line;
-  while ((*source)->ReadLine(&line)) absl::StrAppend(&text, line, "\n");
+  while ((*source)->ReadLine(&line)) text.append(line).append("\n");
   if (absl::Status s = (*source)->status(); !s.ok()) return s;
   // What 'body get' prints, or no more of it than the pieces.
   v1::GetBodyResponse body;
