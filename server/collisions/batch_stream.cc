@@ -39,9 +39,8 @@ WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
                          Executor& executor, const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
-                    {kFirstPairs, kMostPairs}),
-      registry_(registry),
+    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, registry,
+                    {readers, pool}, {kFirstPairs, kMostPairs}),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()) {}
 
@@ -53,37 +52,38 @@ bool BatchStream::IsShort() const {
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
-                       registry_.limits(), call().lifetime());
+                       registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           registry_.limits().max_placements, "the batch");
+                           registry().limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
   call().AddPairs(pair_count_);
-  return ValidatePairs(request().pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
+  return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");
 }
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
   const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true};
-  if (!may_wait) return table_.TryResolve(registry_, options_, plan);
-  if (absl::Status s = table_.Resolve(registry_, options_, plan); !s.ok()) return s;
+  if (!may_wait) return table_.TryResolve(registry(), options_, plan);
+  if (absl::Status s = table_.Resolve(registry(), options_, plan); !s.ok()) return s;
   return true;
 }
 
-uint64_t BatchStream::Begin() {
-  table_.EncodeHeader(registry_.store(), head_.mutable_header());
-  has_head_ = true;
-  size_t next = 0;
-  while ((next = table_.EncodeHulls(next, head_.mutable_hulls(),
-                                    head_.mutable_placement_problems())) < table_.table_rows()) {
-    const size_t bytes = head_.ByteSizeLong();
-    Queue(std::exchange(head_, {}), bytes);
+bool BatchStream::QueueHead() {
+  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head_.mutable_header());
+  next_row_ =
+      table_.EncodeHulls(next_row_, head_.mutable_hulls(), head_.mutable_placement_problems());
+  if (next_row_ == table_.table_rows()) {
+    has_head_ = true;
+    return false;
   }
-  return pair_count_;
+  const size_t bytes = head_.ByteSizeLong();
+  Queue(std::exchange(head_, {}), bytes);
+  return true;
 }
 
 PlacedPair BatchStream::PairAt(uint64_t i) const {

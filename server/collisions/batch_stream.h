@@ -41,8 +41,10 @@ class BatchStream
   absl::Status Validate() override;
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
+  size_t HeldBytes() const override { return table_.MemoryBytes(); }
   // The rest requires the mutex.
-  uint64_t Begin() override;
+  bool QueueHead() override;
+  uint64_t CountUnits() override { return pair_count_; }
   uint64_t EndOfPiece(uint64_t begin, uint64_t end) const override;
   void Submit(PairsPiece& piece) override;
   void Deliver(PairsPiece& piece) override;
@@ -56,7 +58,6 @@ class BatchStream
   bool IsForTeam(const PlacedPair& pair) const;
   absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
 
-  Registry& registry_;
   // The size of the team, and the turns of this call on it.
   const int team_threads_;
   TaskPool::Lane team_lane_;
@@ -67,7 +68,9 @@ class BatchStream
   PlacementTable table_;
 
   // Guarded by the mutex.
-  // The last part of the table of hulls, for the first answers.
+  // The first row of the table of hulls that is still to be told, and the last part of the table,
+  // for the first answers.
+  size_t next_row_ = 0;
   v1::BatchCheckCollisionsResponse head_;
   bool has_head_ = false;
 };

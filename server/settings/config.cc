@@ -191,7 +191,8 @@ class Parser {
     AddLimit(
         "memory-limit", limits.memory_limit,
         "Bytes of memory that hulls, points on their way to them, replacements under way and the "
-        "pairs of streams may hold, beside messages of calls and the store's own buffers; 0: half "
+        "placements, pairs and answers of batches, scenes and streams may hold, beside messages of "
+        "calls and the store's own buffers; 0: half "
         "of what the machine or the control group has",
         kAny, 0);
     AddLimit("request-memory", limits.request_memory,

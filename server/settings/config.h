@@ -33,8 +33,9 @@ struct Limits {
   uint64_t max_textbook_axes = 10'000'000;
   uint64_t max_writers_per_hull = 100'000;
   // Bytes that hulls in memory may hold, replacements under way too, points that wait to be built
-  // or stored, and the placements and pairs of streams; beside messages of calls and the store's
-  // own buffers. 0: half of what the machine or the control group of the process has.
+  // or stored, and the placements, pairs and answers of batches, scenes and streams; beside
+  // messages of calls and the store's own buffers. 0: half of what the machine or the control group
+  // of the process has.
   uint64_t memory_limit = 0;
   // Bytes that requests may take from when they are parsed until they are answered, and the same
   // again for those that are on their way.
