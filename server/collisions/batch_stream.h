@@ -6,9 +6,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/query/batch.h"
+#include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placement_table.h"
@@ -20,19 +22,21 @@
 
 namespace hulld::server {
 
+// A range of pairs, and how far the textbook came with the next of them, if it began.
+struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
+  std::optional<TextbookCheck> check;
+};
+
 // One BatchCheckCollisions call: resolves every hull once, on a reader thread, then answers ranges
 // of pairs on all threads of the pool.
-class BatchStream
-    : public PiecedReplies<v1::BatchCheckCollisionsRequest, v1::BatchCheckCollisionsResponse,
-                           Piece<v1::BatchCheckCollisionsResponse>> {
+class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
+                                         v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
                              Registry& registry, WorkerPool& readers, TaskPool& pool,
                              Executor& executor, const grpc::ByteBuffer& request);
 
  private:
-  using PairsPiece = Piece<v1::BatchCheckCollisionsResponse>;
-
   BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               WorkerPool& readers, TaskPool& pool, Executor& executor,
               const grpc::ByteBuffer& request);
@@ -56,7 +60,12 @@ class BatchStream
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;
-  absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
+  // Each answers the next pair of the piece; by the textbook, a part of that at least. CANCELLED.
+  absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
+  absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
+                                RungCounts* counts);
+  absl::Status Add(absl::StatusOr<hulld::Answer> answer, PairsPiece& piece, BatchColumns* columns,
+                   RungCounts* counts);
 
   // The size of the team, and the turns of this call on it.
   const int team_threads_;
@@ -65,6 +74,8 @@ class BatchStream
   // Written before the first piece.
   uint64_t pair_count_ = 0;
   QueryOptions options_;
+  // The same for a pair that is worth the team.
+  QueryOptions team_options_;
   PlacementTable table_;
 
   // Guarded by the mutex.

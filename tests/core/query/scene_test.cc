@@ -198,7 +198,7 @@ TEST(Scene, CandidatesAreGatheredInStepsAndTakeABitEachAtMost) {
     candidates.Start(*scene, a);
     int steps = 1;
     while (!candidates.Gather(16)) ++steps;
-    if (a < 3) EXPECT_GT(steps, 50);
+    EXPECT_GT(steps, a < 3 ? 50 : 0);
     std::vector<uint32_t> expected;
     for (uint32_t b = a + 1; b < kPlacements && a % 3 != 0; ++b) {
       if (b % 3 != 0) expected.push_back(b);
