@@ -88,9 +88,8 @@ absl::Status Call::Authenticate() {
 // connection.
 std::string Call::Client() const {
   if (!caller_.name.empty()) return "token:" + caller_.name;
-  const std::string peer = context_.peer();
-  if (!peer.starts_with("ipv4:") && !peer.starts_with("ipv6:")) return peer;
-  return peer.substr(0, peer.rfind(':'));
+  if (!peer_.starts_with("ipv4:") && !peer_.starts_with("ipv6:")) return peer_;
+  return peer_.substr(0, peer_.rfind(':'));
 }
 
 void Call::BeginMessage() {
@@ -126,7 +125,7 @@ void Call::LogChange(const std::string& message, const std::string& hull_id, uin
                      const LogFields& fields) const {
   LogFields all;
   if (!caller_.name.empty()) all.push_back({"token", caller_.name});
-  all.push_back({"peer", context_.peer()});
+  all.push_back({"peer", peer_});
   all.push_back({"hull", hull_id});
   all.push_back({"revision", revision});
   all.insert(all.end(), fields.begin(), fields.end());
@@ -137,7 +136,7 @@ void Call::LogSlow(Clock::duration duration, const absl::Status& status, const c
   const auto threshold = admission_.limits().slow_request;
   if (threshold == std::chrono::milliseconds::zero() || duration < threshold) return;
   Log(LogLevel::kWarn, what,
-      {{"peer", context_.peer()},
+      {{"peer", peer_},
        {"code", absl::StatusCodeToString(status.code())},
        {"milliseconds", Milliseconds(duration)},
        {"pairs", pairs_.load(std::memory_order_relaxed)},
@@ -158,7 +157,7 @@ grpc::Status Call::End(const absl::Status& status) {
   const LogLevel level = IsFault(status.code()) ? LogLevel::kError : LogLevel::kDebug;
   if (IsLogged(level)) {
     Log(level, "request failed",
-        {{"peer", context_.peer()},
+        {{"peer", peer_},
          {"code", absl::StatusCodeToString(status.code())},
          {"milliseconds", Milliseconds(duration)},
          {"error", std::string(status.message())}});

@@ -99,6 +99,8 @@ class Call {
   mutable std::once_flag request_id_made_;
   // The client gave one, or something names it: the reply is to carry it.
   mutable std::atomic<bool> request_id_told_ = false;
+  // Known from the start: a connection that is gone has no peer.
+  const std::string peer_ = context_.peer();
   std::optional<TraceContext> trace_;
   CallLifetime lifetime_;
   std::atomic<uint64_t> pairs_ = 0;

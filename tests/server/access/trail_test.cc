@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -115,6 +116,28 @@ TEST_F(Trail, AStreamThatChangedNothingLeavesNoLine) {
   }
   server_.reset();
   EXPECT_THAT(log.text(), Not(HasSubstr("points appended")));
+}
+
+// gRPC knows no peer any more once the connection is gone.
+TEST_F(Trail, AWriterThatVanishedIsNamedAllTheSame) {
+  Restart(TestConfig());
+  const CapturedLog log;
+  for (int i = 0; i < 20; ++i) {
+    const auto channel =
+        grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), [] {
+          grpc::ChannelArguments own;
+          own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+          return own;
+        }());
+    const auto stub = v1::HullService::NewStub(channel);
+    Appender writer(*stub, "h" + std::to_string(i), "w", true);
+    ASSERT_TRUE(writer.Append(1, Cube()).has_value());
+    writer.Cancel();
+  }
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  server_.reset();
+  EXPECT_THAT(log.text(), ContainsRegex("points appended .* peer=ipv4:127.0.0.1:[0-9]+ hull=h19 "));
+  EXPECT_THAT(log.text(), Not(HasSubstr("peer=unknown")));
 }
 
 TEST_F(Trail, ATraceGoesThroughTheLogAndTheReply) {
