@@ -177,7 +177,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
 }
 
 absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
-  if (absl::Status s = table_.Resolve(registry_, options_, plan); !s.ok()) return s;
+  if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
   for (size_t i = 0; i < table_.size(); ++i) {
     if (table_.hull_changed(i)) AskAboutPairsOf(i);
     if (!table_.query_hull_changed(i)) continue;

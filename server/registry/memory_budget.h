@@ -64,7 +64,7 @@ class MemoryBudget {
 
   // limit_bytes: --memory-limit. owners: the mutex that guards the accounts; it may not be
   // constructed yet.
-  MemoryBudget(uint64_t limit_bytes, const std::mutex& owners)
+  MemoryBudget(uint64_t limit_bytes, const FairMutex& owners)
       : limit_bytes_(limit_bytes), owners_(owners) {}
   MemoryBudget(const MemoryBudget&) = delete;
   MemoryBudget& operator=(const MemoryBudget&) = delete;
@@ -84,7 +84,7 @@ class MemoryBudget {
   void Exchange(uint64_t before, uint64_t now);
 
   const uint64_t limit_bytes_;
-  const std::mutex& owners_;
+  const FairMutex& owners_;
   mutable std::mutex mutex_;
   // The rest is guarded by mutex_.
   uint64_t bytes_ = 0;

@@ -66,6 +66,8 @@ struct RegisteredHull {
   void SetLive(std::shared_ptr<LiveHull> points);
   // Up to there `live` is committed.
   void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);
+  // Whether Serve gives something: not when the points are to be read from the store first.
+  bool IsReady() const { return committed.record.vertex_count == 0 || live != nullptr; }
   // What readers are given of the committed hull; null when that is to be read from the store
   // first. Cost: O(1).
   std::shared_ptr<const ServedHull> Serve();

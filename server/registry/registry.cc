@@ -168,6 +168,7 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
              return done(later, status);
            }
            Publish(hull->committed.record.revision);
+           NoteChange(*hull);
            feed_.NoteCreated(later, hull);
            done(later, hull);
          });
@@ -204,6 +205,7 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
         if (!status.ok()) return Answer<uint64_t>(later, done, status);
         Publish(revision);
         vertex_count_ -= hull->committed.record.vertex_count;
+        NoteChange(*hull);
         feed_.NoteDeleted(later, hull->committed.record, revision);
         Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
         Answer<uint64_t>(later, done, revision);
@@ -316,6 +318,7 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
   if (!status.ok()) return status;
   vertex_count_ += record.vertex_count;
   Publish(record.revision);
+  NoteChange(*hull);
   if (former == nullptr) {
     feed_.NoteCreated(locked, hull);
   } else {
@@ -372,10 +375,15 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   writers_.Submit([this, hull] { RunNextChunk(hull); });
 }
 
+void Registry::NoteChange(const RegisteredHull& hull) {
+  recent_changes_.Note(hull.committed.record.hull_id);
+}
+
 // Several threads may find the same damage.
 void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
   if (hull.state.damaged() || hull.state.life() != HullState::Life::kPresent) return;
   hull.state.Damage(damage);
+  NoteChange(hull);
   ++cache_.damaged;
 }
 
@@ -395,6 +403,11 @@ HullPage Registry::List(const std::string& prefix, const std::string& after,
     page.hulls.push_back({hull.committed.record, hull.state.damaged()});
   }
   return page;
+}
+
+HoldStatistics Registry::Holds() const {
+  const std::lock_guard lock(mutex_);
+  return mutex_.Statistics();
 }
 
 RegistrySizes Registry::Sizes() const {

@@ -413,6 +413,7 @@ void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const Stored
                            uint64_t sequence) {
   const HullRecord before = std::exchange(hull->committed, after).record;
   hull->SetCommittedMark(locked, mark);
+  NoteChange(*hull);
   if (after.record.revision != before.revision) {
     Publish(after.record.revision);
     vertex_count_ += after.record.vertex_count - before.vertex_count;

@@ -40,7 +40,7 @@ class MemoryBudgetTest : public ::testing::Test {
   }
   uint64_t bytes() const { return budget_.Statistics().bytes; }
 
-  std::mutex owners_;
+  FairMutex owners_;
   MemoryBudget budget_{100, owners_};
   // The numbers of the owners that were asked to let go, in order.
   std::vector<int> asked_;
@@ -124,8 +124,8 @@ TEST_F(MemoryBudgetTest, AnEmptyAccountMayOutliveTheBudget) {
 }
 
 TEST(MemoryBudgetDeathTest, AnEvictionWithoutTheMutexOfTheOwnersEndsTheProcess) {
-  std::mutex owners;
-  std::mutex another;
+  FairMutex owners;
+  FairMutex another;
   MemoryBudget budget(100, owners);
   Locked locked(another);
   EXPECT_DEATH(budget.Evict(locked), "check failed");
