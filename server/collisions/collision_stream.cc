@@ -159,7 +159,7 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
   // A pair among the pairs of two placements, and among those that are asked about.
   constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
   charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
-  return registry_.CheckMemory();
+  return registry_.CheckMemory(MemoryUse::kReading);
 }
 
 // Checks all of the update before it applies any.

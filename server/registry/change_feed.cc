@@ -48,7 +48,10 @@ struct WatchInterest {
 
 ChangeFeed::ChangeFeed(FairMutex& order, MemoryBudget& budget,
                        std::chrono::milliseconds mark_interval)
-    : order_(order), mark_interval_(mark_interval), charge_(budget), thread_([this] { Run(); }) {}
+    : order_(order),
+      mark_interval_(mark_interval),
+      charge_(budget, MemoryUse::kReading),
+      thread_([this] { Run(); }) {}
 
 ChangeFeed::~ChangeFeed() {
   {

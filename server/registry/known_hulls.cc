@@ -56,6 +56,12 @@ void KnownHulls::BeginLookup() {
   }
 }
 
+uint64_t KnownHulls::HullBytes() const {
+  uint64_t bytes = 0;
+  for (const Known& known : hulls_) bytes += known.view.ok() ? known.bytes : 0;
+  return bytes;
+}
+
 std::vector<absl::StatusOr<HullView>> KnownHulls::Views(std::span<const std::string> ids) const {
   HULLD_CHECK(ids.size() == hull_of_.size());
   std::vector<absl::StatusOr<HullView>> views;

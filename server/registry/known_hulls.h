@@ -61,6 +61,8 @@ class KnownHulls {
     uint32_t first = 0;
     bool is_due = false;
     bool is_prepared = false;
+    // About what it holds of the hull.
+    uint64_t bytes = 0;
     absl::StatusOr<HullView> view = absl::UnknownError("not looked up");
   };
 
@@ -77,6 +79,8 @@ class KnownHulls {
   void MakeDue(uint32_t hull);
   // Looks again for what could not be read, and begins to prepare anew.
   void BeginLookup();
+  // About what is held of all hulls.
+  uint64_t HullBytes() const;
   // In the order asked for.
   std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids) const;
 

@@ -115,11 +115,14 @@ class Registry {
   CommitStatistics Commits() const { return committer_.Statistics(); }
   // Where each batch is timed and counted; set before the first change, and outlives this.
   void SetMetrics(StoreMetrics& metrics) { committer_.SetMetrics(metrics); }
-  // RESOURCE_EXHAUSTED: --memory-limit, although all that can be dropped was.
-  absl::Status CheckMemory();
+  // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
+  absl::Status CheckMemory(MemoryUse use);
 
   // The hulls, ready to be served, all current at one revision of the store. May read from the
   // store and prepare, hence not for gRPC's threads. CANCELLED when should_stop said so.
+  // RESOURCE_EXHAUSTED: hulls would have to be read from the store, or are more than
+  // kMostLookupsPerHold, and what readers hold is beyond their share of --memory-limit; without a
+  // time to retry, if these hulls are most of it.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
@@ -136,7 +139,8 @@ class Registry {
 
   // The canonical snapshot of what was resolved, made if nobody needed it before; it lives as long
   // as view.served. Not for gRPC's threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
-  // said so. Cost: that of building the hull.
+  // said so. RESOURCE_EXHAUSTED: it is not made yet, and readers hold more than their share of
+  // --memory-limit. Cost: that of building the hull.
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
                                         const std::function<bool()>& should_stop);
 
@@ -235,9 +239,10 @@ class Registry {
   absl::Status LookUpDue(Locked& locked, std::span<const std::string> ids, KnownHulls& known,
                          const std::function<bool()>& should_stop, const ReadPlan& plan,
                          bool may_wait);
-  absl::Status LookUp(Locked& locked, const std::string& id, KnownHulls::Known& known,
+  absl::Status LookUp(Locked& locked, const std::string& id, KnownHulls& hulls, uint32_t k,
                       const std::function<bool()>& should_stop, const ReadPlan& plan,
                       bool may_wait);
+  absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
   absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
                               const std::function<bool()>& should_stop);
   static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);

@@ -1,10 +1,12 @@
 // Readers: hulls that are ready to be served, all current at one revision.
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 
 #include <chrono>
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/limit_error.h"
 #include "server/registry/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
@@ -44,7 +46,8 @@ absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> id
       known.NoteChange(recent_changes_.at(next++));
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
-      const absl::Status status = LookUp(locked, ids[due.first], due, should_stop, plan, may_wait);
+      const absl::Status status =
+          LookUp(locked, ids[due.first], known, known.due_.back(), should_stop, plan, may_wait);
       if (!status.ok()) return status;
       due.is_due = false;
       known.due_.pop_back();
@@ -57,13 +60,30 @@ absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> id
     const bool stopped = Stopped(should_stop);
     locked.Lock();
     if (stopped) return Cancelled();
+    if (absl::Status s = CheckReaders(locked, known); !s.ok()) return s;
   }
 }
 
+// Whether readers may hold more.
+absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
+  if (!memory_.IsOver(MemoryUse::kReading)) return absl::OkStatus();
+  const uint64_t share = memory_.share(MemoryUse::kReading);
+  // Trying again does not help who holds most of it.
+  if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
+    return LimitExceeded(
+        absl::StrCat("the hulls that the call names take ", bytes,
+                     " bytes of memory so far, and with what others hold that is more than the "
+                     "readers' share of it; name fewer hulls at a time"),
+        share, "memory-limit");
+  }
+  return memory_.Check(locked, MemoryUse::kReading);
+}
+
 // What readers are given of one hull now, or why there is nothing.
-absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls::Known& known,
+absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls& hulls, uint32_t k,
                               const std::function<bool()>& should_stop, const ReadPlan& plan,
                               bool may_wait) {
+  KnownHulls::Known& known = hulls.hulls_[k];
   bool was_missing = false;
   while (true) {
     const HullPointer hull = FindVisible(id);
@@ -79,6 +99,7 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls:
     const bool prepare = !is_missing && WantsPreparing(*hull, plan.expected_questions);
     if (!may_wait && (is_missing || (prepare && plan.prepare_first))) return WouldWait();
     if (is_missing) {
+      if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
       if (!std::exchange(was_missing, true)) ++cache_.misses;
       const absl::Status loaded = LoadForReaders(locked, *hull, should_stop);
       if (Stopped(should_stop) || absl::IsCancelled(loaded)) return Cancelled();
@@ -94,7 +115,9 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls:
     if (!was_missing) ++cache_.hits;
     if (prepare) SchedulePreparing(hull);
     known.view = HullView{hull->committed.record, hull->Serve()};
+    known.bytes = hull->SharedBytes();
     hull->NoteUse();
+    if (was_missing) memory_.Evict(locked);
     return absl::OkStatus();
   }
 }
@@ -149,6 +172,7 @@ absl::StatusOr<std::pair<uint64_t, HullView>> Registry::Resolve(
 absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
                                                 const std::function<bool()>& should_stop) {
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
+  if (absl::Status s = CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
   Locked locked(mutex_);
   const HullPointer hull = FindVisible(view.record.hull_id);
