@@ -2,6 +2,7 @@
 
 #include <absl/status/status.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -11,6 +12,7 @@
 
 #include "server/call/transport.h"
 #include "server/config_check.h"
+#include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
 #include "server/store/memory_store.h"
 #include "server/store/rocksdb_store.h"
@@ -66,8 +68,15 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       maintenance_service_(*store_, registry_, admission_, long_readers_),
       reflection_service_(admission_, AllServices()) {
   admission_.SetAuthenticator(guard_->authenticator());
-  admission_.SetBacklog(
-      [this] { return readers_.waiting() + long_readers_.waiting() + pool_.waiting(); });
+  admission_.SetBacklog([this](Rpc rpc) {
+    if (UsesWriters(rpc)) return writers_.waiting();
+    return readers_.waiting() + long_readers_.waiting() + pool_.waiting();
+  });
+  guard_->OnTokensChanged([this] {
+    const size_t ended = admission_.EndRevoked(
+        [this](const Caller& caller) { return guard_->authenticator().Knows(caller); });
+    if (ended > 0) spdlog::info("{} calls ended, as their tokens are no longer valid", ended);
+  });
   AddSizesToMetrics();
 }
 
@@ -91,6 +100,13 @@ void Server::AddSizesToMetrics() {
     store.cache_bytes.Set(static_cast<double>(cache.bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
     store.read_only.Set(registry_.Commits().failing ? 1 : 0);
+    if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
+      store.disk_bytes.Set(static_cast<double>(disk->bytes));
+      store.log_bytes.Set(static_cast<double>(disk->log_bytes));
+      store.free_bytes.Set(static_cast<double>(disk->free_bytes));
+      store.stalled.Set(disk->is_stalled ? 1 : 0);
+      advance(store.stalls, disk->stalls);
+    }
   });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().hull_count); });
@@ -135,6 +151,7 @@ absl::Status Server::Listen(const Config& config) {
     return ExplainBindFailure(*address);
   }
   address_ = address->Format(port);
+  AddDescriptorsToMetrics();
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
   for (const char* const service : kServices) {
     health->SetServingStatus(service, true);
@@ -145,6 +162,18 @@ absl::Status Server::Listen(const Config& config) {
   if (!endpoint.ok()) return endpoint.status();
   metrics_endpoint_ = *std::move(endpoint);
   return absl::OkStatus();
+}
+
+void Server::AddDescriptorsToMetrics() {
+  prometheus::Gauge& descriptors =
+      metrics_.AddGauge("process_open_fds", "Descriptors that the process has open.");
+  prometheus::Gauge& connections =
+      metrics_.AddGauge("hulld_connections", "Connections that clients have open.");
+  metrics_.AddRefresh([this, &descriptors, &connections] {
+    const OpenDescriptors open = CountDescriptors(address_);
+    descriptors.Set(static_cast<double>(open.count));
+    connections.Set(static_cast<double>(open.connections));
+  });
 }
 
 void Server::BeginDrain() {
@@ -158,6 +187,7 @@ bool Server::WaitIdle(std::chrono::milliseconds timeout) {
 }
 
 Server::~Server() {
+  guard_->OnTokensChanged(nullptr);
   if (grpc_server_ == nullptr) return;
   admission_.BeginDrain();
   registry_.EndWatches();

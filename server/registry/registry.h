@@ -114,7 +114,10 @@ class Registry {
   CacheStatistics Cache() const;
   CommitStatistics Commits() const { return committer_.Statistics(); }
   // Where each batch is timed and counted; set before the first change, and outlives this.
-  void SetMetrics(StoreMetrics& metrics) { committer_.SetMetrics(metrics); }
+  void SetMetrics(StoreMetrics& metrics) {
+    snapshot_seconds_ = &metrics.snapshot_seconds;
+    committer_.SetMetrics(metrics);
+  }
   // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
   absl::Status CheckMemory(MemoryUse use);
 
@@ -255,6 +258,8 @@ class Registry {
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
   Store& store_;
+  // Where the making of canonical snapshots is timed, if anywhere.
+  prometheus::Histogram* snapshot_seconds_ = nullptr;
   // With the memory limit in force.
   const Limits limits_;
   WorkerPool& writers_;

@@ -173,7 +173,12 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
                                                 const std::function<bool()>& should_stop) {
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
   if (absl::Status s = CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  const auto start = std::chrono::steady_clock::now();
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
+  if (snapshot_seconds_ != nullptr) {
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    snapshot_seconds_->Observe(taken.count());
+  }
   Locked locked(mutex_);
   const HullPointer hull = FindVisible(view.record.hull_id);
   const bool is_current =
