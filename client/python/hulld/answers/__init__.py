@@ -1,0 +1,1 @@
+"""What the server answers, as plain values: frozen, with numpy arrays where there are many numbers."""
