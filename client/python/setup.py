@@ -2,8 +2,9 @@
 
     pip install --no-build-isolation client/python
 
-needs protoc and grpc_python_plugin (Debian: protobuf-compiler, protobuf-compiler-grpc), and no network. Nothing is
-written to the source tree, except by an editable install (pip install -e), whose generated files lie beside the sources.
+needs protoc and grpc_python_plugin (Debian: protobuf-compiler, protobuf-compiler-grpc), and no
+network. Nothing is written to the source tree, except by an editable install (pip install -e),
+whose generated files lie beside the sources.
 """
 
 import atexit
@@ -27,15 +28,27 @@ def find_program(name, package):
 
 
 def generate(target):
-    """Writes the messages (*_pb2.py), their types (*_pb2.pyi) and gRPC's stubs (*_pb2_grpc.py) below `target`/hulld."""
+    """Writes the messages (*_pb2.py), their types (*_pb2.pyi) and gRPC's stubs (*_pb2_grpc.py)
+    below `target`/hulld."""
     sources = sorted(str(path.relative_to(PROTO)) for path in PROTO.glob("hulld/*/*.proto"))
     if not sources:
-        raise SystemExit(f"hulld: no contract in {PROTO}; install from a checkout of hulld, not from a copy of client/python")
+        raise SystemExit(
+            f"hulld: no contract in {PROTO}; install from a checkout of hulld, not from a copy of "
+            "client/python"
+        )
+    plugin = find_program("grpc_python_plugin", "protobuf-compiler-grpc")
     subprocess.run(
-        [find_program("protoc", "protobuf-compiler"), f"-I{PROTO}",
-         f"--python_out={target}", f"--pyi_out={target}", f"--grpc_python_out={target}",
-         f"--plugin=protoc-gen-grpc_python={find_program('grpc_python_plugin', 'protobuf-compiler-grpc')}", *sources],
-        check=True)
+        [
+            find_program("protoc", "protobuf-compiler"),
+            f"-I{PROTO}",
+            f"--python_out={target}",
+            f"--pyi_out={target}",
+            f"--grpc_python_out={target}",
+            f"--plugin=protoc-gen-grpc_python={plugin}",
+            *sources,
+        ],
+        check=True,
+    )
 
 
 class BuildWithContract(build_py):

@@ -3,28 +3,41 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from types import TracebackType
-from typing import Any
+from typing import Any, cast
 
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState, Opened
 from hulld.calls.duplex import Duplex
-from hulld.errors import DeadlineExceededError, FailedPreconditionError, HulldError, UnavailableError
+from hulld.errors import (
+    DeadlineExceededError,
+    FailedPreconditionError,
+    HulldError,
+    UnavailableError,
+)
 from hulld.geometry.points import Points, PointsLike, as_points, chunks_of
 from hulld.retry import RetryPolicy
 
 
 class Appender:
-    """A stream of chunks into one hull, with a bounded number in flight. When the connection breaks, or the server ends the
-    stream and says when to come again, it reconnects as the same writer, asks for the last committed sequence and sends
-    what is missing, so that each chunk is applied once. It stops when the hull or the store is another one than before:
-    what was acknowledged would be missing there.
+    """A stream of chunks into one hull, with a bounded number in flight. When the connection
+    breaks, or the server ends the stream and says when to come again, it reconnects as the same
+    writer, asks for the last committed sequence and sends what is missing, so that each chunk is
+    applied once. It stops when the hull or the store is another one than before: what was
+    acknowledged would be missing there.
 
-    For one thread. A context manager: it waits for all acknowledgements at the end, and cancels what is not acknowledged
-    when it is left by an exception. Made by Client.open_append.
+    For one thread. A context manager: it waits for all acknowledgements at the end, and cancels
+    what is not acknowledged when it is left by an exception. Made by Client.open_append.
     """
 
-    def __init__(self, call: Any, metadata: Any, state: AppendState, retry: RetryPolicy, timeout: float | None) -> None:
+    def __init__(
+        self,
+        call: Any,
+        metadata: Any,
+        state: AppendState,
+        retry: RetryPolicy,
+        timeout: float | None,
+    ) -> None:
         self._call = call
         self._metadata = metadata
         self._state = state
@@ -36,7 +49,8 @@ class Appender:
 
     @property
     def opened(self) -> Opened:
-        """The server's answer to the opening: the hull as it was, and this writer's last committed sequence."""
+        """The server's answer to the opening: the hull as it was, and this writer's last committed
+        sequence."""
         assert self._state.opened is not None
         return self._state.opened
 
@@ -50,16 +64,23 @@ class Appender:
         """What became of the points so far."""
         return self._state.totals()
 
-    def append(self, points: PointsLike, *, if_revision: int | None = None,
-               chunk_bytes: int = DEFAULT_CHUNK_BYTES) -> None:
+    def append(
+        self,
+        points: PointsLike,
+        *,
+        if_revision: int | None = None,
+        chunk_bytes: int = DEFAULT_CHUNK_BYTES,
+    ) -> None:
         """Queues points, in chunks of about chunk_bytes; waits while too much is in flight.
 
-        points: n x 3, as hulld.as_points takes them; doubles and floats travel as they are. A chunk is applied wholly or not
-        at all. if_revision: applied only if the hull is at this revision (0: it was made by this stream, and is empty);
-        then all points must fit one chunk, as the first changes the revision.
+        points: n x 3, as hulld.as_points takes them; doubles and floats travel as they are. A chunk
+        is applied wholly or not at all. if_revision: applied only if the hull is at this revision
+        (0: it was made by this stream, and is empty); then all points must fit one chunk, as the
+        first changes the revision.
 
-        Raises ValueError, before anything is sent: not points; several chunks with if_revision. HulldError: how the stream
-        ended, which may be about an earlier chunk; every further call raises it again.
+        Raises ValueError, before anything is sent: not points; several chunks with if_revision.
+        HulldError: how the stream ended, which may be about an earlier chunk; every further call
+        raises it again.
         """
         for chunk in pieces(points, if_revision, chunk_bytes):
             if self._failed is not None:
@@ -81,8 +102,8 @@ class Appender:
             while connection.receive(self._timeout) is not None:
                 pass
         except (UnavailableError, TimeoutError):
-            # Everything is acknowledged, so it does not matter that a server which drains, or is gone, did not end the
-            # stream properly.
+            # Everything is acknowledged, so it does not matter that a server which drains, or is
+            # gone, did not end the stream properly.
             connection.cancel()
         return self._state.totals()
 
@@ -94,7 +115,12 @@ class Appender:
     def __enter__(self) -> Appender:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if kind is not None:
             self.cancel()
         elif self._failed is None:
@@ -116,7 +142,8 @@ class Appender:
 
     def _connect(self) -> bytes:
         """The server's answer to the opening of a new connection."""
-        # The old stream ends before the new one exists, so that the server sees one stream per writer.
+        # The old stream ends before the new one exists, so that the server sees one stream per
+        # writer.
         if self._connection is not None:
             self._connection.cancel()
         self._connection = Duplex(self._call, self._metadata)
@@ -124,7 +151,9 @@ class Appender:
         try:
             return self._connection.expect(self._timeout)
         except TimeoutError:
-            raise DeadlineExceededError(f"the server did not open the stream within {self._timeout} s") from None
+            raise DeadlineExceededError(
+                f"the server did not open the stream within {self._timeout} s"
+            ) from None
 
     def _open_first(self) -> None:
         deadline = None if self._timeout is None else time.monotonic() + self._timeout
@@ -172,9 +201,13 @@ class Appender:
             except TimeoutError:
                 if enough:
                     return
-                raise self._fail(DeadlineExceededError(
-                    f"the server acknowledged no chunk for {self._timeout} s; {self.totals.points_acknowledged} points "
-                    f"are committed")) from None
+                raise self._fail(
+                    DeadlineExceededError(
+                        f"the server acknowledged no chunk for {self._timeout} s; "
+                        f"{self.totals.points_acknowledged} points "
+                        f"are committed"
+                    )
+                ) from None
             except HulldError as error:
                 if self._state.idle and enough:
                     return
@@ -191,14 +224,17 @@ def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Ite
     array = as_points(points)
     chunks = list(chunks_of(array, chunk_bytes))
     if if_revision is not None and len(chunks) > 1:
-        raise ValueError(f"{len(array)} points make {len(chunks)} chunks, and if_revision can hold for the first alone; give "
-                         f"fewer points, or a larger chunk_bytes")
+        raise ValueError(
+            f"{len(array)} points make {len(chunks)} chunks, and if_revision can hold for the "
+            "first alone; give "
+            f"fewer points, or a larger chunk_bytes"
+        )
     return iter(chunks)
 
 
-def blocks(points: PointsLike | Iterable[PointsLike]) -> Iterator[PointsLike]:
+def blocks(points: PointsLike | Iterator[PointsLike]) -> Iterator[PointsLike]:
     """One array, or each array of an iterator or a generator. Lists and tuples are arrays."""
     if isinstance(points, Iterator):
         yield from points
     else:
-        yield points
+        yield cast(PointsLike, points)

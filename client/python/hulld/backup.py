@@ -19,7 +19,8 @@ _FIRST_LINE = b"hulld backup 1\n"
 
 @dataclass(frozen=True)
 class Backup:
-    """What was saved. header: the store and its revision when the backup began; byte_count: of all files."""
+    """What was saved. header: the store and its revision when the backup began; byte_count: of all
+    files."""
 
     header: Header
     version: str
@@ -28,8 +29,9 @@ class Backup:
 
 
 class BackupWriter:
-    """Writes the parts of SaveBackup: a line that says what it is, then each part after its size and CRC-32. The file gets
-    its name only when it is complete and on disk; otherwise nothing is left. A context manager.
+    """Writes the parts of SaveBackup: a line that says what it is, then each part after its size
+    and CRC-32. The file gets its name only when it is complete and on disk; otherwise nothing is
+    left. A context manager.
 
     OSError: it cannot be written. ValueError: a part is damaged or out of place."""
 
@@ -38,7 +40,9 @@ class BackupWriter:
         self._partial = self._path.with_name(self._path.name + f".{os.getpid()}.partial")
         self._begin: maintenance_pb2.BackupBegin | None = None
         self._end: maintenance_pb2.BackupEnd | None = None
-        self._file = open(self._partial, "xb", opener=lambda name, flags: os.open(name, flags, 0o600))
+        self._file = open(
+            self._partial, "xb", opener=lambda name, flags: os.open(name, flags, 0o600)
+        )
         self._file.write(_FIRST_LINE)
 
     def write(self, data: bytes) -> None:
@@ -67,12 +71,22 @@ class BackupWriter:
             os.fsync(folder)
         finally:
             os.close(folder)
-        return Backup(header_of(self._begin.header), self._begin.version, self._end.file_count, self._end.byte_count)
+        return Backup(
+            header_of(self._begin.header),
+            self._begin.version,
+            self._end.file_count,
+            self._end.byte_count,
+        )
 
     def __enter__(self) -> BackupWriter:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._file.close()
         with contextlib.suppress(FileNotFoundError):
             self._partial.unlink()

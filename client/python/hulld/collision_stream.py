@@ -23,15 +23,25 @@ Update = tuple[npt.ArrayLike, PosesLike]
 
 
 class CollisionStream:
-    """One StreamCollisions call, step by step: poses go up, the relations of the pairs that they change come down. What
-    decided a pair is kept by the server and tried first at its next poses, so that small motions cost little.
+    """One StreamCollisions call, step by step: poses go up, the relations of the pairs that they
+    change come down. What decided a pair is kept by the server and tried first at its next poses,
+    so that small motions cost little.
 
-    Never retried: what the server keeps of a stream ends with it. For one thread. A context manager, which ends the call.
-    Made by Client.stream_collisions.
+    Never retried: what the server keeps of a stream ends with it. For one thread. A context
+    manager, which ends the call. Made by Client.stream_collisions.
     """
 
-    def __init__(self, call: Any, metadata: Any, placements: Placements, pairs: npt.NDArray[np.uint32], wanted: Wanted,
-                 tolerance: float, only_changes: bool, timeout: float | None) -> None:
+    def __init__(
+        self,
+        call: Any,
+        metadata: Any,
+        placements: Placements,
+        pairs: npt.NDArray[np.uint32],
+        wanted: Wanted,
+        tolerance: float,
+        only_changes: bool,
+        timeout: float | None,
+    ) -> None:
         self._placements = len(placements)
         self._pairs = pairs
         self._wanted = wanted
@@ -46,14 +56,18 @@ class CollisionStream:
         """The answer to the opening: every pair, at the first poses."""
         return self._opened
 
-    def update(self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False) -> StreamAnswer:
-        """Moves placements, and answers every pair that this concerns, or with only_changes those whose relation changed.
+    def update(
+        self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
+    ) -> StreamAnswer:
+        """Moves placements, and answers every pair that this concerns, or with only_changes those
+        whose relation changed.
 
-        placements: k indices into those of the stream, each at most once. poses: the new pose of each: k x 7, k x 4 x 4 or
-        k x 3. refresh_hulls: looks every hull up anew before answering; hulls that changed count as moved.
+        placements: k indices into those of the stream, each at most once. poses: the new pose of
+        each: k x 7, k x 4 x 4 or k x 3. refresh_hulls: looks every hull up anew before answering;
+        hulls that changed count as moved.
 
-        Raises ValueError, before anything is sent: an index out of range; poses that are none, or not k. HulldError: the
-        stream has ended, and every later call raises it again.
+        Raises ValueError, before anything is sent: an index out of range; poses that are none, or
+        not k. HulldError: the stream has ended, and every later call raises it again.
         """
         return self._ask(encode_update(placements, poses, self._placements, refresh_hulls))
 
@@ -67,7 +81,8 @@ class CollisionStream:
             yield self.update(placements, poses)
 
     def close(self) -> None:
-        """Says that nothing follows, and waits for the end. HulldError: how the call ended, if not well."""
+        """Says that nothing follows, and waits for the end. HulldError: how the call ended, if not
+        well."""
         if self._failed is not None:
             return
         self._failed = FailedPreconditionError("the collision stream is closed")
@@ -81,7 +96,12 @@ class CollisionStream:
     def __enter__(self) -> CollisionStream:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if kind is None:
             self.close()
         else:
@@ -104,7 +124,9 @@ class CollisionStream:
                 pass
             return step.finish()
         except TimeoutError:
-            failed: HulldError = DeadlineExceededError(f"the server did not answer within {self._timeout} s")
+            failed: HulldError = DeadlineExceededError(
+                f"the server did not answer within {self._timeout} s"
+            )
         except HulldError as error:
             failed = error
         except ValueError as error:
@@ -114,7 +136,9 @@ class CollisionStream:
         raise failed
 
 
-def encode_update(placements: npt.ArrayLike, poses: PosesLike, count: int, refresh_hulls: bool) -> bytes:
+def encode_update(
+    placements: npt.ArrayLike, poses: PosesLike, count: int, refresh_hulls: bool
+) -> bytes:
     """A message that moves some of `count` placements; errors as in CollisionStream.update."""
     indices = as_indices(placements, count, "placements").reshape(-1)
     packed = pack_poses(poses)

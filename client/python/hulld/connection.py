@@ -22,9 +22,9 @@ PathLike = Union[str, "os.PathLike[str]"]
 class Tls:
     """Encrypts. All are paths of PEM files, read when the client connects.
 
-    ca_cert: the authorities that the server's certificate may come from; None: those of the system. cert, key: ours, for a
-    server that asks for one; both or neither. server_name: the name in the server's certificate, where it is not that of
-    the address.
+    ca_cert: the authorities that the server's certificate may come from; None: those of the system.
+    cert, key: ours, for a server that asks for one; both or neither. server_name: the name in the
+    server's certificate, where it is not that of the address.
     """
 
     ca_cert: PathLike | None = None
@@ -34,7 +34,9 @@ class Tls:
 
     def __post_init__(self) -> None:
         if (self.cert is None) != (self.key is None):
-            raise ValueError("a client certificate and its key belong together; give both or neither")
+            raise ValueError(
+                "a client certificate and its key belong together; give both or neither"
+            )
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,11 @@ class Connection:
         if not self.token or not all("!" <= character <= "~" for character in self.token):
             raise ValueError("the token is empty, or holds blanks or characters beyond ASCII")
         if self.tls is None and not self.insecure and not is_loopback(self.server):
-            raise ValueError(f"the token would travel unencrypted to {self.server}, where everyone on the way could read "
-                             f"it; use tls=hulld.Tls(), or allow it with insecure=True")
+            raise ValueError(
+                f"the token would travel unencrypted to {self.server}, where everyone on the way "
+                "could read "
+                f"it; use tls=hulld.Tls(), or allow it with insecure=True"
+            )
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
         """What goes with each call."""
@@ -64,7 +69,8 @@ class Connection:
         options: list[tuple[str, Any]] = [
             ("grpc.max_receive_message_length", _MAX_RECEIVE_BYTES),
             ("grpc.max_send_message_length", -1),
-            # A retry must find a server that has come back meanwhile, rather than gRPC's memory of the failure.
+            # A retry must find a server that has come back meanwhile, rather than gRPC's memory of
+            # the failure.
             ("grpc.initial_reconnect_backoff_ms", 50),
             ("grpc.max_reconnect_backoff_ms", 1000),
         ]
@@ -83,7 +89,9 @@ class Connection:
         def content(path: PathLike | None) -> bytes | None:
             return None if path is None else pathlib.Path(path).read_bytes()
 
-        return grpc.ssl_channel_credentials(content(self.tls.ca_cert), content(self.tls.key), content(self.tls.cert))
+        return grpc.ssl_channel_credentials(
+            content(self.tls.ca_cert), content(self.tls.key), content(self.tls.cert)
+        )
 
 
 def is_loopback(server: str) -> bool:
@@ -103,12 +111,16 @@ def is_loopback(server: str) -> bool:
 def read_token_file(path: PathLike) -> str:
     """The token in a file of one line, as `hullctl token new --token-out` writes it.
 
-    Raises ValueError: others can read it too, or it holds no token; OSError: it cannot be read. No error repeats its text.
+    Raises ValueError: others can read it too, or it holds no token; OSError: it cannot be read. No
+    error repeats its text.
     """
     info = os.stat(path)
     if stat.S_ISREG(info.st_mode) and info.st_mode & 0o077:
         raise ValueError(f"{os.fspath(path)}: others can read this token; chmod 600 it")
     words = pathlib.Path(path).read_text(encoding="ascii", errors="replace").split()
     if len(words) != 1:
-        raise ValueError(f"{os.fspath(path)}: it does not hold one token, as 'hullctl token new --token-out' writes it")
+        raise ValueError(
+            f"{os.fspath(path)}: it does not hold one token, as 'hullctl token new --token-out' "
+            "writes it"
+        )
     return words[0]

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+from google.protobuf.message import DecodeError
+
 from hulld.rpc import error_details_pb2
 
 _DETAILS = "grpc-status-details-bin"
@@ -15,19 +17,28 @@ _ERROR_INFO = "google.rpc.ErrorInfo"
 
 
 class HulldError(Exception):
-    """A call failed. Read the class or `code`, `reason` and `metadata`; the text is for people and may change.
+    """A call failed. Read the class or `code`, `reason` and `metadata`; the text is for people and
+    may change.
 
-    code: gRPC's status, as in "NOT_FOUND". message: what to fix. reason: why, by the name that proto/hulld/v1/error.proto
-    gives, as in "HULL_NOT_FOUND"; None where the server gave none, as for errors of gRPC itself. metadata: what goes with
-    the reason, as in {"hull_id": "arm"}. request_id: under which the server's log knows the call, or None. retry_after: the
-    seconds to wait before the same call is made again; None where the server does not say that it may be.
+    code: gRPC's status, as in "NOT_FOUND". message: what to fix. reason: why, by the name that
+    proto/hulld/v1/error.proto gives, as in "HULL_NOT_FOUND"; None where the server gave none, as
+    for errors of gRPC itself. metadata: what goes with the reason, as in {"hull_id": "arm"}.
+    request_id: under which the server's log knows the call, or None. retry_after: the seconds to
+    wait before the same call is made again; None where the server does not say that it may be.
     """
 
     code = "UNKNOWN"
 
-    def __init__(self, message: str, *, code: str | None = None, reason: str | None = None,
-                 metadata: Mapping[str, str] | None = None, request_id: str | None = None,
-                 retry_after: float | None = None) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: str | None = None,
+        reason: str | None = None,
+        metadata: Mapping[str, str] | None = None,
+        request_id: str | None = None,
+        retry_after: float | None = None,
+    ) -> None:
         super().__init__(message)
         if code is not None:
             self.code = code
@@ -38,8 +49,13 @@ class HulldError(Exception):
         self.retry_after = retry_after
 
     def __reduce__(self) -> tuple[Any, ...]:
-        state = {"code": self.code, "reason": self.reason, "metadata": dict(self.metadata), "request_id": self.request_id,
-                 "retry_after": self.retry_after}
+        state = {
+            "code": self.code,
+            "reason": self.reason,
+            "metadata": dict(self.metadata),
+            "request_id": self.request_id,
+            "retry_after": self.retry_after,
+        }
         return _restore, (type(self), self.message, state)
 
     def __str__(self) -> str:
@@ -90,19 +106,22 @@ class PermissionDeniedError(HulldError):
 
 
 class ResourceExhaustedError(HulldError):
-    """More than a limit allows; metadata["flag"] names it. With retry_after: others use it up at the moment."""
+    """More than a limit allows; metadata["flag"] names it. With retry_after: others use it up at
+    the moment."""
 
     code = "RESOURCE_EXHAUSTED"
 
 
 class FailedPreconditionError(HulldError):
-    """The hull was deleted or replaced while a stream was open, a chunk is missing, or the store keeps nothing to save."""
+    """The hull was deleted or replaced while a stream was open, a chunk is missing, or the store
+    keeps nothing to save."""
 
     code = "FAILED_PRECONDITION"
 
 
 class AbortedError(HulldError):
-    """The hull is not at the revision that the request expects; metadata["current_revision"] is the one that it is at."""
+    """The hull is not at the revision that the request expects; metadata["current_revision"] is the
+    one that it is at."""
 
     code = "ABORTED"
 
@@ -139,9 +158,22 @@ class UnauthenticatedError(HulldError):
 
 _CLASSES: dict[str, type[HulldError]] = {
     kind.code: kind
-    for kind in (CancelledError, InvalidArgumentError, DeadlineExceededError, NotFoundError, AlreadyExistsError,
-                 PermissionDeniedError, ResourceExhaustedError, FailedPreconditionError, AbortedError, UnimplementedError,
-                 InternalError, UnavailableError, DataLossError, UnauthenticatedError)
+    for kind in (
+        CancelledError,
+        InvalidArgumentError,
+        DeadlineExceededError,
+        NotFoundError,
+        AlreadyExistsError,
+        PermissionDeniedError,
+        ResourceExhaustedError,
+        FailedPreconditionError,
+        AbortedError,
+        UnimplementedError,
+        InternalError,
+        UnavailableError,
+        DataLossError,
+        UnauthenticatedError,
+    )
 }
 
 
@@ -155,9 +187,14 @@ def from_status(code: str, message: str, trailing: Iterable[tuple[str, Any]] | N
     metadata = {key: value for key, value in trailing or ()}
     reason, info = _error_info(metadata.get(_DETAILS))
     request_id = metadata.get(_REQUEST_ID)
-    return error_class(code)(message, code=code, reason=reason, metadata=info,
-                             request_id=None if request_id is None else str(request_id),
-                             retry_after=_retry_after(metadata.get(_RETRY)))
+    return error_class(code)(
+        message,
+        code=code,
+        reason=reason,
+        metadata=info,
+        request_id=None if request_id is None else str(request_id),
+        retry_after=_retry_after(metadata.get(_RETRY)),
+    )
 
 
 def from_rpc_error(error: Any) -> HulldError:
@@ -175,7 +212,8 @@ def _error_info(details: Any) -> tuple[str | None, dict[str, str]]:
         for detail in status.details:
             if detail.type_url.endswith("/" + _ERROR_INFO):
                 info.ParseFromString(detail.value)
-    except Exception:  # pylint: disable=broad-except  # What is malformed tells nothing; the status stands without it.
+    except DecodeError:
+        # What is malformed tells nothing; the status stands without it.
         return None, {}
     if info.domain != "hulld":
         return None, {}

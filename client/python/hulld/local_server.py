@@ -24,7 +24,8 @@ _LISTENING = re.compile(r"listening on (\S+)")
 _LINES = 200
 _START_SECONDS = 60.0
 _STOP_SECONDS = 10.0
-# Its input is a pipe from us: it ends when we end, however that happens, and takes the server along.
+# Its input is a pipe from us: it ends when we end, however that happens, and takes the server
+# along.
 _KEEPER = """
 "$@" 3<&- </dev/null & child=$!
 trap 'kill "$child" 2>/dev/null' TERM
@@ -37,16 +38,22 @@ exit "$code"
 
 
 class LocalServer:
-    """A hulld process on a socket of its own, in a directory that no other user can enter. It runs from `start` to `stop`,
-    and ends with this process in any case. A context manager.
+    """A hulld process on a socket of its own, in a directory that no other user can enter. It runs
+    from `start` to `stop`, and ends with this process in any case. A context manager.
 
-    data_dir: keeps the hulls on disk there; None: in memory, until it ends. options: more flags of hulld, as in
-    ["--max-hulls", "10"]. binary: the program; None: HULLD_BINARY, else the PATH, else a build in the checkout around the
-    working directory. FileNotFoundError: there is none.
+    data_dir: keeps the hulls on disk there; None: in memory, until it ends. options: more flags of
+    hulld, as in ["--max-hulls", "10"]. binary: the program; None: HULLD_BINARY, else the PATH, else
+    a build in the checkout around the working directory. FileNotFoundError: there is none.
     """
 
-    def __init__(self, *, data_dir: PathLike | None = None, options: Sequence[str] = (), binary: PathLike | None = None,
-                 environment: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        data_dir: PathLike | None = None,
+        options: Sequence[str] = (),
+        binary: PathLike | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
         self._program = str(find_program("hulld") if binary is None else binary)
         self._data_dir = data_dir
         self._options = list(options)
@@ -62,7 +69,9 @@ class LocalServer:
     def address(self) -> str:
         """For Client, hullctl and any other client on this machine. Requires that it runs."""
         if not self._address:
-            raise RuntimeError("the server does not run; call start(), or use it as a context manager")
+            raise RuntimeError(
+                "the server does not run; call start(), or use it as a context manager"
+            )
         return self._address
 
     @property
@@ -75,21 +84,43 @@ class LocalServer:
         if self._process is not None:
             return self
         self._folder = tempfile.mkdtemp(prefix="hulld-")
-        store = (["--store", "memory"] if self._data_dir is None
-                 else ["--store", "rocksdb", "--data-dir", os.fspath(self._data_dir)])
-        command = [self._program, "--listen", f"unix:{self._folder}/socket", "--drain-timeout", "1", *store, *self._options]
+        store = (
+            ["--store", "memory"]
+            if self._data_dir is None
+            else ["--store", "rocksdb", "--data-dir", os.fspath(self._data_dir)]
+        )
+        command = [
+            self._program,
+            "--listen",
+            f"unix:{self._folder}/socket",
+            "--drain-timeout",
+            "1",
+            *store,
+            *self._options,
+        ]
         # Settings of the caller's own server are not meant for this one.
-        environment = {name: value for name, value in os.environ.items()
-                       if not name.startswith("HULLD_")} | dict(self._environment or {})
+        environment = {
+            name: value for name, value in os.environ.items() if not name.startswith("HULLD_")
+        } | dict(self._environment or {})
         # A session of its own: Ctrl-C in a terminal is for the script, which then ends the server.
         self._process = subprocess.Popen(
-            ["sh", "-c", "exec 3<&0; " + _KEEPER, "hulld", *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True, env=environment, start_new_session=True)
-        self._reader = threading.Thread(target=self._read, args=(self._process,), name="hulld-log", daemon=True)
+            ["sh", "-c", "exec 3<&0; " + _KEEPER, "hulld", *command],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment,
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(
+            target=self._read, args=(self._process,), name="hulld-log", daemon=True
+        )
         self._reader.start()
         if not self._listening.wait(_START_SECONDS) or not self._address:
             self.stop()
-            raise RuntimeError("hulld did not start: " + ("\n".join(self._log) or "it said nothing"))
+            raise RuntimeError(
+                "hulld did not start: " + ("\n".join(self._log) or "it said nothing")
+            )
         return self
 
     def _read(self, process: subprocess.Popen[str]) -> None:
@@ -123,7 +154,12 @@ class LocalServer:
     def __enter__(self) -> LocalServer:
         return self.start()
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.stop()
 
 
@@ -140,7 +176,12 @@ class Local:
         self._client = Client(self._server.start().address, **self._options)
         return self._client
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if self._client is not None:
             self._client.close()
         self._server.stop()
@@ -149,21 +190,31 @@ class Local:
         self._async_client = AsyncClient(self._server.start().address, **self._options)
         return self._async_client
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                        trace: TracebackType | None) -> None:
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if self._async_client is not None:
             await self._async_client.close()
         self._server.stop()
 
 
-def local(*, data_dir: PathLike | None = None, options: Sequence[str] = (), binary: PathLike | None = None,
-          **client: Any) -> Local:
+def local(
+    *,
+    data_dir: PathLike | None = None,
+    options: Sequence[str] = (),
+    binary: PathLike | None = None,
+    **client: Any,
+) -> Local:
     """A server of one's own, for a script or a test, and a client of it:
 
         with hulld.local() as client:
             ...
 
-    The arguments are those of LocalServer; further ones are for the client, such as timeout. The server ends with the
-    context, and its hulls with it unless data_dir keeps them. `async with` gives an AsyncClient.
+    The arguments are those of LocalServer; further ones are for the client, such as timeout. The
+    server ends with the context, and its hulls with it unless data_dir keeps them. `async with`
+    gives an AsyncClient.
     """
     return Local(LocalServer(data_dir=data_dir, options=options, binary=binary), client)

@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 
 def find_program(name: str) -> pathlib.Path:
-    """Where the program is: HULLD_BINARY (for hulld) or HULLCTL_BINARY, the directory of HULLD_BINARY, the PATH, or the
-    newest build in the checkout of hulld that the working directory or this package lies in.
+    """Where the program is: HULLD_BINARY (for hulld) or HULLCTL_BINARY, the directory of
+    HULLD_BINARY, the PATH, or the newest build in the checkout of hulld that the working directory
+    or this package lies in.
 
     Raises FileNotFoundError, which tells where was looked.
     """
@@ -26,11 +27,19 @@ def find_program(name: str) -> pathlib.Path:
     found = shutil.which(name)
     if found:
         return pathlib.Path(found)
-    builds = [build for checkout in _checkouts() for build in checkout.glob(f"build/*/bin/{name}") if os.access(build, os.X_OK)]
+    builds = [
+        build
+        for checkout in _checkouts()
+        for build in checkout.glob(f"build/*/bin/{name}")
+        if os.access(build, os.X_OK)
+    ]
     if builds:
         return max(builds, key=lambda path: path.stat().st_mtime)
-    raise FileNotFoundError(f"there is no {name}: {variable} is not set, the PATH lacks it, and there is no build of it in "
-                            f"a checkout around the working directory; build hulld, or set {variable}")
+    raise FileNotFoundError(
+        f"there is no {name}: {variable} is not set, the PATH lacks it, and there is no build of "
+        "it in "
+        f"a checkout around the working directory; build hulld, or set {variable}"
+    )
 
 
 def _checkouts() -> Iterator[pathlib.Path]:

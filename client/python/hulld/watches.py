@@ -33,7 +33,8 @@ class WatchPosition:
         self._told = False
 
     def take(self, changes: HullChanges, first: bool) -> HullChanges:
-        """`first`: of its connection. A call that resumed nothing tells everything, but not what went meanwhile."""
+        """`first`: of its connection. A call that resumed nothing tells everything, but not what
+        went meanwhile."""
         if first and self._told and (self.after is None or self.after.revision == 0):
             changes = dataclasses.replace(changes, anew=True)
         self.connected = True
@@ -43,16 +44,23 @@ class WatchPosition:
 
 
 class HullWatch:
-    """An iterator over what happens to hulls: first what is there, then a message with `synced`, then changes as they are
-    committed, in the order of their revisions. A slow reader misses states in between, and never the last one. A watch whose
-    connection is lost goes on where it was.
+    """An iterator over what happens to hulls: first what is there, then a message with `synced`,
+    then changes as they are committed, in the order of their revisions. A slow reader misses states
+    in between, and never the last one. A watch whose connection is lost goes on where it was.
 
-    It ends when it is cancelled, by any thread; iterating is for one. A context manager, which cancels it. Raises HulldError
-    where the server refuses it, or was not found again in time. Made by Client.watch_hulls.
+    It ends when it is cancelled, by any thread; iterating is for one. A context manager, which
+    cancels it. Raises HulldError where the server refuses it, or was not found again in time. Made
+    by Client.watch_hulls.
     """
 
-    def __init__(self, start: Callable[[Call[HullChanges]], Any], request: Callable[[Header | None], Call[HullChanges]],
-                 after: Header | None, retry: RetryPolicy, patience: float | None) -> None:
+    def __init__(
+        self,
+        start: Callable[[Call[HullChanges]], Any],
+        request: Callable[[Header | None], Call[HullChanges]],
+        after: Header | None,
+        retry: RetryPolicy,
+        patience: float | None,
+    ) -> None:
         self._start = start
         self._request = request
         self._position = WatchPosition(after)
@@ -64,7 +72,7 @@ class HullWatch:
 
     @property
     def position(self) -> Header | None:
-        """From where another watch of the same can resume: Client.watch_hulls(..., after=position)."""
+        """From where another watch can resume: Client.watch_hulls(..., after=position)."""
         return self._position.after
 
     def __iter__(self) -> Iterator[HullChanges]:
@@ -93,8 +101,12 @@ class HullWatch:
                 if self._cancelled:
                     raise StopIteration
             failures += 1
-            wait = self._retry.wait_after(failures, error, deadline - time.monotonic(),
-                                          math.inf if self._position.connected else None)
+            wait = self._retry.wait_after(
+                failures,
+                error,
+                deadline - time.monotonic(),
+                math.inf if self._position.connected else None,
+            )
             if wait is None:
                 raise error
             time.sleep(wait)
@@ -109,7 +121,12 @@ class HullWatch:
     def __enter__(self) -> HullWatch:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.cancel()
 
     def __del__(self) -> None:
@@ -118,12 +135,14 @@ class HullWatch:
 
 
 class CollisionWatch:
-    """An iterator over pairs that begin and end to collide, or to be within a clearance: because their poses change, which
-    `update` says, and because their hulls change, which the server sees by itself. What happened between two messages is
-    told as one event, or as none where it is as it was.
+    """An iterator over pairs that begin and end to collide, or to be within a clearance: because
+    their poses change, which `update` says, and because their hulls change, which the server sees
+    by itself. What happened between two messages is told as one event, or as none where it is as it
+    was.
 
-    Never retried: what the server keeps of a watch ends with it. Iterating is for one thread; update and cancel are for any.
-    It ends when it is cancelled. A context manager, which cancels it. Made by Client.watch_collisions.
+    Never retried: what the server keeps of a watch ends with it. Iterating is for one thread;
+    update and cancel are for any. It ends when it is cancelled. A context manager, which cancels
+    it. Made by Client.watch_collisions.
     """
 
     def __init__(self, call: Any, metadata: Any, opening: bytes, placements: int) -> None:
@@ -148,8 +167,10 @@ class CollisionWatch:
         return decode_collision_changes(message)
 
     def update(self, placements: npt.ArrayLike, poses: PosesLike) -> None:
-        """Says where placements are now; arguments and ValueError as in CollisionStream.update. The message that takes it
-        into account has its number in `update`, counted from 1. Where the watch has ended, iterating tells why."""
+        """Says where placements are now; arguments and ValueError as in CollisionStream.update. The
+        message that takes it into account has its number in `update`, counted from 1. Where the
+        watch has ended, iterating tells why.
+        """
         self._connection.send(encode_update(placements, poses, self._placements, False))
 
     def cancel(self) -> None:
@@ -160,7 +181,12 @@ class CollisionWatch:
     def __enter__(self) -> CollisionWatch:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.cancel()
 
     def __del__(self) -> None:

@@ -10,15 +10,28 @@ from typing import Any
 from hulld.aio.duplex import AsyncDuplex
 from hulld.appender import pieces
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState, Opened
-from hulld.errors import DeadlineExceededError, FailedPreconditionError, HulldError, UnavailableError
+from hulld.errors import (
+    DeadlineExceededError,
+    FailedPreconditionError,
+    HulldError,
+    UnavailableError,
+)
 from hulld.geometry.points import PointsLike
 from hulld.retry import RetryPolicy
 
 
 class AsyncAppender:
-    """As hulld.Appender; for one task. Entering it (async with) opens the stream. Made by AsyncClient.open_append."""
+    """As hulld.Appender; for one task. Entering it (async with) opens the stream. Made by
+    AsyncClient.open_append."""
 
-    def __init__(self, call: Any, metadata: Any, state: AppendState, retry: RetryPolicy, timeout: float | None) -> None:
+    def __init__(
+        self,
+        call: Any,
+        metadata: Any,
+        state: AppendState,
+        retry: RetryPolicy,
+        timeout: float | None,
+    ) -> None:
         self._call = call
         self._metadata = metadata
         self._state = state
@@ -43,8 +56,13 @@ class AsyncAppender:
         """As Appender.totals."""
         return self._state.totals()
 
-    async def append(self, points: PointsLike, *, if_revision: int | None = None,
-                     chunk_bytes: int = DEFAULT_CHUNK_BYTES) -> None:
+    async def append(
+        self,
+        points: PointsLike,
+        *,
+        if_revision: int | None = None,
+        chunk_bytes: int = DEFAULT_CHUNK_BYTES,
+    ) -> None:
         """As Appender.append."""
         for chunk in pieces(points, if_revision, chunk_bytes):
             if self._failed is not None:
@@ -102,8 +120,12 @@ class AsyncAppender:
             await self.open()
         return self
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                        trace: TracebackType | None) -> None:
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if kind is not None:
             self.cancel()
         elif self._failed is None:
@@ -126,7 +148,9 @@ class AsyncAppender:
         try:
             return await self._connection.expect(self._timeout)
         except TimeoutError:
-            raise DeadlineExceededError(f"the server did not open the stream within {self._timeout} s") from None
+            raise DeadlineExceededError(
+                f"the server did not open the stream within {self._timeout} s"
+            ) from None
 
     async def _reconnect(self, cause: HulldError) -> None:
         while True:
@@ -154,9 +178,13 @@ class AsyncAppender:
         try:
             message = await self._connection.expect(self._timeout)
         except TimeoutError:
-            raise self._fail(DeadlineExceededError(
-                f"the server acknowledged no chunk for {self._timeout} s; {self.totals.points_acknowledged} points are "
-                f"committed")) from None
+            raise self._fail(
+                DeadlineExceededError(
+                    f"the server acknowledged no chunk for {self._timeout} s; "
+                    f"{self.totals.points_acknowledged} points are "
+                    f"committed"
+                )
+            ) from None
         except HulldError as error:
             await self._reconnect(error)
             return

@@ -24,8 +24,17 @@ class AsyncCollisionStream:
     """As hulld.CollisionStream; for one task. Entering it (async with) opens the stream. Made by
     AsyncClient.stream_collisions."""
 
-    def __init__(self, call: Any, metadata: Any, placements: Placements, pairs: npt.NDArray[np.uint32], wanted: Wanted,
-                 tolerance: float, only_changes: bool, timeout: float | None) -> None:
+    def __init__(
+        self,
+        call: Any,
+        metadata: Any,
+        placements: Placements,
+        pairs: npt.NDArray[np.uint32],
+        wanted: Wanted,
+        tolerance: float,
+        only_changes: bool,
+        timeout: float | None,
+    ) -> None:
         self._call = call
         self._metadata = metadata
         self._opening = open_stream(placements, pairs, wanted, tolerance, only_changes)
@@ -42,7 +51,9 @@ class AsyncCollisionStream:
     def opened(self) -> StreamAnswer:
         """As CollisionStream.opened."""
         if self._opened is None:
-            raise RuntimeError("the stream is not open yet; enter it with async with, or await open()")
+            raise RuntimeError(
+                "the stream is not open yet; enter it with async with, or await open()"
+            )
         return self._opened
 
     async def open(self) -> StreamAnswer:
@@ -52,7 +63,9 @@ class AsyncCollisionStream:
             self._opened = await self._ask(self._opening)
         return self._opened
 
-    async def update(self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False) -> StreamAnswer:
+    async def update(
+        self, placements: npt.ArrayLike, poses: PosesLike, *, refresh_hulls: bool = False
+    ) -> StreamAnswer:
         """As CollisionStream.update."""
         request = encode_update(placements, poses, self._placements, refresh_hulls)
         await self.open()
@@ -84,8 +97,12 @@ class AsyncCollisionStream:
         await self.open()
         return self
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                        trace: TracebackType | None) -> None:
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if kind is None:
             await self.close()
         else:
@@ -105,7 +122,9 @@ class AsyncCollisionStream:
                 pass
             return step.finish()
         except TimeoutError:
-            failed: HulldError = DeadlineExceededError(f"the server did not answer within {self._timeout} s")
+            failed: HulldError = DeadlineExceededError(
+                f"the server did not answer within {self._timeout} s"
+            )
         except HulldError as error:
             failed = error
         except ValueError as error:

@@ -11,7 +11,8 @@ from hulld.errors import CancelledError, InternalError, from_rpc_error, from_sta
 
 
 class AsyncDuplex:
-    """gRPC's call with one kind of error. Not for several tasks at a time, but for send, which another may call."""
+    """gRPC's call with one kind of error. Not for several tasks at a time, but for send, which
+    another may call."""
 
     def __init__(self, call: Any, metadata: Any) -> None:
         self._call = call(metadata=metadata)
@@ -34,8 +35,8 @@ class AsyncDuplex:
             pass
 
     async def receive(self, timeout: float | None) -> bytes | None:
-        """The next message; None where the call has ended well. TimeoutError: none came within `timeout` seconds, and the
-        call is cancelled. HulldError: how the call ended."""
+        """The next message; None where the call has ended well. TimeoutError: none came within
+        `timeout` seconds, and the call is cancelled. HulldError: how the call ended."""
         try:
             message = await asyncio.wait_for(self._call.read(), timeout)
         except grpc.RpcError as error:
@@ -56,7 +57,9 @@ class AsyncDuplex:
     async def _raise_end(self) -> None:
         code = await self._call.code()
         if code is not grpc.StatusCode.OK:
-            raise from_status(code.name, await self._call.details() or "", await self._call.trailing_metadata())
+            raise from_status(
+                code.name, await self._call.details() or "", await self._call.trailing_metadata()
+            )
 
     async def expect(self, timeout: float | None) -> bytes:
         """The same where the call must not end yet: InternalError."""
@@ -68,5 +71,3 @@ class AsyncDuplex:
     def cancel(self) -> None:
         """Ends the call, unless it has ended."""
         self._call.cancel()
-
-

@@ -25,10 +25,16 @@ from hulld.watches import WatchPosition
 
 
 class AsyncHullWatch:
-    """As hulld.HullWatch: an asynchronous iterator for one task. Made by AsyncClient.watch_hulls."""
+    """As hulld.HullWatch, for one task. Made by AsyncClient.watch_hulls."""
 
-    def __init__(self, start: Callable[[Call[HullChanges]], Any], request: Callable[[Header | None], Call[HullChanges]],
-                 after: Header | None, retry: RetryPolicy, patience: float | None) -> None:
+    def __init__(
+        self,
+        start: Callable[[Call[HullChanges]], Any],
+        request: Callable[[Header | None], Call[HullChanges]],
+        after: Header | None,
+        retry: RetryPolicy,
+        patience: float | None,
+    ) -> None:
         self._start = start
         self._request = request
         self._position = WatchPosition(after)
@@ -70,8 +76,12 @@ class AsyncHullWatch:
             if self._cancelled:
                 raise StopAsyncIteration
             failures += 1
-            wait = self._retry.wait_after(failures, error, deadline - time.monotonic(),
-                                          math.inf if self._position.connected else None)
+            wait = self._retry.wait_after(
+                failures,
+                error,
+                deadline - time.monotonic(),
+                math.inf if self._position.connected else None,
+            )
             if wait is None:
                 raise error
             await asyncio.sleep(wait)
@@ -85,14 +95,18 @@ class AsyncHullWatch:
     async def __aenter__(self) -> AsyncHullWatch:
         return self
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                        trace: TracebackType | None) -> None:
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.cancel()
 
 
 class AsyncCollisionWatch:
-    """As hulld.CollisionWatch: an asynchronous iterator for one task; update and cancel are for any of the loop. Made by
-    AsyncClient.watch_collisions."""
+    """As hulld.CollisionWatch: an asynchronous iterator for one task; update and cancel are for any
+    of the loop. Made by AsyncClient.watch_collisions."""
 
     def __init__(self, call: Any, metadata: Any, opening: bytes, placements: int) -> None:
         self._placements = placements
@@ -140,6 +154,10 @@ class AsyncCollisionWatch:
         await self._connected()
         return self
 
-    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                        trace: TracebackType | None) -> None:
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.cancel()

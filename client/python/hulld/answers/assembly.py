@@ -28,8 +28,16 @@ class BatchAssembly:
         """ValueError: something is missing."""
         frame = self._frame
         if frame.header is None or frame.columns.rows != len(self._pairs):
-            raise ValueError(f"the batch ended with {frame.columns.rows} answers for {len(self._pairs)} pairs")
-        return Batch(self._pairs, frame.columns.finish(), frame.known_hulls(), frame.placement_problems, frame.header)
+            raise ValueError(
+                f"the batch ended with {frame.columns.rows} answers for {len(self._pairs)} pairs"
+            )
+        return Batch(
+            self._pairs,
+            frame.columns.finish(),
+            frame.known_hulls(),
+            frame.placement_problems,
+            frame.header,
+        )
 
 
 class SceneAssembly:
@@ -47,8 +55,14 @@ class SceneAssembly:
         pairs = frame.indices()
         if frame.header is None or frame.totals is None or pairs.size != 2 * frame.columns.rows:
             raise ValueError("the scene ended early, or its pairs and answers disagree")
-        return Scene(pairs.reshape(-1, 2), frame.columns.finish(), frame.known_hulls(), frame.placement_problems,
-                     frame.totals, frame.header)
+        return Scene(
+            pairs.reshape(-1, 2),
+            frame.columns.finish(),
+            frame.known_hulls(),
+            frame.placement_problems,
+            frame.totals,
+            frame.header,
+        )
 
 
 class StepAssembly:
@@ -70,7 +84,18 @@ class StepAssembly:
         """ValueError: something is missing."""
         frame = self._frame
         rows = frame.indices()
-        if frame.header is None or rows.size != frame.columns.rows or (rows.size and int(rows.max()) >= len(self._pairs)):
+        if (
+            frame.header is None
+            or rows.size != frame.columns.rows
+            or (rows.size and int(rows.max()) >= len(self._pairs))
+        ):
             raise ValueError("the answer's pairs and columns disagree")
-        return StreamAnswer(self._update, rows, self._pairs[rows], frame.columns.finish(), frame.known_hulls(),
-                            frame.placement_problems, frame.header)
+        return StreamAnswer(
+            self._update,
+            rows,
+            self._pairs[rows],
+            frame.columns.finish(),
+            frame.known_hulls(),
+            frame.placement_problems,
+            frame.header,
+        )

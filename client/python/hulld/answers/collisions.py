@@ -76,10 +76,11 @@ class HullVersion:
 
 @dataclass(frozen=True)
 class Separation:
-    """|value - true separation| <= bound, and the sign of the value agrees with the relation; in the caller's length unit.
+    """|value - true separation| <= bound, and the sign of the value agrees with the relation; in
+    the caller's length unit.
 
-    value: the distance when positive; minus the penetration depth when negative; 0 exactly when TOUCHING; infinite when a
-    hull is empty. bound: infinite where a double cannot hold the value.
+    value: the distance when positive; minus the penetration depth when negative; 0 exactly when
+    TOUCHING; infinite when a hull is empty. bound: infinite where a double cannot hold the value.
     """
 
     value: float
@@ -88,7 +89,8 @@ class Separation:
 
 @dataclass(frozen=True)
 class Witness:
-    """Two points, x y z in the world frame, that attain the separation; each within `error` of doing so."""
+    """Two points, x y z in the world frame, that attain the separation; each within `error` of
+    doing so."""
 
     point_a: npt.NDArray[np.float64]
     point_b: npt.NDArray[np.float64]
@@ -99,8 +101,8 @@ class Witness:
 class Feature:
     """The points of one hull that lie farthest along an axis.
 
-    vertex_indices: into the canonical snapshot. vertices: the same vertices, n x 3, in the hull's own frame. facet_index:
-    the facet, when the feature is a whole facet.
+    vertex_indices: into the canonical snapshot. vertices: the same vertices, n x 3, in the hull's
+    own frame. facet_index: the facet, when the feature is a whole facet.
     """
 
     vertex_indices: npt.NDArray[np.uint32]
@@ -120,7 +122,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class VertexPair:
-    """A vertex of A and a vertex of B: indices into the canonical snapshots, and x y z, each in the frame of its own hull."""
+    """A vertex of A and a vertex of B: indices into the canonical snapshots, and x y z, each in the
+    frame of its own hull."""
 
     index_a: int
     index_b: int
@@ -132,9 +135,10 @@ class VertexPair:
 class Certificate:
     """What proves the relation from vertices and poses alone.
 
-    direction: x y z in the world frame, from A towards B, exact as given; integers (of any size) where doubles do not
-    suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max n.A <= min n.B, and the differences of at
-    most four pairs hold 0 in their convex hull. OVERLAPPING: those of at most six pairs hold 0 strictly inside.
+    direction: x y z in the world frame, from A towards B, exact as given; integers (of any size)
+    where doubles do not suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max
+    n.A <= min n.B, and the differences of at most four pairs hold 0 in their convex hull.
+    OVERLAPPING: those of at most six pairs hold 0 strictly inside.
     """
 
     direction: tuple[float, float, float] | tuple[int, int, int] | None
@@ -152,7 +156,8 @@ class HullSize:
 
 @dataclass(frozen=True)
 class Analysis:
-    """How much work an answer took. time: seconds, without the network. axes_total: TEXTBOOK_SAT only, else 0."""
+    """How much work an answer took. time: seconds, without the network. axes_total: TEXTBOOK_SAT
+    only, else 0."""
 
     time: float
     size_a: HullSize
@@ -176,9 +181,10 @@ class Problem:
 class Collision:
     """The answer about one pair.
 
-    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness: where they were wanted and
-    there is one, else None. within_clearance: whether separation <= clearance; None where no clearance was wanted. hull_a,
-    hull_b: the revisions that the answer is about.
+    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness:
+    where they were wanted and there is one, else None. within_clearance: whether separation <=
+    clearance; None where no clearance was wanted. hull_a, hull_b: the revisions that the answer is
+    about.
     """
 
     relation: Relation
@@ -201,17 +207,26 @@ class Collision:
         return self.relation in (Relation.TOUCHING, Relation.OVERLAPPING)
 
     def __bool__(self) -> bool:
-        raise TypeError("an answer is neither true nor false; ask it for .colliding, .relation or .within_clearance")
+        raise TypeError(
+            "an answer is neither true nor false; ask it for .colliding, .relation or "
+            ".within_clearance"
+        )
 
     def _repr_html_(self) -> str:
-        """The viewer's page of both hulls as they are now, where hullctl is found; a table in any case. For notebooks."""
+        """The viewer's page of both hulls as they are now, where hullctl is found; a table in any
+        case. For notebooks."""
         separation, witness = self.separation, self.witness
-        rows = [("relation", self.relation.name), ("decided by", self.rung.name),
-                ("A", f"{self.hull_a.hull_id} (revision {self.hull_a.revision})"),
-                ("B", f"{self.hull_b.hull_id} (revision {self.hull_b.revision})"),
-                ("separation", separation and f"{separation.value!r} within {separation.bound!r}"),
-                ("point of A", witness and witness.point_a), ("point of B", witness and witness.point_b),
-                ("within clearance", self.within_clearance), ("axis", self.axis and self.axis.direction)]
+        rows = [
+            ("relation", self.relation.name),
+            ("decided by", self.rung.name),
+            ("A", f"{self.hull_a.hull_id} (revision {self.hull_a.revision})"),
+            ("B", f"{self.hull_b.hull_id} (revision {self.hull_b.revision})"),
+            ("separation", separation and f"{separation.value!r} within {separation.bound!r}"),
+            ("point of A", witness and witness.point_a),
+            ("point of B", witness and witness.point_b),
+            ("within clearance", self.within_clearance),
+            ("axis", self.axis and self.axis.direction),
+        ]
         viewer = self._viewer or Viewer.absent("this answer did not come from a server")
         return viewer.html(rows, Placements.of(self._question or ()), [(0, 1)])
 
@@ -220,10 +235,11 @@ class Collision:
 class Answers:
     """Answers of several pairs, a row for each; m rows.
 
-    relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations == Relation.TOUCHING. Where
-    they were wanted: separations, separation_bounds (m), witness_points (m x 2 x 3: the point of A, then that of B, world
-    frame), witness_errors (m), NaN in rows that have none; within_clearance (m, bool); axes, analyses, certificates, None
-    in rows that have none. What was not wanted is None. problems: by row, why it has no answer although both its placements
+    relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
+    Relation.TOUCHING. Where they were wanted: separations, separation_bounds (m), witness_points (m
+    x 2 x 3: the point of A, then that of B, world frame), witness_errors (m), NaN in rows that have
+    none; within_clearance (m, bool); axes, analyses, certificates, None in rows that have none.
+    What was not wanted is None. problems: by row, why it has no answer although both its placements
     could.
     """
 
@@ -245,16 +261,21 @@ class Answers:
     @property
     def colliding(self) -> npt.NDArray[np.bool_]:
         """m: TOUCHING or OVERLAPPING."""
-        found: npt.NDArray[np.bool_] = (self.relations == Relation.TOUCHING) | (self.relations == Relation.OVERLAPPING)
+        found: npt.NDArray[np.bool_] = (self.relations == Relation.TOUCHING) | (
+            self.relations == Relation.OVERLAPPING
+        )
         return found
 
     def __bool__(self) -> bool:
-        raise TypeError("answers are neither true nor false; ask them for .colliding.any() or .relations")
+        raise TypeError(
+            "answers are neither true nor false; ask them for .colliding.any() or .relations"
+        )
 
 
 @dataclass(frozen=True)
 class BatchPart:
-    """Answers to the pairs from `first_pair` on. The first parts also hold header, hulls and placement_problems, as in Batch."""
+    """Answers to the pairs from `first_pair` on. The first parts also hold header, hulls and
+    placement_problems, as in Batch."""
 
     first_pair: int
     answers: Answers
@@ -267,8 +288,9 @@ class BatchPart:
 class Batch:
     """The answers to all pairs of a batch.
 
-    pairs: m x 2, as asked. answers: row i answers pairs[i]. hulls: by ID, the revision that the answers are about; IDs
-    without a hull are missing. placement_problems: by index of the placement, why no pair with it has an answer.
+    pairs: m x 2, as asked. answers: row i answers pairs[i]. hulls: by ID, the revision that the
+    answers are about; IDs without a hull are missing. placement_problems: by index of the
+    placement, why no pair with it has an answer.
     """
 
     pairs: npt.NDArray[np.uint32]
@@ -302,8 +324,9 @@ class SceneTotals:
 
 @dataclass(frozen=True)
 class ScenePart:
-    """Pairs that were found, k x 2, the lower index first, ascending, and their answers. The first parts hold no pairs but
-    header, hulls and placement_problems, as in Scene; the last one holds the totals."""
+    """Pairs that were found, k x 2, the lower index first, ascending, and their answers. The first
+    parts hold no pairs but header, hulls and placement_problems, as in Scene; the last one holds
+    the totals."""
 
     pairs: npt.NDArray[np.uint32]
     answers: Answers
@@ -315,8 +338,8 @@ class ScenePart:
 
 @dataclass(frozen=True)
 class Scene:
-    """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the lower index first,
-    ascending. The rest as in Batch."""
+    """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the
+    lower index first, ascending. The rest as in Batch."""
 
     pairs: npt.NDArray[np.uint32]
     answers: Answers
@@ -330,9 +353,10 @@ class Scene:
 class StreamAnswer:
     """The answer to one message of a collision stream.
 
-    update: the message, 0 being the one that opened the stream. rows: which pairs are answered, as positions in the pairs
-    of the stream, ascending; row i of `answers` is about pairs[rows[i]]. pairs: the same as k x 2 indices of placements.
-    hulls, placement_problems: as in Batch, where the hulls were resolved for this message; empty otherwise.
+    update: the message, 0 being the one that opened the stream. rows: which pairs are answered, as
+    positions in the pairs of the stream, ascending; row i of `answers` is about pairs[rows[i]].
+    pairs: the same as k x 2 indices of placements. hulls, placement_problems: as in Batch, where
+    the hulls were resolved for this message; empty otherwise.
     """
 
     update: int
@@ -377,9 +401,10 @@ class CollisionEvent:
 class CollisionChanges:
     """One message of a watch of collisions.
 
-    header: once synced, every change of a watched hull up to this revision is taken into account. update: the last update
-    that these events take into account, 0 being the opening. synced: all pairs have been told of as they are with that
-    update's poses. hulls: those that are new to the watch, or changed. placement_problems: those that begin.
+    header: once synced, every change of a watched hull up to this revision is taken into account.
+    update: the last update that these events take into account, 0 being the opening. synced: all
+    pairs have been told of as they are with that update's poses. hulls: those that are new to the
+    watch, or changed. placement_problems: those that begin.
     """
 
     header: Header

@@ -12,12 +12,13 @@ import numpy.typing as npt
 
 from hulld.notebook import Viewer
 from hulld.v1 import hull_pb2
-from hulld.wire import packed_doubles, packed_varints, read_fields
+from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 
 
 @dataclass(frozen=True)
 class Header:
-    """The store, and its revision that a reply was answered from. Revisions of different stores mean nothing to each other."""
+    """The store, and its revision that a reply was answered from. Revisions of different stores
+    mean nothing to each other."""
 
     store_id: str
     revision: int
@@ -36,17 +37,22 @@ class PointCounts:
     inside: int = 0
 
     def __add__(self, other: PointCounts) -> PointCounts:
-        return PointCounts(self.received + other.received, self.outside + other.outside,
-                           self.duplicate + other.duplicate, self.inside + other.inside)
+        return PointCounts(
+            self.received + other.received,
+            self.outside + other.outside,
+            self.duplicate + other.duplicate,
+            self.inside + other.inside,
+        )
 
 
 @dataclass(frozen=True)
 class HullInfo:
     """A hull without its geometry.
 
-    dimension: -1 (empty), 0 (point), 1 (segment), 2 (polygon) or 3. revision: of the last change of its vertices.
-    create_revision: tells incarnations of one ID apart. damaged: what the store keeps of it is damaged; calls that need it
-    raise DataLossError, other fields may be missing, and delete_hull removes it.
+    dimension: -1 (empty), 0 (point), 1 (segment), 2 (polygon) or 3. revision: of the last change of
+    its vertices. create_revision: tells incarnations of one ID apart. damaged: what the store keeps
+    of it is damaged; calls that need it raise DataLossError, other fields may be missing, and
+    delete_hull removes it.
     """
 
     hull_id: str
@@ -91,7 +97,7 @@ class ReplacedHull:
 
 @dataclass(frozen=True)
 class Audit:
-    """What an audit by means independent of the builder found; finding: what is wrong, when not ok."""
+    """A check by means independent of the builder; finding: what is wrong, when not ok."""
 
     ok: bool
     finding: str
@@ -101,8 +107,9 @@ class Audit:
 class Hull:
     """Sizes, counts and box of a hull.
 
-    edge_count, facet_count: None where they were not asked for. box: 2 x 3, the lowest and the highest corner, in the
-    caller's length unit; None when the hull is empty. audit: None where it was not asked for.
+    edge_count, facet_count: None where they were not asked for. box: 2 x 3, the lowest and the
+    highest corner, in the caller's length unit; None when the hull is empty. audit: None where it
+    was not asked for.
     """
 
     info: HullInfo
@@ -114,13 +121,23 @@ class Hull:
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
     def _repr_html_(self) -> str:
-        """The viewer's page of the hull as it is now, where hullctl is found; a table in any case. For notebooks."""
-        rows = [("hull", self.info.hull_id), ("dimension", self.info.dimension), ("vertices", self.info.vertex_count),
-                ("edges", self.edge_count), ("facets", self.facet_count),
-                ("points", f"{self.info.counts.received} received, {self.info.counts.outside} outside, "
-                           f"{self.info.counts.duplicate} duplicate, {self.info.counts.inside} inside"),
-                ("box", None if self.box is None else f"{self.box[0]} to {self.box[1]}"),
-                ("revision", self.info.revision), ("audit", self.audit and (self.audit.finding or "ok"))]
+        """The viewer's page of the hull as it is now, where hullctl is found; a table in any case.
+        For notebooks."""
+        rows = [
+            ("hull", self.info.hull_id),
+            ("dimension", self.info.dimension),
+            ("vertices", self.info.vertex_count),
+            ("edges", self.edge_count),
+            ("facets", self.facet_count),
+            (
+                "points",
+                f"{self.info.counts.received} received, {self.info.counts.outside} outside, "
+                f"{self.info.counts.duplicate} duplicate, {self.info.counts.inside} inside",
+            ),
+            ("box", None if self.box is None else f"{self.box[0]} to {self.box[1]}"),
+            ("revision", self.info.revision),
+            ("audit", self.audit and (self.audit.finding or "ok")),
+        ]
         viewer = self._viewer or Viewer.absent("this hull was not read from a server")
         return viewer.html(rows, [self.info.hull_id])
 
@@ -129,10 +146,11 @@ class Hull:
 class HullMesh:
     """The canonical snapshot of a hull, or a simplification of it, all of one revision.
 
-    vertices: n x 3, the caller's length unit, in canonical order; the doubles that were sent. facet_sizes: vertices of each
-    facet. facet_indices: indices of vertices, facet after facet, counter-clockwise seen from outside. A hull of dimension 2
-    has one facet, seen from both sides; one of lower dimension has none. error: the Hausdorff distance between mesh and
-    hull is at most this (proven); None where the mesh is the hull itself.
+    vertices: n x 3, the caller's length unit, in canonical order; the doubles that were sent.
+    facet_sizes: vertices of each facet. facet_indices: indices of vertices, facet after facet,
+    counter-clockwise seen from outside. A hull of dimension 2 has one facet, seen from both sides;
+    one of lower dimension has none. error: the Hausdorff distance between mesh and hull is at most
+    this (proven); None where the mesh is the hull itself.
     """
 
     info: HullInfo
@@ -146,23 +164,34 @@ class HullMesh:
     @property
     def facets(self) -> list[npt.NDArray[np.uint32]]:
         """The indices of each facet's vertices."""
-        return np.split(self.facet_indices, np.cumsum(self.facet_sizes)[:-1]) if self.facet_sizes.size else []
+        return (
+            np.split(self.facet_indices, np.cumsum(self.facet_sizes)[:-1])
+            if self.facet_sizes.size
+            else []
+        )
 
     @property
     def triangles(self) -> npt.NDArray[np.int64]:
-        """m x 3: each facet as a fan around its first vertex, for libraries that take triangles only."""
+        """m x 3: each facet as a fan around its first vertex, for libraries that take triangles
+        only."""
         sizes = self.facet_sizes.astype(np.int64)
         starts = np.cumsum(sizes) - sizes
         fans = np.maximum(sizes - 2, 0)
         first = np.repeat(starts, fans)
         step = np.arange(int(fans.sum())) - np.repeat(np.cumsum(fans) - fans, fans)
         corners = np.stack([first, first + step + 1, first + step + 2], axis=1)
-        return self.facet_indices.astype(np.int64)[corners]
+        triangles: npt.NDArray[np.int64] = self.facet_indices.astype(np.int64)[corners]
+        return triangles
 
     def _repr_html_(self) -> str:
         """As Hull's."""
-        rows = [("hull", self.info.hull_id), ("vertices", len(self.vertices)), ("facets", len(self.facet_sizes)),
-                ("within", self.error), ("revision", self.info.revision)]
+        rows = [
+            ("hull", self.info.hull_id),
+            ("vertices", len(self.vertices)),
+            ("facets", len(self.facet_sizes)),
+            ("within", self.error),
+            ("revision", self.info.revision),
+        ]
         viewer = self._viewer or Viewer.absent("this mesh was not read from a server")
         return viewer.html(rows, [self.info.hull_id])
 
@@ -212,7 +241,8 @@ class HullEventKind(IntEnum):
 
 @dataclass(frozen=True)
 class HullEvent:
-    """hull: as of its revision; DELETED: only hull_id, and in revision that of the deletion. box: as in Hull."""
+    """hull: as of its revision; DELETED: only hull_id, and in revision that of the deletion. box:
+    as in Hull."""
 
     kind: HullEventKind
     hull: HullInfo
@@ -223,9 +253,10 @@ class HullEvent:
 class HullChanges:
     """One message of a watch of hulls.
 
-    header: every change up to this revision is in this message or one before it, unless a later one superseded it; a watch
-    resumes from here. events: each hull at most once. synced: what was there has been told; what follows are changes as they
-    are committed. anew: forget all that was told before; the watch tells everything from the start.
+    header: every change up to this revision is in this message or one before it, unless a later one
+    superseded it; a watch resumes from here. events: each hull at most once. synced: what was there
+    has been told; what follows are changes as they are committed. anew: forget all that was told
+    before; the watch tells everything from the start.
     """
 
     header: Header
@@ -246,8 +277,15 @@ def counts_of(message: Any) -> PointCounts:
 
 
 def info_of(message: Any) -> HullInfo:
-    return HullInfo(message.hull_id, message.create_revision, message.revision, message.dimension, message.vertex_count,
-                    counts_of(message.counts), message.damaged)
+    return HullInfo(
+        message.hull_id,
+        message.create_revision,
+        message.revision,
+        message.dimension,
+        message.vertex_count,
+        counts_of(message.counts),
+        message.damaged,
+    )
 
 
 def _box_of(message: Any) -> npt.NDArray[np.float64] | None:
@@ -264,19 +302,34 @@ def decode_created(data: bytes) -> CreatedHull:
 
 def decode_replaced(data: bytes) -> ReplacedHull:
     message = hull_pb2.ReplaceHullResponse.FromString(data)
-    return ReplacedHull(info_of(message.hull), message.created, Durability(message.durability), header_of(message.header))
+    return ReplacedHull(
+        info_of(message.hull),
+        message.created,
+        Durability(message.durability),
+        header_of(message.header),
+    )
 
 
 def decode_hull(data: bytes, with_facets: bool, viewer: Viewer | None) -> Hull:
     message = hull_pb2.GetHullResponse.FromString(data)
     audit = Audit(message.audit.ok, message.audit.finding) if message.HasField("audit") else None
-    return Hull(info_of(message.hull), message.edge_count if with_facets else None,
-                message.facet_count if with_facets else None, _box_of(message), audit, header_of(message.header), viewer)
+    return Hull(
+        info_of(message.hull),
+        message.edge_count if with_facets else None,
+        message.facet_count if with_facets else None,
+        _box_of(message),
+        audit,
+        header_of(message.header),
+        viewer,
+    )
 
 
 def decode_changes(data: bytes) -> HullChanges:
     message = hull_pb2.WatchHullsResponse.FromString(data)
-    events = tuple(HullEvent(HullEventKind(event.kind), info_of(event.hull), _box_of(event)) for event in message.events)
+    events = tuple(
+        HullEvent(HullEventKind(event.kind), info_of(event.hull), _box_of(event))
+        for event in message.events
+    )
     return HullChanges(header_of(message.header), events, message.synced, message.anew)
 
 
@@ -288,23 +341,36 @@ def decode_mesh_part(data: bytes) -> MeshPart:
     for number, _, value in read_fields(data):
         if number == _MESH_HEADER and isinstance(value, memoryview):
             message = hull_pb2.MeshHeader.FromString(bytes(value))
-            return MeshHeader(info_of(message.hull), message.vertex_count, message.facet_count,
-                              message.error if message.HasField("error") else None, header_of(message.header))
+            return MeshHeader(
+                info_of(message.hull),
+                message.vertex_count,
+                message.facet_count,
+                message.error if message.HasField("error") else None,
+                header_of(message.header),
+            )
         if number == _MESH_VERTICES and isinstance(value, memoryview):
-            columns = [packed_doubles(part) for field_number, _, part in read_fields(value) if field_number == 1]
+            columns = [
+                packed_doubles(part)
+                for field_number, _, part in read_fields(value)
+                if field_number == 1
+            ]
             return MeshVertices(np.concatenate(columns or [np.empty(0)]).reshape(-1, 3))
         if number == _MESH_FACETS and isinstance(value, memoryview):
-            found: dict[int, list[npt.NDArray[np.uint64]]] = {1: [], 2: []}
+            found: dict[int, list[Unsigned]] = {1: [], 2: []}
             for field_number, _, part in read_fields(value):
                 if field_number in found:
                     found[field_number].append(packed_varints(part))
-            sizes, indices = (np.concatenate(found[n] or [np.empty(0, np.uint64)]).astype(np.uint32) for n in (1, 2))
+            empty = np.empty(0, np.uint32)
+            sizes, indices = (
+                np.concatenate([empty, *(part.astype(np.uint32) for part in found[n])])
+                for n in (1, 2)
+            )
             return MeshFacets(sizes, indices)
     raise ValueError("the mesh stream holds a message of an unknown kind")
 
 
 class MeshAssembly:
-    """Puts the parts of a mesh together, and checks that they fit: what draws a mesh relies on it."""
+    """Puts the parts of a mesh together, and checks that they fit: drawing relies on it."""
 
     def __init__(self) -> None:
         self._header: MeshHeader | None = None

@@ -36,8 +36,9 @@ class Limits:
 class ServerStatus:
     """What runs, since when, and how much it holds.
 
-    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb" or "memory". hull_count, vertex_count: None where the
-    token is limited to a prefix, as it may not see the sizes of others.
+    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb" or "memory". hull_count,
+    vertex_count: None where the token is limited to a prefix, as it may not see the sizes of
+    others.
     """
 
     header: Header
@@ -53,12 +54,24 @@ class ServerStatus:
 def decode_status(data: bytes) -> ServerStatus:
     message = status_pb2.GetStatusResponse.FromString(data)
     limits = message.limits
-    values = {name: getattr(limits, name) for name in Limits.__dataclass_fields__ if name != "max_request_time"}
+    values = {
+        name: getattr(limits, name)
+        for name in Limits.__dataclass_fields__
+        if name != "max_request_time"
+    }
     longest = limits.max_request_time
     return ServerStatus(
-        header_of(message.header), message.version, message.started.ToDatetime(tzinfo=datetime.timezone.utc),
-        message.uptime.seconds + message.uptime.nanos * 1e-9, message.store_kind,
+        header_of(message.header),
+        message.version,
+        message.started.ToDatetime(tzinfo=datetime.timezone.utc),
+        message.uptime.seconds + message.uptime.nanos * 1e-9,
+        message.store_kind,
         message.hull_count if message.HasField("hull_count") else None,
         message.vertex_count if message.HasField("vertex_count") else None,
-        Limits(max_request_time=longest.seconds + longest.nanos * 1e-9 if limits.HasField("max_request_time") else None,
-               **values))
+        Limits(
+            max_request_time=longest.seconds + longest.nanos * 1e-9
+            if limits.HasField("max_request_time")
+            else None,
+            **values,
+        ),
+    )

@@ -14,8 +14,8 @@ _END: Any = object()
 
 
 class Duplex:
-    """gRPC's own iterators wait without a bound. A thread reads instead, so that every wait has one. For one thread, but
-    for cancel and send, which any thread may call."""
+    """gRPC's own iterators wait without a bound. A thread reads instead, so that every wait has
+    one. For one thread, but for cancel and send, which any thread may call."""
 
     def __init__(self, call: Any, metadata: Any) -> None:
         self._outgoing: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -46,8 +46,9 @@ class Duplex:
         self._outgoing.put(_END)
 
     def receive(self, timeout: float | None) -> bytes | None:
-        """The next message; None where the call has ended well. TimeoutError: none came within `timeout` seconds; 0 looks
-        only. HulldError: how the call ended; every later call raises it again."""
+        """The next message; None where the call has ended well. TimeoutError: none came within
+        `timeout` seconds; 0 looks only. HulldError: how the call ended; every later call raises it
+        again."""
         if not self._ended:
             try:
                 item = self._incoming.get(timeout != 0, timeout)

@@ -1,4 +1,5 @@
-"""One function per call of the contract: its request, how its answer is read, and whether it is safe to repeat."""
+"""One function per call of the contract: its request, how its answer is read, and whether it is
+safe to repeat."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ class Call(Generic[T]):
 
 
 def method_path(service: str, name: str) -> str:
-    """gRPC's path of a call of the contract, as in "/hulld.v1.HullService/GetHull". KeyError: there is none."""
+    """gRPC's path of a call of the contract, as in "/hulld.v1.HullService/GetHull". KeyError: there
+    is none."""
     for module in (hull_pb2, collision_pb2, status_pb2, maintenance_pb2):
         found = module.DESCRIPTOR.services_by_name.get(service)
         if found is not None:
@@ -56,28 +58,51 @@ def is_serving(answer: bytes) -> bool:
 
 def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
     request = hull_pb2.CreateHullRequest(hull_id=hull_id, if_absent=if_absent)
-    return Call(method_path("HullService", "CreateHull"), request.SerializeToString(), hulls.decode_created, if_absent)
+    return Call(
+        method_path("HullService", "CreateHull"),
+        request.SerializeToString(),
+        hulls.decode_created,
+        if_absent,
+    )
 
 
 def get_hull(hull_id: str, audit: bool, facets: bool, viewer: Viewer) -> Call[Hull]:
     request = hull_pb2.GetHullRequest(hull_id=hull_id, audit=audit, without_facets=not facets)
-    return Call(method_path("HullService", "GetHull"), request.SerializeToString(),
-                lambda data: hulls.decode_hull(data, facets, viewer), True)
+    return Call(
+        method_path("HullService", "GetHull"),
+        request.SerializeToString(),
+        lambda data: hulls.decode_hull(data, facets, viewer),
+        True,
+    )
 
 
-def get_hull_mesh(hull_id: str, side: Literal["inside", "outside"] | None, max_vertices: int | None,
-                  max_error: float | None) -> Call[MeshPart]:
+def get_hull_mesh(
+    hull_id: str,
+    side: Literal["inside", "outside"] | None,
+    max_vertices: int | None,
+    max_error: float | None,
+) -> Call[MeshPart]:
     request = hull_pb2.GetHullMeshRequest(hull_id=hull_id)
     if side is None and (max_vertices is not None or max_error is not None):
-        raise ValueError('say on which side of the hull the simpler one lies: side="inside" or side="outside"')
+        raise ValueError(
+            'say on which side of the hull the simpler one lies: side="inside" or side="outside"'
+        )
     if side is not None:
         if side not in ("inside", "outside"):
             raise ValueError(f'side is {side!r}; it is "inside" or "outside"')
         request.simplification.side = (
-            hull_pb2.SIMPLIFICATION_SIDE_INSIDE if side == "inside" else hull_pb2.SIMPLIFICATION_SIDE_OUTSIDE)
+            hull_pb2.SIMPLIFICATION_SIDE_INSIDE
+            if side == "inside"
+            else hull_pb2.SIMPLIFICATION_SIDE_OUTSIDE
+        )
         request.simplification.max_vertices = max_vertices or 0
         request.simplification.max_error = max_error or 0.0
-    return Call(method_path("HullService", "GetHullMesh"), request.SerializeToString(), hulls.decode_mesh_part, True)
+    return Call(
+        method_path("HullService", "GetHullMesh"),
+        request.SerializeToString(),
+        hulls.decode_mesh_part,
+        True,
+    )
 
 
 @dataclass(frozen=True)
@@ -105,14 +130,24 @@ def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
 
     request = hull_pb2.DeleteHullRequest(hull_id=hull_id, if_revision=if_revision)
     # A repeated delete could remove a hull that someone has created anew.
-    return Call(method_path("HullService", "DeleteHull"), request.SerializeToString(), decode, False)
+    return Call(
+        method_path("HullService", "DeleteHull"), request.SerializeToString(), decode, False
+    )
 
 
 def watch_hulls(prefix: str, hull_id: str | None, after: Header | None) -> Call[HullChanges]:
-    request = hull_pb2.WatchHullsRequest(prefix=prefix, hull_id=hull_id or "",
-                                         after_revision=after.revision if after else 0,
-                                         store_id=after.store_id if after else "")
-    return Call(method_path("HullService", "WatchHulls"), request.SerializeToString(), hulls.decode_changes, True)
+    request = hull_pb2.WatchHullsRequest(
+        prefix=prefix,
+        hull_id=hull_id or "",
+        after_revision=after.revision if after else 0,
+        store_id=after.store_id if after else "",
+    )
+    return Call(
+        method_path("HullService", "WatchHulls"),
+        request.SerializeToString(),
+        hulls.decode_changes,
+        True,
+    )
 
 
 def get_status() -> Call[ServerStatus]:
@@ -123,26 +158,54 @@ def save_backup() -> Call[bytes]:
     return Call(method_path("MaintenanceService", "SaveBackup"), b"", bytes, False)
 
 
-def check_collision(a: PlacementLike, b: PlacementLike, wanted: Wanted, tolerance: float, method: Method,
-                    viewer: Viewer) -> Call[Collision]:
+def check_collision(
+    a: PlacementLike,
+    b: PlacementLike,
+    wanted: Wanted,
+    tolerance: float,
+    method: Method,
+    viewer: Viewer,
+) -> Call[Collision]:
     question = (as_placement(a), as_placement(b))
-    request = collision_pb2.CheckCollisionRequest(method=int(method), tolerance=tolerance, wanted=wanted.message())
+    request = collision_pb2.CheckCollisionRequest(
+        method=collision_pb2.Method.Name(int(method)), tolerance=tolerance, wanted=wanted.message()
+    )
     for placement, target in zip(question, (request.a, request.b)):
         target.hull_id = placement.id
         if placement.pose is not None:
             w, x, y, z, tx, ty, tz = (float(number) for number in pack_pose(placement.pose))
             target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
             target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
-    return Call(method_path("CollisionService", "CheckCollision"), request.SerializeToString(),
-                lambda data: collision_messages.decode_collision(data, question, viewer), True)
+    return Call(
+        method_path("CollisionService", "CheckCollision"),
+        request.SerializeToString(),
+        lambda data: collision_messages.decode_collision(data, question, viewer),
+        True,
+    )
 
 
-def check_collisions(placements: Placements, pairs: npt.NDArray[np.uint32], wanted: Wanted, tolerance: float,
-                     method: Method) -> Call[BatchPart]:
-    fixed = collision_pb2.BatchCheckCollisionsRequest(method=int(method), wanted=wanted.message(), tolerance=tolerance)
-    request = MessageWriter().raw(fixed.SerializeToString()).uint32s(2, pairs).message(6, placements.packed())
-    return Call(method_path("CollisionService", "BatchCheckCollisions"), request.finish(),
-                lambda data: collision_messages.decode_batch_part(data, wanted), True)
+def check_collisions(
+    placements: Placements,
+    pairs: npt.NDArray[np.uint32],
+    wanted: Wanted,
+    tolerance: float,
+    method: Method,
+) -> Call[BatchPart]:
+    fixed = collision_pb2.BatchCheckCollisionsRequest(
+        method=collision_pb2.Method.Name(int(method)), wanted=wanted.message(), tolerance=tolerance
+    )
+    request = (
+        MessageWriter()
+        .raw(fixed.SerializeToString())
+        .uint32s(2, pairs)
+        .message(6, placements.packed())
+    )
+    return Call(
+        method_path("CollisionService", "BatchCheckCollisions"),
+        request.finish(),
+        lambda data: collision_messages.decode_batch_part(data, wanted),
+        True,
+    )
 
 
 @dataclass(frozen=True)
@@ -160,28 +223,50 @@ class SceneFilter:
             message.groups.extend(np.asarray(self.groups).reshape(-1).tolist())
         message.ignore_same_group = self.ignore_same_group
         if self.ignored_group_pairs is not None:
-            message.ignored_group_pairs.extend(np.asarray(self.ignored_group_pairs).reshape(-1).tolist())
+            message.ignored_group_pairs.extend(
+                np.asarray(self.ignored_group_pairs).reshape(-1).tolist()
+            )
         if self.movers is not None:
             message.movers = self.movers
 
 
-def find_collisions(placements: Placements, scene: SceneFilter, wanted: Wanted, tolerance: float) -> Call[ScenePart]:
+def find_collisions(
+    placements: Placements, scene: SceneFilter, wanted: Wanted, tolerance: float
+) -> Call[ScenePart]:
     fixed = collision_pb2.FindCollisionsRequest(wanted=wanted.message(), tolerance=tolerance)
     scene.put(fixed)
     request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())
-    return Call(method_path("CollisionService", "FindCollisions"), request.finish(),
-                lambda data: collision_messages.decode_scene_part(data, wanted), True)
+    return Call(
+        method_path("CollisionService", "FindCollisions"),
+        request.finish(),
+        lambda data: collision_messages.decode_scene_part(data, wanted),
+        True,
+    )
 
 
-def open_stream(placements: Placements, pairs: npt.NDArray[np.uint32], wanted: Wanted, tolerance: float,
-                only_changes: bool) -> bytes:
+def open_stream(
+    placements: Placements,
+    pairs: npt.NDArray[np.uint32],
+    wanted: Wanted,
+    tolerance: float,
+    only_changes: bool,
+) -> bytes:
     """The first message of StreamCollisions."""
-    fixed = collision_pb2.CollisionStreamOpen(wanted=wanted.message(), tolerance=tolerance, only_changes=only_changes)
-    opening = MessageWriter().raw(fixed.SerializeToString()).uint32s(2, pairs).message(6, placements.packed())
+    fixed = collision_pb2.CollisionStreamOpen(
+        wanted=wanted.message(), tolerance=tolerance, only_changes=only_changes
+    )
+    opening = (
+        MessageWriter()
+        .raw(fixed.SerializeToString())
+        .uint32s(2, pairs)
+        .message(6, placements.packed())
+    )
     return MessageWriter().message(1, opening).finish()
 
 
-def update_stream(placements: npt.NDArray[np.uint32], poses: npt.NDArray[np.float64], refresh_hulls: bool) -> bytes:
+def update_stream(
+    placements: npt.NDArray[np.uint32], poses: npt.NDArray[np.float64], refresh_hulls: bool
+) -> bytes:
     """A later message of StreamCollisions, or, without refresh_hulls, of WatchCollisions."""
     update = MessageWriter().uint32s(1, placements).doubles(2, poses)
     if refresh_hulls:
@@ -189,8 +274,12 @@ def update_stream(placements: npt.NDArray[np.uint32], poses: npt.NDArray[np.floa
     return MessageWriter().message(2, update).finish()
 
 
-def open_watch(placements: Placements, pairs: npt.NDArray[np.uint32] | None, scene: SceneFilter,
-               clearance: float | None) -> bytes:
+def open_watch(
+    placements: Placements,
+    pairs: npt.NDArray[np.uint32] | None,
+    scene: SceneFilter,
+    clearance: float | None,
+) -> bytes:
     """The first message of WatchCollisions."""
     fixed = collision_pb2.CollisionWatchOpen(clearance=clearance)
     scene.put(fixed)
@@ -202,8 +291,13 @@ def open_watch(placements: Placements, pairs: npt.NDArray[np.uint32] | None, sce
 
 def open_replacement(hull_id: str, create: bool, if_revision: int | None) -> bytes:
     """The first message of ReplaceHull."""
-    return bytes(hull_pb2.ReplaceHullRequest(open=hull_pb2.ReplaceOpen(
-        hull_id=hull_id, create_if_absent=create, if_revision=if_revision)).SerializeToString())
+    return bytes(
+        hull_pb2.ReplaceHullRequest(
+            open=hull_pb2.ReplaceOpen(
+                hull_id=hull_id, create_if_absent=create, if_revision=if_revision
+            )
+        ).SerializeToString()
+    )
 
 
 def replacement_points(block: MessageWriter) -> bytes:

@@ -22,5 +22,11 @@ class Wanted:
 
     def message(self) -> Any:
         return collision_pb2.Wanted(
-            axis=self.axis, analysis=self.analysis, certificate=self.certificate, separation=self.separation,
-            max_error=self.max_error, witness=self.witness, clearance=self.clearance)
+            axis=self.axis,
+            analysis=self.analysis,
+            certificate=self.certificate,
+            separation=self.separation,
+            max_error=self.max_error,
+            witness=self.witness,
+            clearance=self.clearance,
+        )

@@ -35,14 +35,17 @@ def as_placement(placement: PlacementLike) -> Placement:
         return Placement(placement)
     if isinstance(placement, tuple) and len(placement) == 2 and isinstance(placement[0], str):
         return Placement(*placement)
-    raise TypeError(f"{placement!r} is no placement; that is an ID, (ID, pose) or hulld.Placement(ID, pose)")
+    raise TypeError(
+        f"{placement!r} is no placement; that is an ID, (ID, pose) or hulld.Placement(ID, pose)"
+    )
 
 
 class Placements:
     """Many placements of few things: each ID once, the poses as one array.
 
-    ids: the distinct IDs. indices: for each placement, which of the ids it places; left out, each ID is placed once, or a
-    single ID as often as there are poses. poses: for each placement, as pack_poses takes them; left out, where built.
+    ids: the distinct IDs. indices: for each placement, which of the ids it places; left out, each
+    ID is placed once, or a single ID as often as there are poses. poses: for each placement, as
+    pack_poses takes them; left out, where built.
 
         Placements("cube", poses)                        # one hull at n poses
         Placements(["arm", "box"], poses)                # two hulls, two poses
@@ -51,13 +54,21 @@ class Placements:
     ValueError: the lists do not fit each other.
     """
 
-    def __init__(self, ids: str | Sequence[str], poses: PosesLike | None = None,
-                 indices: npt.ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        ids: str | Sequence[str],
+        poses: PosesLike | None = None,
+        indices: npt.ArrayLike | None = None,
+    ) -> None:
         self.ids: list[str] = [ids] if isinstance(ids, str) else list(ids)
         packed: PackedPoses | None = None if poses is None else pack_poses(poses)
         if indices is None:
             many = len(self.ids) == 1 and packed is not None
-            chosen = np.zeros(len(packed), np.uint32) if many and packed is not None else np.arange(len(self.ids), dtype=np.uint32)
+            chosen = (
+                np.zeros(len(packed), np.uint32)
+                if many and packed is not None
+                else np.arange(len(self.ids), dtype=np.uint32)
+            )
         else:
             chosen = as_indices(indices, len(self.ids), "indices")
         if packed is None:
@@ -73,7 +84,10 @@ class Placements:
         if isinstance(placements, cls):
             return placements
         if isinstance(placements, str):
-            raise TypeError(f"{placements!r} is one ID; give a list of placements, or Placements({placements!r}, poses)")
+            raise TypeError(
+                f"{placements!r} is one ID; give a list of placements, or "
+                f"Placements({placements!r}, poses)"
+            )
         single = [as_placement(placement) for placement in placements]  # type: ignore[union-attr]
         places: dict[str, int] = {}
         indices = [places.setdefault(placement.id, len(places)) for placement in single]
@@ -91,14 +105,20 @@ class Placements:
 
     def packed(self) -> MessageWriter:
         """The message PackedPlacements."""
-        return MessageWriter().strings(_HULL_IDS, self.ids).uint32s(_HULLS, self.indices).doubles(_POSES, self.poses)
+        return (
+            MessageWriter()
+            .strings(_HULL_IDS, self.ids)
+            .uint32s(_HULLS, self.indices)
+            .doubles(_POSES, self.poses)
+        )
 
 
 PlacementsLike = Union[Placements, Iterable[PlacementLike]]
 
 
 def as_indices(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[np.uint32]:
-    """`values` as indices below `count`, in their shape. ValueError names the first that is not; TypeError: no integers."""
+    """`values` as indices below `count`, in their shape. ValueError names the first that is not;
+    TypeError: no integers."""
     array = np.asarray(values)
     if array.size == 0:
         return np.empty(array.shape, np.uint32)
@@ -117,10 +137,13 @@ def as_pairs(pairs: npt.ArrayLike, count: int) -> npt.NDArray[np.uint32]:
     if array.size == 0:
         array = np.empty((0, 2), np.uint32)
     if array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f"pairs has the shape {array.shape}; it takes (m, 2), two indices of placements in each row")
+        raise ValueError(
+            f"pairs has the shape {array.shape}; it takes (m, 2), two indices of placements in "
+            "each row"
+        )
     return as_indices(array, count, "pairs")
 
 
 def all_pairs(count: int) -> npt.NDArray[np.uint32]:
-    """Each two of `count` placements once, the lower index first: m x 2, m = count (count - 1) / 2."""
+    """Each two of `count` placements once, the lower index first: (m, 2)."""
     return np.stack(np.triu_indices(count, 1), axis=1).astype(np.uint32)

@@ -20,11 +20,12 @@ _XYZ, _XYZ_FLOAT = 1, 2  # fields of PointBlock
 def as_points(points: PointsLike, name: str = "points") -> Points:
     """An n x 3 array of float64 or float32 that holds the same numbers, exactly.
 
-    points: n x 3, the caller's length unit; a single point of shape (3,) counts as 1 x 3. float64 and float32 stay as they
-    are, and so does their memory. float16 and integers are widened. No copy is made where none is needed.
+    points: n x 3, the caller's length unit; a single point of shape (3,) counts as 1 x 3. float64
+    and float32 stay as they are, and so does their memory. float16 and integers are widened. No
+    copy is made where none is needed.
 
-    Raises ValueError: another shape; a coordinate that is not finite (names it); numbers that no double holds, such as
-    integers beyond 2^53 or long doubles. TypeError: no numbers.
+    Raises ValueError: another shape; a coordinate that is not finite (names it); numbers that no
+    double holds, such as integers beyond 2^53 or long doubles. TypeError: no numbers.
     """
     array: npt.NDArray[Any] = np.asarray(points)
     if array.size == 0 and array.ndim < 2:
@@ -37,8 +38,10 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
     finite = np.isfinite(array)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
-        raise ValueError(f"{name}[{row}].{'xyz'[column]} is {array[row, column]}; leave such points out, as in "
-                         f"{name}[np.isfinite({name}).all(axis=1)]")
+        raise ValueError(
+            f"{name}[{row}].{'xyz'[column]} is {array[row, column]}; leave such points out, as in "
+            f"{name}[np.isfinite({name}).all(axis=1)]"
+        )
     return array
 
 
@@ -62,15 +65,22 @@ def _as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
         same |= np.isnan(array)
     if not same.all():
         row, column = np.argwhere(~same)[0]
-        raise ValueError(f"{name}[{row}].{'xyz'[column]} is {array[row, column]}, which no double holds exactly; "
-                         f"round it to what you mean, as in {name}.astype(float)")
+        raise ValueError(
+            f"{name}[{row}].{'xyz'[column]} is {array[row, column]}, which no double holds "
+            "exactly; "
+            f"round it to what you mean, as in {name}.astype(float)"
+        )
     return doubles
 
 
 def point_block(points: Points) -> MessageWriter:
     """The message PointBlock, its array being the bytes of `points`."""
     writer = MessageWriter()
-    return writer.floats(_XYZ_FLOAT, points) if points.dtype.itemsize == 4 else writer.doubles(_XYZ, points)
+    return (
+        writer.floats(_XYZ_FLOAT, points)
+        if points.dtype.itemsize == 4
+        else writer.doubles(_XYZ, points)
+    )
 
 
 def chunks_of(points: Points, most_bytes: int) -> Iterator[Points]:

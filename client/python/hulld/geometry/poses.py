@@ -9,9 +9,10 @@ from typing import Any, Union
 import numpy as np
 import numpy.typing as npt
 
-#: How far R Rᵀ of a matrix may be from the identity, in its largest entry. It is relative to 1, the length of a row: within
-#: it, a hull of 1 m stands within about a nanometre of where the matrix would put it. Products of hundreds of rotations in
-#: double precision stay far below (observed: 1e-13), matrices of float32 do not (1e-7).
+#: How far R Rᵀ of a matrix may be from the identity, in its largest entry. It is relative to 1, the
+#: length of a row: within it, a hull of 1 m stands within about a nanometre of where the matrix
+#: would put it. Products of hundreds of rotations in double precision stay far below (observed:
+#: 1e-13), matrices of float32 do not (1e-7).
 ORTHOGONALITY_TOLERANCE = 1e-9
 
 PackedPoses = npt.NDArray[np.float64]
@@ -21,8 +22,9 @@ PackedPoses = npt.NDArray[np.float64]
 class Pose:
     """X_WA, the pose of a hull's frame A in the world W: p_W = R(rotation) p_A + translation.
 
-    rotation: quaternion w x y z, finite and not zero; it need not be normalized: q and s q are the same rotation.
-    translation: x y z, the caller's length unit. The pose is the exact rigid motion for these doubles.
+    rotation: quaternion w x y z, finite and not zero; it need not be normalized: q and s q are the
+    same rotation. translation: x y z, the caller's length unit. The pose is the exact rigid motion
+    for these doubles.
     """
 
     rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
@@ -32,18 +34,23 @@ class Pose:
         for name, size in (("rotation", 4), ("translation", 3)):
             values = tuple(float(value) for value in getattr(self, name))
             if len(values) != size:
-                raise ValueError(f"{name} has {len(values)} numbers; it takes {size}, "
-                                 f"{'w x y z' if size == 4 else 'x y z'}")
+                raise ValueError(
+                    f"{name} has {len(values)} numbers; it takes {size}, "
+                    f"{'w x y z' if size == 4 else 'x y z'}"
+                )
             object.__setattr__(self, name, values)
 
     @classmethod
-    def from_matrix(cls, matrix: npt.ArrayLike, *, tolerance: float = ORTHOGONALITY_TOLERANCE) -> Pose:
+    def from_matrix(
+        cls, matrix: npt.ArrayLike, *, tolerance: float = ORTHOGONALITY_TOLERANCE
+    ) -> Pose:
         """The pose that a 4 x 4 matrix stands for, [R t; 0 0 0 1].
 
-        A matrix of doubles is a rotation only up to rounding, so the pose is that of the quaternion nearest by: its matrix
-        differs from R by some units of rounding more than R differs from a rotation. Quarter turns, as in rotations by 90
-        degrees, are exact. Nothing else is repaired: ValueError where R Rᵀ is farther than `tolerance` from the identity
-        (says how far), where R mirrors, where the last row is not 0 0 0 1, where a number is not finite.
+        A matrix of doubles is a rotation only up to rounding, so the pose is that of the quaternion
+        nearest by: its matrix differs from R by some units of rounding more than R differs from a
+        rotation. Quarter turns, as in rotations by 90 degrees, are exact. Nothing else is repaired:
+        ValueError where R Rᵀ is farther than `tolerance` from the identity (says how far), where R
+        mirrors, where the last row is not 0 0 0 1, where a number is not finite.
         """
         array = np.asarray(matrix, np.float64)
         if array.shape != (4, 4):
@@ -64,10 +71,12 @@ class Pose:
 
     def matrix(self) -> npt.NDArray[np.float64]:
         """The 4 x 4 matrix, rounded: for drawing and for other libraries, not to be exact with."""
-        return matrices_of(self.packed().reshape(1, 7))[0]
+        matrix: npt.NDArray[np.float64] = matrices_of(self.packed().reshape(1, 7))[0]
+        return matrix
 
 
-#: A pose: none (where the hull was built), a Pose, 4 x 4, seven numbers w x y z x y z, or a translation x y z.
+#: A pose: none (where the hull was built), a Pose, 4 x 4, seven numbers w x y z x y z, or a
+#: translation x y z.
 PoseLike = Union[None, Pose, npt.ArrayLike]
 #: Many poses: n x 4 x 4, n x 7, n x 3, or a sequence of single ones.
 PosesLike = Union[npt.ArrayLike, Sequence[PoseLike]]
@@ -81,16 +90,21 @@ def pack_pose(pose: PoseLike) -> npt.NDArray[np.float64]:
         return pose.packed()
     array = np.asarray(pose, np.float64)
     if array.shape not in ((3,), (7,), (4, 4)):
-        raise ValueError(f"a pose of shape {array.shape} is none of (4, 4), a matrix; (7,), a quaternion and a translation "
-                         f"w x y z x y z; (3,), a translation")
-    return _pack_array(array[np.newaxis])[0]
+        raise ValueError(
+            f"a pose of shape {array.shape} is none of (4, 4), a matrix; (7,), a quaternion and a "
+            "translation "
+            f"w x y z x y z; (3,), a translation"
+        )
+    packed: npt.NDArray[np.float64] = _pack_array(array[np.newaxis])[0]
+    return packed
 
 
 def pack_poses(poses: PosesLike) -> PackedPoses:
     """Poses as n x 7 numbers, w x y z x y z in each row, as they travel.
 
-    Doubles pass as they are; matrices become quaternions as Pose.from_matrix says. ValueError: another shape, or a matrix
-    that is no rigid motion; it names the pose and says how far off it is.
+    Doubles pass as they are; matrices become quaternions as Pose.from_matrix says. ValueError:
+    another shape, or a matrix that is no rigid motion; it names the pose and says how far off it
+    is.
     """
     if isinstance(poses, np.ndarray) and poses.dtype != object:
         return _pack_array(np.asarray(poses, np.float64))
@@ -120,11 +134,16 @@ def _pack_array(array: npt.NDArray[np.float64]) -> PackedPoses:
         packed[:, 0] = 1
         packed[:, 4:] = array
         return packed
-    raise ValueError(f"poses of shape {array.shape} are none of (n, 4, 4), matrices; (n, 7), quaternions and translations "
-                     f"w x y z x y z; (n, 3), translations")
+    raise ValueError(
+        f"poses of shape {array.shape} are none of (n, 4, 4), matrices; (n, 7), quaternions and "
+        "translations "
+        f"w x y z x y z; (n, 3), translations"
+    )
 
 
-def pack_matrices(matrices: npt.NDArray[np.float64], *, tolerance: float = ORTHOGONALITY_TOLERANCE) -> PackedPoses:
+def pack_matrices(
+    matrices: npt.NDArray[np.float64], *, tolerance: float = ORTHOGONALITY_TOLERANCE
+) -> PackedPoses:
     """n x 4 x 4 matrices as n x 7 numbers; checks and errors as in Pose.from_matrix."""
     _check_matrices(matrices, tolerance)
     packed = np.empty((len(matrices), 7))
@@ -145,16 +164,23 @@ def _check_matrices(matrices: npt.NDArray[np.float64], tolerance: float) -> None
     with np.errstate(over="ignore", invalid="ignore"):
         off = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     if (index := first(~(off <= tolerance))) is not None:
-        raise ValueError(f"poses[{index}]: the rotation is not orthogonal: R Rᵀ is off the identity by {off[index]:.3g}, and "
-                         f"at most {tolerance:g} is allowed; orthonormalize it yourself, or allow more with "
-                         f"Pose.from_matrix(..., tolerance=...)")
+        raise ValueError(
+            f"poses[{index}]: the rotation is not orthogonal: R Rᵀ is off the identity by "
+            f"{off[index]:.3g}, and "
+            f"at most {tolerance:g} is allowed; orthonormalize it yourself, or allow more with "
+            f"Pose.from_matrix(..., tolerance=...)"
+        )
     if (index := first(np.linalg.det(rotations) < 0)) is not None:
-        raise ValueError(f"poses[{index}]: the matrix mirrors (its determinant is negative), which no motion does")
+        raise ValueError(
+            f"poses[{index}]: the matrix mirrors (its determinant is negative), which no motion "
+            "does"
+        )
 
 
 def _quaternions_of(rotations: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Quaternions w x y z of n x 3 x 3 rotations, scaled by their largest component, which avoids every root: so quarter
-    turns are exact. Source: Shepperd 1978, Quaternion from Rotation Matrix."""
+    """Quaternions w x y z of n x 3 x 3 rotations, scaled by their largest component, which avoids
+    every root: so quarter turns are exact. Source: Shepperd 1978, Quaternion from Rotation Matrix.
+    """
     m = rotations
     xx, yy, zz = m[:, 0, 0], m[:, 1, 1], m[:, 2, 2]
     # 4 w², 4 w x, ...: the symmetric matrix 4 q qᵀ.
@@ -179,9 +205,21 @@ def matrices_of(packed: PackedPoses) -> npt.NDArray[np.float64]:
     q = packed[:, :4] / np.abs(packed[:, :4]).max(axis=1, keepdims=True)
     w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
     out = np.zeros((len(packed), 4, 4))
-    out[:, 0, 0], out[:, 0, 1], out[:, 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    out[:, 1, 0], out[:, 1, 1], out[:, 1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    out[:, 2, 0], out[:, 2, 1], out[:, 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    out[:, 0, 0], out[:, 0, 1], out[:, 0, 2] = (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+    )
+    out[:, 1, 0], out[:, 1, 1], out[:, 1, 2] = (
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+    )
+    out[:, 2, 0], out[:, 2, 1], out[:, 2, 2] = (
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    )
     out[:, :3, 3] = packed[:, 4:]
     out[:, 3, 3] = 1
     return out

@@ -1,8 +1,9 @@
 """Writes and reads the fields of a protobuf message whose arrays are numpy's.
 
-python-protobuf takes and gives arrays number by number, some 50 ns each. A packed field is the array's own bytes behind a
-tag and a length, so this module puts numpy's buffer there, and finds it there again. Small messages stay protobuf's; their
-bytes can be put into a message that is written here, and the other way round.
+python-protobuf takes and gives arrays number by number, some 50 ns each. A packed field is the
+array's own bytes behind a tag and a length, so this module puts numpy's buffer there, and finds it
+there again. Small messages stay protobuf's; their bytes can be put into a message that is written
+here, and the other way round.
 
 Source: Protocol Buffers, "Encoding". A test compares both directions with protobuf's own.
 """
@@ -18,6 +19,7 @@ import numpy.typing as npt
 VARINT, FIXED64, LENGTH, FIXED32 = 0, 1, 2, 5
 
 Value = Union[int, memoryview]
+Unsigned = npt.NDArray[np.unsignedinteger[Any]]
 
 
 class WireError(ValueError):
@@ -35,31 +37,27 @@ def encode_varint(value: int) -> bytes:
 
 
 def encode_varints(values: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
-    """The varints of all values, one behind the other: canonical, as protobuf writes them. Cost: some ns each."""
+    """The varints of all values, one behind the other: canonical, as protobuf writes them. Cost:
+    some ns each."""
     flat = np.ascontiguousarray(values, np.uint32).reshape(-1)
-    top = int(flat.max(initial=0))
-    if top < 0x80:
+    size = max(1, -(-int(flat.max(initial=0)).bit_length() // 7))
+    if size == 1:
         return flat.astype(np.uint8)
-    sizes = np.ones(flat.size, np.int64)
-    for bits in (7, 14, 21, 28):
-        if top >> bits == 0:
-            break
-        sizes += flat >= np.uint32(1 << bits)
-    ends = np.cumsum(sizes)
-    out = np.empty(int(ends[-1]), np.uint8)
-    starts = ends - sizes
-    rest = flat
-    for byte in range(int(sizes.max())):
-        more = sizes > byte + 1
-        out[starts + byte] = (rest & np.uint32(0x7F)).astype(np.uint8) | (more.astype(np.uint8) << 7)
-        if not more.any():
-            break
-        starts, rest, sizes = starts[more], rest[more] >> np.uint32(7), sizes[more]
-    return out
+    # All groups of all numbers; then those that a number does not need are left out.
+    groups = np.empty((flat.size, size), np.uint8)
+    kept = np.ones((flat.size, size), np.bool_)
+    for group in range(size):
+        groups[:, group] = (flat >> np.uint32(7 * group)) & np.uint32(0x7F)
+        if group > 0:
+            kept[:, group] = flat >= np.uint32(1 << 7 * group)
+            groups[:, group - 1] |= kept[:, group].view(np.uint8) << np.uint8(7)
+    needed: npt.NDArray[np.uint8] = groups[kept]
+    return needed
 
 
 class MessageWriter:
-    """A message put together from its fields, in the order of the calls. Empty arrays are left out, as proto3 does."""
+    """A message put together from its fields, in the order of the calls. Empty arrays are left out,
+    as proto3 does."""
 
     def __init__(self) -> None:
         self._parts: list[bytes | memoryview] = []
@@ -127,7 +125,8 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
-    """Number, wire type and value of each field, in order. What has a length comes as a view of `data`.
+    """Number, wire type and value of each field, in order. What has a length comes as a view of
+    `data`.
 
     Raises WireError where the bytes are cut off or no message.
     """
@@ -147,11 +146,16 @@ def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
         elif wire_type == FIXED32:
             size = 4
         else:
-            raise WireError(f"field {number} has the wire type {wire_type}, which proto3 does not use")
+            raise WireError(
+                f"field {number} has the wire type {wire_type}, which proto3 does not use"
+            )
         if number == 0:
             raise WireError("a field has the number 0")
         if at + size > len(view):
-            raise WireError(f"field {number} is cut off: {size} bytes were announced, {len(view) - at} are there")
+            raise WireError(
+                f"field {number} is cut off: {size} bytes were announced, {len(view) - at} are "
+                "there"
+            )
         yield number, wire_type, view[at : at + size]
         at += size
 
@@ -170,28 +174,31 @@ def packed_floats(value: Value) -> npt.NDArray[np.float32]:
     return np.frombuffer(value, "<f4")
 
 
-def packed_varints(value: Value) -> npt.NDArray[np.uint64]:
-    """What a field of repeated integers, enums or bools holds, packed or a single entry. Cost: some ns each."""
+def packed_varints(value: Value) -> Unsigned:
+    """What a field of repeated integers, enums or bools holds, packed or a single entry: as uint8,
+    and without a copy, where all are below 128, else as uint64. Cost: some ns each."""
     if isinstance(value, int):
         return np.array([value], np.uint64)
     data = np.frombuffer(value, np.uint8)
-    if not data.size:
-        return np.empty(0, np.uint64)
     last = data < 0x80
+    if last.all():
+        return data
     if not last[-1]:
         raise WireError("the last varint of a field does not end")
-    if last.all():
-        return data.astype(np.uint64)
     ends = np.flatnonzero(last)
-    starts = np.concatenate(([0], ends[:-1] + 1))
+    starts = np.empty_like(ends)
+    starts[0] = 0
+    starts[1:] = ends[:-1] + 1
     sizes = ends - starts + 1
     longest = int(sizes.max())
     if longest > 10:
         raise WireError("a varint is longer than ten bytes")
     # Byte by byte of all numbers at once: most are short, so the passes soon concern few.
-    out = (data[starts] & np.uint8(0x7F)).astype(np.uint64)
+    out: npt.NDArray[np.uint64] = (data[starts] & np.uint8(0x7F)).astype(np.uint64)
     which = np.arange(out.size)
     for byte in range(1, longest):
         which = which[sizes[which] > byte]
-        out[which] |= (data[starts[which] + byte] & np.uint8(0x7F)).astype(np.uint64) << np.uint64(7 * byte)
+        out[which] |= (data[starts[which] + byte] & np.uint8(0x7F)).astype(np.uint64) << np.uint64(
+            7 * byte
+        )
     return out
