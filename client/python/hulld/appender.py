@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import Any, cast
 
@@ -14,6 +14,7 @@ from hulld.errors import (
     FailedPreconditionError,
     HulldError,
     UnavailableError,
+    read_answer,
 )
 from hulld.geometry.points import Points, PointsLike, as_points, chunks_of
 from hulld.retry import RetryPolicy
@@ -82,7 +83,11 @@ class Appender:
         HulldError: how the stream ended, which may be about an earlier chunk; every further call
         raises it again.
         """
-        for chunk in pieces(points, if_revision, chunk_bytes):
+        self.append_chunks(pieces(points, if_revision, chunk_bytes), if_revision)
+
+    def append_chunks(self, chunks: Iterable[Points], if_revision: int | None = None) -> None:
+        """As append, for chunks that hulld.as_points has checked."""
+        for chunk in chunks:
             if self._failed is not None:
                 raise self._failed
             assert self._connection is not None
@@ -159,7 +164,7 @@ class Appender:
         deadline = None if self._timeout is None else time.monotonic() + self._timeout
         while True:
             try:
-                self._state.take_opened(self._connect())
+                read_answer(self._state.take_opened, self._connect())
                 self._state.failures = 0
                 return
             except HulldError as error:
@@ -183,7 +188,7 @@ class Appender:
                 cause = error
                 continue
             try:
-                missing = self._state.resume(opened)
+                missing = read_answer(self._state.resume, opened)
             except HulldError as error:
                 raise self._fail(error) from None
             assert self._connection is not None
@@ -214,7 +219,7 @@ class Appender:
                 self._reconnect(error)
                 continue
             try:
-                self._state.take_ack(message)
+                read_answer(self._state.take_ack, message)
             except HulldError as error:
                 raise self._fail(error) from None
 
@@ -232,9 +237,11 @@ def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Ite
     return iter(chunks)
 
 
-def blocks(points: PointsLike | Iterator[PointsLike]) -> Iterator[PointsLike]:
-    """One array, or each array of an iterator or a generator. Lists and tuples are arrays."""
+def chunks_to_send(
+    points: PointsLike | Iterator[PointsLike], if_revision: int | None, chunk_bytes: int
+) -> Iterator[Points]:
+    """The chunks of one array, which is checked as a whole at once, or of each array of an iterator
+    or a generator, each as it comes. Lists and tuples are arrays."""
     if isinstance(points, Iterator):
-        yield from points
-    else:
-        yield cast(PointsLike, points)
+        return (chunk for block in points for chunk in pieces(block, if_revision, chunk_bytes))
+    return pieces(cast(PointsLike, points), if_revision, chunk_bytes)

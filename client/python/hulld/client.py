@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import TracebackType
 from typing import Any, Literal, TypeVar
 
@@ -25,7 +25,7 @@ from hulld.answers.hulls import (
 )
 from hulld.answers.hulls import ReplacedHull, decode_replaced
 from hulld.answers.status import ServerStatus
-from hulld.appender import Appender, blocks
+from hulld.appender import Appender, chunks_to_send
 from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
 from hulld.calls.attempts import Attempts
@@ -34,7 +34,7 @@ from hulld.calls.requests import Call, SceneFilter
 from hulld.calls.wanted import Wanted
 from hulld.collision_stream import CollisionStream
 from hulld.connection import DEFAULT_SERVER, Connection, PathLike, Tls
-from hulld.errors import InternalError, from_rpc_error
+from hulld.errors import from_rpc_error, read_answer
 from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, all_pairs, as_pairs
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
 from hulld.notebook import Viewer
@@ -140,8 +140,8 @@ class Client:
         FailedPreconditionError: the store is memory."""
         with BackupWriter(path) as writer:
             for part in self._received(requests.save_backup(), timeout):
-                self._take(writer.write, part)
-            return self._take(lambda _: writer.finish(), None)
+                read_answer(writer.write, part)
+            return read_answer(lambda _: writer.finish(), None)
 
     # --- Hulls ---
 
@@ -180,11 +180,11 @@ class Client:
         ValueError: not points. NotFoundError: no such hull. AbortedError: if_revision does not
         match.
         """
+        chunks = chunks_to_send(points, if_revision, chunk_bytes)
         with self.open_append(
             hull_id, create=create, writer_id=writer_id, timeout=timeout
         ) as appender:
-            for block in blocks(points):
-                appender.append(block, if_revision=if_revision, chunk_bytes=chunk_bytes)
+            appender.append_chunks(chunks, if_revision)
             return appender.finish()
 
     def open_append(
@@ -245,7 +245,7 @@ class Client:
             if failure:
                 raise failure[0] from None
             raise from_rpc_error(error) from None
-        return self._take(decode_replaced, answer)
+        return read_answer(decode_replaced, answer)
 
     def get_hull(
         self,
@@ -408,8 +408,8 @@ class Client:
             requests.check_collisions(packed, asked, wanted, tolerance, method),
             self._seconds(timeout),
         ):
-            self._take(batch.add, data)
-        return self._take(lambda _: batch.finish(), None)
+            read_answer(batch.add, data)
+        return read_answer(lambda _: batch.finish(), None)
 
     def iter_check_collisions(
         self,
@@ -468,8 +468,8 @@ class Client:
             requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
             self._seconds(timeout),
         ):
-            self._take(found.add, data)
-        return self._take(lambda _: found.finish(), None)
+            read_answer(found.add, data)
+        return read_answer(lambda _: found.finish(), None)
 
     def iter_find_collisions(
         self,
@@ -559,14 +559,6 @@ class Client:
     def _seconds(self, timeout: float | None) -> float | None:
         return self._timeout if timeout is None else timeout
 
-    @staticmethod
-    def _take(read: Callable[[Any], T], data: Any) -> T:
-        """What the server sent, read; a malformed answer is an error of the call."""
-        try:
-            return read(data)
-        except ValueError as error:
-            raise InternalError(str(error)) from error
-
     def _start(self, call: Call[Any], timeout: float | None) -> Any:
         """Starts a call whose answer streams."""
         multi = self._calls.get(call.method) or self._calls.setdefault(
@@ -587,7 +579,7 @@ class Client:
             except grpc.RpcError as error:
                 time.sleep(attempts.wait_after(from_rpc_error(error)))
                 continue
-            return self._take(call.decode, answer)
+            return read_answer(call.decode, answer)
 
     def _received(self, call: Call[Any], timeout: float | None) -> Iterator[bytes]:
         """The messages of an answer. Retried only while nothing was received."""
@@ -610,7 +602,7 @@ class Client:
 
     def _parts(self, call: Call[T], timeout: float | None) -> Iterator[T]:
         for data in self._received(call, self._seconds(timeout)):
-            yield self._take(call.decode, data)
+            yield read_answer(call.decode, data)
 
     def _mesh(self, call: Call[MeshPart], timeout: float | None) -> HullMesh:
         """Retried from the start, whatever was received."""
@@ -619,8 +611,8 @@ class Client:
             mesh = MeshAssembly()
             try:
                 for data in self._start(call, attempts.remaining()):
-                    mesh.add(self._take(call.decode, data))
+                    mesh.add(read_answer(call.decode, data))
             except grpc.RpcError as error:
                 time.sleep(attempts.wait_after(from_rpc_error(error)))
                 continue
-            return self._take(mesh.finish, self._viewer)
+            return read_answer(mesh.finish, self._viewer)

@@ -14,7 +14,13 @@ from hulld.answers.collisions import StreamAnswer
 from hulld.calls.duplex import Duplex
 from hulld.calls.requests import open_stream, update_stream
 from hulld.calls.wanted import Wanted
-from hulld.errors import DeadlineExceededError, FailedPreconditionError, HulldError, InternalError
+from hulld.errors import (
+    DeadlineExceededError,
+    FailedPreconditionError,
+    HulldError,
+    InternalError,
+    read_answer,
+)
 from hulld.geometry.placements import Placements, as_indices
 from hulld.geometry.poses import PosesLike, pack_poses
 
@@ -120,17 +126,15 @@ class CollisionStream:
         self._count += 1
         self._connection.send(request)
         try:
-            while not step.add(self._connection.expect(self._timeout)):
+            while not read_answer(step.add, self._connection.expect(self._timeout)):
                 pass
-            return step.finish()
+            return read_answer(lambda _: step.finish(), None)
         except TimeoutError:
             failed: HulldError = DeadlineExceededError(
                 f"the server did not answer within {self._timeout} s"
             )
         except HulldError as error:
             failed = error
-        except ValueError as error:
-            failed = InternalError(str(error))
         self._failed = failed
         self._connection.cancel()
         raise failed

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from google.protobuf.message import DecodeError
 
 from hulld.rpc import error_details_pb2
+
+D = TypeVar("D")
+T = TypeVar("T")
 
 _DETAILS = "grpc-status-details-bin"
 _REQUEST_ID = "x-request-id"
@@ -180,6 +183,16 @@ _CLASSES: dict[str, type[HulldError]] = {
 def error_class(code: str) -> type[HulldError]:
     """The class for a status, as in "NOT_FOUND"."""
     return _CLASSES.get(code, HulldError)
+
+
+def read_answer(read: Callable[[D], T], data: D) -> T:
+    """What the server sent, read. InternalError: it is malformed, or contradicts itself."""
+    try:
+        return read(data)
+    except HulldError:
+        raise
+    except (ValueError, DecodeError) as error:
+        raise InternalError(f"the server's answer cannot be read: {error}") from error
 
 
 def from_status(code: str, message: str, trailing: Iterable[tuple[str, Any]] | None) -> HulldError:

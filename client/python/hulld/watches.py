@@ -19,7 +19,14 @@ from hulld.answers.hulls import Header, HullChanges
 from hulld.calls.duplex import Duplex
 from hulld.calls.requests import Call
 from hulld.collision_stream import encode_update
-from hulld.errors import CancelledError, HulldError, InternalError, UnavailableError, from_rpc_error
+from hulld.errors import (
+    CancelledError,
+    HulldError,
+    InternalError,
+    UnavailableError,
+    from_rpc_error,
+    read_answer,
+)
 from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
 
@@ -91,7 +98,7 @@ class HullWatch:
                     self._call = self._start(request)
                 call = self._call
             try:
-                return self._position.take(request.decode(next(call)), first)
+                return self._position.take(read_answer(request.decode, next(call)), first)
             except StopIteration:
                 error: HulldError = UnavailableError("the server ended the watch")
             except grpc.RpcError as rpc_error:
@@ -164,7 +171,7 @@ class CollisionWatch:
         if message is None:
             # The client never says that it has said all.
             raise InternalError("the server ended the watch without a cause")
-        return decode_collision_changes(message)
+        return read_answer(decode_collision_changes, message)
 
     def update(self, placements: npt.ArrayLike, poses: PosesLike) -> None:
         """Says where placements are now; arguments and ValueError as in CollisionStream.update. The

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Iterable
 from types import TracebackType
 from typing import Any
 
@@ -15,8 +16,9 @@ from hulld.errors import (
     FailedPreconditionError,
     HulldError,
     UnavailableError,
+    read_answer,
 )
-from hulld.geometry.points import PointsLike
+from hulld.geometry.points import Points, PointsLike
 from hulld.retry import RetryPolicy
 
 
@@ -64,7 +66,11 @@ class AsyncAppender:
         chunk_bytes: int = DEFAULT_CHUNK_BYTES,
     ) -> None:
         """As Appender.append."""
-        for chunk in pieces(points, if_revision, chunk_bytes):
+        await self.append_chunks(pieces(points, if_revision, chunk_bytes), if_revision)
+
+    async def append_chunks(self, chunks: Iterable[Points], if_revision: int | None = None) -> None:
+        """As append, for chunks that hulld.as_points has checked."""
+        for chunk in chunks:
             if self._failed is not None:
                 raise self._failed
             if self._connection is None:
@@ -104,7 +110,7 @@ class AsyncAppender:
         deadline = None if self._timeout is None else time.monotonic() + self._timeout
         while True:
             try:
-                opened = self._state.take_opened(await self._connect())
+                opened = read_answer(self._state.take_opened, await self._connect())
                 self._state.failures = 0
                 return opened
             except HulldError as error:
@@ -165,7 +171,7 @@ class AsyncAppender:
                 cause = error
                 continue
             try:
-                missing = self._state.resume(opened)
+                missing = read_answer(self._state.resume, opened)
             except HulldError as error:
                 raise self._fail(error) from None
             assert self._connection is not None
@@ -189,6 +195,6 @@ class AsyncAppender:
             await self._reconnect(error)
             return
         try:
-            self._state.take_ack(message)
+            read_answer(self._state.take_ack, message)
         except HulldError as error:
             raise self._fail(error) from None

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from types import TracebackType
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 import grpc
 import numpy.typing as npt
@@ -27,7 +27,7 @@ from hulld.answers.hulls import (
 )
 from hulld.answers.hulls import ReplacedHull, decode_replaced
 from hulld.answers.status import ServerStatus
-from hulld.appender import blocks
+from hulld.appender import chunks_to_send
 from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
@@ -36,7 +36,7 @@ from hulld.calls.requests import Call, SceneFilter
 from hulld.calls.wanted import Wanted
 from hulld.client import DEFAULT_IN_FLIGHT_BYTES, DEFAULT_IN_FLIGHT_CHUNKS, DEFAULT_TIMEOUT
 from hulld.connection import DEFAULT_SERVER, Connection, PathLike, Tls
-from hulld.errors import InternalError, from_rpc_error
+from hulld.errors import from_rpc_error, read_answer
 from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, all_pairs, as_pairs
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
 from hulld.notebook import Viewer
@@ -123,8 +123,8 @@ class AsyncClient:
         """As Client.save_backup."""
         with BackupWriter(path) as writer:
             async for part in self._received(requests.save_backup(), timeout):
-                self._take(writer.write, part)
-            return self._take(lambda _: writer.finish(), None)
+                read_answer(writer.write, part)
+            return read_answer(lambda _: writer.finish(), None)
 
     # --- Hulls ---
 
@@ -146,11 +146,19 @@ class AsyncClient:
         timeout: float | None = None,
     ) -> Appended:
         """As Client.append_points; points may also be an asynchronous iterator."""
+        iterated = isinstance(points, AsyncIterator)
+        chunks = (
+            iter(())
+            if iterated
+            else chunks_to_send(cast(PointsLike, points), if_revision, chunk_bytes)
+        )
         async with self.open_append(
             hull_id, create=create, writer_id=writer_id, timeout=timeout
         ) as appender:
-            async for block in _blocks(points):
-                await appender.append(block, if_revision=if_revision, chunk_bytes=chunk_bytes)
+            await appender.append_chunks(chunks, if_revision)
+            if isinstance(points, AsyncIterator):
+                async for block in points:
+                    await appender.append(block, if_revision=if_revision, chunk_bytes=chunk_bytes)
             return await appender.finish()
 
     def open_append(
@@ -202,7 +210,7 @@ class AsyncClient:
             if failure:
                 raise failure[0] from None
             raise from_rpc_error(error) from None
-        return self._take(decode_replaced, answer)
+        return read_answer(decode_replaced, answer)
 
     async def get_hull(
         self,
@@ -231,11 +239,11 @@ class AsyncClient:
             mesh = MeshAssembly()
             try:
                 async for data in self._start(call, attempts.remaining()):
-                    mesh.add(self._take(call.decode, data))
+                    mesh.add(read_answer(call.decode, data))
             except grpc.RpcError as error:
                 await asyncio.sleep(attempts.wait_after(from_rpc_error(error)))
                 continue
-            return self._take(mesh.finish, self._viewer)
+            return read_answer(mesh.finish, self._viewer)
 
     def iter_hull_mesh(
         self,
@@ -338,8 +346,8 @@ class AsyncClient:
             requests.check_collisions(packed, asked, wanted, tolerance, method),
             self._seconds(timeout),
         ):
-            self._take(batch.add, data)
-        return self._take(lambda _: batch.finish(), None)
+            read_answer(batch.add, data)
+        return read_answer(lambda _: batch.finish(), None)
 
     def iter_check_collisions(
         self,
@@ -391,8 +399,8 @@ class AsyncClient:
             requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
             self._seconds(timeout),
         ):
-            self._take(found.add, data)
-        return self._take(lambda _: found.finish(), None)
+            read_answer(found.add, data)
+        return read_answer(lambda _: found.finish(), None)
 
     def iter_find_collisions(
         self,
@@ -477,14 +485,6 @@ class AsyncClient:
     def _seconds(self, timeout: float | None) -> float | None:
         return self._timeout if timeout is None else timeout
 
-    @staticmethod
-    def _take(read: Callable[[Any], T], data: Any) -> T:
-        """What the server sent, read; a malformed answer is an error of the call."""
-        try:
-            return read(data)
-        except ValueError as error:
-            raise InternalError(str(error)) from error
-
     def _start(self, call: Call[Any], timeout: float | None) -> Any:
         """Starts a call whose answer streams."""
         multi = self._calls.get(call.method) or self._calls.setdefault(
@@ -505,7 +505,7 @@ class AsyncClient:
             except grpc.RpcError as error:
                 await asyncio.sleep(attempts.wait_after(from_rpc_error(error)))
                 continue
-            return self._take(call.decode, answer)
+            return read_answer(call.decode, answer)
 
     async def _received(self, call: Call[Any], timeout: float | None) -> AsyncIterator[bytes]:
         """The messages of an answer. Retried only while nothing was received."""
@@ -528,16 +528,18 @@ class AsyncClient:
 
     async def _parts(self, call: Call[T], timeout: float | None) -> AsyncIterator[T]:
         async for data in self._received(call, self._seconds(timeout)):
-            yield self._take(call.decode, data)
+            yield read_answer(call.decode, data)
 
 
 async def _blocks(
     points: PointsLike | Iterator[PointsLike] | AsyncIterator[PointsLike],
 ) -> AsyncIterator[PointsLike]:
-    """As hulld.appender.blocks."""
+    """One array, or each array of an iterator of either kind."""
     if isinstance(points, AsyncIterator):
         async for block in points:
             yield block
-    else:
-        for block in blocks(points):
+    elif isinstance(points, Iterator):
+        for block in points:
             yield block
+    else:
+        yield cast(PointsLike, points)

@@ -15,7 +15,13 @@ from hulld.answers.collisions import StreamAnswer
 from hulld.calls.requests import open_stream, update_stream
 from hulld.calls.wanted import Wanted
 from hulld.collision_stream import Update, encode_update
-from hulld.errors import DeadlineExceededError, FailedPreconditionError, HulldError, InternalError
+from hulld.errors import (
+    DeadlineExceededError,
+    FailedPreconditionError,
+    HulldError,
+    InternalError,
+    read_answer,
+)
 from hulld.geometry.placements import Placements
 from hulld.geometry.poses import PosesLike
 
@@ -118,17 +124,15 @@ class AsyncCollisionStream:
         self._count += 1
         await self._connection.send(request)
         try:
-            while not step.add(await self._connection.expect(self._timeout)):
+            while not read_answer(step.add, await self._connection.expect(self._timeout)):
                 pass
-            return step.finish()
+            return read_answer(lambda _: step.finish(), None)
         except TimeoutError:
             failed: HulldError = DeadlineExceededError(
                 f"the server did not answer within {self._timeout} s"
             )
         except HulldError as error:
             failed = error
-        except ValueError as error:
-            failed = InternalError(str(error))
         self._failed = failed
         self._connection.cancel()
         raise failed

@@ -18,7 +18,14 @@ from hulld.answers.collisions import CollisionChanges
 from hulld.answers.hulls import Header, HullChanges
 from hulld.calls.requests import Call
 from hulld.collision_stream import encode_update
-from hulld.errors import CancelledError, HulldError, InternalError, UnavailableError, from_rpc_error
+from hulld.errors import (
+    CancelledError,
+    HulldError,
+    InternalError,
+    UnavailableError,
+    from_rpc_error,
+    read_answer,
+)
 from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
 from hulld.watches import WatchPosition
@@ -64,7 +71,7 @@ class AsyncHullWatch:
             try:
                 message = await self._call.read()
                 if message is not grpc.aio.EOF:
-                    return self._position.take(request.decode(message), first)
+                    return self._position.take(read_answer(request.decode, message), first)
                 error: HulldError = UnavailableError("the server ended the watch")
             except grpc.RpcError as rpc_error:
                 error = from_rpc_error(rpc_error)
@@ -137,7 +144,7 @@ class AsyncCollisionWatch:
             raise
         if message is None:
             raise InternalError("the server ended the watch without a cause")
-        return decode_collision_changes(message)
+        return read_answer(decode_collision_changes, message)
 
     async def update(self, placements: npt.ArrayLike, poses: PosesLike) -> None:
         """As CollisionWatch.update."""

@@ -33,9 +33,8 @@ from hulld.answers.collisions import (
     Separation,
     VertexPair,
     Witness,
-    enum_or_zero,
 )
-from hulld.answers.hulls import Header, header_of
+from hulld.answers.hulls import Header, enum_or_zero, header_of
 from hulld.calls.wanted import Wanted
 from hulld.geometry.placements import Placement
 from hulld.notebook import Viewer

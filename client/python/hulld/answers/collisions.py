@@ -413,11 +413,3 @@ class CollisionChanges:
     hulls: Sequence[HullVersion]
     placement_problems: Mapping[int, Problem]
     events: Sequence[CollisionEvent]
-
-
-def enum_or_zero(kind: Any, value: int) -> Any:
-    """A value of a later contract reads as UNSPECIFIED."""
-    try:
-        return kind(value)
-    except ValueError:
-        return kind(0)

@@ -268,6 +268,14 @@ class HullChanges:
 # --- From the contract's messages ---
 
 
+def enum_or_zero(kind: Any, value: int) -> Any:
+    """A value of a later contract reads as UNSPECIFIED."""
+    try:
+        return kind(value)
+    except ValueError:
+        return kind(0)
+
+
 def header_of(message: Any) -> Header:
     return Header(message.store_id, message.revision)
 
@@ -305,7 +313,7 @@ def decode_replaced(data: bytes) -> ReplacedHull:
     return ReplacedHull(
         info_of(message.hull),
         message.created,
-        Durability(message.durability),
+        enum_or_zero(Durability, message.durability),
         header_of(message.header),
     )
 
@@ -327,7 +335,7 @@ def decode_hull(data: bytes, with_facets: bool, viewer: Viewer | None) -> Hull:
 def decode_changes(data: bytes) -> HullChanges:
     message = hull_pb2.WatchHullsResponse.FromString(data)
     events = tuple(
-        HullEvent(HullEventKind(event.kind), info_of(event.hull), _box_of(event))
+        HullEvent(enum_or_zero(HullEventKind, event.kind), info_of(event.hull), _box_of(event))
         for event in message.events
     )
     return HullChanges(header_of(message.header), events, message.synced, message.anew)

@@ -14,6 +14,7 @@ from hulld.answers.hulls import (
     HullInfo,
     PointCounts,
     counts_of,
+    enum_or_zero,
     header_of,
     info_of,
 )
@@ -186,7 +187,7 @@ class AppendState:
         self._drop(ack.sequence, recovered=False)
         self._counts += counts_of(ack.counts)
         self._revision, self._vertices = ack.hull_revision, ack.vertex_count
-        self._durability = Durability(ack.durability)
+        self._durability = enum_or_zero(Durability, ack.durability)
         self._header = header_of(ack.header)
 
     def _drop(self, sequence: int, recovered: bool) -> None:
