@@ -31,6 +31,10 @@ from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
 
 
+#: Messages that a watch reads ahead. Behind them, what changes is put together by the server.
+MOST_WAITING = 16
+
+
 class WatchPosition:
     """Where a watch of hulls is, over all its connections."""
 
@@ -155,7 +159,7 @@ class CollisionWatch:
     def __init__(self, call: Any, metadata: Any, opening: bytes, placements: int) -> None:
         self._placements = placements
         self._cancelled = False
-        self._connection = Duplex(call, metadata)
+        self._connection = Duplex(call, metadata, MOST_WAITING)
         self._connection.send(opening)
 
     def __iter__(self) -> Iterator[CollisionChanges]:

@@ -28,7 +28,7 @@ from hulld.errors import (
 )
 from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
-from hulld.watches import WatchPosition
+from hulld.watches import MOST_WAITING, WatchPosition
 
 
 class AsyncHullWatch:
@@ -125,7 +125,7 @@ class AsyncCollisionWatch:
 
     async def _connected(self) -> AsyncDuplex:
         if self._connection is None:
-            self._connection = AsyncDuplex(self._call, self._metadata)
+            self._connection = AsyncDuplex(self._call, self._metadata, MOST_WAITING)
             # Whoever comes next waits behind this in gRPC's order of writes.
             await self._connection.send(self._opening)
         return self._connection

@@ -17,9 +17,12 @@ class Duplex:
     """gRPC's own iterators wait without a bound. A thread reads instead, so that every wait has
     one. For one thread, but for cancel and send, which any thread may call."""
 
-    def __init__(self, call: Any, metadata: Any) -> None:
+    def __init__(self, call: Any, metadata: Any, most_waiting: int | None = None) -> None:
+        """most_waiting: messages that are read before `receive` asks for them; then the server has
+        to wait. None: all. That is for calls whose answers are bounded by what was sent."""
         self._outgoing: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._room = threading.Semaphore(most_waiting) if most_waiting else None
         self._end: HulldError | None = None
         self._ended = False
         self._call = call(iter(self._outgoing.get, _END), metadata=metadata)
@@ -31,6 +34,8 @@ class Duplex:
         try:
             for message in self._call:
                 self._incoming.put(message)
+                if self._room is not None:
+                    self._room.acquire()
         except grpc.RpcError as error:
             end = from_rpc_error(error)
         self._incoming.put((_END, end))
@@ -55,6 +60,8 @@ class Duplex:
             except queue.Empty:
                 raise TimeoutError from None
             if not isinstance(item, tuple):
+                if self._room is not None:
+                    self._room.release()
                 message: bytes = item
                 return message
             self._ended, self._end = True, item[1]
@@ -73,7 +80,5 @@ class Duplex:
         """Ends the call, unless it has ended."""
         self._call.cancel()
         self._outgoing.put(_END)
-
-    def join(self) -> None:
-        """Waits until gRPC has let go of the call. Requires that it has ended or was cancelled."""
-        self._reader.join()
+        if self._room is not None:
+            self._room.release()
