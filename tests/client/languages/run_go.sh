@@ -4,8 +4,8 @@
 #   run_go.sh PROGRAMS WORK
 #
 # PROGRAMS: the directory of hulld. WORK: a directory for its files, made anew. All comes from
-# Debian: golang-go protoc-gen-go protoc-gen-go-grpc golang-google-grpc-dev
-# golang-google-protobuf-dev golang-google-genproto-dev. Exit code 77: one of them is missing.
+# Debian's packages, which are listed below; half a gigabyte, so docker/packages.txt leaves them out.
+# Exit code 77: one of them is missing.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -18,11 +18,10 @@ libraries=/usr/share/gocode
 server=
 trap '[[ -z $server ]] || { kill "$server"; wait "$server" || true; }' EXIT
 
-for program in go protoc protoc-gen-go protoc-gen-go-grpc; do
-  command -v "$program" >/dev/null || { echo "skipped: $program is not installed"; exit 77; }
-done
-for library in google.golang.org/grpc google.golang.org/protobuf google.golang.org/genproto; do
-  [[ -d $libraries/src/$library ]] || { echo "skipped: Debian's package of $library is not installed"; exit 77; }
+for package in golang-go protobuf-compiler protoc-gen-go protoc-gen-go-grpc golang-google-grpc-dev golang-google-genproto-dev \
+  golang-google-protobuf-dev golang-github-golang-protobuf-1-5-dev; do
+  [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] ||
+    { echo "skipped: $package is not installed"; exit 77; }
 done
 
 rm -rf "$work"
