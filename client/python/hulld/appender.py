@@ -209,8 +209,7 @@ class Appender:
                 raise self._fail(
                     DeadlineExceededError(
                         f"the server acknowledged no chunk for {self._timeout} s; "
-                        f"{self.totals.points_acknowledged} points "
-                        f"are committed"
+                        f"{self.totals.points_acknowledged} points are committed"
                     )
                 ) from None
             except HulldError as error:
@@ -231,8 +230,7 @@ def pieces(points: PointsLike, if_revision: int | None, chunk_bytes: int) -> Ite
     if if_revision is not None and len(chunks) > 1:
         raise ValueError(
             f"{len(array)} points make {len(chunks)} chunks, and if_revision can hold for the "
-            "first alone; give "
-            f"fewer points, or a larger chunk_bytes"
+            "first alone; give fewer points, or a larger chunk_bytes"
         )
     return iter(chunks)
 

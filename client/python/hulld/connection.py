@@ -56,8 +56,7 @@ class Connection:
         if self.tls is None and not self.insecure and not is_loopback(self.server):
             raise ValueError(
                 f"the token would travel unencrypted to {self.server}, where everyone on the way "
-                "could read "
-                f"it; use tls=hulld.Tls(), or allow it with insecure=True"
+                "could read it; use tls=hulld.Tls(), or allow it with insecure=True"
             )
 
     def metadata(self) -> tuple[tuple[str, str], ...]:

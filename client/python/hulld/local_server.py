@@ -10,7 +10,8 @@ import shutil
 import subprocess
 import tempfile
 import threading
-from collections.abc import Mapping, Sequence
+import weakref
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any
 
@@ -52,18 +53,16 @@ class LocalServer:
         data_dir: PathLike | None = None,
         options: Sequence[str] = (),
         binary: PathLike | None = None,
-        environment: Mapping[str, str] | None = None,
     ) -> None:
         self._program = str(find_program("hulld") if binary is None else binary)
         self._data_dir = data_dir
         self._options = list(options)
-        self._environment = environment
-        self._folder: str | None = None
         self._process: subprocess.Popen[str] | None = None
         self._reader: threading.Thread | None = None
         self._listening = threading.Event()
         self._log: collections.deque[str] = collections.deque(maxlen=_LINES)
         self._address = ""
+        self._remove: Callable[[], Any] = lambda: None
 
     @property
     def address(self) -> str:
@@ -83,7 +82,8 @@ class LocalServer:
         """Returns once it listens. RuntimeError: it ended instead; tells what it said."""
         if self._process is not None:
             return self
-        self._folder = tempfile.mkdtemp(prefix="hulld-")
+        folder = tempfile.mkdtemp(prefix="hulld-")
+        self._remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         store = (
             ["--store", "memory"]
             if self._data_dir is None
@@ -92,7 +92,7 @@ class LocalServer:
         command = [
             self._program,
             "--listen",
-            f"unix:{self._folder}/socket",
+            f"unix:{folder}/socket",
             "--drain-timeout",
             "1",
             *store,
@@ -101,7 +101,7 @@ class LocalServer:
         # Settings of the caller's own server are not meant for this one.
         environment = {
             name: value for name, value in os.environ.items() if not name.startswith("HULLD_")
-        } | dict(self._environment or {})
+        }
         # A session of its own: Ctrl-C in a terminal is for the script, which then ends the server.
         self._process = subprocess.Popen(
             ["sh", "-c", "exec 3<&0; " + _KEEPER, "hulld", *command],
@@ -138,7 +138,9 @@ class LocalServer:
         if process is None:
             return
         assert process.stdin is not None and process.stdout is not None and self._reader is not None
+        # Both, as a copy of this process may hold the pipe, too.
         process.stdin.close()
+        process.terminate()
         try:
             process.wait(_STOP_SECONDS)
         except subprocess.TimeoutExpired:
@@ -148,8 +150,7 @@ class LocalServer:
         process.stdout.close()
         self._address = ""
         self._listening.clear()
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+        self._remove()
 
     def __enter__(self) -> LocalServer:
         return self.start()

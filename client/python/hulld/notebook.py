@@ -44,8 +44,8 @@ class Viewer:
         placements, or why there is none. Never raises: a notebook would show the error in place of
         the answer."""
         body = "".join(
-            f"<tr><th style='text-align:left'>{html.escape(str(name))}</th>"
-            f"<td style='text-align:left'>{html.escape(str(value))}</td></tr>"
+            f"<tr><th style='text-align:left'>{html.escape(str(name))}</th><td "
+            f"style='text-align:left'>{html.escape(str(value))}</td></tr>"
             for name, value in rows
             if value is not None
         )

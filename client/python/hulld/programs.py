@@ -37,8 +37,7 @@ def find_program(name: str) -> pathlib.Path:
         return max(builds, key=lambda path: path.stat().st_mtime)
     raise FileNotFoundError(
         f"there is no {name}: {variable} is not set, the PATH lacks it, and there is no build of "
-        "it in "
-        f"a checkout around the working directory; build hulld, or set {variable}"
+        f"it in a checkout around the working directory; build hulld, or set {variable}"
     )
 
 

@@ -1,4 +1,4 @@
-"""What the tests share: one server for all, the data of shared/, a fake server that fails on purpose."""
+"""What the tests share: one server for all, clients of both kinds, the larger meshes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def client(server: hulld.LocalServer) -> Iterator[hulld.Client]:
 
 
 class Blocking:
-    """An asynchronous object that is used like its synchronous twin, so that one test tries both."""
+    """An asynchronous object, used like its synchronous twin: one test tries both."""
 
     def __init__(self, target: Any, loop: asyncio.AbstractEventLoop) -> None:
         self._target = target
@@ -83,8 +83,11 @@ def connect(request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
         asyncio.set_event_loop(loop)
 
     def make(server: str, **options: Any) -> Any:
-        made = (hulld.Client(server, **options) if loop is None
-                else Blocking(hulld.AsyncClient(server, **options), loop))
+        made = (
+            hulld.Client(server, **options)
+            if loop is None
+            else Blocking(hulld.AsyncClient(server, **options), loop)
+        )
         clients.append(made)
         return made
 

@@ -12,15 +12,23 @@ from hulld.rpc import error_details_pb2
 from hulld.v1 import hull_pb2, hull_pb2_grpc, status_pb2, status_pb2_grpc
 
 
-def refuse(context: Any, code: grpc.StatusCode, message: str, *, reason: str | None = None,
-           metadata: dict[str, str] | None = None, pushback: str | None = None) -> None:
+def refuse(
+    context: Any,
+    code: grpc.StatusCode,
+    message: str,
+    *,
+    reason: str | None = None,
+    metadata: dict[str, str] | None = None,
+    pushback: str | None = None,
+) -> None:
     """Ends the call with the details that hulld gives."""
     trailing: list[tuple[str, Any]] = [("x-request-id", "fake-1")]
     if reason is not None:
         status = error_details_pb2.Status(code=code.value[0], message=message)
         info = error_details_pb2.ErrorInfo(reason=reason, domain="hulld", metadata=metadata)
-        status.details.add(type_url="type.googleapis.com/google.rpc.ErrorInfo",
-                           value=info.SerializeToString())
+        status.details.add(
+            type_url="type.googleapis.com/google.rpc.ErrorInfo", value=info.SerializeToString()
+        )
         trailing.append(("grpc-status-details-bin", status.SerializeToString()))
     if pushback is not None:
         trailing.append(("grpc-retry-pushback-ms", pushback))
@@ -95,8 +103,9 @@ class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusService
             response = hull_pb2.AppendPointsResponse()
             if request.HasField("open"):
                 if self.missing and not request.open.create_if_absent:
-                    refuse(context, grpc.StatusCode.NOT_FOUND, "no such hull",
-                           reason="HULL_NOT_FOUND")
+                    refuse(
+                        context, grpc.StatusCode.NOT_FOUND, "no such hull", reason="HULL_NOT_FOUND"
+                    )
                 opened = response.opened
                 opened.header.store_id = self.store_id
                 opened.hull.create_revision = self.create_revision
@@ -108,8 +117,11 @@ class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusService
             self.before(sequence, context)
             points = len(request.chunk.points.xyz) // 3
             response.ack.sequence = sequence
-            response.ack.outcome = (hull_pb2.APPEND_OUTCOME_ALREADY_APPLIED if sequence in self.chunks
-                                    else hull_pb2.APPEND_OUTCOME_APPLIED)
+            response.ack.outcome = (
+                hull_pb2.APPEND_OUTCOME_ALREADY_APPLIED
+                if sequence in self.chunks
+                else hull_pb2.APPEND_OUTCOME_APPLIED
+            )
             self.chunks.setdefault(sequence, points)
             response.ack.counts.received = points
             self.after(sequence, context)

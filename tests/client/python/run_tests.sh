@@ -23,7 +23,8 @@ done
 rm -rf "$work"
 mkdir -p "$work"
 "$python" -m venv --system-site-packages "$work/venv"
-"$work/venv/bin/pip" install --quiet --disable-pip-version-check --no-build-isolation --no-index "$here/../../../client/python"
+"$work/venv/bin/pip" install --quiet --disable-pip-version-check --no-build-isolation \
+  --no-index "$here/../../../client/python"
 
 export HULLD_BINARY=$programs/hulld HULLCTL_BINARY=$programs/hullctl PYTHONDONTWRITEBYTECODE=1
 unset HULLCTL_SERVER HULLCTL_CONTEXT HULLD_TOKEN PYTHONPATH MYPYPATH

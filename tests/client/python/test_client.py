@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import inspect
 import pathlib
 import subprocess
+import threading
 from typing import Any
 
 import numpy as np
@@ -34,10 +36,13 @@ def test_both_clients_have_one_surface() -> None:
             if not name.startswith("_")
         }
 
-    for sync, other in ((hulld.Client, hulld.AsyncClient), (hulld.Appender, hulld.AsyncAppender),
-                        (hulld.CollisionStream, hulld.AsyncCollisionStream),
-                        (hulld.HullWatch, hulld.AsyncHullWatch),
-                        (hulld.CollisionWatch, hulld.AsyncCollisionWatch)):
+    for sync, other in (
+        (hulld.Client, hulld.AsyncClient),
+        (hulld.Appender, hulld.AsyncAppender),
+        (hulld.CollisionStream, hulld.AsyncCollisionStream),
+        (hulld.HullWatch, hulld.AsyncHullWatch),
+        (hulld.CollisionWatch, hulld.AsyncCollisionWatch),
+    ):
         # What a constructor does, an asynchronous one cannot: `open` is extra.
         found = surface(other)
         found.pop("open", None)
@@ -65,10 +70,14 @@ def test_a_hull_is_created_listed_and_deleted(either: Any, name: str) -> None:
     put(either, f"{name}/b")
     assert [hull.hull_id for hull in either.list_hulls(f"{name}/")] == [f"{name}/a", f"{name}/b"]
     assert [hull.hull_id for hull in either.list_hulls(f"{name}/", page_size=1)] == [
-        f"{name}/a", f"{name}/b"]
+        f"{name}/a",
+        f"{name}/b",
+    ]
     with pytest.raises(hulld.AbortedError) as stale:
         either.delete_hull(f"{name}/b", if_revision=1)
-    assert int(stale.value.metadata["current_revision"]) == either.get_hull(f"{name}/b").info.revision
+    assert (
+        int(stale.value.metadata["current_revision"]) == either.get_hull(f"{name}/b").info.revision
+    )
     for hull in ("a", "b"):
         assert either.delete_hull(f"{name}/{hull}").revision > 0
     assert list(either.list_hulls(f"{name}/")) == []
@@ -86,15 +95,19 @@ def test_floats_are_widened_exactly(either: Any, name: str, rng: np.random.Gener
     points = ball(rng, 50).astype(np.float32)
     put(either, name, points)
     vertices = either.get_hull_mesh(name).vertices
-    assert {tuple(v) for v in vertices.tolist()} <= {tuple(p) for p in points.astype(float).tolist()}
+    assert {tuple(v) for v in vertices.tolist()} <= {
+        tuple(p) for p in points.astype(float).tolist()
+    }
     assert len(vertices) > 40
 
 
-def test_points_are_counted_and_cut_into_chunks(either: Any, name: str,
-                                                rng: np.random.Generator) -> None:
+def test_points_are_counted_and_cut_into_chunks(
+    either: Any, name: str, rng: np.random.Generator
+) -> None:
     inside = rng.uniform(0.1, 0.9, (1000, 3))
-    done = either.append_points(name, np.concatenate([CUBE, CUBE, inside]), create=True,
-                                chunk_bytes=24 * 100)
+    done = either.append_points(
+        name, np.concatenate([CUBE, CUBE, inside]), create=True, chunk_bytes=24 * 100
+    )
     assert done.chunks == 11 and done.points == done.points_acknowledged == 1016
     assert done.counts == hulld.PointCounts(1016, 8, 8, 1000)
     assert done.vertex_count == 8 and done.durability == hulld.Durability.MEMORY
@@ -159,10 +172,15 @@ def test_an_error_in_a_with_block_is_the_one_that_is_seen(either: Any, name: str
 
 
 def test_missing_hulls_are_named(either: Any, name: str) -> None:
-    for call in (lambda: either.get_hull(name), lambda: either.get_hull_mesh(name),
-                 lambda: either.append_points(name, CUBE), lambda: either.delete_hull(name),
-                 lambda: either.replace_hull(name, CUBE), lambda: either.check_collision(name, name),
-                 lambda: list(either.iter_hull_mesh(name))):
+    for call in (
+        lambda: either.get_hull(name),
+        lambda: either.get_hull_mesh(name),
+        lambda: either.append_points(name, CUBE),
+        lambda: either.delete_hull(name),
+        lambda: either.replace_hull(name, CUBE),
+        lambda: either.check_collision(name, name),
+        lambda: list(either.iter_hull_mesh(name)),
+    ):
         with pytest.raises(hulld.NotFoundError) as caught:
             call()
         assert caught.value.reason == "HULL_NOT_FOUND"
@@ -201,8 +219,9 @@ def test_a_mesh_has_vertices_facets_and_triangles(either: Any, name: str) -> Non
     assert sum(len(p.vertices) for p in parts if isinstance(p, hulld.MeshVertices)) == 8
 
 
-def test_a_mesh_of_many_messages_is_put_together(either: Any, name: str,
-                                                 rng: np.random.Generator) -> None:
+def test_a_mesh_of_many_messages_is_put_together(
+    either: Any, name: str, rng: np.random.Generator
+) -> None:
     points = ball(rng, 60000)
     put(either, name, points)
     assert sum(isinstance(p, hulld.MeshVertices) for p in either.iter_hull_mesh(name)) > 1
@@ -220,8 +239,9 @@ def test_flat_and_empty_hulls_have_meshes(either: Any, name: str) -> None:
     assert either.get_hull(f"{name}-empty").box is None
 
 
-def test_a_simpler_hull_says_how_far_off_it_is(either: Any, name: str,
-                                               rng: np.random.Generator) -> None:
+def test_a_simpler_hull_says_how_far_off_it_is(
+    either: Any, name: str, rng: np.random.Generator
+) -> None:
     put(either, name, ball(rng, 500))
     inside = either.get_hull_mesh(name, side="inside", max_vertices=40)
     assert len(inside.vertices) <= 40 and 0 < inside.error < 1
@@ -241,8 +261,16 @@ def test_one_pair_is_answered_with_all_that_is_wanted(either: Any, name: str) ->
     plain = either.check_collision(name, (name, (1, 0, 0)))
     assert plain.relation == hulld.Relation.TOUCHING and plain.colliding
     assert plain.separation is plain.axis is plain.witness is plain.certificate is None
-    full = either.check_collision(name, (name, (3, 0, 0)), axis=True, analysis=True, witness=True,
-                                  certificate=True, separation=True, clearance=2.0)
+    full = either.check_collision(
+        name,
+        (name, (3, 0, 0)),
+        axis=True,
+        analysis=True,
+        witness=True,
+        certificate=True,
+        separation=True,
+        clearance=2.0,
+    )
     assert full.relation == hulld.Relation.SEPARATED and full.within_clearance is True
     assert abs(full.separation.value - 2) <= full.separation.bound
     assert full.witness.point_b[0] - full.witness.point_a[0] == pytest.approx(2)
@@ -258,9 +286,11 @@ def test_one_pair_is_answered_with_all_that_is_wanted(either: Any, name: str) ->
 
 def test_the_smallest_double_decides(either: Any, name: str) -> None:
     put(either, name)
-    for x, relation in ((1.0, hulld.Relation.TOUCHING),
-                        (np.nextafter(1, 2), hulld.Relation.SEPARATED),
-                        (np.nextafter(1, 0), hulld.Relation.OVERLAPPING)):
+    for x, relation in (
+        (1.0, hulld.Relation.TOUCHING),
+        (np.nextafter(1, 2), hulld.Relation.SEPARATED),
+        (np.nextafter(1, 0), hulld.Relation.OVERLAPPING),
+    ):
         assert either.check_collision(name, (name, (x, 0, 0))).relation == relation
         packed = hulld.Placements(name, [(0, 0, 0), (x, 0, 0)])
         assert either.check_collisions(packed).answers.relations.tolist() == [relation]
@@ -274,23 +304,38 @@ def test_an_answer_is_neither_true_nor_false(either: Any, name: str) -> None:
         bool(either.check_collisions([name, name]).answers)
 
 
-def test_a_batch_answers_as_single_questions_do(either: Any, name: str,
-                                                rng: np.random.Generator) -> None:
+def test_a_batch_answers_as_single_questions_do(
+    either: Any, name: str, rng: np.random.Generator
+) -> None:
     put(either, name, ball(rng, 40))
     poses = np.concatenate([rng.normal(size=(12, 4)), rng.uniform(-1.5, 1.5, (12, 3))], axis=1)
-    batch = either.check_collisions(hulld.Placements(name, poses), separation=True, witness=True,
-                                    axis=True, certificate=True, analysis=True, clearance=0.1)
+    batch = either.check_collisions(
+        hulld.Placements(name, poses),
+        separation=True,
+        witness=True,
+        axis=True,
+        certificate=True,
+        analysis=True,
+        clearance=0.1,
+    )
     answers = batch.answers
     assert len(batch.pairs) == len(answers) == 66
     assert {1, 3} <= set(answers.relations.tolist())
     for row, (a, b) in enumerate(batch.pairs):
-        one = either.check_collision((name, poses[a]), (name, poses[b]), separation=True,
-                                     witness=True, axis=True, clearance=0.1)
+        one = either.check_collision(
+            (name, poses[a]),
+            (name, poses[b]),
+            separation=True,
+            witness=True,
+            axis=True,
+            clearance=0.1,
+        )
         assert answers.relations[row] == one.relation
         assert answers.separations[row] == one.separation.value
         assert answers.separation_bounds[row] == one.separation.bound
-        np.testing.assert_array_equal(answers.witness_points[row],
-                                      [one.witness.point_a, one.witness.point_b])
+        np.testing.assert_array_equal(
+            answers.witness_points[row], [one.witness.point_a, one.witness.point_b]
+        )
         assert answers.within_clearance[row] == one.within_clearance
         assert (answers.axes[row] is None) == (one.axis is None)
     assert all(certificate is not None for certificate in answers.certificates)
@@ -298,8 +343,9 @@ def test_a_batch_answers_as_single_questions_do(either: Any, name: str,
     assert batch.hulls[name].revision == either.get_hull(name).info.revision
 
 
-def test_a_batch_of_many_messages_comes_in_order(either: Any, name: str,
-                                                 rng: np.random.Generator) -> None:
+def test_a_batch_of_many_messages_comes_in_order(
+    either: Any, name: str, rng: np.random.Generator
+) -> None:
     put(either, name)
     shifts = rng.integers(0, 4, (600, 3)).astype(float)
     pairs = rng.integers(0, 600, (150000, 2))
@@ -313,8 +359,7 @@ def test_a_batch_of_many_messages_comes_in_order(either: Any, name: str,
     at = 0
     for part in parts:
         assert part.first_pair == at or len(part.answers) == 0
-        np.testing.assert_array_equal(part.answers.relations,
-                                      expected[at : at + len(part.answers)])
+        np.testing.assert_array_equal(part.answers.relations, expected[at : at + len(part.answers)])
         at += len(part.answers)
     assert at == len(pairs)
 
@@ -343,8 +388,9 @@ def test_a_tolerance_may_leave_a_pair_open(either: Any, name: str) -> None:
 
 def test_the_textbook_agrees(either: Any, name: str) -> None:
     put(either, name)
-    answer = either.check_collision(name, (name, (1, 0, 0)), method=hulld.Method.TEXTBOOK_SAT,
-                                    analysis=True)
+    answer = either.check_collision(
+        name, (name, (1, 0, 0)), method=hulld.Method.TEXTBOOK_SAT, analysis=True
+    )
     assert answer.relation == hulld.Relation.TOUCHING and answer.analysis.axes_total > 0
 
 
@@ -361,8 +407,13 @@ def test_a_scene_finds_what_a_batch_finds(either: Any, name: str, rng: np.random
     groups = np.arange(60) % 2
     apart = either.find_collisions(placements, groups=groups, ignore_same_group=True)
     np.testing.assert_array_equal(apart.pairs, scene.pairs[(scene.pairs.sum(axis=1) % 2) == 1])
-    none = either.find_collisions(placements, groups=groups, ignore_same_group=True,
-                                  ignored_group_pairs=[(0, 1)], separation=True)
+    none = either.find_collisions(
+        placements,
+        groups=groups,
+        ignore_same_group=True,
+        ignored_group_pairs=[(0, 1)],
+        separation=True,
+    )
     assert none.pairs.shape == (0, 2) and none.answers.separations.shape == (0,)
     near = either.find_collisions(placements, clearance=0.5)
     assert len(near.pairs) > len(scene.pairs) and near.answers.within_clearance.all()
@@ -445,6 +496,7 @@ def test_a_watch_that_is_refused_says_why(either: Any) -> None:
 def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) -> None:
     put(either, name)
     with either.watch_collisions([name, (name, (3, 0, 0))], clearance=1.5) as watch:
+
         def events_of(update: int) -> list[str]:
             found: list[str] = []
             while True:
@@ -454,8 +506,9 @@ def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) ->
                     return found
 
         assert events_of(0) == []
-        for update, (x, expected) in enumerate([(2, ["NEAR"]), (1, ["TOUCH"]), (0.5, ["ENTER"]),
-                                                (9, ["EXIT"])], 1):
+        for update, (x, expected) in enumerate(
+            [(2, ["NEAR"]), (1, ["TOUCH"]), (0.5, ["ENTER"]), (9, ["EXIT"])], 1
+        ):
             watch.update([1], [(x, 0, 0)])
             assert events_of(update) == expected
         watch.update([1], [(1.5, 0, 0)])
@@ -470,6 +523,36 @@ def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) ->
     assert list(watch) == []
 
 
+@pytest.mark.parametrize("kind", ["hulls", "collisions"])
+def test_another_thread_ends_a_watch(client: hulld.Client, name: str, kind: str) -> None:
+    put(client, name)
+    watch = client.watch_hulls(name) if kind == "hulls" else client.watch_collisions([name, name])
+    synced, seen = threading.Event(), []
+
+    def follow() -> None:
+        for changes in watch:
+            seen.append(changes)
+            if changes.synced:
+                synced.set()
+
+    follower = threading.Thread(target=follow)
+    follower.start()
+    assert synced.wait(60)
+    watch.cancel()
+    follower.join(60)
+    assert not follower.is_alive() and seen
+
+
+def test_many_threads_use_one_client(client: hulld.Client, name: str) -> None:
+    put(client, name)
+    shifts = np.linspace(0, 2, 65)
+    with concurrent.futures.ThreadPoolExecutor(8) as pool:
+        found = list(
+            pool.map(lambda x: client.check_collision(name, (name, (x, 0, 0))).relation, shifts)
+        )
+    assert found == [3] * 32 + [2] + [1] * 32
+
+
 # --- Backup ---
 
 
@@ -481,9 +564,18 @@ def test_a_backup_is_what_hullctl_restores(connect: Any, tmp_path: pathlib.Path,
         backup = client.save_backup(saved)
         assert backup.file_count > 0 and backup.byte_count > 0
         assert saved.stat().st_mode & 0o077 == 0
-    subprocess.run([hulld.find_program("hullctl"), "backup", "restore", saved, "--data-dir",
-                    tmp_path / "again"],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [
+            hulld.find_program("hullctl"),
+            "backup",
+            "restore",
+            saved,
+            "--data-dir",
+            tmp_path / "again",
+        ],
+        check=True,
+        capture_output=True,
+    )
     with hulld.LocalServer(data_dir=tmp_path / "again") as server:
         assert connect(server.address).get_hull(name).info.vertex_count == 8
 

@@ -13,15 +13,23 @@ EXAMPLES = SOURCE / "client/python/examples"
 
 
 def run(name: str, *arguments: object, cwd: pathlib.Path) -> str:
-    done = subprocess.run([sys.executable, str(EXAMPLES / name), *map(str, arguments)], cwd=cwd,
-                          capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / name), *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_each_example_has_a_test() -> None:
     assert {path.name for path in EXAMPLES.iterdir() if path.suffix == ".py"} == {
-        "depth_frame.py", "robot_self_collision.py", "trade_plot.py"}
+        "depth_frame.py",
+        "robot_self_collision.py",
+        "trade_plot.py",
+    }
 
 
 def test_the_gripper_stops_above_the_egg(tmp_path: pathlib.Path) -> None:
@@ -39,7 +47,9 @@ def test_a_robot_of_two_links_hits_its_base(tmp_path: pathlib.Path) -> None:
 
 
 def test_a_ur5_hits_itself(tmp_path: pathlib.Path, data: pathlib.Path) -> None:
-    said = run("robot_self_collision.py", data / "example-robot-data", "--samples", 100, cwd=tmp_path)
+    said = run(
+        "robot_self_collision.py", data / "example-robot-data", "--samples", 100, cwd=tmp_path
+    )
     assert "upper_arm_link: 3528 points, " in said
     assert re.search(r"^[1-9][0-9]* of 100 poses collide; 11 pairs asked about$", said, re.M)
     # Joined links, and those that the SRDF excludes, are not asked about.

@@ -1,4 +1,4 @@
-"""What fails is tried again where that is safe, told where it is not, and nothing is applied twice."""
+"""What fails is tried again where that is safe, and told where it is not."""
 
 from __future__ import annotations
 
@@ -35,13 +35,24 @@ def unavailable(context: Any) -> None:
 
 
 def busy(context: Any) -> None:
-    refuse(context, grpc.StatusCode.RESOURCE_EXHAUSTED, "too many calls", reason="OVERLOADED",
-           metadata={"flag": "max-calls", "limit": "1"}, pushback="1")
+    refuse(
+        context,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        "too many calls",
+        reason="OVERLOADED",
+        metadata={"flag": "max-calls", "limit": "1"},
+        pushback="1",
+    )
 
 
 def full(context: Any) -> None:
-    refuse(context, grpc.StatusCode.RESOURCE_EXHAUSTED, "too many hulls", reason="LIMIT_EXCEEDED",
-           metadata={"flag": "max-hulls"})
+    refuse(
+        context,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        "too many hulls",
+        reason="LIMIT_EXCEEDED",
+        metadata={"flag": "max-hulls"},
+    )
 
 
 # --- Single calls ---
@@ -84,8 +95,15 @@ def test_a_limit_without_a_hint_is_final(caller: Any, fake: FakeHulld) -> None:
 
 def test_a_hint_beyond_the_deadline_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
     client = connect(fake.address, timeout=5)
-    fake.script = [lambda context: refuse(context, grpc.StatusCode.RESOURCE_EXHAUSTED, "busy",
-                                          reason="OVERLOADED", pushback="3600000")]
+    fake.script = [
+        lambda context: refuse(
+            context,
+            grpc.StatusCode.RESOURCE_EXHAUSTED,
+            "busy",
+            reason="OVERLOADED",
+            pushback="3600000",
+        )
+    ]
     with pytest.raises(hulld.ResourceExhaustedError) as caught:
         client.get_status()
     assert caught.value.retry_after == 3600 and len(fake.calls) == 1
@@ -152,7 +170,9 @@ def test_a_lost_connection_applies_each_chunk_once(caller: Any, fake: FakeHulld)
 def test_another_hull_is_not_appended_to(caller: Any, fake: FakeHulld, change: str) -> None:
     def replace(sequence: int, context: Any) -> None:
         if sequence == 2:
-            setattr(fake, change, {"store_id": "other", "create_revision": 2, "missing": True}[change])
+            setattr(
+                fake, change, {"store_id": "other", "create_revision": 2, "missing": True}[change]
+            )
             unavailable(context)
 
     fake.before = replace
@@ -233,8 +253,9 @@ def test_details_of_others_and_malformed_ones_are_left_out() -> None:
 
 
 def test_errors_travel_between_processes() -> None:
-    error = hulld.NotFoundError("no", reason="HULL_NOT_FOUND", metadata={"hull_id": "a"},
-                                request_id="7")
+    error = hulld.NotFoundError(
+        "no", reason="HULL_NOT_FOUND", metadata={"hull_id": "a"}, request_id="7"
+    )
     again = pickle.loads(pickle.dumps(error))
     assert type(again) is hulld.NotFoundError and str(again) == str(error)
     assert again.metadata == {"hull_id": "a"}

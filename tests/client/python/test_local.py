@@ -55,12 +55,15 @@ def test_a_server_that_does_not_start_says_why() -> None:
 
 
 def test_the_server_ends_with_a_script_that_is_killed() -> None:
-    script = ("import hulld, sys, time\n"
-              "with hulld.local() as client:\n"
-              "    print(client.server, flush=True)\n"
-              "    sys.stdin.read()\n")
-    with subprocess.Popen([sys.executable, "-c", script], stdin=subprocess.PIPE,
-                          stdout=subprocess.PIPE, text=True) as running:
+    script = (
+        "import hulld, sys, time\n"
+        "with hulld.local() as client:\n"
+        "    print(client.server, flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as running:
         assert running.stdout is not None
         address = running.stdout.readline().strip()
         with hulld.Client(address, retry=hulld.RetryPolicy(max_attempts=1)) as client:
@@ -91,6 +94,7 @@ def test_programs_are_found_by_variable_path_and_build(
     (tmp_path / "tree/deep").mkdir()
     monkeypatch.chdir(tmp_path / "tree/deep")
     monkeypatch.setenv("PATH", str(on_path.parent))
+    monkeypatch.delenv("HULLCTL_BINARY", raising=False)
     monkeypatch.setenv("HULLD_BINARY", str(named))
     assert hulld.find_program("hulld") == named
     program(tmp_path / "named/hullctl")

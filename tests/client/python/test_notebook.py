@@ -24,7 +24,9 @@ def test_a_collision_shows_both_hulls_and_its_numbers(either: Any, name: str) ->
         assert "<iframe" in view._repr_html_() and name in view._repr_html_()
 
 
-def test_without_hullctl_a_table_says_so(either: Any, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_hullctl_a_table_says_so(
+    either: Any, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     either.append_points(name, CUBE, create=True)
     monkeypatch.setenv("HULLCTL_BINARY", "/nowhere/hullctl")
     shown = either.get_hull(name)._repr_html_()

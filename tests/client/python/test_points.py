@@ -40,7 +40,7 @@ def test_integers_pass_where_a_double_holds_them() -> None:
     assert hulld.as_points(exact).tolist() == [[2.0**53, -(2.0**60), 2.0**62]]
     assert hulld.as_points(np.array([[1, 2, 3]], np.int8)).tolist() == [[1, 2, 3]]
     for bad in (2**53 + 1, 2**63 - 1, -(2**53) - 1):
-        with pytest.raises(ValueError, match=rf"points\[0\]\.z is {bad}"):
+        with pytest.raises(ValueError, match=rf"points\[0\]\[2\] is {bad}"):
             hulld.as_points(np.array([[0, 0, bad]]))
     with pytest.raises(ValueError, match="no double holds exactly"):
         hulld.as_points(np.array([[0, 0, 2**64 - 1]], np.uint64))

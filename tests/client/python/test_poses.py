@@ -57,11 +57,13 @@ def test_quarter_turns_are_exact() -> None:
             w, x, y, z = hulld.Pose.from_matrix(matrix(R)).rotation
             # The rotation of an unnormalized quaternion, in integers: no rounding anywhere.
             norm = w * w + x * x + y * y + z * z
-            exact = np.array([
-                [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-            ])
+            exact = np.array(
+                [
+                    [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                    [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+                    [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+                ]
+            )
             assert (exact == norm * R).all()
     assert turns == 24
 
@@ -98,17 +100,30 @@ def test_a_tolerance_is_the_callers_to_give() -> None:
     assert np.abs(pose.matrix() - rough).max() < 1e-6
 
 
-@pytest.mark.parametrize(("bad", "message"), [
-    (np.diag([1.0, 1, -1, 1]), "mirrors"),
-    (np.diag([1.0, 1, 1, 2]), "last row"),
-    (np.full((4, 4), np.nan), "not finite"),
-    (np.zeros((4, 4)), "last row"),
-    (np.diag([0.0, 0, 0, 1]), "off the identity by 1,"),
-    (np.diag([1e200, 1, 1, 1]), "off the identity by inf"),
-])
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        (np.diag([1.0, 1, -1, 1]), "mirrors"),
+        (np.diag([1.0, 1, 1, 2]), "last row"),
+        (np.full((4, 4), np.nan), "not finite"),
+        (np.zeros((4, 4)), "last row"),
+        (np.diag([0.0, 0, 0, 1]), "off the identity by 1,"),
+        (np.diag([1e200, 1, 1, 1]), "off the identity by inf"),
+    ],
+)
 def test_what_is_no_motion_is_refused(bad: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         hulld.Pose.from_matrix(bad)
+
+
+def test_numbers_that_no_double_holds_are_refused() -> None:
+    with pytest.raises(ValueError, match=rf"pose\[0\] is {2**53 + 1}, which no double holds"):
+        hulld.pack_poses([np.array([2**53 + 1, 0, 0])])
+    with pytest.raises(ValueError, match="no double holds"):
+        hulld.pack_poses(np.ones((1, 7), np.longdouble) / 3)
+    with pytest.raises(TypeError, match="not numbers"):
+        hulld.pack_poses([("a", "b", "c")])
+    assert hulld.pack_poses(np.ones((1, 3), np.float32)).dtype == np.float64
 
 
 def test_a_pose_has_four_and_three_numbers() -> None:

@@ -18,7 +18,11 @@ CONFIGURATION = SOURCE / "client/python/pyproject.toml"
 def check(*arguments: str, cwd: pathlib.Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(cwd / "cache"), *arguments],
-        cwd=cwd, capture_output=True, text=True, check=False)
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_the_package_is_typed(tmp_path: pathlib.Path) -> None:
@@ -43,7 +47,8 @@ def test_a_users_mistakes_are_seen(tmp_path: pathlib.Path) -> None:
         "    client.get_hull('a').vertices\n"
         "async def ask(client: hulld.AsyncClient) -> None:\n"
         "    reveal_type(await client.get_hull_mesh('a'))\n"
-        "    client.get_hull('a').info\n")
+        "    client.get_hull('a').info\n"
+    )
     said = check("user.py", cwd=tmp_path).stdout
     assert 'user.py:3: note: Revealed type is "hulld.answers.collisions.Relation"' in said
     assert 'user.py:4: error: Argument 1 to "get_hull" of "Client"' in said

@@ -14,7 +14,9 @@ from hulld.wire import MessageWriter, WireError, packed_doubles, packed_varints,
 from hulld.wire.fields import encode_varints
 
 # Each length of a varint, and both sides of each step.
-STEPS = sorted({max(0, min((1 << bits) + d, 2**32 - 1)) for bits in range(33) for d in (-1, 0, 1)})
+STEPS = sorted(
+    {max(0, min((1 << bits) + d, 2**32 - 1)) for bits in range(33) for d in (-1, 0, 1)}
+)
 # Doubles whose bits a conversion would lose: signed zeros, subnormals, the largest.
 HARD = [0.0, -0.0, 5e-324, -2.2e-308, 1.7976931348623157e308, 0.1, 1 / 3, np.pi]
 
@@ -45,11 +47,11 @@ def test_points_are_what_protobuf_reads() -> None:
     points = np.array(HARD + [1.0], float).reshape(-1, 3)
     block = geometry_pb2.PointBlock.FromString(point_block(as_points(points)).finish())
     assert struct.pack("<9d", *block.xyz) == points.tobytes()
-    assert point_block(as_points(points)).finish() == geometry_pb2.PointBlock(
-        xyz=points.reshape(-1).tolist()
-    ).SerializeToString()
-    floats = points.astype(np.float32)
-    floats[~np.isfinite(floats)] = 3e38
+    assert (
+        point_block(as_points(points)).finish()
+        == geometry_pb2.PointBlock(xyz=points.reshape(-1).tolist()).SerializeToString()
+    )
+    floats = np.where(np.abs(points) < 3e38, points, 3e38).astype(np.float32)
     read = geometry_pb2.PointBlock.FromString(point_block(as_points(floats)).finish())
     assert struct.pack("<9f", *read.xyz_float) == floats.tobytes() and not read.xyz
 
@@ -78,9 +80,12 @@ def test_nested_messages_and_empty_arrays_are_as_protobufs() -> None:
     request = hull_pb2.ReplaceHullRequest(points=geometry_pb2.PointBlock())
     assert MessageWriter().message(2, inner).finish() == request.SerializeToString()
     raw = geometry_pb2.PointBlock(xyz=[1, 2, 3]).SerializeToString()
-    assert MessageWriter().message(2, raw).finish() == hull_pb2.ReplaceHullRequest(
-        points=geometry_pb2.PointBlock(xyz=[1, 2, 3])
-    ).SerializeToString()
+    assert (
+        MessageWriter().message(2, raw).finish()
+        == hull_pb2.ReplaceHullRequest(
+            points=geometry_pb2.PointBlock(xyz=[1, 2, 3])
+        ).SerializeToString()
+    )
 
 
 def test_fields_of_all_wire_types_are_found() -> None:
@@ -94,7 +99,9 @@ def test_unpacked_fields_are_read_too() -> None:
     assert packed_doubles(memoryview(struct.pack("<d", 0.1))).tolist() == [0.1]
 
 
-@pytest.mark.parametrize("data", [b"\x0a\x05abc", b"\x08", b"\x08\xff", b"\x0b", b"\x02\x00", b"\x11abc"])
+@pytest.mark.parametrize(
+    "data", [b"\x0a\x05abc", b"\x08", b"\x08\xff", b"\x0b", b"\x02\x00", b"\x11abc"]
+)
 def test_what_is_cut_off_or_no_message_is_refused(data: bytes) -> None:
     with pytest.raises(WireError):
         list(read_fields(data))

@@ -187,8 +187,7 @@ class AsyncAppender:
             raise self._fail(
                 DeadlineExceededError(
                     f"the server acknowledged no chunk for {self._timeout} s; "
-                    f"{self.totals.points_acknowledged} points are "
-                    f"committed"
+                    f"{self.totals.points_acknowledged} points are committed"
                 )
             ) from None
         except HulldError as error:

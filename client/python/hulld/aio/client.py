@@ -24,8 +24,9 @@ from hulld.answers.hulls import (
     HullMesh,
     MeshAssembly,
     MeshPart,
+    ReplacedHull,
+    decode_replaced,
 )
-from hulld.answers.hulls import ReplacedHull, decode_replaced
 from hulld.answers.status import ServerStatus
 from hulld.appender import chunks_to_send
 from hulld.backup import Backup, BackupWriter

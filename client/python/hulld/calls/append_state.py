@@ -123,15 +123,15 @@ class AppendState:
         ):
             raise FailedPreconditionError(
                 f'hull "{self.hull_id}" is another one since the connection was lost; '
-                f"{self._acknowledged} acknowledged "
-                f"points are gone with the old one; append everything again"
+                f"{self._acknowledged} acknowledged points are gone with the old one; append "
+                "everything again"
             )
         first = self._next_sequence - len(self._unacknowledged)
         if not first - 1 <= opened.last_sequence < self._next_sequence:
             raise InternalError(
                 f'the server\'s last sequence of writer "{self.writer_id}" is '
-                f"{opened.last_sequence}, which this stream "
-                f"cannot continue; does another client write under the same name?"
+                f"{opened.last_sequence}, which this stream cannot continue; does another client "
+                "write under the same name?"
             )
         self._reconnects += 1
         self._drop(opened.last_sequence, recovered=True)

@@ -34,7 +34,7 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
         array = array.reshape(1, 3)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} has the shape {array.shape}; it takes (n, 3), x y z in each row")
-    array = _as_floats(array, name)
+    array = as_floats(array, name)
     finite = np.isfinite(array)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
@@ -45,7 +45,9 @@ def as_points(points: PointsLike, name: str = "points") -> Points:
     return array
 
 
-def _as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
+def as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
+    """The same numbers as float64 or float32. ValueError: no double holds one of them, which is
+    named. TypeError: no numbers."""
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "f" and size in (4, 8):
         # The wire is little-endian.
@@ -64,11 +66,11 @@ def _as_floats(array: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
     if kind == "f":
         same |= np.isnan(array)
     if not same.all():
-        row, column = np.argwhere(~same)[0]
+        at = tuple(int(index) for index in np.argwhere(~same)[0])
+        place = "".join(f"[{index}]" for index in at)
         raise ValueError(
-            f"{name}[{row}].{'xyz'[column]} is {array[row, column]}, which no double holds "
-            "exactly; "
-            f"round it to what you mean, as in {name}.astype(float)"
+            f"{name}{place} is {array[at]}, which no double holds "
+            f"exactly; round it to what you mean, as in {name}.astype(float)"
         )
     return doubles
 

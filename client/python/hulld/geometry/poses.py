@@ -9,6 +9,8 @@ from typing import Any, Union
 import numpy as np
 import numpy.typing as npt
 
+from hulld.geometry.points import as_floats
+
 #: How far R Rᵀ of a matrix may be from the identity, in its largest entry. It is relative to 1, the
 #: length of a row: within it, a hull of 1 m stands within about a nanometre of where the matrix
 #: would put it. Products of hundreds of rotations in double precision stay far below (observed:
@@ -52,7 +54,7 @@ class Pose:
         ValueError where R Rᵀ is farther than `tolerance` from the identity (says how far), where R
         mirrors, where the last row is not 0 0 0 1, where a number is not finite.
         """
-        array = np.asarray(matrix, np.float64)
+        array = _doubles(matrix)
         if array.shape != (4, 4):
             raise ValueError(f"the matrix has the shape {array.shape}; it takes (4, 4)")
         return cls.from_packed(pack_matrices(array.reshape(1, 4, 4), tolerance=tolerance)[0])
@@ -60,7 +62,7 @@ class Pose:
     @classmethod
     def from_packed(cls, numbers: npt.ArrayLike) -> Pose:
         """The pose of seven numbers, w x y z x y z."""
-        values = [float(value) for value in np.asarray(numbers, np.float64)]
+        values = [float(value) for value in _doubles(numbers)]
         if len(values) != 7:
             raise ValueError(f"a packed pose has seven numbers, not {len(values)}")
         return cls((values[0], values[1], values[2], values[3]), (values[4], values[5], values[6]))
@@ -82,18 +84,25 @@ PoseLike = Union[None, Pose, npt.ArrayLike]
 PosesLike = Union[npt.ArrayLike, Sequence[PoseLike]]
 
 
+def _doubles(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """ValueError: a number that no double holds."""
+    doubles: npt.NDArray[np.float64] = as_floats(np.asarray(values), "pose").astype(
+        np.float64, copy=False
+    )
+    return doubles
+
+
 def pack_pose(pose: PoseLike) -> npt.NDArray[np.float64]:
     """The seven numbers of one pose. Errors as in pack_poses."""
     if pose is None:
         return np.array([1.0, 0, 0, 0, 0, 0, 0])
     if isinstance(pose, Pose):
         return pose.packed()
-    array = np.asarray(pose, np.float64)
+    array = _doubles(pose)
     if array.shape not in ((3,), (7,), (4, 4)):
         raise ValueError(
             f"a pose of shape {array.shape} is none of (4, 4), a matrix; (7,), a quaternion and a "
-            "translation "
-            f"w x y z x y z; (3,), a translation"
+            "translation w x y z x y z; (3,), a translation"
         )
     packed: npt.NDArray[np.float64] = _pack_array(array[np.newaxis])[0]
     return packed
@@ -107,7 +116,7 @@ def pack_poses(poses: PosesLike) -> PackedPoses:
     is.
     """
     if isinstance(poses, np.ndarray) and poses.dtype != object:
-        return _pack_array(np.asarray(poses, np.float64))
+        return _pack_array(_doubles(poses))
     sequence: Sequence[Any] = list(poses)  # type: ignore[arg-type]
     if not sequence:
         return np.empty((0, 7))
@@ -136,8 +145,7 @@ def _pack_array(array: npt.NDArray[np.float64]) -> PackedPoses:
         return packed
     raise ValueError(
         f"poses of shape {array.shape} are none of (n, 4, 4), matrices; (n, 7), quaternions and "
-        "translations "
-        f"w x y z x y z; (n, 3), translations"
+        "translations w x y z x y z; (n, 3), translations"
     )
 
 
@@ -166,9 +174,8 @@ def _check_matrices(matrices: npt.NDArray[np.float64], tolerance: float) -> None
     if (index := first(~(off <= tolerance))) is not None:
         raise ValueError(
             f"poses[{index}]: the rotation is not orthogonal: R Rᵀ is off the identity by "
-            f"{off[index]:.3g}, and "
-            f"at most {tolerance:g} is allowed; orthonormalize it yourself, or allow more with "
-            f"Pose.from_matrix(..., tolerance=...)"
+            f"{off[index]:.3g}, and at most {tolerance:g} is allowed; orthonormalize it yourself, "
+            "or allow more with Pose.from_matrix(..., tolerance=...)"
         )
     if (index := first(np.linalg.det(rotations) < 0)) is not None:
         raise ValueError(
