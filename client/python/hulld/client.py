@@ -32,6 +32,7 @@ from hulld.calls import requests
 from hulld.calls.attempts import Attempts
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
 from hulld.calls.requests import Call, SceneFilter
+from hulld.calls.told_pairs import WatchedPlacements
 from hulld.calls.wanted import Wanted
 from hulld.collision_stream import CollisionStream
 from hulld.connection import DEFAULT_SERVER, Connection, PathLike, Tls
@@ -541,6 +542,7 @@ class Client:
         ignored_group_pairs: npt.ArrayLike | None = None,
         movers: int | None = None,
         clearance: float | None = None,
+        timeout: float | None = None,
     ) -> CollisionWatch:
         """Tells when pairs begin and end to collide, or to be within a clearance, because poses or
         hulls change. pairs: m x 2 indices of placements; None: a scene, with groups and movers as
@@ -551,8 +553,9 @@ class Client:
         return CollisionWatch(
             self._channel.stream_stream(requests.WATCH_COLLISIONS),
             self._connection.metadata(),
-            requests.open_watch(packed, asked, scene, clearance),
-            len(packed),
+            WatchedPlacements(packed, asked, scene, clearance),
+            self._retry,
+            self._seconds(timeout),
         )
 
     # --- How calls are made ---

@@ -140,12 +140,20 @@ class CollisionStream:
         raise failed
 
 
-def encode_update(
-    placements: npt.ArrayLike, poses: PosesLike, count: int, refresh_hulls: bool
-) -> bytes:
-    """A message that moves some of `count` placements; errors as in CollisionStream.update."""
+def check_update(
+    placements: npt.ArrayLike, poses: PosesLike, count: int
+) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float64]]:
+    """Indices of some of `count` placements, and their poses, packed; errors as in
+    CollisionStream.update."""
     indices = as_indices(placements, count, "placements").reshape(-1)
     packed = pack_poses(poses)
     if len(packed) != len(indices):
         raise ValueError(f"there are {len(packed)} poses for {len(indices)} placements")
-    return update_stream(indices, packed, refresh_hulls)
+    return indices, packed
+
+
+def encode_update(
+    placements: npt.ArrayLike, poses: PosesLike, count: int, refresh_hulls: bool
+) -> bytes:
+    """A message that moves placements; errors as in CollisionStream.update."""
+    return update_stream(*check_update(placements, poses, count), refresh_hulls)

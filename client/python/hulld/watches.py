@@ -17,16 +17,11 @@ from hulld.answers.collision_messages import decode_collision_changes
 from hulld.answers.collisions import CollisionChanges
 from hulld.answers.hulls import Header, HullChanges
 from hulld.calls.duplex import Duplex
-from hulld.calls.requests import Call
-from hulld.collision_stream import encode_update
-from hulld.errors import (
-    CancelledError,
-    HulldError,
-    InternalError,
-    UnavailableError,
-    from_rpc_error,
-    read_answer,
-)
+from hulld.calls.requests import Call, update_stream
+from hulld.calls.told_pairs import ToldPairs, WatchedPlacements
+from hulld.collision_stream import check_update
+from hulld.errors import HulldError, InternalError, UnavailableError, from_rpc_error, read_answer
+
 from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
 
@@ -149,45 +144,95 @@ class CollisionWatch:
     """An iterator over pairs that begin and end to collide, or to be within a clearance: because
     their poses change, which `update` says, and because their hulls change, which the server sees
     by itself. What happened between two messages is told as one event, or as none where it is as it
-    was.
+    was. A watch whose connection is lost goes on with the poses as they are by then: it tells what
+    changed meanwhile, and nothing twice, and is `synced` once more.
 
-    Never retried: what the server keeps of a watch ends with it. Iterating is for one thread;
-    update and cancel are for any. It ends when it is cancelled. A context manager, which cancels
-    it. Made by Client.watch_collisions.
+    It connects when it is first asked, and ends when it is cancelled. Iterating is for one thread;
+    update and cancel are for any. A context manager, which cancels it. Raises HulldError where the
+    server refuses it, or was not found again in time. Made by Client.watch_collisions.
     """
 
-    def __init__(self, call: Any, metadata: Any, opening: bytes, placements: int) -> None:
-        self._placements = placements
-        self._cancelled = False
-        self._connection = Duplex(call, metadata, MOST_WAITING)
-        self._connection.send(opening)
+    def __init__(
+        self,
+        call: Any,
+        metadata: Any,
+        watched: WatchedPlacements,
+        retry: RetryPolicy,
+        patience: float | None,
+    ) -> None:
+        self._call = call
+        self._metadata = metadata
+        self._watched = watched
+        self._told = ToldPairs(watched)
+        self._retry = retry
+        self._patience = patience
+        # Guards the poses, and that a call begins with them.
+        self._lock = threading.Lock()
+        self._connection: Duplex | None = None
+        self._updates_before = 0
+        self._first = self._connected = self._cancelled = False
 
     def __iter__(self) -> Iterator[CollisionChanges]:
         return self
 
     def __next__(self) -> CollisionChanges:
-        try:
-            message = self._connection.receive(None)
-        except CancelledError:
+        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
+        failures = 0
+        while True:
+            connection = self._open()
+            try:
+                message = connection.receive(None)
+                if message is not None:
+                    return self._take(read_answer(decode_collision_changes, message))
+                # The client never says that it has said all.
+                error: HulldError = InternalError("the server ended the watch without a cause")
+            except HulldError as ended:
+                error = ended
+            with self._lock:
+                self._connection = None
+                if self._cancelled:
+                    raise StopIteration
+            failures += 1
+            attempts = math.inf if self._connected else None
+            remaining = deadline - time.monotonic()
+            wait = self._retry.wait_after(failures, error, remaining, attempts)
+            if wait is None:
+                raise error
+            time.sleep(wait)
+
+    def _open(self) -> Duplex:
+        with self._lock:
             if self._cancelled:
-                raise StopIteration from None
-            raise
-        if message is None:
-            # The client never says that it has said all.
-            raise InternalError("the server ended the watch without a cause")
-        return read_answer(decode_collision_changes, message)
+                raise StopIteration
+            if self._connection is None:
+                self._connection = Duplex(self._call, self._metadata, MOST_WAITING)
+                self._connection.send(self._watched.opening())
+                self._updates_before = self._watched.updates
+                self._first = True
+            return self._connection
+
+    def _take(self, changes: CollisionChanges) -> CollisionChanges:
+        if self._first and self._connected:
+            self._told.start_anew()
+        self._first, self._connected = False, True
+        return self._told.take(changes, self._updates_before)
 
     def update(self, placements: npt.ArrayLike, poses: PosesLike) -> None:
         """Says where placements are now; arguments and ValueError as in CollisionStream.update. The
-        message that takes it into account has its number in `update`, counted from 1. Where the
-        watch has ended, iterating tells why.
-        """
-        self._connection.send(encode_update(placements, poses, self._placements, False))
+        message that takes it into account has its number in `update`, counted from 1. While there
+        is no connection it is noted, for the next."""
+        indices, packed = check_update(placements, poses, len(self._watched.placements))
+        with self._lock:
+            self._watched.move(indices, packed)
+            if self._connection is not None:
+                self._connection.send(update_stream(indices, packed, False))
 
     def cancel(self) -> None:
-        """Ends the iteration."""
-        self._cancelled = True
-        self._connection.cancel()
+        """Ends the iteration, now and ever after."""
+        with self._lock:
+            self._cancelled = True
+            if self._connection is not None:
+                self._connection.cancel()
 
     def __enter__(self) -> CollisionWatch:
         return self

@@ -523,6 +523,44 @@ def test_a_watch_tells_of_contacts_that_begin_and_end(either: Any, name: str) ->
     assert list(watch) == []
 
 
+def test_a_watch_of_collisions_outlives_its_server(
+    connect: Any, tmp_path: pathlib.Path, name: str
+) -> None:
+    def run() -> hulld.LocalServer:
+        listen = ["--listen", f"unix:{tmp_path}/socket"]
+        return hulld.LocalServer(data_dir=tmp_path / "hulls", options=listen)
+
+    def events_of(update: int) -> dict[tuple[int, int], str]:
+        found: dict[tuple[int, int], str] = {}
+        while True:
+            changes = next(watch)
+            for event in changes.events:
+                assert event.placements not in found
+                found[event.placements] = event.kind.name
+            if changes.synced and changes.update >= update:
+                return found
+
+    placements = [(name, (x, 0, 0)) for x in (0, 0.5, 9, 9.5, 30, 30.5, 50, 52)]
+    with run() as server:
+        client = connect(server.address, timeout=60)
+        put(client, name)
+        watch = client.watch_collisions(placements, clearance=1.5)
+        assert events_of(0) == {(0, 1): "ENTER", (2, 3): "ENTER", (4, 5): "ENTER", (6, 7): "NEAR"}
+        watch.update([1], [(3, 0, 0)])
+        assert events_of(1) == {(0, 1): "EXIT"}
+        watch.update([1], [(1, 0, 0)])
+        assert events_of(2) == {(0, 1): "TOUCH"}
+    watch.update([3, 7], [(15, 0, 0), (70, 0, 0)])
+    watch.update([1], [(0.5, 0, 0)])
+    with run() as server:
+        # What is as it was, the pair (4, 5), is not told again.
+        assert events_of(4) == {(0, 1): "ENTER", (2, 3): "EXIT", (6, 7): "FAR"}
+        client.delete_hull(name)
+        assert set(events_of(4).values()) == {"LOST"}
+        watch.cancel()
+        assert list(watch) == []
+
+
 @pytest.mark.parametrize("kind", ["hulls", "collisions"])
 def test_another_thread_ends_a_watch(client: hulld.Client, name: str, kind: str) -> None:
     put(client, name)

@@ -34,6 +34,7 @@ from hulld.calls import requests
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
 from hulld.calls.attempts import Attempts
 from hulld.calls.requests import Call, SceneFilter
+from hulld.calls.told_pairs import WatchedPlacements
 from hulld.calls.wanted import Wanted
 from hulld.client import DEFAULT_IN_FLIGHT_BYTES, DEFAULT_IN_FLIGHT_CHUNKS, DEFAULT_TIMEOUT
 from hulld.connection import DEFAULT_SERVER, Connection, PathLike, Tls
@@ -469,6 +470,7 @@ class AsyncClient:
         ignored_group_pairs: npt.ArrayLike | None = None,
         movers: int | None = None,
         clearance: float | None = None,
+        timeout: float | None = None,
     ) -> AsyncCollisionWatch:
         """As Client.watch_collisions."""
         packed = Placements.of(placements)
@@ -477,8 +479,9 @@ class AsyncClient:
         return AsyncCollisionWatch(
             self.channel.stream_stream(requests.WATCH_COLLISIONS),
             self._connection.metadata(),
-            requests.open_watch(packed, asked, scene, clearance),
-            len(packed),
+            WatchedPlacements(packed, asked, scene, clearance),
+            self._retry,
+            self._seconds(timeout),
         )
 
     # --- How calls are made ---

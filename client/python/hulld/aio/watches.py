@@ -16,16 +16,11 @@ from hulld.aio.duplex import AsyncDuplex
 from hulld.answers.collision_messages import decode_collision_changes
 from hulld.answers.collisions import CollisionChanges
 from hulld.answers.hulls import Header, HullChanges
-from hulld.calls.requests import Call
-from hulld.collision_stream import encode_update
-from hulld.errors import (
-    CancelledError,
-    HulldError,
-    InternalError,
-    UnavailableError,
-    from_rpc_error,
-    read_answer,
-)
+from hulld.calls.requests import Call, update_stream
+from hulld.calls.told_pairs import ToldPairs, WatchedPlacements
+from hulld.collision_stream import check_update
+from hulld.errors import HulldError, InternalError, UnavailableError, from_rpc_error, read_answer
+
 from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
 from hulld.watches import MOST_WAITING, WatchPosition
@@ -115,41 +110,78 @@ class AsyncCollisionWatch:
     """As hulld.CollisionWatch: an asynchronous iterator for one task; update and cancel are for any
     of the loop. Made by AsyncClient.watch_collisions."""
 
-    def __init__(self, call: Any, metadata: Any, opening: bytes, placements: int) -> None:
-        self._placements = placements
-        self._cancelled = False
-        self._opening = opening
+    def __init__(
+        self,
+        call: Any,
+        metadata: Any,
+        watched: WatchedPlacements,
+        retry: RetryPolicy,
+        patience: float | None,
+    ) -> None:
         self._call = call
         self._metadata = metadata
+        self._watched = watched
+        self._told = ToldPairs(watched)
+        self._retry = retry
+        self._patience = patience
+        # Messages go in the order in which the poses changed.
+        self._lock = asyncio.Lock()
         self._connection: AsyncDuplex | None = None
-
-    async def _connected(self) -> AsyncDuplex:
-        if self._connection is None:
-            self._connection = AsyncDuplex(self._call, self._metadata, MOST_WAITING)
-            # Whoever comes next waits behind this in gRPC's order of writes.
-            await self._connection.send(self._opening)
-        return self._connection
+        self._updates_before = 0
+        self._first = self._connected = self._cancelled = False
 
     def __aiter__(self) -> AsyncIterator[CollisionChanges]:
         return self
 
     async def __anext__(self) -> CollisionChanges:
-        if self._cancelled:
-            raise StopAsyncIteration
-        try:
-            message = await (await self._connected()).receive(None)
-        except CancelledError:
+        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
+        failures = 0
+        while True:
+            connection = await self._open()
+            try:
+                message = await connection.receive(None)
+                if message is not None:
+                    return self._take(read_answer(decode_collision_changes, message))
+                error: HulldError = InternalError("the server ended the watch without a cause")
+            except HulldError as ended:
+                error = ended
+            self._connection = None
             if self._cancelled:
-                raise StopAsyncIteration from None
-            raise
-        if message is None:
-            raise InternalError("the server ended the watch without a cause")
-        return read_answer(decode_collision_changes, message)
+                raise StopAsyncIteration
+            failures += 1
+            attempts = math.inf if self._connected else None
+            remaining = deadline - time.monotonic()
+            wait = self._retry.wait_after(failures, error, remaining, attempts)
+            if wait is None:
+                raise error
+            await asyncio.sleep(wait)
+
+    async def _open(self) -> AsyncDuplex:
+        async with self._lock:
+            if self._cancelled:
+                raise StopAsyncIteration
+            if self._connection is None:
+                connection = AsyncDuplex(self._call, self._metadata, MOST_WAITING)
+                self._connection = connection
+                self._updates_before = self._watched.updates
+                self._first = True
+                await connection.send(self._watched.opening())
+                return connection
+            return self._connection
+
+    def _take(self, changes: CollisionChanges) -> CollisionChanges:
+        if self._first and self._connected:
+            self._told.start_anew()
+        self._first, self._connected = False, True
+        return self._told.take(changes, self._updates_before)
 
     async def update(self, placements: npt.ArrayLike, poses: PosesLike) -> None:
         """As CollisionWatch.update."""
-        request = encode_update(placements, poses, self._placements, False)
-        await (await self._connected()).send(request)
+        indices, packed = check_update(placements, poses, len(self._watched.placements))
+        async with self._lock:
+            self._watched.move(indices, packed)
+            if self._connection is not None:
+                await self._connection.send(update_stream(indices, packed, False))
 
     def cancel(self) -> None:
         """As CollisionWatch.cancel."""
@@ -158,7 +190,6 @@ class AsyncCollisionWatch:
             self._connection.cancel()
 
     async def __aenter__(self) -> AsyncCollisionWatch:
-        await self._connected()
         return self
 
     async def __aexit__(
