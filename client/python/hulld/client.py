@@ -57,7 +57,8 @@ class Client:
 
     server: HOST:PORT, or any other target name of gRPC, as in "unix:/run/hulld.sock". timeout:
     seconds for each call, its retries included; None: no bound. Each method takes one of its own.
-    For streams it bounds each wait instead. retry: how often calls that are safe to repeat are
+    For appenders and collision streams it bounds each wait instead, for watches the search for a
+    server that was lost. retry: how often calls that are safe to repeat are
     repeated. tls: encrypts. token: sent with each call; never unencrypted to another machine,
     unless `insecure` allows it.
 

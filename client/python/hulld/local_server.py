@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import collections
 import os
 import pathlib
@@ -188,7 +189,8 @@ class Local:
         self._server.stop()
 
     async def __aenter__(self) -> AsyncClient:
-        self._async_client = AsyncClient(self._server.start().address, **self._options)
+        await asyncio.to_thread(self._server.start)
+        self._async_client = AsyncClient(self._server.address, **self._options)
         return self._async_client
 
     async def __aexit__(
@@ -199,7 +201,7 @@ class Local:
     ) -> None:
         if self._async_client is not None:
             await self._async_client.close()
-        self._server.stop()
+        await asyncio.to_thread(self._server.stop)
 
 
 def local(

@@ -14,6 +14,7 @@ import pytest
 
 import hulld
 from conftest import CUBE
+from hulld.v1 import hull_pb2, hull_pb2_grpc
 
 
 def put(client: Any, name: str, points: np.ndarray = CUBE) -> None:
@@ -58,6 +59,12 @@ def test_status_tells_version_and_limits(either: Any) -> None:
     assert status.limits.max_request_time == 300
     assert status.uptime >= 0 and status.started.tzinfo is not None
     assert either.check_health() is True
+
+
+def test_the_contracts_own_stubs_share_the_channel(client: hulld.Client, name: str) -> None:
+    stub = hull_pb2_grpc.HullServiceStub(client.channel)
+    made = stub.CreateHull(hull_pb2.CreateHullRequest(hull_id=name))
+    assert made.created and client.get_hull(name).info.create_revision == made.hull.create_revision
 
 
 def test_a_hull_is_created_listed_and_deleted(either: Any, name: str) -> None:

@@ -55,7 +55,8 @@ def version_of(message: Any) -> HullVersion:
 
 def _problem_of(message: Any) -> Problem:
     reason = None
-    if message.reason:
+    # A reason of a later contract has no name here.
+    if message.reason and message.reason in error_pb2.ErrorReason.values():
         reason = error_pb2.ErrorReason.Name(message.reason).removeprefix("ERROR_REASON_")
     return Problem(_CODES.get(message.code, "UNKNOWN"), message.message, reason)
 

@@ -50,9 +50,9 @@ class WatchedPlacements:
 
 
 class ToldPairs:
-    """Where another call takes the place of one that was lost, it begins by telling everything. This
-    leaves out what is known and adds what ended in between, so that both tell what one would have
-    told. Memory: the pairs that collide or are near."""
+    """A call that takes the place of one that was lost begins by telling everything. This leaves
+    out what is known and adds what ended in between, so that both tell what one would have told.
+    Memory: the pairs that collide or are near."""
 
     def __init__(self, watched: WatchedPlacements) -> None:
         self._watched = watched
