@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <thread>
 #include <utility>
@@ -109,6 +110,12 @@ void Server::AddSizesToMetrics() {
   });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().hull_count); });
+  metrics_.AddGauge("hulld_registry_lock_hold_max_seconds",
+                    "Longest hold of the registry's lock within the last one to two minutes.",
+                    [this] {
+                      const std::chrono::duration<double> longest = registry_.Holds().longest;
+                      return longest.count();
+                    });
   metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
                     [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
 }

@@ -86,7 +86,8 @@ absl::Status ReplaceStream::Build() {
     return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
-  if (absl::Status s = registry_.CheckMemory(); !s.ok()) return Prefixed(name, s);
+  if (absl::Status s = registry_.CheckMemory(MemoryUse::kWriting); !s.ok())
+    return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
       {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call().ShouldStop(); }});

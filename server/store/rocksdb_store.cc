@@ -92,10 +92,13 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   const rocksdb::Status status = db_->Write(options, &batch);
   if (status.ok()) {
     files_->Commit();
-  } else {
-    failure_ = WriteFailed(status);
+    return absl::OkStatus();
   }
-  return failure_;
+  failure_ = WriteFailed(status);
+  // The log may hold the batch, or a part of it, although it was not synced.
+  const rocksdb::Status cut = files_->CutUncommitted();
+  seen_failed_syncs_ = files_->failed_syncs();
+  return cut.ok() ? failure_ : OutcomeUnknown(status, cut, options_.data_dir);
 }
 
 absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
@@ -211,7 +214,7 @@ absl::Status RocksDbStore::SyncLog() {
   const rocksdb::Status status = db_->SyncWAL();
   if (!status.ok() && !status.IsNotSupported()) {
     failure_ = WriteFailed(status);
-    spdlog::error("{}", std::string(failure_.message()));
+    spdlog::error("cannot sync the log in {}: {}", options_.data_dir, status.ToString());
   }
   return failure_;
 }

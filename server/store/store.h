@@ -103,8 +103,9 @@ class Store {
                                                 const std::string& writer_id) = 0;
 
   // Keeps changes, all or none, before anyone can see them: one call at a time, in the order in
-  // which they take effect. An error refuses them all, and what is kept is as before. (Should this
-  // process be killed before Recover, the next one may find them, if the error was UNAVAILABLE.)
+  // which they take effect. An error refuses them all, and what is kept is as before, also for a
+  // process that opens the store after this one was killed; unless the error is UNAVAILABLE and
+  // says that this is not known: then the next process may find them, until Recover succeeds.
   virtual absl::Status Commit(std::span<const Change* const> changes) = 0;
   // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
   virtual absl::Status Recover() = 0;

@@ -211,6 +211,7 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_points_inside_total"), 1);
   EXPECT_EQ(Metric("hulld_hulls"), 1);
   EXPECT_EQ(Metric("hulld_vertices"), 8);
+  EXPECT_GT(Metric("hulld_registry_lock_hold_max_seconds"), 0);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"CreateHull\"}"), 1);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"CheckCollision\"}"), 2);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"NOT_FOUND\",rpc=\"CheckCollision\"}"), 1);
