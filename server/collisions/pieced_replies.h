@@ -72,6 +72,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kMostUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
   // Bytes that a piece may hold while another is before it.
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
+  // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
+  static constexpr size_t kSmallBytes = 256 << 10;
   // Replies up to this size join the one that waits before them.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
 
@@ -96,7 +98,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         lane_(threads.pool),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
-        charge_(registry.memory()),
+        charge_(registry.memory(), MemoryUse::kReading),
         piece_units_(shape.first_units) {}
 
   // Whether preparing takes about a slice when nothing has to be waited for.
@@ -207,11 +209,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     });
   }
 
-  // RESOURCE_EXHAUSTED: there is no room for what the call holds.
+  // RESOURCE_EXHAUSTED: there is no room for what the call holds. A small call is let in all the
+  // same, as hulls in memory are served to those that name few.
   absl::Status Charge() {
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);
-    return registry_.CheckMemory();
+    if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
+    return registry_.CheckMemory(MemoryUse::kReading);
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
