@@ -92,7 +92,9 @@ constexpr std::string_view kRooms[] = {
     "client/calls",
     "client/watch",
     "client",
+    "client/pose",
     "client/formats",
+    "client/robot",
     "client/verify",
     "client/hullctl/printing",
     "client/hullctl/help",
@@ -105,6 +107,7 @@ constexpr std::string_view kRooms[] = {
     "client/hullctl/shell",
     "client/hullctl/view/bridge",
     "client/hullctl/view",
+    "client/hullctl/robot",
     "client/hullctl/commands",
     "client/hullctl",
 };

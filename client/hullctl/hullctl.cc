@@ -15,6 +15,7 @@
 #include "client/hullctl/completion/completion.h"
 #include "client/hullctl/completion/completion_script.h"
 #include "client/hullctl/completion/completion_values.h"
+#include "client/hullctl/robot/robot_commands.h"
 
 namespace hulld {
 namespace {
@@ -83,6 +84,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddBatchCommand(program, invocation);
   AddSceneCommand(program, invocation);
   AddStreamCommand(program, invocation);
+  AddRobotCommand(program, invocation);
   AddVerifyCommand(program, invocation);
   AddWatchCommand(program, invocation);
   program.BeginGroup("Run a server");
