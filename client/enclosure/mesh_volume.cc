@@ -1,8 +1,8 @@
 #include "client/enclosure/mesh_volume.h"
 
+#include <algorithm>
 #include <array>
-#include <map>
-#include <utility>
+#include <numeric>
 #include <vector>
 
 #include "client/enclosure/convex_region.h"
@@ -13,14 +13,17 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-// For each vertex, the first one at the same coordinates.
+// For each vertex, one that stands for all at the same coordinates.
 std::vector<uint32_t> Merged(const TriangleMesh& mesh) {
-  std::map<Point, uint32_t> first;
-  std::vector<uint32_t> merged;
-  for (const Point& p : mesh.vertices) {
-    // Adding 0 makes -0 the same as 0.
-    const Point key = {p[0] + 0, p[1] + 0, p[2] + 0};
-    merged.push_back(first.emplace(key, static_cast<uint32_t>(merged.size())).first->second);
+  std::vector<uint32_t> order(mesh.vertices.size());
+  std::iota(order.begin(), order.end(), 0);
+  // -0 and 0 compare as equal, as they are the same place.
+  std::sort(order.begin(), order.end(),
+            [&mesh](uint32_t a, uint32_t b) { return mesh.vertices[a] < mesh.vertices[b]; });
+  std::vector<uint32_t> merged(order.size());
+  for (size_t i = 0; i < order.size(); ++i) {
+    const bool same = i > 0 && mesh.vertices[order[i]] == mesh.vertices[order[i - 1]];
+    merged[order[i]] = same ? merged[order[i - 1]] : order[i];
   }
   return merged;
 }
@@ -59,18 +62,26 @@ BigInteger SixfoldVolume(const HullMesh& hull, const CommonExponent& grid) {
 
 bool IsClosed(const TriangleMesh& mesh) {
   const std::vector<uint32_t> merged = Merged(mesh);
-  // Passes from the lower to the higher vertex, less those back.
-  std::map<std::pair<uint32_t, uint32_t>, int64_t> passes;
+  // Each passage of an edge: its lower and its higher vertex, and whether it went up.
+  std::vector<std::array<uint32_t, 3>> passages;
   for (const auto& triangle : mesh.triangles) {
     for (size_t i = 0; i < 3; ++i) {
       const uint32_t from = merged[triangle[i]];
       const uint32_t to = merged[triangle[(i + 1) % 3]];
-      if (from < to) ++passes[{from, to}];
-      if (from > to) --passes[{to, from}];
+      if (from != to) passages.push_back({std::min(from, to), std::max(from, to), from < to});
     }
   }
-  for (const auto& [edge, balance] : passes) {
+  std::sort(passages.begin(), passages.end());
+  for (size_t begin = 0; begin < passages.size();) {
+    int64_t balance = 0;
+    size_t end = begin;
+    for (; end < passages.size() && passages[end][0] == passages[begin][0] &&
+           passages[end][1] == passages[begin][1];
+         ++end) {
+      balance += passages[end][2] == 1 ? 1 : -1;
+    }
     if (balance != 0) return false;
+    begin = end;
   }
   return !mesh.triangles.empty();
 }

@@ -152,7 +152,7 @@ ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
   return Find(run, arguments.wishes, &*read);
 }
 
-void AddCheck(Command scene, Invocation* invocation) {
+void AddCheck(Command scene, const std::string* scene_file, Invocation* invocation) {
   auto arguments = std::make_shared<SceneArguments>();
   Command command = scene.AddCommand("check", "Answer what a scene file asks");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
@@ -163,8 +163,12 @@ void AddCheck(Command scene, Invocation* invocation) {
       "those of the server: 'hullctl scene apply' puts them there. 'hullctl scene apply --help'\n"
       "shows how a scene in YAML asks.");
   command.SetExamples({{"", "hullctl scene check cell.yaml --separation"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return CheckScene(*invocation, *arguments); }; });
+  command.OnGiven([=] {
+    invocation->action = [=] {
+      const absl::Status alone = RefuseSecondFile(*scene_file);
+      return alone.ok() ? CheckScene(*invocation, *arguments) : invocation->FailUsage(alone);
+    };
+  });
 }
 
 }  // namespace
@@ -186,8 +190,8 @@ void AddSceneCommand(Command program, Invocation* invocation) {
       invocation->action = [=] { return FindInScene(*invocation, *arguments); };
     }
   });
-  AddSceneSyncCommands(command, invocation);
-  AddCheck(command, invocation);
+  AddSceneSyncCommands(command, &arguments->file, invocation);
+  AddCheck(command, &arguments->file, invocation);
 }
 
 }  // namespace hulld

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <atomic>
-#include <map>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -273,9 +272,9 @@ absl::Status RobotCheck::AskAll(WaypointStream* stream) {
     waypoints_ += count;
     bar_.Update(waypoints_ * pairs_.size() / 2);
   }
-  if (!begun) {
+  if (!begun && !stopped_) {
     return absl::InvalidArgumentError(
-        absl::StrCat(source_->name(), ": there is no waypoint in it"));
+        absl::StrCat(arguments_.joints, ": there is no waypoint in it"));
   }
   return stream->Close();
 }
@@ -340,7 +339,8 @@ void RobotCheck::PrintHead() {
   }
   run_.out << "# " << pairs_.size() / 2 << " pairs";
   if (left_out_ > 0) run_.out << "; " << left_out_ << " left out by " << left_out_by_;
-  run_.out << "\n";
+  // Warnings come behind it.
+  run_.out << "\n" << std::flush;
 }
 
 void RobotCheck::PrintTotals() {

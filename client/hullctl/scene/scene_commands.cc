@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/scene_sync.h"
 #include "client/hullctl/scene/yaml_scene.h"
@@ -142,7 +143,13 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
 
 }  // namespace
 
-void AddSceneSyncCommands(Command scene, Invocation* invocation) {
+absl::Status RefuseSecondFile(const std::string& scene_file) {
+  if (scene_file.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      absl::StrCat("unexpected argument ", Quoted(scene_file), "; a scene is one file"));
+}
+
+void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocation* invocation) {
   struct Declared {
     const char* name;
     const char* help;
@@ -183,7 +190,10 @@ void AddSceneSyncCommands(Command scene, Invocation* invocation) {
     command.SetDetails(absl::StrCat(declared.details, "\n", kYamlHelp));
     command.SetExamples({{"", declared.example}});
     command.OnGiven([=, act = declared.act] {
-      invocation->action = [=] { return act(*invocation, *arguments); };
+      invocation->action = [=] {
+        const absl::Status alone = RefuseSecondFile(*scene_file);
+        return alone.ok() ? act(*invocation, *arguments) : invocation->FailUsage(alone);
+      };
     });
   }
 }

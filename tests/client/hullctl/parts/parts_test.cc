@@ -74,7 +74,7 @@ TEST_F(HullctlParts, CoverTellsWhatSticksOut) {
   EXPECT_EQ(Ask({"cover", "l/", bracket_.path()}).out, ran.out);
   ran = Ask({"cover", "l/foot", bracket_.path(), "--limit", "1"});
   EXPECT_THAT(ran.out, HasSubstr("OUTSIDE: 10 of 24 triangles stick out (exact), by 3, with an "));
-  EXPECT_THAT(ran.out, HasSubstr("triangle 13\tby 3\tat 1 4 0\n# 9 more; raise --limit"));
+  EXPECT_THAT(ran.out, HasSubstr("triangle 12\tby 3\tat 0 4 1\n# 9 more; raise --limit"));
   ran = Ask({"cover", "l/foot", bracket_.path(), "--output", "name"});
   EXPECT_EQ(ran.out, "OUTSIDE\n");
   EXPECT_THAT(AskJson({"cover", "l/", bracket_.path()}).out, HasSubstr("\"enclosed\":true"));

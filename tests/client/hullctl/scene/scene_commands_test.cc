@@ -72,6 +72,11 @@ TEST_F(HullctlScene, CheckAnswersWhatTheFileAsks) {
   EXPECT_THAT(ran.out, HasSubstr("a\tb\tSEPARATED\t1 within"));
   EXPECT_EQ(Ask({"scene", pairs.path()}).code, 2);
   EXPECT_EQ(Ask({"scene"}).code, 2);
+  for (const char* command : {"apply", "check"}) {
+    ran = Ask({"scene", command, cell_.path(), pairs.path()});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, HasSubstr("a scene is one file"));
+  }
 }
 
 TEST_F(HullctlScene, DeleteRemovesWhatTheFileDefines) {
