@@ -22,7 +22,7 @@ class HalfSpace {
   const BigInteger& offset() const { return offset_; }
 
   // The sign of normal . P - offset, exact: -1 inside, 0 on the boundary, 1 outside. `P` is p on
-  // the grid. Cost: ~5 ns, ~200 ns where the filter cannot tell.
+  // the grid. Cost: three products, and exact ones where the filter cannot tell.
   int Side(const std::array<double, 3>& p, const BigVector& P) const;
 
  private:
@@ -60,7 +60,7 @@ class ConvexRegion {
 BigVector OnGrid(const std::array<double, 3>& p, const CommonExponent& grid);
 
 // Whether the hull is that of exactly these points (x y z each): each is in the hull, and each
-// vertex of the hull is one of them. Exact. Cost: points times facets, ~5 ns each.
+// vertex of the hull is one of them. Exact. Cost: a test for each point and facet.
 absl::StatusOr<bool> IsHullOf(const HullMesh& mesh, const std::vector<double>& xyz);
 
 }  // namespace hulld

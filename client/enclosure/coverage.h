@@ -40,14 +40,14 @@ struct Coverage {
 // A triangle whose corners are all in one piece lies in it. Any other is cut: by the half spaces of
 // each piece in turn, into what lies in the piece and convex polygons that do not; what is left
 // after all pieces is outside of all. Corners are quotients of integers of any length, so nothing
-// is rounded before the answer. Cut points are reduced, so that their digits stay within a few
-// hundred for doubles of similar size.
+// is rounded before the answer. Cut points are reduced, so that their digits are bounded by those
+// of the planes that meet in them, however many cuts led there.
 //
 // It is the surface that is asked about. One piece that holds the surface holds what it encloses,
 // for it is convex; several may leave a hollow inside of a solid whose surface they cover.
 //
 // `progress` is told the triangles that are done. INTERNAL: facets that do not fit their vertices.
-// Cost: triangles times facets, ~5 ns each, and ~10 us for each cut.
+// Cost: a test for each vertex and facet, and exact arithmetic for each cut.
 absl::StatusOr<Coverage> CoverMesh(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh,
                                    const std::function<void(uint64_t done)>& progress);
 

@@ -17,7 +17,7 @@ bool IsClosed(const TriangleMesh& mesh);
 // (signed tetrahedra, Gauss 1813), the quotient rounded. Parts of the mesh that overlap count
 // twice; its direction does not matter. Nothing when the mesh is not closed, or has no volume: then
 // there is none to compare. Requires facets of the hull that are planar, as the server's are.
-// Cost: ~1 us for each triangle.
+// Cost: exact arithmetic for each triangle.
 std::optional<double> VolumeRatio(const HullMesh& hull, const TriangleMesh& mesh);
 
 }  // namespace hulld

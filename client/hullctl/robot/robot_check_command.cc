@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -68,10 +69,12 @@ class RobotCheck {
   absl::Status ChoosePairs();
   absl::StatusOr<Waypoint> GivenValues() const;
   absl::Status OpenWaypoints();
+  absl::StatusOr<bool> ReadWaypoint(Waypoint* free_values);
   absl::StatusOr<bool> NextWaypoint(Waypoint* free_values);
-  void WarnOfLimits(const Waypoint& free_values);
+  void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
   absl::Status AskAll(WaypointStream* stream);
   void Take(uint64_t waypoint, size_t pair, const AnswerRow& row, const std::string& problem);
+  void TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem);
   void TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides);
   void PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row);
   void PrintHead();
@@ -96,7 +99,8 @@ class RobotCheck {
   std::unique_ptr<ByteSource> source_;
   std::optional<WaypointReader> reader_;
   bool given_was_read_ = false;
-  // There is more than one waypoint: then only changes are told.
+  // The first waypoints, which tell whether there is more than one: then only changes are told.
+  std::deque<Waypoint> pending_;
   bool many_ = false;
   std::vector<uint64_t> lines_;
   std::atomic<bool> stopped_ = false;
@@ -204,17 +208,27 @@ absl::StatusOr<RobotCheck::Waypoint> RobotCheck::GivenValues() const {
 }
 
 absl::Status RobotCheck::OpenWaypoints() {
-  if (arguments_.joints.empty()) return absl::OkStatus();
-  auto source = ByteSource::Open(arguments_.joints);
-  if (!source.ok()) return source.status();
-  source_ = *std::move(source);
-  auto reader = WaypointReader::Open(source_.get(), model_.robot);
-  if (!reader.ok()) return reader.status();
-  reader_ = *std::move(reader);
-  return absl::OkStatus();
+  if (!arguments_.joints.empty()) {
+    auto source = ByteSource::Open(arguments_.joints);
+    if (!source.ok()) return source.status();
+    source_ = *std::move(source);
+    auto reader = WaypointReader::Open(source_.get(), model_.robot);
+    if (!reader.ok()) return reader.status();
+    reader_ = *std::move(reader);
+  }
+  Waypoint values;
+  while (pending_.size() < 2) {
+    const auto more = ReadWaypoint(&values);
+    if (!more.ok()) return more.status();
+    if (!*more) break;
+    pending_.push_back(values);
+  }
+  many_ = pending_.size() > 1;
+  if (!pending_.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": there is no waypoint in it"));
 }
 
-absl::StatusOr<bool> RobotCheck::NextWaypoint(Waypoint* free_values) {
+absl::StatusOr<bool> RobotCheck::ReadWaypoint(Waypoint* free_values) {
   if (reader_.has_value()) {
     auto more = reader_->Next(free_values);
     if (more.ok() && *more) lines_.push_back(reader_->line());
@@ -228,6 +242,13 @@ absl::StatusOr<bool> RobotCheck::NextWaypoint(Waypoint* free_values) {
   return true;
 }
 
+absl::StatusOr<bool> RobotCheck::NextWaypoint(Waypoint* free_values) {
+  if (pending_.empty()) return ReadWaypoint(free_values);
+  *free_values = std::move(pending_.front());
+  pending_.pop_front();
+  return true;
+}
+
 std::string RobotCheck::PlaceOf(uint64_t waypoint) const {
   std::string place = absl::StrCat("waypoint ", waypoint + 1);
   if (waypoint < lines_.size()) {
@@ -236,7 +257,7 @@ std::string RobotCheck::PlaceOf(uint64_t waypoint) const {
   return place;
 }
 
-void RobotCheck::WarnOfLimits(const Waypoint& free_values) {
+void RobotCheck::WarnOfLimits(uint64_t waypoint, const Waypoint& free_values) {
   const std::vector<std::string> problems =
       LimitProblems(model_.robot, AllJointValues(model_.robot, free_values));
   if (problems.empty()) return;
@@ -244,14 +265,13 @@ void RobotCheck::WarnOfLimits(const Waypoint& free_values) {
   bar_.Clear();
   for (const std::string& problem : problems) {
     run_.err << "hullctl: warning: ";
-    if (reader_.has_value()) run_.err << source_->name() << ":" << lines_.back() << ": ";
+    if (reader_.has_value()) run_.err << source_->name() << ":" << lines_[waypoint] << ": ";
     run_.err << problem << "\n";
   }
 }
 
 absl::Status RobotCheck::AskAll(WaypointStream* stream) {
   bool more = true;
-  bool begun = false;
   while (more && !stopped_ && !(arguments_.first && first_.has_value())) {
     std::vector<double> poses;
     size_t count = 0;
@@ -261,20 +281,14 @@ absl::Status RobotCheck::AskAll(WaypointStream* stream) {
       if (!next.ok()) return next.status();
       more = *next;
       if (!more) break;
-      WarnOfLimits(values);
+      WarnOfLimits(waypoints_ + count, values);
       model_.AppendPoses(arguments_.X_WB, values, &poses);
       ++count;
     }
     if (count == 0) break;
-    many_ = many_ || begun || count > 1;
-    begun = true;
     if (absl::Status asked = stream->Ask(count, poses); !asked.ok()) return asked;
     waypoints_ += count;
     bar_.Update(waypoints_ * pairs_.size() / 2);
-  }
-  if (!begun && !stopped_) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(arguments_.joints, ": there is no waypoint in it"));
   }
   return stream->Close();
 }
@@ -307,17 +321,19 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
     last_contact_ = waypoint;
   }
   if (row.relation == v1::RELATION_UNSPECIFIED) {
-    bar_.Clear();
-    if (failed_++ < kMostWarnings) {
-      run_.err << "hullctl: " << NameOf(pair, 0) << " with " << NameOf(pair, 1) << " at "
-               << PlaceOf(waypoint) << ": " << problem << "\n";
-    }
-  }
-  if (many_) {
+    TellOfFailure(waypoint, pair, problem);
+  } else if (many_) {
     TakeOfMany(waypoint, pair, row, collides);
   } else {
     PrintRow(waypoint, "", pair, row);
   }
+}
+
+void RobotCheck::TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem) {
+  bar_.Clear();
+  if (failed_++ >= kMostWarnings) return;
+  run_.err << "hullctl: " << NameOf(pair, 0) << " with " << NameOf(pair, 1) << " at "
+           << PlaceOf(waypoint) << ": " << problem << "\n";
 }
 
 void RobotCheck::TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides) {
@@ -382,7 +398,7 @@ ExitCode RobotCheck::Run() {
   arguments_.wishes.Apply(&scope.wanted, &tolerance);
   scope.tolerance = tolerance;
   // One waypoint is looked at closely.
-  if (arguments_.joints.empty() && tolerance == 0) scope.wanted.set_separation(true);
+  if (!many_ && tolerance == 0) scope.wanted.set_separation(true);
   collides_.assign(pairs_.size() / 2, false);
   PrintHead();
   WaypointStream stream(client_, std::move(scope),
@@ -463,7 +479,8 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
       "\nA joint without a value is at 0, or in the middle of its limits where they exclude 0. A\n"
       "value beyond limits is warned of, not changed. One configuration prints every pair and its\n"
       "separation. Several waypoints are one stream: pairs are printed as they begin (ENTER) and\n"
-      "end (LEAVE) to collide, and the first contact is named. Only the waypoints themselves are\n"
+      "end (LEAVE) to collide or touch, and the first contact is named. Only the waypoints "
+      "themselves are\n"
       "checked, not the motion between them. A collision is an answer: exit code 0.");
   command.SetExamples(
       {{"As it stands, with all joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},

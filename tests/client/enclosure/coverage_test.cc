@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "client/enclosure/convex_region.h"
 #include "tests/client/enclosure/box_mesh.h"
-#include "tests/core/checks/point_sets.h"
 
 namespace hulld {
 namespace {
@@ -118,18 +118,22 @@ double AreaInCell(const std::array<std::array<double, 2>, 3>& triangle, double x
 // cell by cell.
 TEST(Coverage, AreaAgreesWithCellsOfAGrid) {
   constexpr int kSide = 6;
-  const uint64_t seed = TestSeed(1201);
-  Random random(seed);
+  constexpr uint64_t kSeed = 1201;
+  std::mt19937_64 generator(kSeed);
+  // From `least` to `most`; the same everywhere, unlike the standard's distributions.
+  const auto between = [&generator](int least, int most) {
+    return least + static_cast<int>(generator() % static_cast<uint64_t>(most - least + 1));
+  };
   int covered = 0;
   int open = 0;
   for (int round = 0; round < 200; ++round) {
     std::vector<HullMesh> pieces;
     bool cell[kSide][kSide] = {};
-    for (int i = random.Between(1, 7); i > 0; --i) {
-      const int x = random.Below(kSide);
-      const int y = random.Below(kSide);
-      const int right = random.Between(x + 1, kSide);
-      const int top = random.Between(y + 1, kSide);
+    for (int i = between(1, 7); i > 0; --i) {
+      const int x = between(0, kSide - 1);
+      const int y = between(0, kSide - 1);
+      const int right = between(x + 1, kSide);
+      const int top = between(y + 1, kSide);
       pieces.push_back(BoxHull({double(x), double(y), -1}, {double(right), double(top), 1}));
       for (int a = x; a < right; ++a) {
         for (int b = y; b < top; ++b) cell[a][b] = true;
@@ -137,7 +141,7 @@ TEST(Coverage, AreaAgreesWithCellsOfAGrid) {
     }
     std::array<std::array<double, 2>, 3> corners;
     for (auto& corner : corners) {
-      for (double& x : corner) x = random.Between(0, kSide);
+      for (double& x : corner) x = between(0, kSide);
     }
     const auto& [p, q, r] = corners;
     if ((q[0] - p[0]) * (r[1] - p[1]) == (q[1] - p[1]) * (r[0] - p[0])) continue;
@@ -150,8 +154,9 @@ TEST(Coverage, AreaAgreesWithCellsOfAGrid) {
     const Coverage coverage =
         Cover(pieces, Triangle({p[0], p[1], 0}, {q[0], q[1], 0}, {r[0], r[1], 0}));
     const double area = coverage.uncovered.empty() ? 0 : coverage.uncovered[0].area;
-    ASSERT_NEAR(area, expected, 1e-9) << "seed " << seed << " round " << round;
-    ASSERT_EQ(coverage.uncovered.empty(), expected < 1e-9) << "seed " << seed << " round " << round;
+    ASSERT_NEAR(area, expected, 1e-9) << "seed " << kSeed << " round " << round;
+    ASSERT_EQ(coverage.uncovered.empty(), expected < 1e-9)
+        << "seed " << kSeed << " round " << round;
     ++(coverage.uncovered.empty() ? covered : open);
   }
   EXPECT_GT(covered, 20);
