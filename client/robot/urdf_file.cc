@@ -362,7 +362,8 @@ RobotJoint JointOf(const urdf::Joint& from) {
 }
 
 // Walks the tree of the model from its root; parents come before their children.
-absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlaces& places) {
+absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlaces& places,
+                              const std::string& file) {
   Robot robot;
   robot.name = model.getName();
   std::vector<std::pair<const urdf::Link*, int>> pending = {{model.getRoot().get(), -1}};
@@ -373,10 +374,13 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlac
     const int index = static_cast<int>(robot.links.size());
     RobotLink link;
     link.name = from->name;
-    const std::vector<ShapePlace>& lines = places.at(from->name);
-    if (lines.size() != from->collision_array.size()) {
-      return absl::InternalError(absl::StrCat("link ", from->name, " lost a shape"));
+    // A name with letters that XML cannot hold may come back as another.
+    const auto known = places.find(from->name);
+    if (known == places.end() || known->second.size() != from->collision_array.size()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          file, ": liburdfdom reads link ", Quoted(from->name), " otherwise; use a plain name"));
     }
+    const std::vector<ShapePlace>& lines = known->second;
     for (size_t i = 0; i < lines.size(); ++i) {
       link.shapes.push_back(ShapeOf(*from->collision_array[i], lines[i]));
     }
@@ -397,7 +401,12 @@ absl::StatusOr<Robot> RobotOf(const urdf::ModelInterface& model, const ShapePlac
   for (RobotJoint& joint : robot.joints) {
     const urdf::JointMimicSharedPtr mimic = model.getJoint(joint.name)->mimic;
     if (mimic == nullptr || joint.kind == JointKind::kFixed) continue;
-    joint.mimics = index_of.at(mimic->joint_name);
+    const auto leader = index_of.find(mimic->joint_name);
+    if (leader == index_of.end()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          file, ": liburdfdom reads joint ", Quoted(joint.name), " otherwise; use plain names"));
+    }
+    joint.mimics = leader->second;
     joint.multiplier = mimic->multiplier;
     joint.offset = mimic->offset;
   }
@@ -425,7 +434,7 @@ absl::StatusOr<Robot> ParseUrdf(const std::string& text, const std::string& name
   if (model == nullptr || model->getRoot() == nullptr) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": liburdfdom refuses it: ", problem));
   }
-  return RobotOf(*model, places);
+  return RobotOf(*model, places, name);
 }
 
 absl::StatusOr<Robot> ReadUrdf(const std::string& path) {

@@ -126,7 +126,7 @@ TEST(Coverage, AreaAgreesWithCellsOfAGrid) {
   };
   int covered = 0;
   int open = 0;
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < 400; ++round) {
     std::vector<HullMesh> pieces;
     bool cell[kSide][kSide] = {};
     for (int i = between(1, 7); i > 0; --i) {
