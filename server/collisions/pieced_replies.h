@@ -96,7 +96,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
         lane_(threads.pool),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
-        charge_(registry.memory()),
+        charge_(registry.memory(), MemoryUse::kReading),
         piece_units_(shape.first_units) {}
 
   // Whether preparing takes about a slice when nothing has to be waited for.
@@ -211,7 +211,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   absl::Status Charge() {
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);
-    return registry_.CheckMemory();
+    return registry_.CheckMemory(MemoryUse::kReading);
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
