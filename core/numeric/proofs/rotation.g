@@ -17,7 +17,8 @@ entry = (1 + i) * (1 + d4) * difference * (1 + d5);
 { P in [0, 1] /\ |x| <= 1 /\ |y| <= 1 /\ |i| <= 0x3.000001p-53
   /\ |d1| <= kUnitRoundoff /\ |d2| <= kUnitRoundoff /\ |d3| <= kUnitRoundoff
   /\ |d4| <= kUnitRoundoff /\ |d5| <= kUnitRoundoff
-  /\ |e1| <= kUnitRoundoff /\ |e2| <= kUnitRoundoff /\ |e3| <= kUnitRoundoff /\ |e4| <= kUnitRoundoff
+  /\ |e1| <= kUnitRoundoff /\ |e2| <= kUnitRoundoff /\ |e3| <= kUnitRoundoff
+  /\ |e4| <= kUnitRoundoff
   -> |inverse - 1| <= 0x3.000001p-53 /\ |entry - exact| <= kRotationEntryError }
 
 difference - exact -> (difference - (half_a - half_b))

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Scripts that prove nothing, or that the constants do not follow from, are not taken for proofs."""
+"""Scripts that prove nothing, or not what the constants say, are not taken for proofs."""
 
 import contextlib
 import io
