@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-#include <thread>
 #include <utility>
 
 #include "server/call/transport.h"
 #include "server/config_check.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
+#include "server/settings/cpu_limit.h"
 #include "server/store/memory_store.h"
 #include "server/store/rocksdb_store.h"
 
@@ -33,11 +33,10 @@ std::vector<std::string> AllServices() {
 }
 
 // At least two, so that one long task does not hold up all others.
-int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
+int PoolThreads() { return std::max(2, DefaultThreads()); }
 
 int AnswerThreads(const Config& config) {
-  if (config.threads > 0) return config.threads;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return config.threads > 0 ? config.threads : DefaultThreads();
 }
 
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {

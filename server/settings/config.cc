@@ -122,7 +122,7 @@ class Parser {
                   "in between can read and change what passes, tokens included")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
+    Add("threads", config_.threads, "Threads that compute answers; 0: as many as can run at a time")
         ->check(CLI::Range(0, 1024));
     AddStore();
     Add("drain-timeout", drain_timeout_seconds_,

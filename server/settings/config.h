@@ -73,7 +73,7 @@ struct Config {
   std::string tls_client_ca;
   // The tokens that may call (server/access/token_table.h); empty: everyone who can connect.
   std::string tokens_file;
-  // Threads of parallel queries; 0: one per core.
+  // Threads that compute answers; 0: DefaultThreads() of cpu_limit.h.
   int threads = 0;
   // Where hulls live: "rocksdb" or "memory".
   std::string store = "rocksdb";
