@@ -93,6 +93,8 @@ def test_programs_are_found_by_variable_path_and_build(
     built = program(tmp_path / "tree/build/release/bin/hulld")
     (tmp_path / "tree/deep").mkdir()
     monkeypatch.chdir(tmp_path / "tree/deep")
+    # The package itself may be installed below a checkout, as it is when ctest runs this.
+    monkeypatch.setattr("hulld.programs.__file__", str(tmp_path / "programs.py"))
     monkeypatch.setenv("PATH", str(on_path.parent))
     monkeypatch.delenv("HULLCTL_BINARY", raising=False)
     monkeypatch.setenv("HULLD_BINARY", str(named))
