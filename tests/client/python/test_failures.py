@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import time
+import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -232,6 +234,21 @@ def test_a_watch_goes_on_where_it_was(caller: Any, fake: FakeHulld) -> None:
         seen = [next(watch).header.revision for _ in range(3)]
     assert seen == [10, 20, 30]
     assert fake.calls[:3] == ["WatchHulls after 0", "WatchHulls after 10", "WatchHulls after 20"]
+
+
+def test_a_watch_that_was_quiet_for_long_goes_on(
+    caller: Any, fake: FakeHulld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = [0.0]
+    passing = types.SimpleNamespace(monotonic=lambda: clock[0], sleep=time.sleep)
+    monkeypatch.setattr("hulld.watches.time", passing)
+
+    def pass_an_hour() -> None:
+        clock[0] += 3600
+
+    fake.before_end = pass_an_hour
+    with caller.watch_hulls(timeout=20) as watch:
+        assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
 
 
 # --- Errors ---
