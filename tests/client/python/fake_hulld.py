@@ -51,8 +51,6 @@ class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusService
         # Called with each chunk; raises or aborts to fail before (or, with `after`, behind) it.
         self.before: Callable[[int, Any], None] = lambda sequence, context: None
         self.after: Callable[[int, Any], None] = lambda sequence, context: None
-        # Called before a watch is ended.
-        self.before_end: Callable[[], None] = lambda: None
         self._server = grpc.server(concurrent.futures.ThreadPoolExecutor(8))
         hull_pb2_grpc.add_HullServiceServicer_to_server(self, self._server)
         status_pb2_grpc.add_StatusServiceServicer_to_server(self, self._server)
@@ -97,7 +95,6 @@ class FakeHulld(hull_pb2_grpc.HullServiceServicer, status_pb2_grpc.StatusService
         message.header.store_id, message.header.revision = "store", request.after_revision + 10
         message.events.add(kind=hull_pb2.HULL_EVENT_KIND_PRESENT).hull.hull_id = "a"
         yield message
-        self.before_end()
         refuse(context, grpc.StatusCode.UNAVAILABLE, "the server ends soon", reason="DRAINING")
 
     def AppendPoints(self, requests: Any, context: Any) -> Iterator[Any]:
