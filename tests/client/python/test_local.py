@@ -8,6 +8,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -76,6 +77,9 @@ def test_the_server_ends_with_a_script_that_is_killed() -> None:
             with pytest.raises(hulld.UnavailableError):
                 while True:
                     next(watch)
+    # Removed a moment later, by what kept the server.
+    while pathlib.Path(address.removeprefix("unix:")).parent.exists():
+        time.sleep(0.01)
 
 
 def test_programs_are_found_by_variable_path_and_build(
