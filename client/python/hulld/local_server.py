@@ -27,7 +27,7 @@ _LINES = 200
 _START_SECONDS = 60.0
 _STOP_SECONDS = 10.0
 # Its input is a pipe from us: it ends when we end, however that happens, and takes the server
-# along.
+# along, and its folder, $0.
 _KEEPER = """
 "$@" 3<&- </dev/null & child=$!
 trap 'kill "$child" 2>/dev/null' TERM
@@ -35,6 +35,7 @@ trap 'kill "$child" 2>/dev/null' TERM
 wait "$child"; code=$?
 [ "$code" -gt 128 ] && { wait "$child"; code=$?; }
 kill "$reader" 2>/dev/null
+rm -f "$0/socket"; rmdir "$0" 2>/dev/null
 exit "$code"
 """
 
@@ -105,7 +106,7 @@ class LocalServer:
         }
         # A session of its own: Ctrl-C in a terminal is for the script, which then ends the server.
         self._process = subprocess.Popen(
-            ["sh", "-c", "exec 3<&0; " + _KEEPER, "hulld", *command],
+            ["sh", "-c", "exec 3<&0; " + _KEEPER, folder, *command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

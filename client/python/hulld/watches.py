@@ -30,6 +30,30 @@ from hulld.retry import RetryPolicy
 MOST_WAITING = 16
 
 
+class Search:
+    """The search for a server that was lost. It takes its time from the first failure on, however
+    long it was quiet before."""
+
+    def __init__(self, retry: RetryPolicy, patience: float | None) -> None:
+        self._retry = retry
+        self._patience = math.inf if patience is None else patience
+        self._deadline = math.inf
+        self._failures = 0
+
+    def wait_after(self, error: HulldError, connected: bool) -> float:
+        """The seconds to wait before the next attempt. `connected`: there was a server, so that
+        only time bounds the attempts. Raises `error` where there is no other."""
+        if self._failures == 0:
+            self._deadline = time.monotonic() + self._patience
+        self._failures += 1
+        attempts = math.inf if connected else None
+        remaining = self._deadline - time.monotonic()
+        wait = self._retry.wait_after(self._failures, error, remaining, attempts)
+        if wait is None:
+            raise error
+        return wait
+
+
 class WatchPosition:
     """Where a watch of hulls is, over all its connections."""
 
@@ -85,8 +109,7 @@ class HullWatch:
         return self
 
     def __next__(self) -> HullChanges:
-        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
-        failures = 0
+        search = Search(self._retry, self._patience)
         while True:
             request = self._request(self._position.after)
             with self._lock:
@@ -106,16 +129,7 @@ class HullWatch:
                 self._call = None
                 if self._cancelled:
                     raise StopIteration
-            failures += 1
-            wait = self._retry.wait_after(
-                failures,
-                error,
-                deadline - time.monotonic(),
-                math.inf if self._position.connected else None,
-            )
-            if wait is None:
-                raise error
-            time.sleep(wait)
+            time.sleep(search.wait_after(error, self._position.connected))
 
     def cancel(self) -> None:
         """Ends the iteration, now and ever after."""
@@ -176,8 +190,7 @@ class CollisionWatch:
         return self
 
     def __next__(self) -> CollisionChanges:
-        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
-        failures = 0
+        search = Search(self._retry, self._patience)
         while True:
             connection = self._open()
             try:
@@ -192,13 +205,7 @@ class CollisionWatch:
                 self._connection = None
                 if self._cancelled:
                     raise StopIteration
-            failures += 1
-            attempts = math.inf if self._connected else None
-            remaining = deadline - time.monotonic()
-            wait = self._retry.wait_after(failures, error, remaining, attempts)
-            if wait is None:
-                raise error
-            time.sleep(wait)
+            time.sleep(search.wait_after(error, self._connected))
 
     def _open(self) -> Duplex:
         with self._lock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import types
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -12,8 +13,10 @@ import pytest
 
 import hulld
 from fake_hulld import FakeHulld, refuse
+from hulld.calls.requests import watch_hulls
 from hulld.errors import from_status
 from hulld.retry import may_retry
+from hulld.v1 import hull_pb2
 
 QUICK = hulld.RetryPolicy(initial_backoff=0.001, max_backoff=0.002)
 
@@ -232,6 +235,47 @@ def test_a_watch_goes_on_where_it_was(caller: Any, fake: FakeHulld) -> None:
         seen = [next(watch).header.revision for _ in range(3)]
     assert seen == [10, 20, 30]
     assert fake.calls[:3] == ["WatchHulls after 0", "WatchHulls after 10", "WatchHulls after 20"]
+
+
+class LostAfterAnHour(grpc.RpcError):
+    """How a quiet watch ends."""
+
+    def code(self) -> grpc.StatusCode:
+        return grpc.StatusCode.UNAVAILABLE
+
+    def details(self) -> str:
+        return "the connection is lost"
+
+    def trailing_metadata(self) -> None:
+        return None
+
+
+def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    passing = types.SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: None)
+    monkeypatch.setattr("hulld.watches.time", passing)
+    revisions = iter((10, 20, 30))
+
+    class Quiet:
+        """Tells one message, and an hour later that the connection is lost."""
+
+        def __init__(self, call: Any) -> None:
+            self.told = False
+
+        def __next__(self) -> bytes:
+            if self.told:
+                clock[0] += 3600
+                raise LostAfterAnHour
+            self.told = True
+            message = hull_pb2.WatchHullsResponse(synced=True)
+            message.header.revision = next(revisions)
+            return bytes(message.SerializeToString())
+
+        def cancel(self) -> None:
+            pass
+
+    watch = hulld.HullWatch(Quiet, lambda after: watch_hulls("", None, after), None, QUICK, 20)
+    assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
 
 
 # --- Errors ---

@@ -8,6 +8,7 @@ import pathlib
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -76,6 +77,9 @@ def test_the_server_ends_with_a_script_that_is_killed() -> None:
             with pytest.raises(hulld.UnavailableError):
                 while True:
                     next(watch)
+    # Removed a moment later, by what kept the server.
+    while pathlib.Path(address.removeprefix("unix:")).parent.exists():
+        time.sleep(0.01)
 
 
 def test_programs_are_found_by_variable_path_and_build(
@@ -93,6 +97,8 @@ def test_programs_are_found_by_variable_path_and_build(
     built = program(tmp_path / "tree/build/release/bin/hulld")
     (tmp_path / "tree/deep").mkdir()
     monkeypatch.chdir(tmp_path / "tree/deep")
+    # The package itself may be installed below a checkout, as it is when ctest runs this.
+    monkeypatch.setattr("hulld.programs.__file__", str(tmp_path / "programs.py"))
     monkeypatch.setenv("PATH", str(on_path.parent))
     monkeypatch.delenv("HULLCTL_BINARY", raising=False)
     monkeypatch.setenv("HULLD_BINARY", str(named))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
-import time
 from collections.abc import AsyncIterator, Callable
 from types import TracebackType
 from typing import Any
@@ -23,7 +21,7 @@ from hulld.errors import HulldError, InternalError, UnavailableError, from_rpc_e
 
 from hulld.geometry.poses import PosesLike
 from hulld.retry import RetryPolicy
-from hulld.watches import MOST_WAITING, WatchPosition
+from hulld.watches import MOST_WAITING, Search, WatchPosition
 
 
 class AsyncHullWatch:
@@ -54,8 +52,7 @@ class AsyncHullWatch:
         return self
 
     async def __anext__(self) -> HullChanges:
-        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
-        failures = 0
+        search = Search(self._retry, self._patience)
         while True:
             if self._cancelled:
                 raise StopAsyncIteration
@@ -77,16 +74,7 @@ class AsyncHullWatch:
             self._call = None
             if self._cancelled:
                 raise StopAsyncIteration
-            failures += 1
-            wait = self._retry.wait_after(
-                failures,
-                error,
-                deadline - time.monotonic(),
-                math.inf if self._position.connected else None,
-            )
-            if wait is None:
-                raise error
-            await asyncio.sleep(wait)
+            await asyncio.sleep(search.wait_after(error, self._position.connected))
 
     def cancel(self) -> None:
         """As HullWatch.cancel."""
@@ -134,8 +122,7 @@ class AsyncCollisionWatch:
         return self
 
     async def __anext__(self) -> CollisionChanges:
-        deadline = math.inf if self._patience is None else time.monotonic() + self._patience
-        failures = 0
+        search = Search(self._retry, self._patience)
         while True:
             connection = await self._open()
             try:
@@ -148,13 +135,7 @@ class AsyncCollisionWatch:
             self._connection = None
             if self._cancelled:
                 raise StopAsyncIteration
-            failures += 1
-            attempts = math.inf if self._connected else None
-            remaining = deadline - time.monotonic()
-            wait = self._retry.wait_after(failures, error, remaining, attempts)
-            if wait is None:
-                raise error
-            await asyncio.sleep(wait)
+            await asyncio.sleep(search.wait_after(error, self._connected))
 
     async def _open(self) -> AsyncDuplex:
         async with self._lock:
