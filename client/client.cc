@@ -194,7 +194,9 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(const std::string& hull_id) const {
   return GetHullMesh(request);
 }
 
-absl::StatusOr<HullMesh> Client::GetHullMesh(const v1::GetHullMeshRequest& request) const {
+absl::StatusOr<HullMesh> Client::GetHullMesh(
+    const v1::GetHullMeshRequest& request,
+    const std::function<void(const HullMesh&)>& on_part) const {
   const Deadline deadline = NextDeadline();
   HullMesh mesh;
   absl::Status status = CallWithRetries(options_.retry, deadline, [&] {
@@ -204,7 +206,10 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(const v1::GetHullMeshRequest& reque
     const auto reader = hulls_->GetHullMesh(&context, request);
     absl::Status part_status;
     v1::GetHullMeshResponse part;
-    while (part_status.ok() && reader->Read(&part)) part_status = AddPart(part, &mesh);
+    while (part_status.ok() && reader->Read(&part)) {
+      part_status = AddPart(part, &mesh);
+      if (part_status.ok() && on_part) on_part(mesh);
+    }
     if (!part_status.ok()) context.TryCancel();
     const grpc::Status end = reader->Finish();
     return part_status.ok() ? FromGrpcStatus(end, context) : part_status;
@@ -306,7 +311,8 @@ std::unique_ptr<CollisionStream> Client::OpenCollisionStream() const {
 }
 
 std::unique_ptr<CollisionWatch> Client::WatchCollisions(v1::CollisionWatchOpen open) const {
-  return std::make_unique<CollisionWatch>(collisions_, std::move(open));
+  return std::make_unique<CollisionWatch>(collisions_, std::move(open), options_.retry,
+                                          options_.timeout);
 }
 
 absl::StatusOr<v1::GetStatusResponse> Client::GetStatus() const {

@@ -91,7 +91,11 @@ class Client {
   // INTERNAL: the stream contradicts itself.
   absl::StatusOr<HullMesh> GetHullMesh(const std::string& hull_id) const;
   // The same with all that a request can ask for, such as a simplification.
-  absl::StatusOr<HullMesh> GetHullMesh(const v1::GetHullMeshRequest& request) const;
+  // `on_part`, when given, is shown what has come, its header first, after each part of it; a call
+  // that is repeated begins anew.
+  absl::StatusOr<HullMesh> GetHullMesh(
+      const v1::GetHullMeshRequest& request,
+      const std::function<void(const HullMesh&)>& on_part = {}) const;
 
   // One page.
   absl::StatusOr<v1::ListHullsResponse> ListHulls(const v1::ListHullsRequest& request) const;
@@ -127,7 +131,8 @@ class Client {
   absl::Status FindCollisions(const v1::FindCollisionsRequest& request,
                               const SceneReceiver& receive) const;
 
-  // Tells when pairs begin and end to collide. Lasts until it is ended.
+  // Tells when pairs begin and end to collide. The timeout bounds the search for a server that was
+  // lost.
   std::unique_ptr<CollisionWatch> WatchCollisions(v1::CollisionWatchOpen open) const;
 
   absl::StatusOr<v1::GetStatusResponse> GetStatus() const;

@@ -53,7 +53,7 @@ check_format() {
     echo "skipped: clang-format-14 is not installed"
     return 0
   fi
-  find core server client tests -name '*.cc' -print0 -o -name '*.h' -print0 |
+  find core server client tests \( -name '*.cc' -o -name '*.h' -o -name '*.js' \) -print0 |
     xargs -0 -r clang-format-14 --dry-run -Werror ||
     { echo "Please run clang-format-14 -i on the files above."; return 1; }
 }

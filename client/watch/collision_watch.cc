@@ -1,43 +1,155 @@
 #include "client/watch/collision_watch.h"
 
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "client/calls/grpc_status.h"
 
 namespace hulld {
+namespace {
 
-CollisionWatch::CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub,
-                               v1::CollisionWatchOpen open)
-    : stub_(std::move(stub)), stream_(stub_->WatchCollisions(&context_)) {
-  v1::WatchCollisionsRequest request;
-  *request.mutable_open() = std::move(open);
-  // Where this fails, Next says why.
-  stream_->Write(request);
+constexpr int kPoseNumbers = 7;
+
+absl::Status CheckUpdate(const v1::CollisionWatchOpen& open,
+                         const v1::CollisionWatchUpdate& update) {
+  if (update.poses_size() != kPoseNumbers * update.placements_size()) {
+    return absl::InvalidArgumentError(absl::StrCat("poses: ", update.poses_size(), " numbers for ",
+                                                   update.placements_size(),
+                                                   " placements; each needs ", kPoseNumbers));
+  }
+  const v1::PackedPlacements& packed = open.packed_placements();
+  const int count = std::max(open.placements_size(),
+                             std::min(packed.hulls_size(), packed.poses_size() / kPoseNumbers));
+  for (const uint32_t placement : update.placements()) {
+    if (placement >= static_cast<uint32_t>(count)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("placements: there is no placement ", placement, "; there are ", count));
+    }
+  }
+  return absl::OkStatus();
 }
 
-CollisionWatch::~CollisionWatch() {
-  if (!end_.ok()) return;
-  Cancel();
-  v1::WatchCollisionsResponse rest;
-  while (stream_->Read(&rest)) {
+void SetPose(const double* numbers, v1::Placement* placement) {
+  v1::Quaternion* const q = placement->mutable_pose()->mutable_rotation();
+  q->set_w(numbers[0]);
+  q->set_x(numbers[1]);
+  q->set_y(numbers[2]);
+  q->set_z(numbers[3]);
+  v1::Vector3* const t = placement->mutable_pose()->mutable_translation();
+  t->set_x(numbers[4]);
+  t->set_y(numbers[5]);
+  t->set_z(numbers[6]);
+}
+
+// Puts the new poses in the place of the old ones.
+void Apply(const v1::CollisionWatchUpdate& update, v1::CollisionWatchOpen* open) {
+  for (int i = 0; i < update.placements_size(); ++i) {
+    const double* const numbers = update.poses().data() + kPoseNumbers * i;
+    const auto placement = static_cast<int>(update.placements(i));
+    if (open->placements_size() > 0) {
+      SetPose(numbers, open->mutable_placements(placement));
+    } else {
+      std::copy_n(
+          numbers, kPoseNumbers,
+          open->mutable_packed_placements()->mutable_poses()->begin() + kPoseNumbers * placement);
+    }
   }
-  stream_->Finish();
+}
+
+}  // namespace
+
+CollisionWatch::CollisionWatch(std::shared_ptr<v1::CollisionService::Stub> stub,
+                               v1::CollisionWatchOpen open, RetryPolicy retry,
+                               std::chrono::milliseconds patience)
+    : stub_(std::move(stub)),
+      retry_(std::move(retry)),
+      patience_(patience),
+      told_(open),
+      open_(std::move(open)) {}
+
+CollisionWatch::~CollisionWatch() {
+  Cancel();
+  if (call_ != nullptr) Close(*call_).IgnoreError();
 }
 
 absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
-  if (!end_.ok()) return end_;
-  v1::WatchCollisionsResponse message;
-  if (stream_->Read(&message)) return message;
-  end_ = FromGrpcStatus(stream_->Finish(), context_);
-  // The client never says that it has said all.
-  if (end_.ok()) end_ = absl::InternalError("the server ended the watch without a cause");
-  return end_;
+  const Deadline deadline = std::chrono::system_clock::now() + patience_;
+  RetryPolicy retry = retry_;
+  if (connected_) retry.max_attempts = std::numeric_limits<int>::max();
+  for (int failures = 0;;) {
+    const bool is_new = call_ == nullptr;
+    if (is_new) call_ = Open();
+    if (call_ == nullptr) return absl::CancelledError("the watch was cancelled");
+    v1::WatchCollisionsResponse message;
+    if (call_->stream->Read(&message)) {
+      if (is_new && connected_) told_.StartAnew();
+      connected_ = true;
+      told_.Take(&message);
+      message.set_update(call_->updates_before + message.update());
+      return message;
+    }
+    const absl::Status status = Close(*call_);
+    call_.reset();
+    if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
+  }
 }
 
-bool CollisionWatch::Update(const v1::CollisionWatchUpdate& update) {
+absl::Status CollisionWatch::Update(const v1::CollisionWatchUpdate& update) {
+  std::shared_ptr<Call> call;
+  {
+    const std::lock_guard lock(update_mutex_);
+    if (absl::Status status = CheckUpdate(open_, update); !status.ok()) return status;
+    Apply(update, &open_);
+    ++updates_;
+    call = updated_call_;
+  }
+  if (call == nullptr) return absl::OkStatus();
   v1::WatchCollisionsRequest request;
   *request.mutable_update() = update;
-  return stream_->Write(request);
+  // Where this fails, the next call opens with it.
+  call->stream->Write(request);
+  return absl::OkStatus();
+}
+
+std::shared_ptr<CollisionWatch::Call> CollisionWatch::Open() {
+  const auto call = std::make_shared<Call>();
+  {
+    const std::lock_guard lock(cancel_mutex_);
+    if (cancelled_) return nullptr;
+    cancelled_call_ = call;
+    call->stream = stub_->WatchCollisions(&call->context);
+  }
+  const std::lock_guard lock(update_mutex_);
+  v1::WatchCollisionsRequest request;
+  *request.mutable_open() = open_;
+  call->updates_before = updates_;
+  updated_call_ = call;
+  // Where this fails, Next says why.
+  call->stream->Write(request);
+  return call;
+}
+
+absl::Status CollisionWatch::Close(Call& call) {
+  {
+    const std::lock_guard lock(update_mutex_);
+    updated_call_.reset();
+  }
+  absl::Status status = FromGrpcStatus(call.stream->Finish(), call.context);
+  // The client never says that it has said all.
+  if (status.ok()) status = absl::InternalError("the server ended the watch without a cause");
+  const std::lock_guard lock(cancel_mutex_);
+  cancelled_call_.reset();
+  if (cancelled_) return absl::CancelledError("the watch was cancelled");
+  return status;
+}
+
+void CollisionWatch::Cancel() {
+  const std::lock_guard lock(cancel_mutex_);
+  cancelled_ = true;
+  if (cancelled_call_ != nullptr) cancelled_call_->context.TryCancel();
 }
 
 }  // namespace hulld

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -68,8 +69,8 @@ struct CollisionService::PairQuery {
     return IsQuickToRelate(placed_a().query_hull()) && IsQuickToRelate(placed_b().query_hull());
   }
   bool IsForTeam() const { return IsTextbookForTeam(options, placed_a(), placed_b()); }
-  absl::Status Answer(const v1::Wanted& wanted, Metrics& metrics,
-                      v1::CheckCollisionResponse* response) const;
+  absl::Status Encode(const absl::StatusOr<Answer>& answer, const v1::Wanted& wanted,
+                      Metrics& metrics, v1::CheckCollisionResponse* response) const;
   const PlacedHull& placed_a() const {
     HULLD_CHECK(a.has_value());
     return *a;
@@ -130,9 +131,18 @@ absl::Status CollisionService::PairQuery::Place(Registry& registry,
   return absl::OkStatus();
 }
 
-absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metrics& metrics,
+struct CollisionService::TextbookQuery {
+  TextbookQuery(PairQuery given_pair, bool for_team)
+      : pair(std::move(given_pair)), is_for_team(for_team) {}
+
+  PairQuery pair;
+  const bool is_for_team;
+  std::optional<TextbookCheck> check;
+};
+
+absl::Status CollisionService::PairQuery::Encode(const absl::StatusOr<Answer>& answer,
+                                                 const v1::Wanted& wanted, Metrics& metrics,
                                                  v1::CheckCollisionResponse* response) const {
-  const auto answer = hulld::CheckCollision(placed_a(), placed_b(), options);
   if (!answer.ok()) return NameQueryLimit(answer.status(), options);
   RungCounts counts;
   counts.Add(answer->rung);
@@ -171,29 +181,57 @@ void CollisionService::Check(CheckCall* call) {
     return Compute(*std::move(query), call);
   }
   // Waits for the store, or for canonical snapshots to be made.
-  readers_.Submit([this, call, query = *std::move(query)]() mutable {
-    const absl::Status placed = query.Place(
-        registry_, registry_.Resolve(HullIds(call->request()), query.options.should_stop),
-        &call->response());
-    if (!placed.ok()) return call->End(placed);
-    Compute(std::move(query), call);
-  });
+  const ClientId client = call->call().client();
+  readers_.Submit(
+      [this, call, query = *std::move(query)]() mutable {
+        const absl::Status placed = query.Place(
+            registry_, registry_.Resolve(HullIds(call->request()), query.options.should_stop),
+            &call->response());
+        if (!placed.ok()) return call->End(placed);
+        Compute(std::move(query), call);
+      },
+      client);
 }
 
 void CollisionService::Compute(PairQuery query, CheckCall* call) {
   const v1::Wanted& wanted = call->request().wanted();
   v1::CheckCollisionResponse* const response = &call->response();
   Metrics& metrics = call->call().metrics();
-  if (query.options.WantsRelationOnly() && query.IsQuick()) {
-    return call->End(query.Answer(wanted, metrics, response));
+  if (query.options.method == Method::kTextbookSat) {
+    const bool is_for_team = query.IsForTeam();
+    if (is_for_team) query.options.threads = executor_.threads();
+    return SubmitPiece(std::make_shared<TextbookQuery>(std::move(query), is_for_team), call);
   }
-  const bool is_for_team = query.IsForTeam();
-  if (is_for_team) query.options.threads = executor_.threads();
-  TaskPool& pool = is_for_team ? executor_.opener() : pool_;
   // `wanted` lives until the call ends.
-  pool.Submit([call, response, &wanted, &metrics, query = std::move(query)] {
-    call->End(query.Answer(wanted, metrics, response));
-  });
+  const auto answer = [call, response, &wanted, &metrics](const PairQuery& pair) {
+    call->End(pair.Encode(hulld::CheckCollision(pair.placed_a(), pair.placed_b(), pair.options),
+                          wanted, metrics, response));
+  };
+  if (query.options.WantsRelationOnly() && query.IsQuick()) return answer(query);
+  pool_.Submit([answer, query = std::move(query)] { answer(query); }, call->call().client());
+}
+
+void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCall* call) {
+  TaskPool& pool = query->is_for_team ? executor_.opener() : pool_;
+  const ClientId client = call->call().client();
+  pool.Submit(
+      [this, query = std::move(query), call] {
+        const PairQuery& pair = query->pair;
+        const auto end = std::chrono::steady_clock::now() +
+                         (query->is_for_team ? Executor::kSliceTime : TaskPool::kSliceTime);
+        if (!query->check.has_value()) {
+          absl::StatusOr<TextbookCheck> begun =
+              TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
+          if (!begun.ok()) return call->End(NameQueryLimit(begun.status(), pair.options));
+          query->check = *std::move(begun);
+        }
+        const absl::StatusOr<bool> done = query->check->Advance(end);
+        if (!done.ok()) return call->End(done.status());
+        if (!*done) return SubmitPiece(query, call);
+        call->End(pair.Encode(query->check->Finish(), call->request().wanted(),
+                              call->call().metrics(), &call->response()));
+      },
+      client);
 }
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,

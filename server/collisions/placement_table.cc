@@ -40,10 +40,11 @@ const QueryHull& QueryHullOf(const absl::StatusOr<HullView>& hull, bool canonica
 
 // Hulls that queries with these options can be asked of. CANCELLED: options.should_stop said so.
 absl::StatusOr<Resolved> ResolveFor(Registry& registry, std::span<const std::string> ids,
-                                    const QueryOptions& options, const ReadPlan& plan) {
+                                    KnownHulls& known, const QueryOptions& options,
+                                    const ReadPlan& plan) {
   const bool canonical = options.WantsCanonical();
   absl::StatusOr<Resolved> resolved =
-      registry.Resolve(ids, options.should_stop, canonical ? ReadPlan() : plan);
+      registry.Refresh(ids, known, options.should_stop, canonical ? ReadPlan() : plan);
   if (!resolved.ok() || !canonical) return resolved;
   for (absl::StatusOr<HullView>& hull : resolved->hulls) {
     if (!hull.ok()) continue;
@@ -157,14 +158,26 @@ size_t PlacementTable::MemoryBytes() const {
   size_t of_ids = 0;
   for (const std::string& id : ids_) of_ids += id.capacity();
   return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull)) + named_.size() * sizeof named_[0] +
-         ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) +
-                        sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
+         ids_.size() *
+             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
+              sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
          entries_.size() * sizeof(uint32_t) + of_ids;
 }
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
                                      const ReadPlan& plan) {
-  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids_, options, plan);
+  KnownHulls known;
+  return ResolveFrom(registry, known, options, plan);
+}
+
+absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& options,
+                                     const ReadPlan& plan) {
+  return ResolveFrom(registry, known_, options, plan);
+}
+
+absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownHulls& known,
+                                         const QueryOptions& options, const ReadPlan& plan) {
+  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids_, known, options, plan);
   if (!resolved.ok()) return resolved.status();
   Take(registry, *std::move(resolved), options.WantsCanonical());
   return absl::OkStatus();
@@ -175,7 +188,8 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
-  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids, options, {});
+  KnownHulls known;
+  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids, known, options, {});
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);

@@ -18,6 +18,7 @@
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
+#include "server/registry/known_hulls.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
@@ -40,7 +41,10 @@ class PlacementTable {
   // `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // The same, but false, at once, where it would have to wait or to make something.
+  // The same for who does so again and again: only hulls that changed since are looked up.
+  absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
+
+  // The same as Resolve, but false, at once, where it would have to wait or to make something.
   bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return entries_.size(); }
@@ -103,6 +107,8 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
+  absl::Status ResolveFrom(Registry& registry, KnownHulls& known, const QueryOptions& options,
+                           const ReadPlan& plan);
   void Take(const Registry& registry, Resolved resolved, bool canonical);
   void SortByHull();
   PlacedHull Place(size_t i) const;
@@ -115,6 +121,8 @@ class PlacementTable {
   std::vector<std::string> ids_;
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
+  // For Refresh.
+  KnownHulls known_;
   // What is asked of each: its own, or NoHull's.
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;

@@ -90,7 +90,7 @@ void HullService::Create(CreateCall* call) {
                      if (!created.ok()) return call->End(created.status());
                      const HullRecord& hull = created->hull;
                      if (created->created) {
-                       call->call().Log(LogLevel::kInfo, "hull created", {{"hull", hull.hull_id}});
+                       call->call().LogChange("hull created", hull.hull_id, hull.revision);
                      }
                      v1::CreateHullResponse& response = call->response();
                      EncodeHeader(registry_.store(), created->store_revision,
@@ -155,13 +155,13 @@ void HullService::Delete(DeleteCall* call) {
   }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-  registry_.Delete(
-      request.hull_id(), if_revision, [this, call](const absl::StatusOr<uint64_t>& revision) {
-        if (!revision.ok()) return call->End(revision.status());
-        call->call().Log(LogLevel::kInfo, "hull deleted", {{"hull", call->request().hull_id()}});
-        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
-        call->End(absl::OkStatus());
-      });
+  registry_.Delete(request.hull_id(), if_revision,
+                   [this, call](const absl::StatusOr<uint64_t>& revision) {
+                     if (!revision.ok()) return call->End(revision.status());
+                     call->call().LogChange("hull deleted", call->request().hull_id(), *revision);
+                     EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
+                     call->End(absl::OkStatus());
+                   });
 }
 
 }  // namespace hulld::server

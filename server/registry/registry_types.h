@@ -91,6 +91,9 @@ struct CacheStatistics {
   // Builders, points and what is prepared of them, canonical snapshots; points that wait to be
   // built, and vertices that wait for the store; and what calls hold for long (MemoryCharge).
   uint64_t bytes = 0;
+  // What of that is held for readers, and for writers (MemoryUse).
+  uint64_t reading_bytes = 0;
+  uint64_t writing_bytes = 0;
   uint64_t limit_bytes = 0;
   // Hulls that a reader asked for and that were in memory.
   uint64_t hits = 0;

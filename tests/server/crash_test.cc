@@ -23,7 +23,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "tests/server/harness/history_client.h"
 #include "tests/server/harness/hull_history.h"
-#include "tests/server/harness/hulld_process.h"
+#include "tests/server/harness/restartable_server.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -44,70 +44,6 @@ uint64_t Seed() {
 constexpr int kWriters = 8;
 constexpr int kReaders = 8;
 constexpr int kHulls = 5;
-
-// A directory that goes with this.
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "hulld-crash-XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  ~TemporaryDirectory() { std::filesystem::remove_all(path_); }
-  const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
-};
-
-// A server that can be killed and started again, on a unix socket and a store of its own.
-class RestartableServer : public ::testing::Test {
- protected:
-  std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
-
-  // Of a connection that tries again at once while the server starts. It may take a second to be
-  // made, which is what gRPC means by the least backoff.
-  static grpc::ChannelArguments ReconnectAtOnce() {
-    grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);
-    arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
-    arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 50);
-    return arguments;
-  }
-
-  // A connection of client number `i` alone.
-  std::shared_ptr<grpc::Channel> Channel(int i) const {
-    grpc::ChannelArguments own = ReconnectAtOnce();
-    own.SetInt("hulld.test.client", i);
-    return grpc::CreateCustomChannel(address(), grpc::InsecureChannelCredentials(), own);
-  }
-
-  void StartServer(const std::vector<std::string>& options = {}) {
-    std::vector<std::string> arguments = {"--listen", address(), "--store", "rocksdb", "--data-dir",
-                                          absl::StrCat(directory_.path(), "/store"),
-                                          // Nobody reads what it says while clients call.
-                                          "--log-level", "warn"};
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    server_ = std::make_unique<Process>(arguments);
-    const auto deadline = std::chrono::system_clock::now() + std::chrono::seconds(60);
-    ASSERT_TRUE(Channel(-1)->WaitForConnected(deadline)) << "hulld did not start" << Said();
-  }
-
-  // Kills the server.
-  void Kill() {
-    server_->Signal(SIGKILL);
-    EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself" << Said();
-  }
-
-  // What the server logged until it was killed, which this does if nobody has.
-  std::string Said() {
-    server_->Signal(SIGKILL);
-    server_->ReadToEnd();
-    return absl::StrCat("; it said:\n", absl::StrJoin(server_->lines(), ""));
-  }
-
-  const TemporaryDirectory directory_;
-  std::unique_ptr<Process> server_;
-};
 
 class Crash : public RestartableServer {
  protected:

@@ -1,11 +1,13 @@
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/mesh_obj.h"
+#include "client/hullctl/printing/progress_bar.h"
 
 namespace hulld {
 namespace {
@@ -51,7 +53,14 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(
         "--outside says how to simplify; give --max-vertices, --max-error or both as well"));
   }
-  const auto mesh = run.MakeClient().GetHullMesh(RequestFor(arguments));
+  std::optional<ProgressBar> bar;
+  const auto mesh =
+      run.MakeClient().GetHullMesh(RequestFor(arguments), [&](const HullMesh& so_far) {
+        const uint64_t total = so_far.header.vertex_count() + so_far.header.facet_count();
+        if (!bar) bar.emplace(run.err, run.shows_progress, "vertices", total);
+        bar->Update(so_far.vertex_count() + so_far.facet_sizes.size(), so_far.vertex_count());
+      });
+  bar.reset();
   if (!mesh.ok()) return run.Fail(mesh.status());
   const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
     run.json() ? WriteMessages(*mesh, out) : WriteObj(*mesh, out);

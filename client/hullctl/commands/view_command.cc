@@ -13,6 +13,7 @@
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/view/bridge/bridge.h"
 #include "client/hullctl/view/bridge/page_html.h"
+#include "client/hullctl/view/browser_picture.h"
 #include "client/hullctl/view/demo_scenes.h"
 #include "client/hullctl/view/page_session.h"
 #include "client/hullctl/view/recording.h"
@@ -29,7 +30,10 @@ struct ViewArguments {
   std::string scene_key;
   uint16_t port = 0;
   bool no_open = false;
+  bool edit = false;
   std::string html_file;
+  std::string png_file;
+  PictureSize size;
   std::string up = "y";
 };
 
@@ -90,13 +94,14 @@ class Viewing {
   Viewing(const Invocation& run, const ViewArguments& arguments)
       : run_(run),
         arguments_(arguments),
-        program_{run.MakeClient(), run.server, arguments.up, {}, {}},
+        program_{run.MakeClient(), run.server, arguments.up, arguments.edit, {}, {}},
         temporary_(program_.client) {}
 
   ExitCode Run() {
     const ExitCode loaded = arguments_.demo ? LoadDemo() : LoadThings();
     if (loaded != ExitCode::kDone) return loaded;
-    return arguments_.html_file.empty() ? Serve() : WriteHtml();
+    if (!arguments_.html_file.empty()) return WriteHtml();
+    return arguments_.png_file.empty() ? Serve() : WritePng();
   }
 
  private:
@@ -175,6 +180,20 @@ class Viewing {
     return ExitCode::kDone;
   }
 
+  ExitCode WritePng() {
+    const auto recording = RecordScene(program_, program_.scenes.front());
+    if (!recording.ok()) return run_.Fail(recording.status());
+    const auto picture = PictureOf(PicturePage(*recording, arguments_.size));
+    if (!picture.ok()) return run_.Fail(picture.status());
+    const absl::Status written =
+        WriteOutput(arguments_.png_file, run_.out, [&](std::ostream& out) { out << *picture; });
+    if (!written.ok()) return run_.FailUsage(written);
+    if (arguments_.png_file == "-") return ExitCode::kDone;
+    run_.out << arguments_.png_file << ": " << arguments_.size.width << " by "
+             << arguments_.size.height << " pixels\n";
+    return ExitCode::kDone;
+  }
+
   ExitCode Serve() {
     BridgeOptions options;
     options.port = arguments_.port;
@@ -215,6 +234,13 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
   if (!arguments.demo && !arguments.scene_key.empty()) {
     return run.FailUsage(absl::InvalidArgumentError("--scene chooses among those of --demo"));
   }
+  const int files = !arguments.html_file.empty() + !arguments.png_file.empty();
+  if (files == 2) {
+    return run.FailUsage(absl::InvalidArgumentError("--html and --png write one file; give one"));
+  }
+  if (files == 1 && arguments.edit) {
+    return run.FailUsage(absl::InvalidArgumentError("--edit is for the page that asks a server"));
+  }
   return Viewing(run, arguments).Run();
 }
 
@@ -240,20 +266,36 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .AddText("--html", &arguments->html_file,
                "Write one file that shows the scene without a server, and end")
       .ValueName("FILE");
+  command
+      .AddText("--png", &arguments->png_file,
+               "Write a picture, drawn by a browser without a window, and end")
+      .ValueName("FILE");
+  const auto take_size = [arguments](const std::string& text) {
+    const auto size = ParsePictureSize(text);
+    if (size.ok()) arguments->size = *size;
+    return size.status();
+  };
+  command.AddParsed("--size", take_size, "Pixels of --png (default 1600x1000)")
+      .ValueName("WIDTHxHEIGHT");
+  command.AddFlag("--edit", &arguments->edit,
+                  "Let the page append points to hulls and delete them");
   command.AddText("--up", &arguments->up, "The axis that points up (default y)")
       .ValueName("x|y|z")
       .OneOf({"x", "y", "z"});
   command.SetDetails(
-      "The page asks hulld through hullctl: it never sees your token, and it changes nothing on\n"
-      "the server. The hull of a FILE is made by the server, under view/, and deleted at the end;\n"
+      "The page asks hulld through hullctl: it never sees your token, and without --edit it\n"
+      "changes nothing on the server. The hull of a FILE is made by the server, under view/, and "
+      "deleted at the end;\n"
       "without the right to write, the file is shown without its hull. Press ? on the page for\n"
-      "its keys. 'hullctl picture' draws without a browser.");
+      "its keys. --png runs chromium or another browser of its family; 'hullctl picture' draws\n"
+      "without any, as SVG.");
   command.SetExamples(
       {{"All hulls of the server", "hullctl view"},
        {"Those whose IDs start so, and those to come", "hullctl view cell-3/"},
        {"A hull beside the points, mesh and hull of a file", "hullctl view arm part.stl"},
        {"Placements, as for 'hullctl scene'", "hullctl view scene.json"},
-       {"One file to send to someone", "hullctl view arm --html arm.html"}});
+       {"One file to send to someone", "hullctl view arm --html arm.html"},
+       {"A picture for a report", "hullctl view scene.json --png scene.png --size 1200x800"}});
   command.OnGiven([=] { invocation->action = [=] { return View(*invocation, *arguments); }; });
 }
 

@@ -180,11 +180,11 @@ void AddWatchCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Prints a line for each event: what happened, name, revision, vertices and points, box.\n"
       "First come all hulls (PRESENT) and a line '# synced'; then what is CREATED, CHANGED,\n"
-      "REPLACED and DELETED, the last state of each hull where many changes come at once. A\n"
-      "watch that loses the server looks for it during --timeout and goes on where it was.\n"
+      "REPLACED and DELETED, the last state of each hull where many changes come at once.\n"
       "With --scene: what happened (ENTER, TOUCH, EXIT, with a clearance NEAR and FAR, LOST\n"
       "when a hull goes), the two placements, and the revisions of their hulls. FILE is as in\n"
       "'hullctl scene' and 'hullctl batch'; poses stay, hulls grow.\n"
+      "A watch that loses the server looks for it during --timeout, and goes on where it was.\n"
       "With --output json each message of the contract is one line. Ctrl-C ends it.");
   command.SetExamples(
       {{"Those of one cell", "hullctl watch cell-3/"},

@@ -53,7 +53,7 @@ std::string PosesJson(const ViewObject& a, const ViewObject& b) {
 std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                           const ViewObject& b, uint64_t update, bool rest,
                           const v1::HullVersion& version_a, const v1::HullVersion& version_b,
-                          const AnswerRow& row) {
+                          const AnswerRow& row, const std::string& tolerant_json = "") {
   JsonObject message;
   message.Add("type", "answer")
       .AddJson("update", std::to_string(update))
@@ -63,6 +63,7 @@ std::string AnswerMessage(std::pair<uint32_t, uint32_t> pair, const ViewObject& 
       .AddJson("hullA", MessageJson(version_a))
       .AddJson("hullB", MessageJson(version_b));
   AddRow(row, &message);
+  if (!tolerant_json.empty()) message.AddJson("tolerant", tolerant_json);
   return message.Close();
 }
 
@@ -154,7 +155,8 @@ v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b) 
 
 std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                            const ViewObject& b, uint64_t update,
-                           const v1::CheckCollisionResponse& response) {
+                           const v1::CheckCollisionResponse& response,
+                           const std::string& tolerant_json) {
   AnswerRow row;
   row.relation = response.relation();
   row.rung = response.rung();
@@ -162,8 +164,8 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
   if (response.has_certificate()) row.certificate = &response.certificate();
   if (response.has_separation()) row.separation = response.separation();
   if (response.has_witness()) row.witness = response.witness();
-  return AnswerMessage(pair, a, b, update, /*rest=*/true, response.hull_a(), response.hull_b(),
-                       row);
+  return AnswerMessage(pair, a, b, update, /*rest=*/true, response.hull_a(), response.hull_b(), row,
+                       tolerant_json);
 }
 
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,
@@ -277,7 +279,27 @@ absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) 
   const ViewObject& b = question.objects[question.pair->second];
   const auto response = client_.CheckCollision(PairRequest(a, b));
   if (!response.ok()) return response.status();
-  return PairAnswerJson(*question.pair, a, b, question.update, *response);
+  if (question.tolerance == 0) {
+    return PairAnswerJson(*question.pair, a, b, question.update, *response);
+  }
+  const auto tolerant = TolerantAnswer(question);
+  if (!tolerant.ok()) return tolerant.status();
+  return PairAnswerJson(*question.pair, a, b, question.update, *response, *tolerant);
+}
+
+absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Question& question) const {
+  v1::CheckCollisionRequest request =
+      PairRequest(question.objects[question.pair->first], question.objects[question.pair->second]);
+  // A tolerance excludes them.
+  request.clear_wanted();
+  request.set_tolerance(question.tolerance);
+  const auto response = client_.CheckCollision(request);
+  if (!response.ok()) return response.status();
+  return JsonObject()
+      .AddJson("tolerance", NumbersJson(&question.tolerance, 1))
+      .Add("relation", v1::Relation_Name(response->relation()))
+      .Add("rung", v1::Rung_Name(response->rung()))
+      .Close();
 }
 
 absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {

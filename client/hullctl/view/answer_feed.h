@@ -51,6 +51,8 @@ class AnswerFeed {
   bool AnswerPair(const Question& question);
   absl::StatusOr<std::string> MovingAnswer(const Question& question);
   absl::StatusOr<std::string> RestingAnswer(const Question& question) const;
+  // What the tolerance makes of the pair, as JSON.
+  absl::StatusOr<std::string> TolerantAnswer(const Question& question) const;
   bool AnswerScene(const Question& question) const;
 
   const Client& client_;
@@ -72,10 +74,12 @@ class AnswerFeed {
   std::thread thread_;
 };
 
-// All that a page shows of a pair, from the answer to one question.
+// All that a page shows of a pair, from the answer to one question; tolerant_json: its member
+// `tolerant` (protocol.h), or empty.
 std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject& a,
                            const ViewObject& b, uint64_t update,
-                           const v1::CheckCollisionResponse& response);
+                           const v1::CheckCollisionResponse& response,
+                           const std::string& tolerant_json = "");
 
 // What is wanted for that.
 v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b);

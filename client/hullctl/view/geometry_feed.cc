@@ -30,46 +30,20 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const Geomet
 }
 
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)
-    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
-
-GeometryFeed::~GeometryFeed() {
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
-  thread_.join();
-}
+    : files_(std::make_shared<ShapeFiles>()),
+      worker_(kMostWishes, [&client, page = std::move(page)](const Order& order) {
+        return page->SendBinary(FrameFor(client, *order.files, order.wish));
+      }) {}
 
 void GeometryFeed::Show(const ShapeFiles& files) {
   const std::lock_guard lock(mutex_);
-  files_ = files;
-  wishes_.clear();
+  files_ = std::make_shared<ShapeFiles>(files);
+  worker_.Forget();
 }
 
 void GeometryFeed::Ask(const std::vector<GeometryWish>& wishes) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (wishes_.size() + wishes.size() > kMostWishes) return;
-    wishes_.insert(wishes_.end(), wishes.begin(), wishes.end());
-  }
-  changed_.notify_all();
-}
-
-void GeometryFeed::Run() {
-  while (true) {
-    GeometryWish wish;
-    ShapeFiles files;
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return !wishes_.empty() || ended_; });
-      if (ended_) return;
-      wish = std::move(wishes_.front());
-      wishes_.pop_front();
-      files = files_;
-    }
-    if (!page_->SendBinary(FrameFor(client_, files, wish))) return;
-  }
+  const std::lock_guard lock(mutex_);
+  for (const GeometryWish& wish : wishes) worker_.Ask({wish, files_});
 }
 
 }  // namespace hulld

@@ -47,6 +47,7 @@ std::string HelloMessage(const ViewProgram& program) {
   return TextMessage("hello", {{"server", QuoteJson(program.server)},
                                {"version", QuoteJson(HULLD_VERSION)},
                                {"up", QuoteJson(program.up)},
+                               {"edit", program.edit ? "true" : "false"},
                                {"scenes", scenes + "]"}});
 }
 
@@ -54,7 +55,8 @@ PageSession::PageSession(const ViewProgram& program, std::shared_ptr<PageChannel
     : program_(program),
       page_(std::move(page)),
       answers_(program.client, page_),
-      geometry_(program.client, page_) {
+      geometry_(program.client, page_),
+      edits_(program.edit ? std::make_unique<EditFeed>(program.client, page_) : nullptr) {
   page_->SendText(HelloMessage(program_));
   Show(program_.scenes.front().key);
 }
@@ -71,6 +73,22 @@ void PageSession::OnMessage(std::string_view json) {
   if (message->show) Show(*message->show);
   if (!message->geometry.empty()) geometry_.Ask(message->geometry);
   if (message->question) answers_.Ask(*message->question);
+  if (message->edit) Edit(*std::move(message->edit));
+}
+
+void PageSession::Edit(ViewEdit edit) {
+  if (edits_ == nullptr) {
+    page_->SendText(ProblemMessage("This page may only look; start 'hullctl view --edit'."));
+    return;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    if (!known_.contains(edit.hull_id)) {
+      page_->SendText(ProblemMessage("There is no hull \"" + edit.hull_id + "\" on show."));
+      return;
+    }
+  }
+  edits_->Ask(std::move(edit));
 }
 
 void PageSession::Show(const std::string& key) {

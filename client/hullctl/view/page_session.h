@@ -12,6 +12,7 @@
 #include "client/client.h"
 #include "client/hullctl/view/answer_feed.h"
 #include "client/hullctl/view/bridge/bridge.h"
+#include "client/hullctl/view/edit_feed.h"
 #include "client/hullctl/view/geometry_feed.h"
 #include "client/hullctl/view/hull_follower.h"
 #include "client/hullctl/view/protocol.h"
@@ -25,6 +26,8 @@ struct ViewProgram {
   std::string server;
   // "x", "y" or "z".
   std::string up;
+  // Whether pages may change hulls.
+  bool edit = false;
   // At least one; pages start with the first.
   std::vector<ViewScene> scenes;
   // Told the key of each scene that a page starts to show; may be empty.
@@ -43,6 +46,7 @@ class PageSession final : public PageHandler {
 
  private:
   void Show(const std::string& key);
+  void Edit(ViewEdit edit);
   // Called by the thread of the follower of scene number `scene`.
   void TakeHull(uint64_t scene, const v1::HullEvent& event, bool synced);
 
@@ -50,6 +54,8 @@ class PageSession final : public PageHandler {
   const std::shared_ptr<PageChannel> page_;
   AnswerFeed answers_;
   GeometryFeed geometry_;
+  // Null unless pages may change hulls.
+  const std::unique_ptr<EditFeed> edits_;
 
   std::mutex mutex_;
   // Guarded by the mutex: which scene is on show, counted, and what of it is known by ID.

@@ -126,6 +126,26 @@ GeometryWish ReadSimplification(Reader* reader) {
   return wish;
 }
 
+ViewEdit ReadEdit(Reader* reader) {
+  ViewEdit edit;
+  const std::string action = reader->Text("action");
+  if (action != "append" && action != "delete") reader->Complain("action", "is none of an edit");
+  if (action == "delete") edit.action = ViewEdit::Action::kDelete;
+  edit.hull_id = reader->Text("hullId");
+  for (const Value& number : reader->List("points").values()) {
+    if (number.kind_case() != Value::kNumberValue) {
+      reader->Complain("points", "holds what is not a number");
+      return edit;
+    }
+    edit.points.push_back(number.number_value());
+  }
+  const bool is_append = edit.action == ViewEdit::Action::kAppend;
+  if (edit.points.size() % 3 != 0 || edit.points.empty() == is_append) {
+    reader->Complain("points", "needs three numbers for each point to append");
+  }
+  return edit;
+}
+
 template <typename Number>
 void AppendBytes(const std::vector<Number>& numbers, std::string* frame) {
   frame->append(reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number));
@@ -173,6 +193,8 @@ absl::StatusOr<PageMessage> ParsePageMessage(std::string_view json) {
     message.geometry.push_back(ReadSimplification(&reader));
   } else if (type == "question") {
     message.question = ReadQuestion(&reader);
+  } else if (type == "edit") {
+    message.edit = ReadEdit(&reader);
   } else {
     reader.Complain("type", "is none that the bridge knows");
   }

@@ -32,21 +32,26 @@ namespace hulld {
 //              about (two indices, or none), the tolerance of the scene, and whether nothing moves
 //              now. While a question waits, the next one takes its place, its poses added. `answer`
 //              and `collisions` answer it.
+//   edit       {action: "append"|"delete", hullId, points}: changes a hull; `points` are three
+//              numbers each. Refused unless `hello` says that the page may. `edited` answers it.
 //
 // The bridge to the page:
-//   hello      {server, version, up, scenes: [{key, title}]}, first.
+//   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: whether the page
+//   may
+//              change hulls.
 //   scene      {number, key, title, note, files: [{name}], objects: [OBJECT]}: forget what was
-//   there. OBJECT
-//              is {name, hullId, file, pose}: hullId is "" and file -1 where there is none. Other
-//              messages name objects and files by their index here.
+//              there. OBJECT is {name, hullId, file, pose}: hullId is "" and file -1 where there is
+//              none. Other messages name objects and files by their index here.
 //   objects    {scene, objects}: more objects of that scene, behind those that are there.
 //   hull       {event}: a HullEvent of the contract: a hull changed, appeared or went.
 //   answer     {update, rest, pair, poses, hullA, hullB, relation, rung, axis, certificate,
-//              separation, witness} or {update, pair, problem}: of the pair that was asked for. At
-//              rest this is what CheckCollision says, and else what StreamCollisions says.
+//              separation, witness, tolerant} or {update, pair, problem}: of the pair that was
+//              asked for. At rest this is what CheckCollision says, and else what StreamCollisions
+//              says. tolerant, at rest and with a tolerance: {tolerance, relation, rung}, what
+//              CheckCollision says with it.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
-//   of
-//              the scene that collide (FindCollisions), a < b.
+//              of the scene that collide (FindCollisions), a < b.
+//   edited     {hullId, done, message}: how an edit ended; message is for people.
 //   problem    {message}: something failed; for people.
 //
 // A frame is, little-endian: the length of its head (uint32), its head (JSON), zeros up to a
@@ -77,10 +82,18 @@ struct GeometryWish {
   std::optional<uint32_t> file;
   std::optional<v1::GetHullMeshRequest> simplified;
 };
+struct ViewEdit {
+  enum class Action { kAppend, kDelete };
+  Action action = Action::kAppend;
+  std::string hull_id;
+  // x y z of each point to append.
+  std::vector<double> points;
+};
 struct PageMessage {
   std::optional<std::string> show;
   std::vector<GeometryWish> geometry;
   std::optional<ViewQuestion> question;
+  std::optional<ViewEdit> edit;
 };
 
 // INVALID_ARGUMENT: what is wrong with it.

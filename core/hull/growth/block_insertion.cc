@@ -150,7 +150,7 @@ class BlockInsertion {
     for (const Range& range : RangesOf(stride)) {
       const std::span<const Vector> points = points_.subspan(range.first, range.end - range.first);
       indices_.clear();
-      surface_.directions()->AppendSurvivors(points, indices_);
+      surface_.directions()->AppendSurvivors(points, indices_, poll_);
       // Gathered while they are in the cache.
       for (const uint32_t i : indices_) {
         if (!IsDone(range.first + i)) survivors.push_back(points[i]);
@@ -162,7 +162,7 @@ class BlockInsertion {
         surface_.MeasureBefore(vertices_, survivors.size(), kFineMapFineness, kWalksPerSurvivor,
                                poll_)) {
       indices_.clear();
-      surface_.directions()->AppendSurvivors(survivors, indices_);
+      surface_.directions()->AppendSurvivors(survivors, indices_, poll_);
       for (size_t k = 0; k < indices_.size(); ++k) survivors[k] = survivors[indices_[k]];
       survivors.resize(indices_.size());
     }

@@ -35,7 +35,7 @@ class ChunkedVector {
       chunks_.push_back(std::make_unique_for_overwrite<T[]>(capacity));
       std::copy_n(from, std::min(kChunk, other.size_ - first), chunks_.back().get());
     }
-    noted_.assign(chunks_.size(), Noted{});
+    noted_.clear();
     first_capacity_ = chunks_.empty() ? 0 : other.first_capacity_;
     size_ = other.size_;
     return *this;
@@ -72,7 +72,6 @@ class ChunkedVector {
       if (size_ == first_capacity_) GrowFirst();
     } else if (size_ >> kBits == chunks_.size()) {
       chunks_.push_back(std::make_unique_for_overwrite<T[]>(kChunk));
-      noted_.emplace_back();
     }
     return size_++;
   }
@@ -81,17 +80,16 @@ class ChunkedVector {
   void StartJournal() {
     HULLD_CHECK(journal_.empty() && journal_end_ == 0);
     journal_end_ = size_;
-    size_before_ = size_;
   }
   // Makes everything as it was when the journal was started, and ends it. Cost: the changes.
   void Undo() {
     for (const Change& change : journal_) {
       chunks_[change.index >> kBits][change.index & kMask] = change.before;
     }
-    size_ = size_before_;
+    size_ = journal_end_;
     EndJournal();
     chunks_.resize((size_ + kMask) >> kBits);
-    noted_.resize(chunks_.size());
+    if (noted_.size() > chunks_.size()) noted_.resize(chunks_.size());
     if (chunks_.empty()) first_capacity_ = 0;
   }
   // Ends the journal and keeps what changed. Cost: the changes.
@@ -120,16 +118,14 @@ class ChunkedVector {
   void GrowFirst() {
     const size_t capacity = std::max(kLeastCapacity, 2 * size_);
     auto grown = std::make_unique_for_overwrite<T[]>(capacity);
-    if (chunks_.empty()) {
-      chunks_.emplace_back();
-      noted_.emplace_back();
-    }
+    if (chunks_.empty()) chunks_.emplace_back();
     std::copy_n(chunks_[0].get(), size_, grown.get());
     chunks_[0] = std::move(grown);
     first_capacity_ = capacity;
   }
 
   void Note(size_t i) {
+    if (noted_.size() < chunks_.size()) noted_.resize(chunks_.size());
     uint64_t& noted = noted_[i >> kBits][(i & kMask) / 64];
     const uint64_t bit = uint64_t{1} << (i % 64);
     if ((noted & bit) != 0) return;
@@ -138,14 +134,14 @@ class ChunkedVector {
   }
 
   std::vector<std::unique_ptr<T[]>> chunks_;
-  // By chunk.
+  // By chunk; of the last chunks perhaps none yet, so that a vector without a journal has none.
   std::vector<Noted> noted_;
   // Elements that the first chunk has room for.
   size_t first_capacity_ = 0;
   size_t size_ = 0;
-  // The journal is about elements below this; 0 when there is none.
+  // How many elements there were when the journal was started, the ones that it is about; 0 when
+  // there is none.
   size_t journal_end_ = 0;
-  size_t size_before_ = 0;
   std::vector<Change> journal_;
 };
 

@@ -78,14 +78,14 @@ bool DirectionMap::Coarsen() {
   return true;
 }
 
-void DirectionMap::AppendSurvivors(std::span<const Vector> points,
-                                   std::vector<uint32_t>& survivors) const {
+void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
+                                   StopPoll& poll) const {
   // By the chunk, so that the buffer stays in the nearest cache.
   constexpr size_t kChunk = 1024;
   // Room beyond the chunk's, as four are written at a time.
   std::array<uint32_t, kChunk + 4> buffer;
   const bool has_avx2 = CurrentSimdPath() == SimdPath::kAvx2 && rejects_;
-  for (size_t first = 0; first < points.size(); first += kChunk) {
+  for (size_t first = 0; first < points.size() && !poll.Step(); first += kChunk) {
     const std::span<const Vector> chunk =
         points.subspan(first, std::min(kChunk, points.size() - first));
     uint32_t* end = buffer.data();

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/numeric/cube_map.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
@@ -95,8 +96,10 @@ class DirectionMap {
     return gauges_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
   }
 
-  // Appends the indices of the points that are not certainly inside, ascending.
-  void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors) const;
+  // Appends the indices of the points that are not certainly inside, ascending; of some of the
+  // points only once the poll says stop.
+  void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
+                       StopPoll& poll) const;
 
  private:
   size_t corner_count() const {

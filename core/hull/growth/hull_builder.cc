@@ -14,6 +14,7 @@
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/block_insertion.h"
 #include "core/hull/growth/canonical_snapshot.h"
+#include "core/hull/growth/kept_before.h"
 #include "core/hull/growth/polygon_boundary.h"
 #include "core/hull/growth/surface.h"
 #include "core/hull/growth/vertex_table.h"
@@ -82,13 +83,13 @@ class HullBuilder::State {
   // Starts a journal: what comes can be undone until it ends.
   void StartJournal() {
     vertices_.StartJournal();
-    before_ = Before{ends_, polygon_.has_value(), surface_.has_value(), std::nullopt};
+    before_.Start({ends_, polygon_.has_value(), surface_.has_value(), std::nullopt});
     if (polygon_) polygon_->StartJournal();
     if (surface_) surface_->StartJournal();
   }
   // Makes everything as it was when the journal was started.
   void Undo() {
-    HULLD_CHECK(before_.has_value());
+    HULLD_CHECK(before_);
     ends_ = before_->ends;
     if (before_->has_surface) {
       surface_->Undo();
@@ -102,14 +103,14 @@ class HullBuilder::State {
       polygon_.reset();
     }
     vertices_.Undo();
-    before_.reset();
+    before_.End();
   }
   // Keeps what changed.
   void EndJournal() {
     vertices_.EndJournal();
     if (polygon_) polygon_->EndJournal();
     if (surface_ && before_->has_surface) surface_->EndJournal();
-    before_.reset();
+    before_.End();
   }
   size_t JournalBytes() const {
     size_t bytes = vertices_.JournalBytes();
@@ -239,7 +240,7 @@ class HullBuilder::State {
     bool has_surface;
     std::optional<PolygonBoundary> polygon;
   };
-  std::optional<Before> before_;
+  KeptBefore<Before> before_;
 };
 
 HullBuilder::HullBuilder() : state_(std::make_unique<State>()) {}

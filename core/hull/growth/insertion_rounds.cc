@@ -47,15 +47,18 @@ constexpr int kGridBits = 14;
 constexpr int kPlaceBits = 3 + 2 * kGridBits;
 static_assert(kPlaceBits <= 32);
 
-void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch) {
+// Unfinished when the poll says stop.
+void SortByUpperHalf(std::vector<SortKey>& keys, std::vector<SortKey>& scratch, StopPoll& poll) {
   constexpr size_t kWorthRadix = 2048;
   if (keys.size() < kWorthRadix) {
     std::sort(keys.begin(), keys.end());
     return;
   }
   constexpr int kDigit = 11;
+  constexpr size_t kKeysPerStep = 256;
   scratch.resize(keys.size());
   for (int shift = 32; shift < 32 + kPlaceBits; shift += kDigit) {
+    if (poll.Step(keys.size() / kKeysPerStep)) return;
     std::array<uint32_t, 1 << kDigit> starts{};
     constexpr uint64_t kMask = (1 << kDigit) - 1;
     for (const SortKey key : keys) ++starts[(key >> shift) & kMask];
@@ -130,9 +133,13 @@ class RoundsInsertion {
       }
     }
     if (!is_last) surface_.CountRejected(members_.size(), members_.size() - keys_.size());
-    SortByUpperHalf(keys_, scratch_);
+    SortByUpperHalf(keys_, scratch_, poll_);
     // Gathered first: the misses of a loop that does nothing else overlap.
-    for (const SortKey key : keys_) chosen_.push_back(points_[static_cast<uint32_t>(key)]);
+    chosen_.reserve(keys_.size());
+    for (const SortKey key : keys_) {
+      if (poll_.Step()) return;
+      chosen_.push_back(points_[static_cast<uint32_t>(key)]);
+    }
   }
 
   // The last round is most of the points: all are read in order, and only those that remain are
@@ -142,9 +149,12 @@ class RoundsInsertion {
       members_.resize(points_.size());
       std::iota(members_.begin(), members_.end(), 0u);
     } else {
-      directions->AppendSurvivors(points_, members_);
+      directions->AppendSurvivors(points_, members_, poll_);
     }
-    std::erase_if(members_, [&](uint32_t i) { return rounds_.RoundOf(i) != round; });
+    std::erase_if(members_, [&](uint32_t i) {
+      poll_.Step();
+      return rounds_.RoundOf(i) != round;
+    });
   }
 
   bool InsertChosen() {

@@ -50,6 +50,7 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
 
 void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t cell) {
   const double size = SizeWith(vertices, point);
+  const uint64_t work_before = work_;
   std::optional<Location> location;
   if (directions_) {
     location = Walk(vertices, point, size, Alive(directions_->hint(cell)), work_);
@@ -58,6 +59,7 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
     location = Scan(vertices, point, size);
     work_ += triangles_.size();
   }
+  steps_ += (work_ - work_before) / kTrianglesPerStep;
   last_ = location->triangle;
   if (location->side == Side::kInside) {
     // A point equal to a vertex lies in the cones of that vertex's triangles alone.
@@ -110,23 +112,23 @@ void Surface::StartJournal() {
   HULLD_CHECK(!before_);
   triangles_.StartJournal();
   free_.StartJournal();
-  before_ = Before{.alive = alive_,
-                   .extent = extent_,
-                   .next_update = next_update_,
-                   .asked = asked_,
-                   .rejected = rejected_,
-                   .measured_at = measured_at_,
-                   .mark = mark_,
-                   .last = last_,
-                   .was_measuring = measuring_.has_value(),
-                   .has_new_directions = false,
-                   .directions = std::nullopt};
+  before_.Start({.alive = alive_,
+                 .extent = extent_,
+                 .next_update = next_update_,
+                 .asked = asked_,
+                 .rejected = rejected_,
+                 .measured_at = measured_at_,
+                 .mark = mark_,
+                 .last = last_,
+                 .was_measuring = measuring_.has_value(),
+                 .has_new_directions = false,
+                 .directions = std::nullopt});
 }
 
 // Marks and hints stay: a mark matters only while it is the present one, and a hint may be any
 // number.
 void Surface::Undo() {
-  HULLD_CHECK(before_.has_value());
+  HULLD_CHECK(before_);
   triangles_.Undo();
   free_.Undo();
   alive_ = before_->alive;
@@ -141,13 +143,13 @@ void Surface::Undo() {
   measuring_.reset();
   if (before_->was_measuring) next_update_ = alive_;
   if (mark_ < before_->mark) ResetMarks();
-  before_.reset();
+  before_.End();
 }
 
 void Surface::EndJournal() {
   triangles_.EndJournal();
   free_.EndJournal();
-  before_.reset();
+  before_.End();
 }
 
 size_t Surface::JournalBytes() const {

@@ -13,6 +13,7 @@
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/chunked_vector.h"
 #include "core/hull/growth/direction_map.h"
+#include "core/hull/growth/kept_before.h"
 #include "core/hull/growth/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
@@ -119,7 +120,7 @@ class Surface {
   std::optional<VertexId> CornerAt(const VertexTable& vertices, TriangleId id,
                                    const Vector& point) const;
   // Steps of insertions since this was last asked, for a poll: one for each, and more for those
-  // that change many triangles.
+  // that change many triangles, or look for their place among many.
   uint64_t TakeSteps() { return std::exchange(steps_, 0); }
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
@@ -326,7 +327,7 @@ class Surface {
   uint32_t mark_ = 0;
   // See TakeSteps.
   uint64_t steps_ = 0;
-  std::optional<Before> before_;
+  KeptBefore<Before> before_;
   // Where the last insertion was.
   TriangleId last_ = 0;
 };

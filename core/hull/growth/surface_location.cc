@@ -156,20 +156,18 @@ void Surface::SetCenter(const VertexTable& vertices) {
   KeepDirections();
   directions_.emplace(*interior);
   extent_ = 0;
-  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-    for (const VertexId v : t.corners) {
-      extent_ = std::max(extent_, (vertices[v] - *interior).cwiseAbs().maxCoeff());
-    }
-  });
+  for (VertexId v = 0; v < vertices.id_bound(); ++v) {
+    if (vertices.IsAlive(v)) extent_ = std::max(extent_, LargestComponent(vertices[v] - *interior));
+  }
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
-  // The mean of the corners; each divided first, so that no sum overflows.
+  // The mean of the vertices, in the order of memory; each divided first, so that no sum overflows.
   Vector mean = Vector::Zero();
-  const double weight = 1.0 / static_cast<double>(3 * alive_);
-  ForEachTriangle([&](TriangleId, const SurfaceTriangle& t) {
-    for (const VertexId v : t.corners) mean += vertices[v] * weight;
-  });
+  const double weight = 1.0 / static_cast<double>(vertices.size());
+  for (VertexId v = 0; v < vertices.id_bound(); ++v) {
+    if (vertices.IsAlive(v)) mean += vertices[v] * weight;
+  }
   if (!mean.allFinite()) return std::nullopt;
   const double size = SizeWith(vertices, mean);
   bool inside = true;

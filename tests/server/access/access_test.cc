@@ -6,7 +6,6 @@
 #include <google/protobuf/descriptor.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
-#include <openssl/sha.h>
 #include <unistd.h>
 
 #include <cstring>
@@ -20,6 +19,7 @@
 #include "server/access/caller.h"
 #include "tests/server/harness/test_certificates.h"
 #include "tests/server/harness/test_server.h"
+#include "tests/server/harness/test_tokens.h"
 
 namespace hulld::server {
 namespace {
@@ -28,19 +28,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-std::string TokenLine(const std::string& name, const std::string& role, const std::string& prefix,
-                      const std::string& token) {
-  unsigned char hash[SHA256_DIGEST_LENGTH];
-  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash);
-  std::string text = absl::StrCat(name, " ", role, " ", prefix, " sha256:");
-  for (const unsigned char byte : hash) {
-    char digits[3];
-    std::snprintf(digits, sizeof digits, "%02x", byte);
-    text += digits;
-  }
-  return text + "\n";
-}
 
 // How a call ended and the bytes of its replies.
 struct Outcome {

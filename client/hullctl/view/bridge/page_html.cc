@@ -86,4 +86,10 @@ std::string StandalonePage(std::string_view recording_json) {
   return FillIn(resources);
 }
 
+std::string PicturePage(std::string_view recording_json, const PictureSize& size) {
+  const std::string body = absl::StrCat("\n<body class=\"picture\" style=\"--width: ", size.width,
+                                        "px; --height: ", size.height, "px\">\n");
+  return absl::StrReplaceAll(StandalonePage(recording_json), {{"\n<body>\n", body}});
+}
+
 }  // namespace hulld

@@ -1,6 +1,7 @@
 #ifndef HULLD_CLIENT_HULLCTL_VIEW_BRIDGE_PAGE_HTML_H_
 #define HULLD_CLIENT_HULLCTL_VIEW_BRIDGE_PAGE_HTML_H_
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,16 @@ std::string ServedPagePolicy(std::string_view nonce, std::string_view host);
 // The same page as one file that needs no server and no network. `recording_json`: what the page
 // shows (protocol.h).
 std::string StandalonePage(std::string_view recording_json);
+
+// In pixels.
+struct PictureSize {
+  uint32_t width = 1600;
+  uint32_t height = 1000;
+};
+
+// The same without its panels, which puts a PNG of what it shows, as a data URL, into the attribute
+// data-png of its body.
+std::string PicturePage(std::string_view recording_json, const PictureSize& size);
 
 }  // namespace hulld
 

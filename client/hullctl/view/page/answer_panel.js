@@ -6,11 +6,17 @@ import {poseText} from 'hulld/pose.js';
 const MOST_ROWS = 200;
 const MOST_CHOICES = 400;
 const MARK_NAMES = {
-  plane: 'plane', axis: 'axis', witness: 'witness points', certificate: 'certificate',
+  plane: 'plane',
+  axis: 'axis',
+  witness: 'witness points',
+  certificate: 'certificate',
 };
 const AXIS_KINDS = {
-  AXIS_KIND_FACET_A: 'facet of A', AXIS_KIND_FACET_B: 'facet of B', AXIS_KIND_EDGE_EDGE: 'two edges',
-  AXIS_KIND_FLAT: 'flat hulls', AXIS_KIND_GENERAL: 'found by search',
+  AXIS_KIND_FACET_A: 'facet of A',
+  AXIS_KIND_FACET_B: 'facet of B',
+  AXIS_KIND_EDGE_EDGE: 'two edges',
+  AXIS_KIND_FLAT: 'flat hulls',
+  AXIS_KIND_GENERAL: 'found by search',
 };
 
 export class AnswerPanel {
@@ -30,8 +36,10 @@ export class AnswerPanel {
     const {pair} = model;
     if (!pair) {
       const hint = model.objects.filter((o) => o.hullId && !o.gone).length > 1 ?
-          'Select an object, then shift-click another one.' : 'A pair needs two hulls.';
-      this.root.replaceChildren(element('h2', {}, 'Answer'), element('p', {className: 'quiet'}, hint));
+          'Select an object, then shift-click another one.' :
+          'A pair needs two hulls.';
+      this.root.replaceChildren(
+          element('h2', {}, 'Answer'), element('p', {className: 'quiet'}, hint));
       return;
     }
     this.root.replaceChildren(
@@ -48,12 +56,15 @@ export class AnswerPanel {
     if (pair[place] >= MOST_CHOICES) near.push(model.objects[pair[place]]);
     for (const object of near) {
       if (!object.hullId || object.index === pair[1 - place]) continue;
-      select.append(element('option', {value: object.index, selected: object.index === pair[place]}, object.name));
+      select.append(element(
+          'option', {value: object.index, selected: object.index === pair[place]}, object.name));
     }
     select.addEventListener('change', () => {
       const chosen = Number(select.value);
-      if (model.selected === pair[place]) model.select(chosen, pair[1 - place]);
-      else model.select(model.selected, chosen);
+      if (model.selected === pair[place])
+        model.select(chosen, pair[1 - place]);
+      else
+        model.select(model.selected, chosen);
     });
     return [element('b', {}, letter), select];
   }
@@ -63,7 +74,8 @@ export class AnswerPanel {
     const {answer, pair} = this.model;
     if (!pair) return;
     if (!answer) {
-      const text = this.live ? 'Asking\u2026' : 'Not in this file; it holds the answers at the start.';
+      const text =
+          this.live ? 'Asking\u2026' : 'Not in this file; it holds the answers at the start.';
       this.body.replaceChildren(element('p', {className: 'quiet'}, text));
       return;
     }
@@ -74,14 +86,17 @@ export class AnswerPanel {
     // Read aloud once it is at rest.
     this.body.setAttribute('aria-busy', String(!answer.rest));
     const open = this.body.querySelector('details')?.open;
-    this.body.replaceChildren(this.verdict(answer), this.table(answer), this.toggles(), this.command(answer, open));
+    this.body.replaceChildren(
+        this.verdict(answer), this.table(answer), this.toggles(), this.command(answer, open));
   }
 
   verdict(answer) {
-    const {word, sign, style} = RELATIONS[answer.relation] || {word: 'no answer', sign: '', style: ''};
-    return element('p', {className: 'verdict', id: 'verdict'},
-      element('span', {className: style, id: 'relation'}, `${sign} ${word}`),
-      element('span', {className: 'moving'}, answer.rest ? '' : 'while moving'));
+    const {word, sign, style} =
+        RELATIONS[answer.relation] || {word: 'no answer', sign: '', style: ''};
+    return element(
+        'p', {className: 'verdict', id: 'verdict'},
+        element('span', {className: style, id: 'relation'}, `${sign} ${word}`),
+        element('span', {className: 'moving'}, answer.rest ? '' : 'while moving'));
   }
 
   table(answer) {
@@ -89,7 +104,10 @@ export class AnswerPanel {
     const value = Number(separation?.value);
     const list = facts([
       ['separation', separation && exact(separation.value)],
-      ['', value < 0 ? element('span', {className: 'quiet'}, 'minus the depth of the overlap') : null],
+      [
+        '',
+        value < 0 ? element('span', {className: 'quiet'}, 'minus the depth of the overlap') : null
+      ],
       ['within', separation && exact(separation.bound)],
       ['axis', axis?.direction && vector(axis.direction.x, axis.direction.y, axis.direction.z)],
       ['', axis?.direction && element('span', {className: 'quiet'}, AXIS_KINDS[axis.kind] || '')],
@@ -97,10 +115,22 @@ export class AnswerPanel {
       ['point of B', witness && vector(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
       ['certificate', certificate && this.certificateText(certificate)],
       ['decided by', RUNGS[answer.rung]],
+      ...this.tolerantRows(answer),
       ['revisions', `${answer.hullA.revision} and ${answer.hullB.revision}`],
     ]);
     list.id = 'answer-facts';
     return list;
+  }
+
+  // What the tolerance makes of it: perhaps a lesser answer, by a cheaper rung.
+  tolerantRows({tolerant}) {
+    if (!tolerant) return [];
+    const {word, sign} = RELATIONS[tolerant.relation];
+    return [
+      ['tolerance', exact(tolerant.tolerance)],
+      ['with it', `${sign} ${word}`],
+      ['decided then by', RUNGS[tolerant.rung]],
+    ];
   }
 
   certificateText({direction, integerDirection, pairs}) {
@@ -110,28 +140,35 @@ export class AnswerPanel {
   }
 
   toggles() {
-    return element('div', {className: 'marks', role: 'group', 'aria-label': 'What of the answer is drawn'},
-      ...Object.entries(MARK_NAMES).map(([key, name]) => {
-        const swatch = element('span', {className: 'swatch'});
-        swatch.style.background = MARK_COLOURS[key];
-        return element('label', {},
-          element('input', {
-            type: 'checkbox', checked: this.marks.on[key], onchange: ({target}) => {
-              this.marks.on[key] = target.checked;
-              this.marks.rebuild();
-            },
-          }), swatch, name);
-      }));
+    return element(
+        'div', {className: 'marks', role: 'group', 'aria-label': 'What of the answer is drawn'},
+        ...Object.entries(MARK_NAMES).map(([key, name]) => {
+          const swatch = element('span', {className: 'swatch'});
+          swatch.style.background = MARK_COLOURS[key];
+          return element(
+              'label', {}, element('input', {
+                type: 'checkbox',
+                checked: this.marks.on[key],
+                onchange: ({target}) => {
+                  this.marks.on[key] = target.checked;
+                  this.marks.rebuild();
+                },
+              }),
+              swatch, name);
+        }));
   }
 
   // The same question for a shell; every number reads back as the same double.
   command(answer, open) {
     const [a, b] = this.model.pair.map((i) => this.model.objects[i]);
     const {poses} = answer;
-    const text = `hullctl check ${a.hullId} ${b.hullId} --separation --witness --axis --certificate ` +
+    const text =
+        `hullctl check ${a.hullId} ${b.hullId} --separation --witness --axis --certificate ` +
         `--pose-a ${poseText(poses.slice(0, 7))} --pose-b ${poseText(poses.slice(7))}`;
-    return element('details', {className: 'command', open: Boolean(open)},
-      element('summary', {}, 'Ask the same in a shell'), element('pre', {tabIndex: 0, id: 'command'}, text));
+    return element(
+        'details', {className: 'command', open: Boolean(open)},
+        element('summary', {}, 'Ask the same in a shell'),
+        element('pre', {tabIndex: 0, id: 'command'}, text));
   }
 
   updateCollisions() {
@@ -139,18 +176,31 @@ export class AnswerPanel {
     const {pairs, problems, totals} = model.collisions;
     const count = Number(totals.touching || 0) + Number(totals.overlapping || 0) +
         Number(totals.withinTolerance || 0);
-    const title = count === 0 ? 'No pair collides' : count === 1 ? '1 pair collides' : `${grouped(count)} pairs collide`;
+    const title = count === 0 ? 'No pair collides' :
+        count === 1           ? '1 pair collides' :
+                                `${grouped(count)} pairs collide`;
     const rows = pairs.slice(0, MOST_ROWS).map(([a, b, relation]) => {
       const {word, sign, style} = RELATIONS[relation];
-      return element('li', {}, element('button', {
-        type: 'button', onclick: () => this.visit(a, b),
-      }, element('span', {className: 'names'}, `${model.objects[a].name} and ${model.objects[b].name}`),
-         element('span', {className: `tag ${style}`}, `${sign} ${word}`)));
+      return element(
+          'li', {},
+          element(
+              'button', {
+                type: 'button',
+                onclick: () => this.visit(a, b),
+              },
+              element(
+                  'span', {className: 'names'},
+                  `${model.objects[a].name} and ${model.objects[b].name}`),
+              element('span', {className: `tag ${style}`}, `${sign} ${word}`)));
     });
-    const more = count > rows.length ? element('p', {className: 'more'}, `and ${grouped(count - rows.length)} more`) : null;
-    const slider = this.slider || (this.slider = this.live ? this.toleranceSlider() : element('span'));
+    const more = count > rows.length ?
+        element('p', {className: 'more'}, `and ${grouped(count - rows.length)} more`) :
+        null;
+    const slider =
+        this.slider || (this.slider = this.live ? this.toleranceSlider() : element('span'));
     this.list.replaceChildren(
-        element('h2', {id: 'collision-count'}, title), element('ol', {}, ...rows), ...(more ? [more] : []),
+        element('h2', {id: 'collision-count'}, title), element('ol', {}, ...rows),
+        ...(more ? [more] : []),
         ...problems.map((problem) => element('p', {className: 'quiet'}, problem)), slider);
   }
 
@@ -164,16 +214,21 @@ export class AnswerPanel {
     const {model} = this;
     const output = element('output', {}, 'exact');
     const input = element('input', {
-      type: 'range', min: 0, max: 60, value: 0, id: 'tolerance', 'aria-label': 'Tolerance of the list',
+      type: 'range',
+      min: 0,
+      max: 60,
+      value: 0,
+      id: 'tolerance',
+      'aria-label': 'Tolerance',
       oninput: () => {
         const radius = model.bounds()?.radius || 1;
         const steps = Number(input.value);
-        model.tolerance = steps === 0 ? 0 : Number((radius * 10 ** ((steps - 60) / 10 - 1)).toPrecision(3));
+        model.tolerance =
+            steps === 0 ? 0 : Number((radius * 10 ** ((steps - 60) / 10 - 1)).toPrecision(3));
         output.textContent = steps === 0 ? 'exact' : short(model.tolerance);
         model.tell('tolerance');
       },
     });
-    return element('div', {className: 'slider'},
-      element('label', {}, 'Tolerance of this list ', output, input));
+    return element('div', {className: 'slider'}, element('label', {}, 'Tolerance ', output, input));
   }
 }

@@ -1,5 +1,6 @@
 // Many objects as one surface and one set of lines, placed in double and then made float: two calls
 // of the GPU instead of two for each object.
+import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
 import {RELATIONS} from 'hulld/palette.js';
 import {rotate, unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
@@ -7,26 +8,10 @@ import {THREE} from 'hulld/three.js';
 // Lines of more edges than this hide what they stand on.
 const MOST_EDGES = 400000;
 
-export class Crowd {
-  constructor(model, stage) {
-    this.model = model;
-    this.stage = stage;
-    this.group = new THREE.Group();
-    stage.scene.add(this.group);
-  }
-
+export class Crowd extends DrawnGroup {
   clear() {
-    for (const part of [...this.group.children]) {
-      part.geometry.dispose();
-      part.material.dispose();
-      this.group.remove(part);
-    }
+    super.clear();
     this.ranges = new Map();
-  }
-
-  dispose() {
-    this.clear();
-    this.stage.scene.remove(this.group);
   }
 
   // `except`: the object that is drawn on its own.
@@ -70,21 +55,23 @@ export class Crowd {
     };
     const parts = [];
     if (this.model.show.hull) {
-      parts.push(new THREE.Mesh(geometryWith(triangles), new THREE.MeshPhongMaterial({
-        vertexColors: THREE.VertexColors, flatShading: true, shininess: 12, specular: 0x222222,
-        polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
-      })));
+      parts.push(new THREE.Mesh(
+          geometryWith(triangles), facetMaterial({vertexColors: THREE.VertexColors})));
     }
     if (edges.length) {
       parts.push(new THREE.LineSegments(geometryWith(edges), new THREE.LineBasicMaterial({
-        color: this.stage.theme.edge, transparent: true, opacity: 0.35,
+        color: this.stage.theme.edge,
+        transparent: true,
+        opacity: 0.35,
       })));
     }
     if (this.model.show.points) {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute('position', position);
-      parts.push(new THREE.Points(geometry, new THREE.PointsMaterial(
-          {color: this.stage.theme.edge, size: 2, sizeAttenuation: false})));
+      parts.push(new THREE.Points(
+          geometry,
+          new THREE.PointsMaterial(
+              {color: this.stage.theme.edge, size: 2, sizeAttenuation: false})));
     }
     for (const part of parts) {
       // One sphere about all of it is never out of sight.
@@ -99,7 +86,8 @@ export class Crowd {
     const relation = RELATIONS[this.model.relationOf.get(object.index)];
     const colour = new THREE.Color(relation ? relation.lit : object.colour);
     const bytes = [colour.r, colour.g, colour.b].map((value) => Math.round(255 * value));
-    const shift = [object.pose[4] - origin[0], object.pose[5] - origin[1], object.pose[6] - origin[2]];
+    const shift =
+        [object.pose[4] - origin[0], object.pose[5] - origin[1], object.pose[6] - origin[2]];
     for (let i = 0; i < hull.xyz.length; i += 3) {
       const p = rotate(quaternion, [hull.xyz[i], hull.xyz[i + 1], hull.xyz[i + 2]]);
       for (let k = 0; k < 3; ++k) {

@@ -2,9 +2,12 @@
 export function element(name, properties = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(properties)) {
-    if (key.startsWith('on')) made.addEventListener(key.slice(2), value);
-    else if (key.includes('-')) made.setAttribute(key, value);
-    else made[key] = value;
+    if (key.startsWith('on'))
+      made.addEventListener(key.slice(2), value);
+    else if (key.includes('-'))
+      made.setAttribute(key, value);
+    else
+      made[key] = value;
   }
   made.append(...children.filter((child) => child || child === 0));
   return made;
@@ -29,4 +32,5 @@ export function facts(rows) {
   return list;
 }
 
-export const vector = (...xyz) => element('span', {className: 'number'}, xyz.map((v) => String(Number(v))).join(' '));
+export const vector = (...xyz) =>
+    element('span', {className: 'number'}, xyz.map((v) => String(Number(v))).join(' '));

@@ -26,8 +26,10 @@ export class Gizmo {
     this.handles.addEventListener('dragging-changed', ({value}) => {
       stage.controls.enabled = !value;
       this.dragged = true;
-      if (value) this.begin();
-      else this.follow(true);
+      if (value)
+        this.begin();
+      else
+        this.follow(true);
     });
     this.setMode('translate');
   }
@@ -45,7 +47,8 @@ export class Gizmo {
   // To where the object is, or away.
   update() {
     const {object, model} = this;
-    if (!this.handles.enabled || !object || !object.hullId || !model.isShown(object) || !model.shapeOf(object)) {
+    if (!this.handles.enabled || !object || !object.hullId || !model.isShown(object) ||
+        !model.shapeOf(object)) {
       this.handles.detach();
       return;
     }
@@ -64,8 +67,8 @@ export class Gizmo {
     this.startPosition = this.proxy.position.clone();
   }
 
-  // The pose that the handles stand for. A move adds to the translation and leaves the quaternion as
-  // it is, bit for bit; a turn keeps the middle of the box where it is.
+  // The pose that the handles stand for. A move adds to the translation and leaves the quaternion
+  // as it is, bit for bit; a turn keeps the middle of the box where it is.
   follow(rest) {
     const {object, model} = this;
     if (!object || !this.startPose) return;

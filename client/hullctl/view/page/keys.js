@@ -33,12 +33,14 @@ export function bindKeys(actions) {
     const names = keys.flatMap((key, i) => [...(i ? [between] : []), element('kbd', {}, key)]);
     list.append(element('dt', {}, ...names), element('dd', {}, text));
   }
-  const plain = new Map(table.filter(([, , , act]) => act).map(([[key], , , act]) => [key.toLowerCase(), act]));
+  const plain = new Map(
+      table.filter(([, , , act]) => act).map(([[key], , , act]) => [key.toLowerCase(), act]));
   plain.set('escape', plain.get('esc'));
 
   addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const typing = event.target.matches?.('input:not([type="checkbox"]):not([type="color"]), select, textarea');
+    const typing = event.target.matches?.(
+        'input:not([type="checkbox"]):not([type="color"]), select, textarea');
     if (typing) {
       if (event.key === 'Escape') event.target.blur();
       return;

@@ -40,8 +40,9 @@ export class Labels {
   place() {
     const {model, stage} = this;
     for (const [object, element] of this.rows) {
-      const corners = model.cornersOf(object).map((corner) => stage.toScreen(
-          new THREE.Vector3(...corner.map((value, k) => value - model.origin[k]))));
+      const corners = model.cornersOf(object).map(
+          (corner) => stage.toScreen(
+              new THREE.Vector3(...corner.map((value, k) => value - model.origin[k]))));
       const inFront = corners.every(Boolean);
       element.hidden = !inFront;
       if (!inFront) continue;

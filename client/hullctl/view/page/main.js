@@ -11,6 +11,7 @@ import {Model} from 'hulld/model.js';
 import {ObjectPanel} from 'hulld/object_panel.js';
 import {ObjectView} from 'hulld/object_view.js';
 import {pick} from 'hulld/picking.js';
+import {keepPicture} from 'hulld/picture.js';
 import {HullShape, MeshShape, newVertices} from 'hulld/shape.js';
 import {ShellView} from 'hulld/shell_view.js';
 import {Stage} from 'hulld/stage.js';
@@ -44,15 +45,19 @@ class Viewer {
       answer: (message) => this.answer(message),
       collisions: (message) => this.collisions(message),
       problem: (message) => this.say(message.message),
+      edited: (message) => this.edited(message),
       frame: (frame) => this.frame(frame),
       lost: () => this.lost(),
     });
     this.answerPanel = new AnswerPanel(this.model, this.marks, this.connection.live);
-    this.objectPanel = new ObjectPanel(this.model, this.connection.live,
-                                       (...wish) => this.simplify(...wish));
+    this.objectPanel = new ObjectPanel(
+        this.model, this.connection.live, (...wish) => this.simplify(...wish),
+        (edit) => this.connection.send({type: 'edit', ...edit}));
     this.listen();
     this.bindControls();
-    this.stage.beforeFrame((now) => [...this.views.values()].reduce((any, view) => view.fade(now) || any, false));
+    this.stage.beforeFrame(
+        (now) => [...this.views.values()].reduce((any, view) => view.fade(now) || any, false));
+    if (document.body.classList.contains('picture')) keepPicture(this.stage);
     document.body.dataset.ready = 'yes';
   }
 
@@ -109,16 +114,19 @@ class Viewer {
 
   // --- Messages ---
 
-  hello({server, version, up, scenes}) {
+  hello({server, version, up, edit, scenes}) {
     this.server = server;
+    this.objectPanel.mayEdit = edit && this.connection.live;
     this.stage.setUp(up);
     this.gizmo.handles.camera = this.stage.camera;
     const choice = $('scene-choice');
     choice.hidden = scenes.length < 2;
     const ordered = scenes.slice().sort((a, b) => a.key.localeCompare(b.key));
-    choice.replaceChildren(...ordered.map(({key, title}) => element('option', {value: key}, `${key}  ${title}`)));
+    choice.replaceChildren(
+        ...ordered.map(({key, title}) => element('option', {value: key}, `${key}  ${title}`)));
     $('status').dataset.live = this.connection.live ? 'yes' : 'no';
-    $('status').title = this.connection.live ? `hulld ${version} at ${server}` : 'A recording; nothing here changes';
+    $('status').title = this.connection.live ? `hulld ${version} at ${server}` :
+                                               'A recording; nothing here changes';
     this.scenes = scenes.map(({key}) => key);
   }
 
@@ -268,15 +276,20 @@ class Viewer {
     this.stage.radius = bounds.radius;
     this.stage.flyTo(bounds, {jump: true, direction: this.stage.defaultView()});
     const hulls = model.objects.filter(({hullId, gone}) => hullId && !gone);
-    if (hulls.length === 2) model.select(hulls[1].index, hulls[0].index);
-    else if (model.objects.length === 1) model.select(0);
-    else this.ask(true);
+    if (hulls.length === 2)
+      model.select(hulls[1].index, hulls[0].index);
+    else if (model.objects.length === 1)
+      model.select(0);
+    else
+      this.ask(true);
     document.body.dataset.fitted = document.body.dataset.scene || 'yes';
   }
 
   answer(message) {
     const {pair} = this.model;
-    if (!pair || message.update < this.firstUpdate || message.pair[0] !== pair[0] || message.pair[1] !== pair[1]) return;
+    if (!pair || message.update < this.firstUpdate || message.pair[0] !== pair[0] ||
+        message.pair[1] !== pair[1])
+      return;
     this.model.answer = message;
     this.marks.rebuild();
     this.answerPanel.update();
@@ -288,11 +301,17 @@ class Viewer {
     this.model.setCollisions(message);
   }
 
+  edited(message) {
+    if (!this.objectPanel.edited(message)) this.say(message.message);
+  }
+
   lost() {
     $('status').dataset.live = 'lost';
     $('status').textContent = 'ended';
-    this.say('hullctl has ended, or lets this page in no more. What is here stays, and nothing follows. ' +
-             'Run hullctl view again for another address.');
+    this.say(
+        'hullctl has ended, or lets this page in no more. ' +
+        'What is here stays, and nothing follows. ' +
+        'Run hullctl view again for another address.');
   }
 
   // --- Questions ---
@@ -334,8 +353,8 @@ class Viewer {
 
   rebuildViews() {
     const {model, stage} = this;
-    const single = model.isCrowd ?
-        model.objects.filter(({index}) => index === model.selected) : model.objects;
+    const single =
+        model.isCrowd ? model.objects.filter(({index}) => index === model.selected) : model.objects;
     const wanted = new Set(single.map(({index}) => index));
     for (const [index, view] of this.views) {
       if (wanted.has(index)) continue;
@@ -343,7 +362,8 @@ class Viewer {
       this.views.delete(index);
     }
     for (const object of single) {
-      if (!this.views.has(object.index)) this.views.set(object.index, new ObjectView(model, stage, object));
+      if (!this.views.has(object.index))
+        this.views.set(object.index, new ObjectView(model, stage, object));
       this.views.get(object.index).rebuild();
     }
     if (model.isCrowd) {
@@ -387,7 +407,9 @@ class Viewer {
     $('message').textContent = text;
     $('message').hidden = false;
     clearTimeout(this.silence);
-    this.silence = setTimeout(() => { $('message').hidden = true; }, 12000);
+    this.silence = setTimeout(() => {
+      $('message').hidden = true;
+    }, 12000);
   }
 
   setTheme(name) {
@@ -426,7 +448,8 @@ class Viewer {
       });
     }
     $('fit').addEventListener('click', () => this.fit());
-    $('theme').addEventListener('click', () => this.setTheme(this.theme === 'dark' ? 'light' : 'dark'));
+    $('theme').addEventListener(
+        'click', () => this.setTheme(this.theme === 'dark' ? 'light' : 'dark'));
     $('help').addEventListener('click', () => $('keys').showModal());
     $('scene-choice').addEventListener('change', ({target}) => {
       this.connection.send({type: 'show', key: target.value});
@@ -442,7 +465,8 @@ class Viewer {
     this.bindPicking();
     bindKeys({
       fit: () => this.fit(),
-      flyToSelected: () => model.selected !== null && model.tell('fly', [model.objects[model.selected]]),
+      flyToSelected: () =>
+          model.selected !== null && model.tell('fly', [model.objects[model.selected]]),
       step: (by) => this.step(by),
       nextOther: () => this.nextOther(),
       nextCollision: () => this.nextCollision(),
@@ -478,8 +502,10 @@ class Viewer {
       if (!down || this.gizmo.dragged || this.gizmo.handles.dragging) return;
       if (Math.hypot(clientX - down[0], clientY - down[1]) > 4) return;
       const index = pick(this.model, this.stage, offsetX, offsetY);
-      if (index === null) this.model.select(null);
-      else this.tree.choose(this.model.objects[index], shiftKey);
+      if (index === null)
+        this.model.select(null);
+      else
+        this.tree.choose(this.model.objects[index], shiftKey);
     });
   }
 
@@ -511,13 +537,15 @@ class Viewer {
     const present = this.model.objects.filter(({gone}) => !gone);
     if (!present.length) return;
     const at = present.findIndex(({index}) => index === this.model.selected);
-    const next = at < 0 ? (by > 0 ? 0 : present.length - 1) : (at + by + present.length) % present.length;
+    const next =
+        at < 0 ? (by > 0 ? 0 : present.length - 1) : (at + by + present.length) % present.length;
     this.model.select(present[next].index);
   }
 
   nextOther() {
     const {model} = this;
-    const others = model.objects.filter(({hullId, gone, index}) => hullId && !gone && index !== model.selected);
+    const others = model.objects.filter(
+        ({hullId, gone, index}) => hullId && !gone && index !== model.selected);
     if (model.selected === null || !others.length) return;
     const at = others.findIndex(({index}) => index === model.other);
     model.select(model.selected, others[(at + 1) % others.length].index);

@@ -1,26 +1,16 @@
 // Draws what an answer says: the separating plane and its axis, the witness points, and the vertex
 // pairs of the certificate.
+import {DrawnGroup} from 'hulld/drawn_group.js';
 import {MARK_COLOURS} from 'hulld/palette.js';
 import {toWorld} from 'hulld/pose.js';
-import {THREE, discTexture} from 'hulld/three.js';
+import {discTexture, THREE} from 'hulld/three.js';
 
 const number = ({x, y, z}) => [Number(x), Number(y), Number(z)];
 
-export class Marks {
+export class Marks extends DrawnGroup {
   constructor(model, stage) {
-    this.model = model;
-    this.stage = stage;
+    super(model, stage);
     this.on = {plane: true, axis: true, witness: true, certificate: true};
-    this.group = new THREE.Group();
-    stage.scene.add(this.group);
-  }
-
-  clear() {
-    this.group.traverse((part) => {
-      part.geometry?.dispose();
-      part.material?.dispose();
-    });
-    this.group.remove(...this.group.children);
   }
 
   rebuild() {
@@ -29,8 +19,8 @@ export class Marks {
     const objects = (pair || []).map((i) => this.model.objects[i]);
     if (answer && !answer.problem && pair && objects.every((o) => this.model.isShown(o))) {
       this.size = Math.min(...objects.map((o) => this.model.radiusOf(o))) || 1;
-      const witness = answer.witness && isFinite(answer.separation?.value) && [
-        number(answer.witness.pointA), number(answer.witness.pointB)];
+      const witness = answer.witness && isFinite(answer.separation?.value) &&
+          [number(answer.witness.pointA), number(answer.witness.pointB)];
       if (witness && this.on.witness) this.addWitness(witness);
       if (answer.axis?.direction) this.addAxis(number(answer.axis.direction), witness, objects);
       if (answer.certificate && this.on.certificate) this.addCertificate(answer, objects);
@@ -44,7 +34,8 @@ export class Marks {
 
   line(points, colour, options = {}) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
-    const material = new THREE.LineBasicMaterial({color: colour, depthTest: false, transparent: true, ...options});
+    const material = new THREE.LineBasicMaterial(
+        {color: colour, depthTest: false, transparent: true, ...options});
     const line = new THREE.LineSegments(geometry, material);
     line.renderOrder = 8;
     this.group.add(line);
@@ -52,11 +43,15 @@ export class Marks {
 
   dots(points, colour, size) {
     const geometry = new THREE.BufferGeometry().setFromPoints(points);
-    const material = new THREE.PointsMaterial(
-        {
-          color: colour, size, sizeAttenuation: false, depthTest: false, transparent: true,
-          map: discTexture(), alphaTest: 0.3,
-        });
+    const material = new THREE.PointsMaterial({
+      color: colour,
+      size,
+      sizeAttenuation: false,
+      depthTest: false,
+      transparent: true,
+      map: discTexture(),
+      alphaTest: 0.3,
+    });
     const dots = new THREE.Points(geometry, material);
     dots.renderOrder = 9;
     this.group.add(dots);
@@ -73,7 +68,8 @@ export class Marks {
     const n = new THREE.Vector3(...direction).normalize();
     if (!(n.length() > 0.5)) return;
     const {axis} = this.model.answer;
-    const feature = ({xyz}, object) => this.local(toWorld(object.pose, xyz.slice(0, 3).map(Number)));
+    const feature = ({xyz}, object) =>
+        this.local(toWorld(object.pose, xyz.slice(0, 3).map(Number)));
     const ends = [feature(axis.featureA, objects[0]), feature(axis.featureB, objects[1])];
     const near = witness ? witness.map((p) => this.local(p)) : ends;
     const middle = near[0].clone().add(near[1]).multiplyScalar(0.5);
@@ -99,11 +95,15 @@ export class Marks {
   addPlane(n, middle) {
     const half = 0.9 * this.size;
     const turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
-    const corner = (x, y) => new THREE.Vector3(half * x, half * y, 0).applyQuaternion(turn).add(middle);
+    const corner = (x, y) =>
+        new THREE.Vector3(half * x, half * y, 0).applyQuaternion(turn).add(middle);
     const plane = new THREE.Mesh(
-        new THREE.PlaneBufferGeometry(2 * half, 2 * half),
-        new THREE.MeshBasicMaterial({
-          color: MARK_COLOURS.plane, transparent: true, opacity: 0.16, side: THREE.DoubleSide, depthWrite: false,
+        new THREE.PlaneBufferGeometry(2 * half, 2 * half), new THREE.MeshBasicMaterial({
+          color: MARK_COLOURS.plane,
+          transparent: true,
+          opacity: 0.16,
+          side: THREE.DoubleSide,
+          depthWrite: false,
         }));
     plane.quaternion.copy(turn);
     plane.position.copy(middle);
@@ -117,8 +117,9 @@ export class Marks {
   addCertificate({certificate}, objects) {
     const points = [];
     for (const pair of certificate.pairs) {
-      points.push(this.local(toWorld(objects[0].pose, number(pair.vertexA))),
-                  this.local(toWorld(objects[1].pose, number(pair.vertexB))));
+      points.push(
+          this.local(toWorld(objects[0].pose, number(pair.vertexA))),
+          this.local(toWorld(objects[1].pose, number(pair.vertexB))));
     }
     if (!points.length) return;
     this.line(points, MARK_COLOURS.certificate);

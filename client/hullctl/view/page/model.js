@@ -98,7 +98,8 @@ export class Model extends EventTarget {
   cornersOf(object) {
     const {low, high, xyz, vertexCount} = this.shapeOf(object);
     if (vertexCount <= MOST_CORNERS) {
-      return Array.from({length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
+      return Array.from(
+          {length: vertexCount}, (_, i) => toWorld(object.pose, xyz.subarray(3 * i, 3 * i + 3)));
     }
     const corners = [];
     for (let i = 0; i < 8; ++i) {
@@ -111,8 +112,10 @@ export class Model extends EventTarget {
   // nothing is shown.
   bounds(objects = this.objects) {
     const corners = objects
-        .filter((object) => this.isShown(object) && this.shapeOf(object) && !this.shapeOf(object).isEmpty)
-        .flatMap((object) => this.cornersOf(object));
+                        .filter(
+                            (object) => this.isShown(object) && this.shapeOf(object) &&
+                                !this.shapeOf(object).isEmpty)
+                        .flatMap((object) => this.cornersOf(object));
     if (!corners.length) return null;
     const low = [Infinity, Infinity, Infinity];
     const high = [-Infinity, -Infinity, -Infinity];
@@ -123,7 +126,11 @@ export class Model extends EventTarget {
       }
     }
     const centre = low.map((value, k) => value / 2 + high[k] / 2);
-    return {centre, radius: Math.hypot(...high.map((value, k) => value - low[k])) / 2 || 1, corners};
+    return {
+      centre,
+      radius: Math.hypot(...high.map((value, k) => value - low[k])) / 2 || 1,
+      corners
+    };
   }
 
   select(index, other = undefined) {

@@ -4,10 +4,13 @@ import {element, exact, facts, grouped, short} from 'hulld/dom.js';
 const POSE_NAMES = ['w', 'x', 'y', 'z', 'x', 'y', 'z'];
 
 export class ObjectPanel {
-  constructor(model, live, simplify) {
+  constructor(model, live, simplify, edit) {
     this.model = model;
     this.live = live;
     this.simplify = simplify;
+    this.edit = edit;
+    // The bridge says so.
+    this.mayEdit = false;
     this.root = document.getElementById('object');
     this.side = 'inside';
     this.steps = 0;
@@ -27,17 +30,19 @@ export class ObjectPanel {
     }
     // Typing must not be disturbed by an object that changes.
     if (this.root.contains(document.activeElement) && this.shownIndex === object.index &&
-        document.activeElement.matches('input')) {
+        document.activeElement.matches('input, textarea, button')) {
       this.factsBlock.replaceChildren(...this.factRows(object));
       return;
     }
     this.shownIndex = object.index;
-    this.factsBlock = element('div', {className: 'block', id: 'object-facts'}, ...this.factRows(object));
+    this.factsBlock =
+        element('div', {className: 'block', id: 'object-facts'}, ...this.factRows(object));
     const blocks = [this.factsBlock];
     if (object.hullId) blocks.push(this.poseBlock(object));
     if (object.hullId && this.live && this.model.hullOf(object)?.info.dimension === 3) {
       blocks.push(this.simplifyBlock(object));
     }
+    if (this.mayEdit && object.hullId && !object.gone) blocks.push(this.editBlock(object));
     this.root.replaceChildren(...blocks);
   }
 
@@ -57,7 +62,11 @@ export class ObjectPanel {
       ['facets', hull && grouped(hull.facetCount)],
       ['points', info?.counts && grouped(info.counts.received)],
       ['volume', hull?.info.dimension === 3 ? exact(hull.measures.volume) : null],
-      ['box', hull && !hull.isEmpty ? hull.high.map((h, k) => short(h - hull.low[k])).join(' \u00d7 ') : null],
+      [
+        'box',
+        hull && !hull.isEmpty ? hull.high.map((h, k) => short(h - hull.low[k])).join(' \u00d7 ') :
+                                null
+      ],
       ...this.meshRows(hull, mesh, object),
     ]));
     return rows;
@@ -67,34 +76,50 @@ export class ObjectPanel {
     if (!mesh) return [];
     const rows = [['file', this.model.files[object.file].name]];
     if (!mesh.triangles.length) {
-      const drawn = mesh.vertexCount < mesh.pointCount ? `, ${grouped(mesh.vertexCount)} drawn` : '';
+      const drawn =
+          mesh.vertexCount < mesh.pointCount ? `, ${grouped(mesh.vertexCount)} drawn` : '';
       return [...rows, ['in it', `${grouped(mesh.pointCount)} points${drawn}`]];
     }
-    rows.push(['mesh', `${grouped(mesh.vertexCount)} vertices, ${grouped(mesh.triangles.length / 3)} triangles`]);
+    rows.push([
+      'mesh',
+      `${grouped(mesh.vertexCount)} vertices, ${grouped(mesh.triangles.length / 3)} triangles`
+    ]);
     if (!hull || hull.info.dimension !== 3) return rows;
     const {volume, area} = mesh.measures;
     if (volume) {
-      rows.push(['mesh volume', exact(volume)],
-                ['hull is', `${short(hull.measures.volume / volume)} times as large as its mesh`]);
+      rows.push(
+          ['mesh volume', exact(volume)],
+          ['hull is', `${short(hull.measures.volume / volume)} times as large as its mesh`]);
     } else {
-      rows.push(['mesh volume', 'none: the mesh is not closed'],
-                ['hull has', `${short(hull.measures.area / area)} times the area of its mesh`]);
+      rows.push(
+          ['mesh volume', 'none: the mesh is not closed'],
+          ['hull has', `${short(hull.measures.area / area)} times the area of its mesh`]);
     }
     return rows;
   }
 
   poseBlock(object) {
-    this.inputs = object.pose.map((value, i) => element('input', {
-      type: 'text', inputMode: 'decimal', value: String(value), autocomplete: 'off', spellcheck: false,
-      readOnly: !this.live, 'data-pose': i,
-      'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
-      onchange: () => this.typed(object),
-    }));
-    const fields = (from, to) => element('div', {className: 'pose'},
-      ...this.inputs.slice(from, to).flatMap((input, i) => [element('b', {className: 'quiet'}, POSE_NAMES[from + i]), input]));
-    return element('div', {className: 'block'},
-      element('h2', {}, 'Translation'), fields(4, 7),
-      element('details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'), fields(0, 4)));
+    this.inputs =
+        object.pose.map((value, i) => element('input', {
+                          type: 'text',
+                          inputMode: 'decimal',
+                          value: String(value),
+                          autocomplete: 'off',
+                          spellcheck: false,
+                          readOnly: !this.live,
+                          'data-pose': i,
+                          'aria-label': `${i < 4 ? 'Rotation' : 'Translation'} ${POSE_NAMES[i]}`,
+                          onchange: () => this.typed(object),
+                        }));
+    const fields = (from, to) => element(
+        'div', {className: 'pose'},
+        ...this.inputs.slice(from, to).flatMap(
+            (input, i) => [element('b', {className: 'quiet'}, POSE_NAMES[from + i]), input]));
+    return element(
+        'div', {className: 'block'}, element('h2', {}, 'Translation'), fields(4, 7),
+        element(
+            'details', {className: 'command'}, element('summary', {}, 'Rotation (quaternion)'),
+            fields(0, 4)));
   }
 
   typed(object) {
@@ -122,29 +147,100 @@ export class ObjectPanel {
     this.result = element('div', {'aria-live': 'polite'});
     const ask = () => {
       const size = this.model.radiusOf(object);
-      const maxError = this.steps === 0 ? 0 : Number((size * 10 ** ((this.steps - 40) / 13) / 2).toPrecision(3));
+      const maxError =
+          this.steps === 0 ? 0 : Number((size * 10 ** ((this.steps - 40) / 13) / 2).toPrecision(3));
       this.output.textContent = this.steps === 0 ? 'off' : `error up to ${short(maxError)}`;
       if (this.steps === 0) this.result.replaceChildren();
       this.simplify(object, this.side, maxError);
     };
-    return element('div', {className: 'block'},
-      element('h2', {}, 'A simpler hull'),
-      element('div', {className: 'slider'},
-        element('label', {}, 'Simplify ', this.output,
-          element('input', {
-            type: 'range', min: 0, max: 40, value: 0, id: 'simplify', oninput: ({target}) => {
-              this.steps = Number(target.value);
-              ask();
-            },
-          })),
-        element('select', {
-          'aria-label': 'Side', onchange: ({target}) => {
-            this.side = target.value;
-            ask();
-          },
-        }, element('option', {value: 'inside', selected: this.side === 'inside'}, 'inside: a subset of the vertices'),
-           element('option', {value: 'outside', selected: this.side === 'outside'}, 'outside: encloses the hull'))),
-      this.result);
+    return element(
+        'div', {className: 'block'}, element('h2', {}, 'A simpler hull'),
+        element(
+            'div', {className: 'slider'},
+            element('label', {}, 'Simplify ', this.output, element('input', {
+                      type: 'range',
+                      min: 0,
+                      max: 40,
+                      value: 0,
+                      id: 'simplify',
+                      oninput: ({target}) => {
+                        this.steps = Number(target.value);
+                        ask();
+                      },
+                    })),
+            element(
+                'select', {
+                  'aria-label': 'Side',
+                  onchange: ({target}) => {
+                    this.side = target.value;
+                    ask();
+                  },
+                },
+                element(
+                    'option', {value: 'inside', selected: this.side === 'inside'},
+                    'inside: a subset of the vertices'),
+                element(
+                    'option', {value: 'outside', selected: this.side === 'outside'},
+                    'outside: encloses the hull'))),
+        this.result);
+  }
+
+  // Points to append, and an end to the hull.
+  editBlock(object) {
+    // What was typed, and what came of it, stays while the object does.
+    if (this.editing?.object === object) return this.editing.block;
+    const points = element('textarea', {
+      id: 'edit-points',
+      rows: 3,
+      spellcheck: false,
+      placeholder: 'x y z, one point a line',
+      'aria-label': `Points to append to ${object.hullId}`,
+    });
+    const append = element(
+        'button', {type: 'button', id: 'edit-append', onclick: () => this.append(object, points)},
+        'Append points');
+    const remove = element('button', {type: 'button', id: 'edit-delete'}, 'Delete this hull');
+    // A second press, of other words, so that a slip deletes nothing.
+    remove.addEventListener('click', () => {
+      if (remove.dataset.sure) {
+        this.edit({action: 'delete', hullId: object.hullId, points: []});
+      } else {
+        remove.dataset.sure = 'yes';
+        remove.textContent = `Really delete ${object.hullId}, for everyone`;
+      }
+    });
+    remove.addEventListener('blur', () => {
+      delete remove.dataset.sure;
+      remove.textContent = 'Delete this hull';
+    });
+    this.editResult = element('p', {className: 'quiet', id: 'edit-result', 'aria-live': 'polite'});
+    const block = element(
+        'div', {className: 'block'}, element('h2', {}, 'Change it'), points,
+        element('div', {className: 'buttons'}, append, remove), this.editResult);
+    this.editing = {object, block};
+    return block;
+  }
+
+  append({hullId}, area) {
+    const lines = area.value.split('\n').map((line) => line.trim()).filter(Boolean);
+    const points = lines.map((line) => line.split(/[\s,;]+/).map(Number));
+    const wrong = points.findIndex((point) => point.length !== 3 || !point.every(Number.isFinite));
+    area.setAttribute('aria-invalid', String(wrong >= 0 || !lines.length));
+    if (wrong >= 0 || !lines.length) {
+      this.editResult.textContent =
+          lines.length ? `"${lines[wrong]}" is not three numbers.` : 'There are no points yet.';
+      return;
+    }
+    this.sent = area;
+    this.edit({action: 'append', hullId, points: points.flat()});
+  }
+
+  // Whether it was told here.
+  edited({hullId, done, message}) {
+    if (this.object?.hullId !== hullId || !this.editResult?.isConnected) return false;
+    this.editResult.textContent = message;
+    if (done && this.sent?.isConnected) this.sent.value = '';
+    return true;
   }
 
   simplified(hull) {

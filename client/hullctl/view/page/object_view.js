@@ -1,8 +1,9 @@
-// One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the middle
-// of the object's box, turned as the pose says.
+// One object as three.js draws it: points, mesh, hull with its edges. Its group stands at the
+// middle of the object's box, turned as the pose says.
+import {DrawnGroup, facetMaterial} from 'hulld/drawn_group.js';
 import {MARK_COLOURS, RELATIONS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
-import {THREE, discTexture} from 'hulld/three.js';
+import {discTexture, THREE} from 'hulld/three.js';
 
 const FLASH_MS = 1200;
 
@@ -22,36 +23,16 @@ export function geometryOf(shape, kind) {
   return kinds[kind];
 }
 
-const surface = (colour, options) => new THREE.MeshPhongMaterial({
-  color: colour, flatShading: true, shininess: 12, specular: 0x222222,
-  polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1, ...options,
-});
-
 // The lines of a larger hull would cover all of it, and both of its sides cost twice.
 const isHuge = (hull) => hull.facetCount > 200000;
 
 // Many lines hide what they stand on.
 const edgeWeight = (count) => (count > 20000 ? 0.2 : count > 1000 ? 0.55 : 1);
 
-export class ObjectView {
+export class ObjectView extends DrawnGroup {
   constructor(model, stage, object) {
-    this.model = model;
-    this.stage = stage;
+    super(model, stage);
     this.object = object;
-    this.group = new THREE.Group();
-    stage.scene.add(this.group);
-  }
-
-  dispose() {
-    this.clear();
-    this.stage.scene.remove(this.group);
-  }
-
-  clear() {
-    for (const part of [...this.group.children]) {
-      part.material.dispose();
-      this.group.remove(part);
-    }
   }
 
   // Builds what is to be drawn anew; cheap, as geometries are shared.
@@ -69,8 +50,10 @@ export class ObjectView {
     if (cloud && (show.points || (mesh && !mesh.triangles.length && show.mesh))) {
       this.addPoints(cloud);
     }
-    if (hull && show.hull && !hull.isEmpty) this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
-    if (hull && show.edges && !hull.isEmpty && !isHuge(hull) && (show.hull || !(mesh && show.mesh))) {
+    if (hull && show.hull && !hull.isEmpty)
+      this.addHull(hull, Boolean(mesh && show.mesh) || show.points);
+    if (hull && show.edges && !hull.isEmpty && !isHuge(hull) &&
+        (show.hull || !(mesh && show.mesh))) {
       this.addEdges(hull);
     }
     this.place();
@@ -79,18 +62,23 @@ export class ObjectView {
   // Parts of other shapes than the hull have centres of their own.
   shift(part, shape) {
     part.position.set(...shape.centre.map((value, k) => value - this.centre[k]));
+    part.userData.sharesGeometry = true;
     this.group.add(part);
   }
 
   addMesh(mesh) {
-    const material = surface(this.object.colour, {side: THREE.DoubleSide});
+    const material = facetMaterial({color: this.object.colour, side: THREE.DoubleSide});
     this.shift(new THREE.Mesh(geometryOf(mesh, 'triangles'), material), mesh);
   }
 
   addPoints(shape) {
     const size = shape.vertexCount > 20000 ? 1.5 : 4;
     const material = new THREE.PointsMaterial({
-      color: this.stage.theme.edge, size, sizeAttenuation: false, map: discTexture(), alphaTest: 0.5,
+      color: this.stage.theme.edge,
+      size,
+      sizeAttenuation: false,
+      map: discTexture(),
+      alphaTest: 0.5,
     });
     const points = new THREE.Points(geometryOf(shape, 'points'), material);
     points.renderOrder = 2;
@@ -101,10 +89,12 @@ export class ObjectView {
   addHull(hull, isBeside) {
     const flat = hull.info.dimension < 3;
     const sides = flat ? [THREE.DoubleSide] :
-        isHuge(hull) ? [THREE.FrontSide] : [THREE.BackSide, THREE.FrontSide];
+        isHuge(hull)   ? [THREE.FrontSide] :
+                         [THREE.BackSide, THREE.FrontSide];
     for (const side of sides) {
       const glass = {transparent: true, opacity: isBeside ? 0.16 : 0.5, depthWrite: false};
-      const material = surface(this.object.colour, {side, ...(isHuge(hull) && !isBeside ? {} : glass)});
+      const material = facetMaterial(
+          {color: this.object.colour, side, ...(isHuge(hull) && !isBeside ? {} : glass)});
       const part = new THREE.Mesh(geometryOf(hull, 'triangles'), material);
       part.renderOrder = side === THREE.FrontSide ? 4 : 3;
       this.shift(part, hull);
@@ -140,13 +130,18 @@ export class ObjectView {
     });
     geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
     const material = new THREE.PointsMaterial({
-      color: MARK_COLOURS.flash, size: 11, sizeAttenuation: false, transparent: true, depthTest: false,
+      color: MARK_COLOURS.flash,
+      size: 11,
+      sizeAttenuation: false,
+      transparent: true,
+      depthTest: false,
       map: discTexture(),
     });
     const points = new THREE.Points(geometry, material);
     points.renderOrder = 6;
     points.userData.end = performance.now() + FLASH_MS;
     this.shift(points, hull);
+    points.userData.sharesGeometry = false;
     this.stage.draw();
   }
 

@@ -29,7 +29,11 @@ export const MARK_COLOURS = {
   shell: '#f0e442',
   flash: '#e69f00',
 };
-export const AXIS_COLOURS = {x: '#d55e00', y: '#009e73', z: '#0072b2'};
+export const AXIS_COLOURS = {
+  x: '#d55e00',
+  y: '#009e73',
+  z: '#0072b2'
+};
 
 export const THEMES = {
   light: {ground: 0xf4f5f6, edge: 0x2a3036, edgeOpacity: 0.5, sky: 0xffffff, earth: 0xb4bac2},

@@ -29,10 +29,12 @@ function hitTriangles(shape, o, d) {
 // The index of the object under (x, y), in CSS pixels of the canvas; null when there is none.
 export function pick(model, stage, x, y) {
   const ray = new THREE.Raycaster();
-  ray.setFromCamera({
-    x: 2 * x / stage.canvas.clientWidth - 1,
-    y: 1 - 2 * y / stage.canvas.clientHeight,
-  }, stage.camera);
+  ray.setFromCamera(
+      {
+        x: 2 * x / stage.canvas.clientWidth - 1,
+        y: 1 - 2 * y / stage.canvas.clientHeight,
+      },
+      stage.camera);
   const origin = ray.ray.origin.toArray();
   const direction = ray.ray.direction.toArray();
   let nearest = Infinity;
@@ -42,14 +44,15 @@ export function pick(model, stage, x, y) {
     if (!model.isShown(object) || !shape || shape.isEmpty) continue;
     const centre = model.centreOf(object).map((value, k) => value - model.origin[k]);
     const towards = origin.map((value, k) => value - centre[k]);
-    const along = -(towards[0] * direction[0] + towards[1] * direction[1] + towards[2] * direction[2]);
+    const along =
+        -(towards[0] * direction[0] + towards[1] * direction[1] + towards[2] * direction[2]);
     const closest = towards.map((value, k) => value + along * direction[k]);
     if (Math.hypot(...closest) > shape.radius || along + shape.radius < 0) continue;
     if (along - shape.radius > nearest) continue;
     const q = unitQuaternion(object.pose);
     const local = rotateBack(q, towards).map((value, k) => value + shape.centre[k]);
-    const distance = shape.triangles.length ?
-        hitTriangles(shape, local, rotateBack(q, direction)) : along;
+    const distance =
+        shape.triangles.length ? hitTriangles(shape, local, rotateBack(q, direction)) : along;
     if (distance < nearest) [nearest, picked] = [distance, object.index];
   }
   return picked;

@@ -1,4 +1,5 @@
-// Poses as the contract has them: seven doubles, quaternion w x y z (of any length) and translation.
+// Poses as the contract has them: seven doubles, quaternion w x y z (of any length) and
+// translation.
 
 export const IDENTITY = [1, 0, 0, 0, 0, 0, 0];
 

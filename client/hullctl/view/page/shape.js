@@ -98,8 +98,10 @@ export class Shape {
     this.centre = this.isEmpty ? [0, 0, 0] : low.map((value, k) => value / 2 + high[k] / 2);
     let reach = 0;
     for (let i = 0; i < xyz.length; i += 3) {
-      reach = Math.max(reach, Math.hypot(xyz[i] - this.centre[0], xyz[i + 1] - this.centre[1],
-                                         xyz[i + 2] - this.centre[2]));
+      reach = Math.max(
+          reach,
+          Math.hypot(
+              xyz[i] - this.centre[0], xyz[i + 1] - this.centre[1], xyz[i + 2] - this.centre[2]));
     }
     this.radius = reach;
   }

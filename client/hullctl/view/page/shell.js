@@ -20,8 +20,9 @@ export function shellGeometry(hull, distance) {
     const n = normalOf(hull.xyz, facet);
     const base = positions.length / 3;
     facet.forEach((v, i) => {
-      positions.push(hull.xyz[3 * v] - cx + distance * n[0], hull.xyz[3 * v + 1] - cy + distance * n[1],
-                     hull.xyz[3 * v + 2] - cz + distance * n[2]);
+      positions.push(
+          hull.xyz[3 * v] - cx + distance * n[0], hull.xyz[3 * v + 1] - cy + distance * n[1],
+          hull.xyz[3 * v + 2] - cz + distance * n[2]);
       const j = (i + 1) % facet.length;
       moved.set(`${v} ${facet[j]}`, [base + i, base + j]);
       const previous = facet[(i + facet.length - 1) % facet.length];

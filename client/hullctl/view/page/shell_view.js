@@ -1,5 +1,6 @@
-// Draws a simpler hull in place of the selected one with the shell of its proven error, or the shell
-// of the tolerance.
+// Draws a simpler hull in place of the selected one with the shell of its proven error, or the
+// shell of the tolerance.
+import {DrawnGroup} from 'hulld/drawn_group.js';
 import {MARK_COLOURS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 import {shellGeometry} from 'hulld/shell.js';
@@ -8,25 +9,14 @@ import {THREE} from 'hulld/three.js';
 // Shells of larger hulls are not drawn: they take longer to make than people wait.
 const MOST_FACETS = 20000;
 
-export class ShellView {
-  constructor(model, stage) {
-    this.model = model;
-    this.stage = stage;
-    this.group = new THREE.Group();
-    stage.scene.add(this.group);
-  }
-
+export class ShellView extends DrawnGroup {
   clear() {
     this.expected = null;
     this.empty();
   }
 
   empty() {
-    for (const part of [...this.group.children]) {
-      part.geometry.dispose();
-      part.material.dispose();
-      this.group.remove(part);
-    }
+    super.clear();
     this.stage.draw();
   }
 
@@ -71,7 +61,12 @@ export class ShellView {
 
   add(geometry, centre, {color, opacity}) {
     const part = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({
-      color, opacity, transparent: true, depthWrite: false, flatShading: true, side: THREE.DoubleSide,
+      color,
+      opacity,
+      transparent: true,
+      depthWrite: false,
+      flatShading: true,
+      side: THREE.DoubleSide,
     }));
     part.renderOrder = 6;
     part.userData.centre = centre;

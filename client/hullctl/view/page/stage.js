@@ -38,7 +38,9 @@ export class Stage {
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
     this.controls.addEventListener('change', () => this.draw());
-    this.controls.addEventListener('start', () => { this.flight = null; });
+    this.controls.addEventListener('start', () => {
+      this.flight = null;
+    });
   }
 
   setTheme(name) {
@@ -83,8 +85,8 @@ export class Stage {
     this.fitDepth();
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
-    for (const update of this.after) update();
     this.drawTriad();
+    for (const update of this.after) update();
     if (more) this.draw();
   }
 
@@ -106,8 +108,7 @@ export class Stage {
   // Shows all of the bounds (model.js); keeps the direction of view unless one is given.
   flyTo({centre, radius, corners}, {jump = false, direction = null} = {}) {
     const target = new THREE.Vector3(...centre.map((value, k) => value - this.model.origin[k]));
-    const view = direction ||
-        this.camera.position.clone().sub(this.controls.target).normalize();
+    const view = direction || this.camera.position.clone().sub(this.controls.target).normalize();
     if (!(view.length() > 0.5)) view.copy(this.defaultView());
     const right = new THREE.Vector3().crossVectors(this.camera.up, view).normalize();
     const up = new THREE.Vector3().crossVectors(view, right);
@@ -117,8 +118,9 @@ export class Stage {
     let distance = 0.05 * radius;
     for (const corner of corners) {
       const p = new THREE.Vector3(...corner.map((value, k) => value - centre[k]));
-      distance = Math.max(distance, p.dot(view) + Math.abs(p.dot(up)) / height,
-                          p.dot(view) + Math.abs(p.dot(right)) / width);
+      distance = Math.max(
+          distance, p.dot(view) + Math.abs(p.dot(up)) / height,
+          p.dot(view) + Math.abs(p.dot(right)) / width);
     }
     const position = target.clone().addScaledVector(view, distance);
     if (jump || calm.matches) {
@@ -173,8 +175,9 @@ export class Stage {
 
   pan(right, up) {
     const distance = this.camera.position.distanceTo(this.controls.target);
-    const shift = new THREE.Vector3(right, up, 0).multiplyScalar(distance * 0.05)
-        .applyQuaternion(this.camera.quaternion);
+    const shift = new THREE.Vector3(right, up, 0)
+                      .multiplyScalar(distance * 0.05)
+                      .applyQuaternion(this.camera.quaternion);
     this.camera.position.add(shift);
     this.controls.target.add(shift);
     this.controls.update();

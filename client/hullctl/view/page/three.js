@@ -1,5 +1,5 @@
-// three.js r111, as Debian's libjs-three has it: a classic script that was loaded before us. Nothing
-// else names the global, so that another version or library needs a change here alone.
+// three.js r111, as Debian's libjs-three has it: a classic script that was loaded before us.
+// Nothing else names the global, so that another version or library needs a change here alone.
 export const THREE = globalThis.THREE;
 
 // Points as discs; without it they are squares.

@@ -45,13 +45,16 @@ export class Tree {
       rows.push(...members.slice(0, room).map((object) => this.row(object, Boolean(group))));
     }
     const shown = rows.filter(({dataset}) => dataset.index !== undefined).length;
-    const closed = [...groups].filter(([g]) => this.closed.has(g)).reduce((n, [, m]) => n + m.length, 0);
+    const closed =
+        [...groups].filter(([g]) => this.closed.has(g)).reduce((n, [, m]) => n + m.length, 0);
     const rest = found.length - shown - closed;
     if (rest > 0) {
-      rows.push(element('div', {className: 'more'}, `and ${grouped(rest)} more: search to find them`));
+      rows.push(
+          element('div', {className: 'more'}, `and ${grouped(rest)} more: search to find them`));
     }
     if (!found.length) {
-      const empty = this.model.objects.length ? 'No name has this in it.' : 'There are no hulls yet.';
+      const empty =
+          this.model.objects.length ? 'No name has this in it.' : 'There are no hulls yet.';
       rows.push(element('div', {className: 'more'}, empty));
     }
     this.root.replaceChildren(...rows);
@@ -61,18 +64,25 @@ export class Tree {
   groupRow(group, members) {
     const closed = this.closed.has(group);
     const visible = members.some((object) => object.visible);
-    return element('div', {className: 'row group'},
-      element('button', {
-        type: 'button', className: 'name', 'aria-expanded': String(!closed), 'data-row': `group ${group}`,
-        onclick: () => {
-          if (!this.closed.delete(group)) this.closed.add(group);
-          this.rebuild();
-        },
-      }, `${closed ? '\u25b8' : '\u25be'} ${group} `, element('span', {className: 'quiet'}, grouped(members.length))),
-      this.eye(visible, group, `group-eye ${group}`, () => {
-        for (const object of members) object.visible = !visible;
-        this.model.tell('visibility');
-      }));
+    return element(
+        'div', {className: 'row group'},
+        element(
+            'button', {
+              type: 'button',
+              className: 'name',
+              'aria-expanded': String(!closed),
+              'data-row': `group ${group}`,
+              onclick: () => {
+                if (!this.closed.delete(group)) this.closed.add(group);
+                this.rebuild();
+              },
+            },
+            `${closed ? '\u25b8' : '\u25be'} ${group} `,
+            element('span', {className: 'quiet'}, grouped(members.length))),
+        this.eye(visible, group, `group-eye ${group}`, () => {
+          for (const object of members) object.visible = !visible;
+          this.model.tell('visibility');
+        }));
   }
 
   row(object, nested) {
@@ -80,29 +90,41 @@ export class Tree {
     const isSelected = object.index === model.selected;
     const isOther = object.index === model.other && model.selected !== null;
     const relation = RELATIONS[model.relationOf.get(object.index)];
-    const names = ['row', nested && 'nested', isSelected && 'selected', object.gone && 'gone',
-                   !object.visible && 'off'];
-    const row = element('div', {className: names.filter(Boolean).join(' '), 'data-index': object.index},
-      element('input', {
-        type: 'color', value: object.colour, 'aria-label': `Colour of ${object.name}`,
-        oninput: ({target}) => {
-          object.colour = target.value;
-          model.tell('colour');
-        },
-      }),
-      element('button', {
-        type: 'button', className: 'name', title: object.name, 'aria-pressed': String(isSelected),
-        'data-row': `name ${object.index}`,
-        onclick: ({shiftKey}) => this.choose(object, shiftKey),
-        ondblclick: () => model.tell('fly', [object]),
-      }, nested ? object.name.slice(groupOf(object.name).length) : object.name),
-      relation && element('span', {className: `tag ${relation.style}`, title: relation.word},
-                          `${relation.sign} ${relation.word}`),
-      object.gone && element('span', {className: 'tag quiet'}, 'deleted'),
-      this.eye(object.visible, object.name, `eye ${object.index}`, () => {
-        object.visible = !object.visible;
-        model.tell('visibility');
-      }));
+    const names = [
+      'row', nested && 'nested', isSelected && 'selected', object.gone && 'gone',
+      !object.visible && 'off'
+    ];
+    const row = element(
+        'div', {className: names.filter(Boolean).join(' '), 'data-index': object.index},
+        element('input', {
+          type: 'color',
+          value: object.colour,
+          'aria-label': `Colour of ${object.name}`,
+          oninput: ({target}) => {
+            object.colour = target.value;
+            model.tell('colour');
+          },
+        }),
+        element(
+            'button', {
+              type: 'button',
+              className: 'name',
+              title: object.name,
+              'aria-pressed': String(isSelected),
+              'data-row': `name ${object.index}`,
+              onclick: ({shiftKey}) => this.choose(object, shiftKey),
+              ondblclick: () => model.tell('fly', [object]),
+            },
+            nested ? object.name.slice(groupOf(object.name).length) : object.name),
+        relation &&
+            element(
+                'span', {className: `tag ${relation.style}`, title: relation.word},
+                `${relation.sign} ${relation.word}`),
+        object.gone && element('span', {className: 'tag quiet'}, 'deleted'),
+        this.eye(object.visible, object.name, `eye ${object.index}`, () => {
+          object.visible = !object.visible;
+          model.tell('visibility');
+        }));
     if (isOther) row.title = 'The other one of the pair';
     return row;
   }
@@ -117,9 +139,14 @@ export class Tree {
   }
 
   eye(visible, name, key, toggle) {
-    return element('button', {
-      type: 'button', className: 'eye', 'data-row': key,
-      'aria-label': `${visible ? 'Hide' : 'Show'} ${name}`, onclick: toggle,
-    }, visible ? 'hide' : 'show');
+    return element(
+        'button', {
+          type: 'button',
+          className: 'eye',
+          'data-row': key,
+          'aria-label': `${visible ? 'Hide' : 'Show'} ${name}`,
+          onclick: toggle,
+        },
+        visible ? 'hide' : 'show');
   }
 }

@@ -237,7 +237,8 @@ TEST_F(BridgeTest, EndsWhilePagesAreOpen) {
 }
 
 TEST(StandalonePage, HoldsAllThatItNeeds) {
-  const std::string page = StandalonePage("{\"note\":\"</script><script>alert(1)\"}");
+  const std::string recording = "{\"note\":\"</script><script>alert(1)\"}";
+  const std::string page = StandalonePage(recording);
   // The page is too long to print it when it is wrong.
   const auto holds = [&page](const char* text) { return page.find(text) != std::string::npos; };
   EXPECT_TRUE(holds("default-src 'none'"));
@@ -246,6 +247,10 @@ TEST(StandalonePage, HoldsAllThatItNeeds) {
   EXPECT_FALSE(holds("<link"));
   // Data cannot end the script that it stands in.
   EXPECT_FALSE(holds("</script><script>alert"));
+  // A picture is the same page without its panels.
+  EXPECT_TRUE(holds("\n<body>\n"));
+  const std::string picture = PicturePage(recording, {800, 600});
+  EXPECT_NE(picture.find("\n<body class=\"picture\" style=\"--width: 800px"), std::string::npos);
 }
 
 }  // namespace

@@ -3,10 +3,14 @@
     /usr/bin/python3 viewer_test.py BIN_DIRECTORY [TEST...]
 """
 
+import base64
 import json
+import os
 import pathlib
 import re
 import shlex
+import struct
+import subprocess
 import unittest
 
 import viewing
@@ -419,6 +423,89 @@ class ViewerTest(unittest.TestCase):
         self.assertEqual(self.browser.js("performance.getEntriesByType('resource')"
                                          ".filter(({name}) => !name.startsWith('data:')).length"), 0)
         self.assertNotRegex(target.read_text(), r"\bview/[0-9a-f]{12}/")
+
+    def test_a_picture_without_a_window(self):
+        target = pathlib.Path(self.hulld.directory, "room.png")
+        said = self.hulld.hullctl("view", "room/left", "room/right", "--png", str(target),
+                                  "--size", "1200x800")
+        self.assertIn("1200 by 800 pixels", said)
+        png = target.read_bytes()
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", png[16:24]), (1200, 800))
+        # Shaded facets on a ground that reaches every corner, hence no panel.
+        self.browser.driver.get("about:blank")
+        colours = self.browser.driver.execute_async_script("""
+          const [base64, done] = arguments;
+          const image = new Image();
+          image.onload = () => {
+            const canvas = document.createElement('canvas');
+            [canvas.width, canvas.height] = [image.width, image.height];
+            const context = canvas.getContext('2d');
+            context.drawImage(image, 0, 0);
+            const {data} = context.getImageData(0, 0, image.width, image.height);
+            const at = (x, y) => String(data.slice(4 * (y * image.width + x)).slice(0, 3));
+            const all = new Set();
+            for (let x = 0; x < image.width; ++x) all.add(at(x, image.height / 2));
+            const [right, low] = [image.width - 2, image.height - 2];
+            done({all: all.size, corners: [at(2, 2), at(right, 2), at(2, low), at(right, low)]});
+          };
+          image.src = 'data:image/png;base64,' + base64;""", base64.b64encode(png).decode())
+        self.assertGreater(colours["all"], 20)
+        self.assertEqual(len(set(colours["corners"])), 1)
+
+    def test_a_picture_needs_a_browser(self):
+        for name, words in (("no-such-browser", "is no program"), ("/bin/false", "made no picture")):
+            refused = subprocess.run(
+                [*self.hulld.command(), "view", "box", "--png", "box.png"], text=True,
+                cwd=self.hulld.directory, capture_output=True,
+                env={**os.environ, "HULLCTL_BROWSER": name})
+            self.assertNotEqual(refused.returncode, 0)
+            self.assertIn(words, refused.stderr)
+        self.assertFalse(pathlib.Path(self.hulld.directory, "box.png").exists())
+
+    def test_changes_hulls_only_with_edit(self):
+        self.hulld.add_box("edited")
+        self.view("edited")
+        self.assertFalse(self.browser.js("Boolean(document.querySelector('#edit-points'))"))
+        # Nor can a page that tries.
+        self.browser.js("hulldViewer.connection.send("
+                        "{type: 'edit', action: 'delete', hullId: 'edited', points: []})")
+        self.browser.wait("document.querySelector('#message').textContent.includes('--edit')")
+        self.view("edited", "--edit")
+        points = self.browser.wait("document.querySelector('#edit-points')")
+        append = self.browser.driver.find_element(By.ID, "edit-append")
+        points.send_keys("0 0 five")
+        append.click()
+        self.assertIn("is not three numbers", self.browser.text("#edit-result"))
+        points.clear()
+        points.send_keys("0 0 5.1\n0, 0, 0")
+        append.click()
+        self.browser.wait("hulldViewer.model.hulls.get('edited').high[2] === 5.1")
+        self.browser.wait(
+            "document.querySelector('#edit-result').textContent.includes('2 appended, 1 outside')")
+        self.assertEqual(self.hulld.json("get", "edited")["hull"]["vertexCount"], "9")
+        # The first press asks.
+        delete = self.browser.driver.find_element(By.ID, "edit-delete")
+        delete.click()
+        self.assertIn("Really delete edited", delete.text)
+        self.assertIn("edited", self.hulld.hullctl("list"))
+        delete.click()
+        self.browser.wait("document.querySelector('#tree').textContent.includes('deleted')")
+        self.assertNotIn("edited", self.hulld.hullctl("list"))
+
+    def test_tolerance_of_the_pair_is_answered_beside_the_exact_answer(self):
+        self.view("room/left", "room/right")
+        self.assert_answers_as_api()
+        self.browser.js("(() => { const slider = document.querySelector('#tolerance');"
+                        " slider.value = 60; slider.dispatchEvent(new Event('input')); })()")
+        self.browser.wait("hulldViewer.model.answer?.tolerant")
+        tolerance = self.browser.fact("tolerance")
+        self.assertEqual(float(tolerance), self.browser.js("hulldViewer.model.tolerance"))
+        answer = self.hulld.json("check", "room/left", "room/right", "--tolerance", tolerance)
+        self.assertEqual(answer["relation"],
+                         self.browser.js("hulldViewer.model.answer.tolerant.relation"))
+        # The exact answer stays beside it.
+        self.assert_answers_as_api()
 
     def test_address_lets_one_browser_in_once(self):
         viewer = self.hulld.view("box")

@@ -73,8 +73,11 @@ class Hulld:
         self.process.stop()
         shutil.rmtree(self.directory)
 
+    def command(self):
+        return [self.programs / "hullctl", "--server", self.address]
+
     def hullctl(self, *arguments, **options):
-        return subprocess.run([self.programs / "hullctl", "--server", self.address, *arguments],
+        return subprocess.run([*self.command(), *arguments],
                               cwd=self.directory, check=True, stdout=subprocess.PIPE, text=True,
                               **options).stdout
 

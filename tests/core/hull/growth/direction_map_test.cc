@@ -40,7 +40,8 @@ DirectionMap MapOf(const Gauge& gauge, const Vector& center, int resolution) {
 
 size_t SurvivorCount(const DirectionMap& map, const std::vector<Vector>& points) {
   std::vector<uint32_t> survivors;
-  map.AppendSurvivors(points, survivors);
+  StopPoll never;
+  map.AppendSurvivors(points, survivors, never);
   EXPECT_TRUE(std::is_sorted(survivors.begin(), survivors.end()));
   return survivors.size();
 }
@@ -110,12 +111,13 @@ TEST(DirectionMap, SimdPathsKeepTheSamePoints) {
   for (int i = -20; i <= 20; ++i) points.emplace_back(0.1 + 0.9, 0.2 + 0.09 * i / 2, 0.3 - 0.9);
   points.push_back(Vector::Constant(1e305));
   std::vector<uint32_t> fast;
-  map.AppendSurvivors(points, fast);
+  StopPoll never;
+  map.AppendSurvivors(points, fast, never);
   EXPECT_GT(fast.size(), 500u);
   EXPECT_LT(fast.size(), 2500u);
   ASSERT_TRUE(UseSimdPath(SimdPath::kPortable));
   std::vector<uint32_t> portable;
-  map.AppendSurvivors(points, portable);
+  map.AppendSurvivors(points, portable, never);
   UseSimdPath(before);
   EXPECT_EQ(fast, portable);
 }

@@ -214,7 +214,7 @@ TEST(HullCost, MemoryOfMeshesIsBoundedByTheVertices) {
 // Scenes hold many small hulls. What they hold whatever their size weighs more for each vertex.
 TEST(HullCost, MemoryOfSmallHullsIsSmall) {
   Random random(TestSeed(504));
-  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 750);
+  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 700);
   EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 24, 1))), 650);
   EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 64, 1))), 400);
 }

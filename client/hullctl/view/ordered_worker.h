@@ -1,0 +1,74 @@
+#ifndef HULLD_CLIENT_HULLCTL_VIEW_ORDERED_WORKER_H_
+#define HULLD_CLIENT_HULLCTL_VIEW_ORDERED_WORKER_H_
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace hulld {
+
+// Does one piece of work after another, in the order in which they are asked for, on a thread of
+// its own. Any thread may call it.
+template <typename Work>
+class OrderedWorker {
+ public:
+  // `most`: more than that many do not wait; they are dropped. `work` is done until it returns
+  // false, and nothing after that.
+  OrderedWorker(size_t most, std::function<bool(const Work&)> work)
+      : most_(most), work_(std::move(work)), thread_([this] { Run(); }) {}
+  // Waits for the work that is under way; what waits is dropped.
+  ~OrderedWorker() {
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+    }
+    changed_.notify_all();
+    thread_.join();
+  }
+  OrderedWorker(const OrderedWorker&) = delete;
+  OrderedWorker& operator=(const OrderedWorker&) = delete;
+
+  void Ask(Work work) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (waiting_.size() >= most_) return;
+      waiting_.push_back(std::move(work));
+    }
+    changed_.notify_all();
+  }
+  // Drops what waits.
+  void Forget() {
+    const std::lock_guard lock(mutex_);
+    waiting_.clear();
+  }
+
+ private:
+  void Run() {
+    while (true) {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
+      if (ended_) return;
+      const Work work = std::move(waiting_.front());
+      waiting_.pop_front();
+      lock.unlock();
+      if (!work_(work)) return;
+    }
+  }
+
+  const size_t most_;
+  const std::function<bool(const Work&)> work_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // Guarded by the mutex.
+  std::deque<Work> waiting_;
+  bool ended_ = false;
+  std::thread thread_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_VIEW_ORDERED_WORKER_H_

@@ -1,0 +1,36 @@
+// What is drawn for one purpose: parts in a group of the scene, which come and go together.
+import {THREE} from 'hulld/three.js';
+
+export class DrawnGroup {
+  constructor(model, stage) {
+    this.model = model;
+    this.stage = stage;
+    this.group = new THREE.Group();
+    stage.scene.add(this.group);
+  }
+
+  // Takes all parts away, with what they hold on the graphics processor.
+  clear() {
+    this.group.traverse((part) => {
+      if (!part.userData.sharesGeometry) part.geometry?.dispose();
+      part.material?.dispose();
+    });
+    this.group.remove(...this.group.children);
+  }
+
+  dispose() {
+    this.clear();
+    this.stage.scene.remove(this.group);
+  }
+}
+
+// Facets, each of one shade.
+export const facetMaterial = (options) => new THREE.MeshPhongMaterial({
+  flatShading: true,
+  shininess: 12,
+  specular: 0x222222,
+  polygonOffset: true,
+  polygonOffsetFactor: 1,
+  polygonOffsetUnits: 1,
+  ...options,
+});

@@ -1,0 +1,126 @@
+#include "client/watch/told_pairs.h"
+
+namespace hulld {
+namespace {
+
+bool IsCollision(v1::Relation relation) {
+  return relation == v1::RELATION_OVERLAPPING || relation == v1::RELATION_TOUCHING;
+}
+
+}  // namespace
+
+ToldPairs::ToldPairs(const v1::CollisionWatchOpen& open) {
+  for (const v1::Placement& placement : open.placements()) {
+    open_.add_placements()->set_hull_id(placement.hull_id());
+  }
+  *open_.mutable_packed_placements()->mutable_hull_ids() = open.packed_placements().hull_ids();
+  *open_.mutable_packed_placements()->mutable_hulls() = open.packed_placements().hulls();
+  if (open.has_clearance()) open_.set_clearance(open.clearance());
+}
+
+void ToldPairs::StartAnew() { retold_.emplace(); }
+
+void ToldPairs::Take(v1::WatchCollisionsResponse* message) {
+  TakeHulls(*message);
+  TakeProblems(message);
+  TakeEvents(message);
+  if (!retold_ || !message->synced()) return;
+  TellWhatEnded(message);
+  retold_.reset();
+}
+
+const std::string& ToldPairs::HullOf(uint32_t placement) const {
+  const v1::PackedPlacements& packed = open_.packed_placements();
+  const size_t i = placement;
+  if (i < static_cast<size_t>(open_.placements_size())) {
+    return open_.placements(static_cast<int>(i)).hull_id();
+  }
+  if (i < static_cast<size_t>(packed.hulls_size())) {
+    const size_t hull = packed.hulls(static_cast<int>(i));
+    if (hull < static_cast<size_t>(packed.hull_ids_size())) {
+      return packed.hull_ids(static_cast<int>(hull));
+    }
+  }
+  static const std::string none;
+  return none;
+}
+
+void ToldPairs::TakeHulls(const v1::WatchCollisionsResponse& message) {
+  for (const v1::HullVersion& hull : message.hulls()) {
+    revisions_[hull.hull_id()] = hull.revision();
+    std::erase_if(problems_,
+                  [&](const auto& problem) { return HullOf(problem.first) == hull.hull_id(); });
+  }
+}
+
+void ToldPairs::TakeProblems(v1::WatchCollisionsResponse* message) {
+  v1::WatchCollisionsResponse kept;
+  for (const v1::PlacementProblem& problem : message->placement_problems()) {
+    std::string& known = problems_[problem.placement()];
+    if (retold_ && known == problem.message()) continue;
+    known = problem.message();
+    *kept.add_placement_problems() = problem;
+  }
+  message->mutable_placement_problems()->Swap(kept.mutable_placement_problems());
+}
+
+void ToldPairs::TakeEvents(v1::WatchCollisionsResponse* message) {
+  v1::WatchCollisionsResponse kept;
+  for (v1::CollisionEvent& event : *message->mutable_events()) {
+    if (TakeEvent(&event)) *kept.add_events() = std::move(event);
+  }
+  message->mutable_events()->Swap(kept.mutable_events());
+}
+
+bool ToldPairs::TakeEvent(v1::CollisionEvent* event) {
+  const Pair pair(event->placement_a(), event->placement_b());
+  const State now = {event->relation(), event->within_clearance()};
+  State before;
+  if (const auto told = told_.find(pair); told != told_.end()) before = told->second;
+  if (IsCollision(now.relation) || now.within_clearance) {
+    told_[pair] = now;
+  } else {
+    told_.erase(pair);
+  }
+  if (!retold_) return true;
+  retold_->insert(pair);
+  // The other call compares with nothing.
+  if (now.relation == v1::RELATION_SEPARATED && IsCollision(before.relation)) {
+    event->set_kind(v1::COLLISION_EVENT_KIND_EXIT);
+  }
+  return now.relation != before.relation || now.within_clearance != before.within_clearance;
+}
+
+void ToldPairs::TellWhatEnded(v1::WatchCollisionsResponse* message) {
+  for (auto told = told_.begin(); told != told_.end();) {
+    if (retold_->contains(told->first)) {
+      ++told;
+      continue;
+    }
+    *message->add_events() = EndOf(told->first, told->second);
+    told = told_.erase(told);
+  }
+}
+
+v1::CollisionEvent ToldPairs::EndOf(const Pair& pair, const State& before) const {
+  v1::CollisionEvent event;
+  event.set_placement_a(pair.first);
+  event.set_placement_b(pair.second);
+  if (problems_.contains(pair.first) || problems_.contains(pair.second)) {
+    event.set_kind(v1::COLLISION_EVENT_KIND_LOST);
+    return event;
+  }
+  event.set_kind(IsCollision(before.relation) ? v1::COLLISION_EVENT_KIND_EXIT
+                                              : v1::COLLISION_EVENT_KIND_FAR);
+  event.set_relation(v1::RELATION_SEPARATED);
+  if (open_.has_clearance()) event.set_within_clearance(false);
+  for (const auto& [placement, set] :
+       {std::pair(pair.first, &v1::CollisionEvent::set_revision_a),
+        std::pair(pair.second, &v1::CollisionEvent::set_revision_b)}) {
+    const auto revision = revisions_.find(HullOf(placement));
+    if (revision != revisions_.end()) (event.*set)(revision->second);
+  }
+  return event;
+}
+
+}  // namespace hulld

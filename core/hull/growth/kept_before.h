@@ -1,0 +1,40 @@
+#ifndef HULLD_CORE_HULL_GROWTH_KEPT_BEFORE_H_
+#define HULLD_CORE_HULL_GROWTH_KEPT_BEFORE_H_
+
+#include <memory>
+#include <utility>
+
+#include "core/base/check.h"
+
+namespace hulld {
+
+// What a journal keeps beside the old values of elements: nothing, and of a pointer's size, while
+// there is no journal, as most hulls have none.
+template <typename T>
+class KeptBefore {
+ public:
+  KeptBefore() = default;
+  // Requires that no journal is kept.
+  KeptBefore(const KeptBefore& other) { *this = other; }
+  KeptBefore& operator=(const KeptBefore& other) {
+    HULLD_CHECK(!*this && !other);
+    return *this;
+  }
+  KeptBefore(KeptBefore&&) noexcept = default;
+  KeptBefore& operator=(KeptBefore&&) noexcept = default;
+
+  void Start(T before) { value_ = std::make_unique<T>(std::move(before)); }
+  void End() { value_.reset(); }
+
+  explicit operator bool() const { return value_ != nullptr; }
+  // Requires a journal.
+  T* operator->() { return value_.get(); }
+  const T* operator->() const { return value_.get(); }
+
+ private:
+  std::unique_ptr<T> value_;
+};
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_HULL_GROWTH_KEPT_BEFORE_H_

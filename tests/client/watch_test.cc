@@ -1,0 +1,211 @@
+// Watches whose server goes and comes again.
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/strip.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+class Watches : public server::ServerTest {
+ protected:
+  void SetUp() override {
+    directory_ = std::filesystem::path(::testing::TempDir()) /
+                 absl::StrCat("hulld_watch_", getpid(), "_", counter_++);
+    std::filesystem::create_directories(directory_);
+    config_ = TestConfig();
+    config_.store = "rocksdb";
+    config_.data_dir = directory_ / "data";
+    config_.listen = absl::StrCat("unix:", (directory_ / "socket").string());
+    Restart(config_);
+    ClientOptions options;
+    options.server = server_->address();
+    // The client waits once it has lost the server: time for another one to start.
+    options.retry.wait = [this](std::chrono::milliseconds) {
+      ++waits_;
+      if (server_ != nullptr) return;
+      Restart(config_);
+      if (meanwhile_) meanwhile_();
+    };
+    client_ = std::make_unique<Client>(options);
+  }
+  ~Watches() override {
+    client_.reset();
+    server_.reset();
+    std::filesystem::remove_all(directory_);
+  }
+  // Ends the server; the next one is started by the watch that misses it.
+  void Lose(std::function<void()> meanwhile) {
+    meanwhile_ = std::move(meanwhile);
+    TearDown();
+  }
+
+  static std::string Text(const v1::CollisionEvent& event) {
+    const std::string kind = v1::CollisionEventKind_Name(event.kind());
+    return absl::StrCat(absl::StripPrefix(kind, "COLLISION_EVENT_KIND_"), " ", event.placement_a(),
+                        " ", event.placement_b());
+  }
+  // The messages up to the next that is `synced`, as one.
+  static v1::WatchCollisionsResponse Round(CollisionWatch& watch) {
+    v1::WatchCollisionsResponse all;
+    while (true) {
+      const auto message = watch.Next();
+      EXPECT_TRUE(message.ok()) << message.status();
+      if (!message.ok()) return all;
+      all.MergeFrom(*message);
+      if (message->synced()) return all;
+    }
+  }
+  static std::vector<std::string> Events(const v1::WatchCollisionsResponse& round) {
+    std::vector<std::string> texts;
+    for (const v1::CollisionEvent& event : round.events()) texts.push_back(Text(event));
+    return texts;
+  }
+  static v1::CollisionWatchUpdate MoveTo(uint32_t placement, double x) {
+    v1::CollisionWatchUpdate update;
+    update.add_placements(placement);
+    for (const double number : {1., 0., 0., 0., x, 0., 0.}) update.add_poses(number);
+    return update;
+  }
+
+  static inline int counter_ = 0;
+  std::filesystem::path directory_;
+  server::Config config_;
+  std::unique_ptr<Client> client_;
+  std::function<void()> meanwhile_;
+  int waits_ = 0;
+};
+
+TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
+  Put("a", server::Cube());
+  Put("b", server::Cube());
+  const auto watch = client_->WatchHulls({});
+  auto message = watch->Next();
+  while (message.ok() && !message->synced()) message = watch->Next();
+  ASSERT_TRUE(message.ok()) << message.status();
+  Lose([this] { Put("c", server::Cube()); });
+  std::vector<std::string> told;
+  do {
+    message = watch->Next();
+    ASSERT_TRUE(message.ok()) << message.status();
+    EXPECT_FALSE(message->anew());
+    for (const v1::HullEvent& event : message->events()) told.push_back(event.hull().hull_id());
+  } while (!message->synced());
+  // Once for its creation and for its points, or once for both.
+  EXPECT_THAT(told, testing::AnyOf(ElementsAre("c"), ElementsAre("c", "c")));
+  EXPECT_GT(waits_, 0);
+}
+
+// Cubes of side 1 along x, as placements one by one and packed.
+class CollisionWatches : public Watches, public ::testing::WithParamInterface<bool> {
+ protected:
+  void SetUp() override {
+    Watches::SetUp();
+    Put("cube", server::Cube());
+    Put("grows", server::Cube());
+    Put("goes", server::Cube());
+  }
+  static v1::CollisionWatchOpen OpenOf(const std::vector<std::pair<std::string, double>>& places) {
+    v1::CollisionWatchOpen open;
+    for (const auto& [hull, x] : places) {
+      if (!GetParam()) {
+        *open.add_placements() = server::PlacementOf(hull, x);
+        continue;
+      }
+      v1::PackedPlacements& packed = *open.mutable_packed_placements();
+      packed.add_hulls(static_cast<uint32_t>(packed.hull_ids_size()));
+      packed.add_hull_ids(hull);
+      for (const double number : {1., 0., 0., 0., x, 0., 0.}) packed.add_poses(number);
+    }
+    return open;
+  }
+};
+
+TEST_P(CollisionWatches, TellNothingTwiceAndWhatEnded) {
+  // 0 and 1 overlap and stay so; 2 and 3 touch, and will overlap; 4 and 5 overlap until 5 goes; 6
+  // and 7 overlap, until 7 moves away.
+  const auto watch = client_->WatchCollisions(OpenOf({{"cube", 0},
+                                                      {"cube", 0.5},
+                                                      {"grows", 10},
+                                                      {"cube", 11},
+                                                      {"cube", 20},
+                                                      {"goes", 20.5},
+                                                      {"cube", 30},
+                                                      {"cube", 30.5},
+                                                      {"cube", 50}}));
+  EXPECT_THAT(Events(Round(*watch)),
+              UnorderedElementsAre("ENTER 0 1", "TOUCH 2 3", "ENTER 4 5", "ENTER 6 7"));
+  // Without a change, too, an update is told of.
+  ASSERT_TRUE(watch->Update(MoveTo(8, 60)).ok());
+  EXPECT_EQ(Round(*watch).update(), 1u);
+  Lose([&] {
+    server::Appender appender(*hulls_, "grows", "w");
+    ASSERT_TRUE(appender.Append(1, {1.25, 0.5, 0.5}).has_value());
+    ASSERT_TRUE(appender.Finish().ok());
+    ASSERT_TRUE(Delete("goes").ok());
+    ASSERT_TRUE(watch->Update(MoveTo(7, 40)).ok());
+  });
+  const v1::WatchCollisionsResponse after = Round(*watch);
+  EXPECT_THAT(Events(after), UnorderedElementsAre("ENTER 2 3", "LOST 4 5", "EXIT 6 7"));
+  EXPECT_EQ(after.update(), 2u);
+  for (const v1::CollisionEvent& event : after.events()) {
+    if (Text(event) != "EXIT 6 7") continue;
+    EXPECT_EQ(event.relation(), v1::RELATION_SEPARATED);
+    EXPECT_EQ(event.revision_a(), Get("cube").hull().revision());
+    EXPECT_EQ(event.revision_b(), event.revision_a());
+  }
+  // As ever after that.
+  ASSERT_TRUE(watch->Update(MoveTo(7, 29.5)).ok());
+  const v1::WatchCollisionsResponse last = Round(*watch);
+  EXPECT_THAT(Events(last), ElementsAre("ENTER 6 7"));
+  EXPECT_EQ(last.update(), 3u);
+}
+
+TEST_P(CollisionWatches, TellWhatIsNotNearAnyMore) {
+  v1::CollisionWatchOpen open = OpenOf({{"cube", 0}, {"cube", 1.5}, {"cube", 10}, {"cube", 10.5}});
+  open.set_clearance(1);
+  const auto watch = client_->WatchCollisions(open);
+  EXPECT_THAT(Events(Round(*watch)), UnorderedElementsAre("NEAR 0 1", "ENTER 2 3"));
+  Lose([&] {
+    ASSERT_TRUE(watch->Update(MoveTo(1, 5)).ok());
+    ASSERT_TRUE(watch->Update(MoveTo(3, 11.5)).ok());
+  });
+  const v1::WatchCollisionsResponse after = Round(*watch);
+  EXPECT_THAT(Events(after), UnorderedElementsAre("FAR 0 1", "EXIT 2 3"));
+  for (const v1::CollisionEvent& event : after.events()) {
+    EXPECT_EQ(event.within_clearance(), event.placement_a() == 2);
+  }
+}
+
+TEST_P(CollisionWatches, RefuseUpdatesThatNameNoPlacement) {
+  const auto watch = client_->WatchCollisions(OpenOf({{"cube", 0}, {"cube", 9}}));
+  EXPECT_THAT(std::string(watch->Update(MoveTo(2, 0)).message()), HasSubstr("no placement 2"));
+  v1::CollisionWatchUpdate short_pose = MoveTo(1, 0);
+  short_pose.mutable_poses()->RemoveLast();
+  EXPECT_THAT(std::string(watch->Update(short_pose).message()), HasSubstr("needs 7"));
+  EXPECT_THAT(Events(Round(*watch)), IsEmpty());
+  watch->Cancel();
+  EXPECT_TRUE(absl::IsCancelled(watch->Next().status()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Placements, CollisionWatches, testing::Bool(), [](const auto& packed) {
+  return packed.param ? std::string("packed") : std::string("one_by_one");
+});
+
+}  // namespace
+}  // namespace hulld
