@@ -69,7 +69,7 @@ TEST_F(HullctlScene, CheckAnswersWhatTheFileAsks) {
                        "place: {a: {id: cell/part}, b: {id: cell/part, at: [2, 0, 0]}}\n"
                        "ask: {pairs: [[a, b]], separation: true}\n");
   ran = Ask({"scene", "check", pairs.path()});
-  EXPECT_THAT(ran.out, HasSubstr("a\tb\tSEPARATED\t1 within"));
+  EXPECT_THAT(ran.out, HasSubstr("a\tb\tSEPARATED\t0.99"));
   EXPECT_EQ(Ask({"scene", pairs.path()}).code, 2);
   EXPECT_EQ(Ask({"scene"}).code, 2);
   for (const char* command : {"apply", "check"}) {
