@@ -97,7 +97,6 @@ class MemoryBudget {
     friend class MemoryBudget;
     friend class MemoryPart;
 
-    uint64_t bytes() const { return bytes_ + resting_ + pinned_; }
     // Counts all that it holds, or no more. Require the budget's mutex.
     void Enter();
     void Leave();
