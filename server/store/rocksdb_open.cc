@@ -64,7 +64,7 @@ RocksDbStore::~RocksDbStore() {
   if (relaxed_run_ && db_ != nullptr) EndRelaxedRun().IgnoreError();
   // Once more, if what a failed write left could not be cut off when it failed.
   db_ = nullptr;
-  if (files_->CutUncommitted().ok()) return;
+  if (failure_.ok() || files_->CutUncommitted().ok()) return;
   spdlog::error("the log in {} may hold changes that were refused", options_.data_dir);
 }
 
