@@ -107,6 +107,8 @@ TEST_F(Trail, EachChangeOfAHullNamesWhoMadeIt) {
 TEST_F(Trail, AStreamThatChangedNothingLeavesNoLine) {
   Restart(TestConfig());
   Put("a", Cube());
+  // Its line may come after its answer.
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
   const CapturedLog log;
   {
     Appender again(*hulls_, "a", "put");
