@@ -45,7 +45,8 @@ TEST_F(HullctlParts, AppendSaysHowMuchLargerTheHullIs) {
   ran = Ask({"append", "l", bracket_.path()});
   EXPECT_THAT(ran.out, testing::Not(HasSubstr("volume")));
   const TempFile open("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
-  EXPECT_THAT(Ask({"append", "o", open.path(), "--create"}).out, HasSubstr("not compared: the mesh is not closed"));
+  EXPECT_THAT(Ask({"append", "o", open.path(), "--create"}).out,
+              HasSubstr("not compared: the mesh is not closed"));
   const TempFile points("p.xyz", "0 0 0\n");
   EXPECT_THAT(Ask({"append", "p", points.path(), "--create"}).out,
               testing::Not(HasSubstr("volume")));
