@@ -24,7 +24,8 @@ list_missing() {
   local packages package
   packages=$(list_packages "$@")
   for package in $packages; do
-    [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] ||
+    # A line for each architecture.
+    dpkg-query -W -f '${db:Status-Status}\n' "$package" 2>/dev/null | grep -qx installed ||
       echo "$package"
   done
 }
@@ -39,6 +40,8 @@ install_missing() {
     return 1
   fi
   export DEBIAN_FRONTEND=noninteractive
+  # Packages of another architecture are named name:architecture.
+  [[ $missing != *:arm64* ]] || dpkg --add-architecture arm64
   apt-get -q update
   # shellcheck disable=SC2086  # One word per package.
   apt-get -q install -y --no-install-recommends $missing

@@ -13,6 +13,7 @@
 #include "server/process/log.h"
 #include "server/server.h"
 #include "server/settings/config.h"
+#include "server/settings/cpu_limit.h"
 
 namespace hulld::server {
 namespace {
@@ -63,6 +64,11 @@ void LogStart(const Config& config, const Server& server) {
       "per batch, {} textbook axes",
       HULLD_VERSION, config.store, limits.max_points_per_chunk, limits.max_vertices_per_hull,
       limits.max_hulls, limits.max_pairs_per_batch, limits.max_textbook_axes);
+  if (config.threads > 0) {
+    spdlog::info("threads that compute answers: {}, as --threads says", config.threads);
+  } else {
+    spdlog::info("threads that compute answers: {}", ReadCpuLimit().Describe());
+  }
   LogStore(config);
   for (const std::string& warning : ExposureWarnings(config)) spdlog::warn("{}", warning);
   if (!server.metrics_address().empty()) {

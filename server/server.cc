@@ -2,15 +2,18 @@
 
 #include <absl/status/status.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <iterator>
-#include <thread>
 #include <utility>
 
 #include "server/call/transport.h"
 #include "server/config_check.h"
+#include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
+#include "server/settings/cpu_limit.h"
 #include "server/store/memory_store.h"
 #include "server/store/rocksdb_store.h"
 
@@ -31,11 +34,10 @@ std::vector<std::string> AllServices() {
 }
 
 // At least two, so that one long task does not hold up all others.
-int PoolThreads() { return std::max(2, static_cast<int>(std::thread::hardware_concurrency())); }
+int PoolThreads() { return std::max(2, DefaultThreads()); }
 
 int AnswerThreads(const Config& config) {
-  if (config.threads > 0) return config.threads;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return config.threads > 0 ? config.threads : DefaultThreads();
 }
 
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
@@ -67,8 +69,15 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       maintenance_service_(*store_, registry_, admission_, long_readers_),
       reflection_service_(admission_, AllServices()) {
   admission_.SetAuthenticator(guard_->authenticator());
-  admission_.SetBacklog(
-      [this] { return readers_.waiting() + long_readers_.waiting() + pool_.waiting(); });
+  admission_.SetBacklog([this](Rpc rpc) {
+    if (UsesWriters(rpc)) return writers_.waiting();
+    return readers_.waiting() + long_readers_.waiting() + pool_.waiting();
+  });
+  guard_->OnTokensChanged([this] {
+    const size_t ended = admission_.EndRevoked(
+        [this](const Caller& caller) { return guard_->authenticator().Knows(caller); });
+    if (ended > 0) spdlog::info("{} calls ended, as their tokens are no longer valid", ended);
+  });
   AddSizesToMetrics();
 }
 
@@ -92,11 +101,24 @@ void Server::AddSizesToMetrics() {
     store.cache_bytes.Set(static_cast<double>(cache.bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
     store.read_only.Set(registry_.Commits().failing ? 1 : 0);
+    if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
+      store.disk_bytes.Set(static_cast<double>(disk->bytes));
+      store.log_bytes.Set(static_cast<double>(disk->log_bytes));
+      store.free_bytes.Set(static_cast<double>(disk->free_bytes));
+      store.stalled.Set(disk->is_stalled ? 1 : 0);
+      advance(store.stalls, disk->stalls);
+    }
   });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().hull_count); });
   metrics_.AddGauge("hulld_bodies", "Bodies in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().body_count); });
+  metrics_.AddGauge("hulld_registry_lock_hold_max_seconds",
+                    "Longest hold of the registry's lock within the last one to two minutes.",
+                    [this] {
+                      const std::chrono::duration<double> longest = registry_.Holds().longest;
+                      return longest.count();
+                    });
   metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
                     [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
 }
@@ -133,6 +155,7 @@ absl::Status Server::Listen(const Config& config) {
     return ExplainBindFailure(*address);
   }
   address_ = address->Format(port);
+  AddDescriptorsToMetrics();
   grpc::HealthCheckServiceInterface* health = grpc_server_->GetHealthCheckService();
   for (const char* const service : kServices) {
     health->SetServingStatus(service, true);
@@ -143,6 +166,18 @@ absl::Status Server::Listen(const Config& config) {
   if (!endpoint.ok()) return endpoint.status();
   metrics_endpoint_ = *std::move(endpoint);
   return absl::OkStatus();
+}
+
+void Server::AddDescriptorsToMetrics() {
+  prometheus::Gauge& descriptors =
+      metrics_.AddGauge("process_open_fds", "Descriptors that the process has open.");
+  prometheus::Gauge& connections =
+      metrics_.AddGauge("hulld_connections", "Connections that clients have open.");
+  metrics_.AddRefresh([this, &descriptors, &connections] {
+    const OpenDescriptors open = CountDescriptors(address_);
+    descriptors.Set(static_cast<double>(open.count));
+    connections.Set(static_cast<double>(open.connections));
+  });
 }
 
 void Server::BeginDrain() {
@@ -156,6 +191,7 @@ bool Server::WaitIdle(std::chrono::milliseconds timeout) {
 }
 
 Server::~Server() {
+  guard_->OnTokensChanged(nullptr);
   if (grpc_server_ == nullptr) return;
   admission_.BeginDrain();
   registry_.EndWatches();

@@ -62,6 +62,7 @@ class Server {
 
   absl::Status Listen(const Config& config);
   void AddSizesToMetrics();
+  void AddDescriptorsToMetrics();
 
   const std::unique_ptr<Guard> guard_;
   // All others report to it.

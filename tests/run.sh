@@ -1,10 +1,11 @@
 #!/bin/bash
 # Builds hulld and runs its tests, as continuous integration does: presets release and asan-ubsan.
 #
-#   bash tests/run.sh [--release-only] [--tsan] [--fuzz] [--tidy] [--no-install]
+#   bash tests/run.sh [--release-only] [--tsan] [--fuzz] [--arm64] [--tidy] [--no-install]
 #
 # --tsan runs, instead, the tests of what uses threads under ThreadSanitizer (clang; preset tsan);
 # --fuzz runs each fuzzer for a fixed number of inputs under libFuzzer (clang; preset fuzz);
+# --arm64 cross-compiles the test of digests for 64-bit ARM and runs it by qemu;
 # --tidy runs clang-tidy over what changed (tests/tidy.sh).
 #
 # On a bare Debian 12 it first installs what docker/packages.txt lists (as root); with everything
@@ -21,10 +22,11 @@ for option in "$@"; do
     --release-only) presets=(release) ;;
     --tsan) presets=(tsan) sections+=(tsan) ;;
     --fuzz) presets=(fuzz) sections+=(fuzz) ;;
+    --arm64) presets=(arm64) sections+=(arm64) ;;
     --tidy) presets=() sections+=(tidy) tidy=yes ;;
     --no-install) install=no ;;
     --help)
-      sed -n '2,11s/^# \{0,1\}//p' tests/run.sh
+      sed -n '2,12s/^# \{0,1\}//p' tests/run.sh
       exit 0
       ;;
     *)

@@ -9,6 +9,7 @@
 #include <exception>
 #include <functional>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -98,7 +99,8 @@ absl::Status AddTriangles(const std::string& path, const aiMesh& mesh, const Aff
   return absl::OkStatus();
 }
 
-using MeshVisitor = std::function<absl::Status(const aiMesh& mesh, const Affine& X_WM)>;
+using MeshVisitor =
+    std::function<absl::Status(const aiMesh& mesh, const Affine& X_WM, const aiNode& node)>;
 
 absl::Status VisitMeshes(const aiScene& scene, const MeshVisitor& visit) {
   std::vector<std::pair<const aiNode*, Affine>> pending = {{scene.mRootNode, Affine()}};
@@ -107,7 +109,7 @@ absl::Status VisitMeshes(const aiScene& scene, const MeshVisitor& visit) {
     pending.pop_back();
     const Affine X_WN = Compose(X_WP, node->mTransformation);
     for (unsigned i = 0; i < node->mNumMeshes; ++i) {
-      absl::Status status = visit(*scene.mMeshes[node->mMeshes[i]], X_WN);
+      absl::Status status = visit(*scene.mMeshes[node->mMeshes[i]], X_WN, *node);
       if (!status.ok()) return status;
     }
     // Pushed in reverse, so that the order is the file's.
@@ -134,7 +136,7 @@ absl::Status ReadThroughAssimp(const std::string& path, const MeshVisitor& visit
 }
 
 absl::Status ReadAssimpPoints(const std::string& path, PointCollector* points) {
-  return ReadThroughAssimp(path, [&](const aiMesh& mesh, const Affine& X_WM) {
+  return ReadThroughAssimp(path, [&](const aiMesh& mesh, const Affine& X_WM, const aiNode&) {
     return AddPoints(path, mesh, X_WM, points);
   });
 }
@@ -150,8 +152,22 @@ absl::Status ReadGltf(const std::string& path, PointCollector* points) {
 }
 
 absl::Status ReadAssimpMesh(const std::string& path, TriangleMesh* mesh) {
-  return ReadThroughAssimp(path, [&](const aiMesh& part, const Affine& X_WM) {
+  return ReadThroughAssimp(path, [&](const aiMesh& part, const Affine& X_WM, const aiNode&) {
     return AddTriangles(path, part, X_WM, mesh);
+  });
+}
+
+absl::Status ReadAssimpParts(const std::string& path, std::vector<MeshPart>* parts) {
+  std::map<const aiNode*, size_t> part_of;
+  return ReadThroughAssimp(path, [&](const aiMesh& mesh, const Affine& X_WM, const aiNode& node) {
+    if (mesh.mNumFaces == 0) return absl::OkStatus();
+    const auto [entry, is_new] = part_of.emplace(&node, parts->size());
+    if (is_new) {
+      // An STL file of several solids has their names on the meshes or on the nodes.
+      const aiString& name = node.mName.length > 0 ? node.mName : mesh.mName;
+      parts->push_back({name.C_Str(), {}});
+    }
+    return AddTriangles(path, mesh, X_WM, &(*parts)[entry->second].mesh);
   });
 }
 

@@ -3,7 +3,9 @@
 #include <absl/strings/str_cat.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 
 #include "client/formats/obj_face.h"
 #include "client/formats/off_reader.h"
@@ -22,7 +24,7 @@ absl::Status AddVertex(const ByteSource& source, std::string_view text, Triangle
     const NumberText kind = ParseDouble(token, &coordinate);
     if (kind != NumberText::kNumber) return source.ErrorAtLine(NumberProblem(kind, token));
     if (!std::isfinite(coordinate)) {
-      return source.ErrorAtLine(Quoted(token) + " cannot be drawn; a vertex must be finite");
+      return source.ErrorAtLine(Quoted(token) + " is not finite");
     }
   }
   if (mesh->vertices.size() >= kMaxVertices) return source.ErrorAtLine("too many vertices");
@@ -48,9 +50,11 @@ bool FindObjVertex(std::string_view token, size_t vertices, uint32_t* index) {
   return true;
 }
 
-}  // namespace
-
-absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh) {
+// Reads vertices to `mesh` and passes on each face, as the indices of its corners, and each `o` and
+// `g`, as keyword and name.
+absl::Status WalkObj(ByteSource* source, TriangleMesh* mesh,
+                     const std::function<void(const std::vector<uint32_t>&)>& take_face,
+                     const std::function<void(std::string_view, std::string_view)>& take_name) {
   std::string_view line;
   std::vector<uint32_t> corners;
   while (source->ReadLine(&line)) {
@@ -59,6 +63,7 @@ absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh) {
     if (keyword == "v") {
       if (absl::Status status = AddVertex(*source, rest, mesh); !status.ok()) return status;
     }
+    if (keyword == "o" || keyword == "g") take_name(keyword, Trim(rest));
     if (keyword != "f") continue;
     corners.clear();
     for (std::string_view token; !(token = NextToken(&rest)).empty();) {
@@ -68,9 +73,132 @@ absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh) {
       }
     }
     if (corners.empty()) return source->ErrorAtLine("a face names no vertex");
-    AddPolygon(corners, mesh);
+    take_face(corners);
   }
   return source->status();
+}
+
+// The triangles of a mesh in parts: part_of gives the part of each.
+std::vector<MeshPart> Distribute(const TriangleMesh& mesh, const std::vector<uint32_t>& part_of,
+                                 const std::vector<std::string>& names) {
+  constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+  std::vector<MeshPart> parts;
+  for (const std::string& name : names) parts.push_back({name, {}});
+  std::vector<std::vector<uint32_t>> triangles_of(parts.size());
+  for (uint32_t i = 0; i < mesh.triangles.size(); ++i) triangles_of[part_of[i]].push_back(i);
+  std::vector<uint32_t> index(mesh.vertices.size(), kNone);
+  for (size_t part = 0; part < parts.size(); ++part) {
+    TriangleMesh& to = parts[part].mesh;
+    for (const uint32_t i : triangles_of[part]) {
+      std::array<uint32_t, 3> triangle = mesh.triangles[i];
+      for (uint32_t& corner : triangle) {
+        uint32_t& known = index[corner];
+        if (known == kNone) {
+          known = static_cast<uint32_t>(to.vertices.size());
+          to.vertices.push_back(mesh.vertices[corner]);
+        }
+        corner = known;
+      }
+      to.triangles.push_back(triangle);
+    }
+    for (const uint32_t i : triangles_of[part]) {
+      for (const uint32_t corner : mesh.triangles[i]) index[corner] = kNone;
+    }
+  }
+  std::erase_if(parts, [](const MeshPart& part) { return part.mesh.triangles.empty(); });
+  return parts;
+}
+
+// The parts of a mesh that hang together.
+std::vector<MeshPart> Components(const TriangleMesh& mesh) {
+  // Each vertex leads to another of its component, and in the end to one that stands for it.
+  std::vector<uint32_t> leader(mesh.vertices.size());
+  std::map<std::array<double, 3>, uint32_t> first;
+  for (uint32_t i = 0; i < leader.size(); ++i) {
+    const std::array<double, 3>& p = mesh.vertices[i];
+    // Adding 0 makes -0 the same as 0.
+    leader[i] = first.emplace(std::array{p[0] + 0, p[1] + 0, p[2] + 0}, i).first->second;
+  }
+  const auto find = [&leader](uint32_t i) {
+    while (leader[i] != i) i = leader[i] = leader[leader[i]];
+    return i;
+  };
+  for (const auto& [a, b, c] : mesh.triangles) {
+    leader[find(a)] = find(b);
+    leader[find(b)] = find(c);
+  }
+  std::map<uint32_t, uint32_t> number;
+  std::vector<uint32_t> part_of;
+  std::vector<std::string> names;
+  for (const auto& triangle : mesh.triangles) {
+    const auto [entry, is_new] =
+        number.emplace(find(triangle[0]), static_cast<uint32_t>(names.size()));
+    if (is_new) names.push_back(absl::StrCat("component-", names.size() + 1));
+    part_of.push_back(entry->second);
+  }
+  return Distribute(mesh, part_of, names);
+}
+
+}  // namespace
+
+absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh) {
+  return WalkObj(
+      source, mesh, [mesh](const std::vector<uint32_t>& corners) { AddPolygon(corners, mesh); },
+      [](std::string_view, std::string_view) {});
+}
+
+absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts) {
+  TriangleMesh mesh;
+  std::vector<uint32_t> part_of;
+  std::vector<std::string> names;
+  std::map<std::string, uint32_t> number;
+  std::string object;
+  std::string group;
+  const absl::Status read = WalkObj(
+      source, &mesh,
+      [&](const std::vector<uint32_t>& corners) {
+        const std::string name =
+            absl::StrCat(object, object.empty() || group.empty() ? "" : ".", group);
+        const auto [entry, is_new] = number.emplace(name, static_cast<uint32_t>(names.size()));
+        if (is_new) names.push_back(name);
+        AddPolygon(corners, &mesh);
+        part_of.resize(mesh.triangles.size(), entry->second);
+      },
+      [&](std::string_view keyword, std::string_view name) {
+        if (keyword == "o") object = name;
+        // A new object starts without a group.
+        group = keyword == "g" ? std::string(name) : "";
+      });
+  if (!read.ok()) return read;
+  *parts = Distribute(mesh, part_of, names);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split) {
+  const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
+  if (!format.ok()) return format.status();
+  std::vector<MeshPart> parts;
+  const bool has_names =
+      *format == PointFormat::kObj || *format == PointFormat::kStl || *format == PointFormat::kGltf;
+  if (split == SplitBy::kComponent || !has_names) {
+    const auto mesh = ReadMesh(path);
+    if (!mesh.ok()) return mesh.status();
+    if (split == SplitBy::kComponent) {
+      parts = Components(*mesh);
+    } else if (!mesh->triangles.empty()) {
+      parts.push_back({"", *mesh});
+    }
+  } else if (*format == PointFormat::kObj) {
+    auto source = ByteSource::Open(path);
+    if (!source.ok()) return source.status();
+    if (absl::Status read = ReadObjParts(source->get(), &parts); !read.ok()) return read;
+  } else {
+    // Says plainly why a file cannot be opened.
+    if (auto source = ByteSource::Open(path); !source.ok()) return source.status();
+    if (absl::Status read = ReadAssimpParts(path, &parts); !read.ok()) return read;
+  }
+  if (!parts.empty()) return parts;
+  return absl::InvalidArgumentError(absl::StrCat(path, ": there is no triangle in it"));
 }
 
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh) {

@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// A mesh for drawing, held whole in memory.
+// A mesh, held whole in memory.
 struct TriangleMesh {
   std::vector<std::array<double, 3>> vertices;
   // Indices into vertices, all in range.
@@ -23,10 +23,31 @@ struct TriangleMesh {
 // the file and the place.
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path);
 
+// A part of a file, under the name that the file has for it; empty where it has none.
+struct MeshPart {
+  std::string name;
+  TriangleMesh mesh;
+};
+
+enum class SplitBy {
+  // What the file names: objects and groups of obj, solids of stl, nodes of gltf. Parts of one name
+  // are one part; off has no names, and is one part.
+  kName,
+  // What hangs together: triangles that share a vertex, at the same coordinates. "component-1" and
+  // so on, in the order of the file.
+  kComponent,
+};
+
+// Reads the mesh of a file, as ReadMesh does, in parts. Vertices that no triangle names belong to
+// no part; parts without triangles are left out. INVALID_ARGUMENT also when there is no triangle.
+absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split);
+
 // The readers of each format. Those of stl and gltf place each mesh as its node says.
 absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadAssimpMesh(const std::string& path, TriangleMesh* mesh);
+absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts);
+absl::Status ReadAssimpParts(const std::string& path, std::vector<MeshPart>* parts);
 
 }  // namespace hulld
 

@@ -15,6 +15,8 @@
 #include "client/hullctl/completion/completion.h"
 #include "client/hullctl/completion/completion_script.h"
 #include "client/hullctl/completion/completion_values.h"
+#include "client/hullctl/parts/cover_command.h"
+#include "client/hullctl/robot/robot_commands.h"
 
 namespace hulld {
 namespace {
@@ -84,6 +86,8 @@ void AddCommands(Command program, Invocation* invocation) {
   AddBatchCommand(program, invocation);
   AddSceneCommand(program, invocation);
   AddStreamCommand(program, invocation);
+  AddRobotCommand(program, invocation);
+  AddCoverCommand(program, invocation);
   AddVerifyCommand(program, invocation);
   AddWatchCommand(program, invocation);
   program.BeginGroup("Run a server");

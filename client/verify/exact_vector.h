@@ -40,6 +40,7 @@ class CommonExponent {
   }
   // number / 2^exponent. Requires that it was included (checked in debug builds).
   BigInteger ToInteger(double number) const;
+  int exponent() const { return exponent_; }
 
  private:
   // The exponent of the lowest bit of all numbers so far; no double has a higher one than this.

@@ -76,7 +76,7 @@ CollisionWatch::~CollisionWatch() {
 }
 
 absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
-  const Deadline deadline = std::chrono::system_clock::now() + patience_;
+  Deadline deadline;
   RetryPolicy retry = retry_;
   if (connected_) retry.max_attempts = std::numeric_limits<int>::max();
   for (int failures = 0;;) {
@@ -93,6 +93,8 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     }
     const absl::Status status = Close(*call_);
     call_.reset();
+    // From the first failure: there may have been hours of quiet before it.
+    if (failures == 0) deadline = std::chrono::system_clock::now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }

@@ -20,7 +20,7 @@ HullWatch::~HullWatch() {
 }
 
 absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
-  const Deadline deadline = std::chrono::system_clock::now() + patience_;
+  Deadline deadline;
   RetryPolicy retry = retry_;
   if (connected_) retry.max_attempts = std::numeric_limits<int>::max();
   for (int failures = 0;;) {
@@ -38,6 +38,8 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
       return message;
     }
     const absl::Status status = Close();
+    // From the first failure: there may have been hours of quiet before it.
+    if (failures == 0) deadline = std::chrono::system_clock::now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }

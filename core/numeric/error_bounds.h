@@ -5,18 +5,20 @@
 
 // Every floating-point error bound of core, with its derivation. All assume IEEE doubles, round to
 // nearest, gradual underflow (no FTZ/DAZ), no contraction to FMA, and exponents within the range of
-// exponent_limits.h that belongs to the bound.
+// exponent_limits.h that belongs to the bound. Gappa proves them from the scripts in proofs/, whose
+// page tells which and what is left to proofs by hand; the numbers there may be a little smaller.
 namespace hulld {
 
 // Unit roundoff: |fl(x op y) - x op y| <= u |x op y| without underflow.
 inline constexpr double kUnitRoundoff = 0x1p-53;
 
-// |fl(det) - det| <= factor * fl(permanent) for the 3x3 determinant of rounded coordinate
-// differences, without underflow. Proven: Shewchuk 1997, Adaptive Precision Floating-Point
-// Arithmetic, table 2 (o3derrboundA).
+// The 3x3 determinant of rounded coordinate differences has the sign of fl(det) where |fl(det)| >
+// fl(factor * fl(permanent)), without underflow. It may err by more than that: by 8 u permanent, as
+// the last sum's rounding, which keeps the sign, does not count. Proven: Shewchuk 1997, Adaptive
+// Precision Floating-Point Arithmetic, table 2 (o3derrboundA).
 inline constexpr double kOrient3dErrorFactor = (7 + 56 * kUnitRoundoff) * kUnitRoundoff;
 
-// The same for 2x2. Proven: Shewchuk 1997 (ccwerrboundA).
+// The same for 2x2, which may err by 4 u permanent. Proven: Shewchuk 1997 (ccwerrboundA).
 inline constexpr double kOrient2dErrorFactor = (3 + 16 * kUnitRoundoff) * kUnitRoundoff;
 
 // The plane of a triangle a, b, c in floating point, with edges e = b - a and f = c - a: the normal
@@ -94,7 +96,7 @@ inline constexpr double kSupportErrorFactor = 512 * kUnitRoundoff;
 // det[w1, w2, w3] of computed Minkowski vertices with components at most W and errors at most
 // d = 128 u S each, W <= 4 S. A 3x3 determinant is at most 4 W^3, so a value above 24 W^2 d needs
 // W > 6 d; there the exact change by errors, 18 W^2 d + 18 W d^2 + 6 d^3, is at most 21.2 W^2 d,
-// and rounding, 6 * 5 u W^3 with u W <= d / 73, less than W^2 d. Times W^2 d. Proven.
+// and rounding, 6 * 5 u W^3 with u W <= d / 32, less than W^2 d. Times W^2 d. Proven.
 inline constexpr double kTetrahedronErrorFactor = 24;
 
 // det[u, v, w] where each is a computed Minkowski vertex, the difference of two, or the ray, with
@@ -205,19 +207,22 @@ inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
 // turned one. Times S, for S between kFilterMinSize and kFilterMaxSize. Proven.
 inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 
-// The sign of det[p, q, r] for computed Minkowski vertices in a unit with S < 2, so that components
-// are below 8 and those of the edges below 16: the normal errs by 2048 u per component, its product
-// with p by 3 * 8 * 2048 u, products and sums by 3 * 3 u * 8 * 512: below 2^17 u. What exceeds
-// twice that is certainly positive. Proven.
+// The sign of det[p, q, r], p . ((q - p) x (r - p)), for computed Minkowski vertices in a unit with
+// S < 2: a vertex errs by 256 u per component and is at most 2 sqrt(3), an edge by 520 u and is at
+// most 4 sqrt(3), as translations cancel in it. So the normal, at most 96, errs by 2 * 520 u * 2
+// * 6.93 and 4 u * 48: below 14700 u; its product with p by 3 * 3.47 * 14700 u and 3 * 96 * 256 u;
+// products, sums and the length by less than 18000 u: below 245000 u, and 2^18 u is 262144 u. What
+// exceeds that is certainly positive. Proven.
 inline constexpr double kLeastOutward = 0x1p-35;
 
 // A rational number or the square root of one, with 60 bits or more, rounded to a double: u of
 // itself and less than 2^-60; twice that, and the least double for gradual underflow. Proven.
 inline constexpr double kRoundedRelativeError = 2 * kUnitRoundoff;
 
-// Hull centre: the mean of six vertices. Five sums of values up to 6 M and one division: at most 7
-// u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). So is the mean of
-// up to ten inner vertices: nine sums of values up to 10 M, 90 u M / 10, and a division. Proven.
+// Hull centre: the sum of the sixths of six vertices. Sixths err by u M in all, the sums by 3 u M:
+// at most 7 u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). So is
+// the mean of up to ten inner vertices: nine sums of values up to 10 M, 90 u M / 10, and a
+// division: 11 u M. Proven.
 
 }  // namespace hulld
 

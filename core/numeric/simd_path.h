@@ -3,9 +3,11 @@
 
 #include <atomic>
 
-// Defined where functions compiled for AVX2 exist beside the portable ones.
+// Defined where functions for AVX2 or for NEON exist beside the portable ones.
 #if defined(__x86_64__)
 #define HULLD_HAS_AVX2_PATH
+#elif defined(__aarch64__)
+#define HULLD_HAS_NEON_PATH
 #endif
 
 namespace hulld {
@@ -14,6 +16,7 @@ namespace hulld {
 enum class SimdPath {
   kPortable,  // the baseline that all code is compiled for
   kAvx2,
+  kNeon,  // part of every 64-bit ARM; loops that the compiler would not put into its registers
 };
 
 namespace internal {
@@ -22,12 +25,15 @@ extern std::atomic<SimdPath> simd_path;
 
 // The best path of this machine, unless UseSimdPath chose another.
 inline SimdPath CurrentSimdPath() {
-#ifdef HULLD_HAS_AVX2_PATH
+#if defined(HULLD_HAS_AVX2_PATH) || defined(HULLD_HAS_NEON_PATH)
   return internal::simd_path.load(std::memory_order_relaxed);
 #else
   return SimdPath::kPortable;
 #endif
 }
+
+// The best path of this machine.
+SimdPath BestSimdPath();
 
 // Makes every thread take this path from now on; false, and no change, when the machine lacks it.
 // For tests and benchmarks.

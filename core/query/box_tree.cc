@@ -50,17 +50,19 @@ Box BoundingBox(const PlacedHull& placed) {
   return box;
 }
 
-BoxTree::BoxTree(std::span<const Box> boxes) : indices_(boxes.size()) {
+BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should_stop)
+    : indices_(boxes.size()) {
   std::iota(indices_.begin(), indices_.end(), 0u);
   if (boxes.empty()) return;
   nodes_.reserve(2 * (boxes.size() / (kLeafBoxes / 2) + 1));
-  Build(boxes, 0, static_cast<uint32_t>(boxes.size()));
+  StopPoll poll(should_stop);
+  Build(boxes, 0, static_cast<uint32_t>(boxes.size()), poll);
   boxes_.reserve(boxes.size());
   for (const uint32_t index : indices_) boxes_.push_back(boxes[index]);
 }
 
 // Halves the boxes along the axis in which their centres spread widest.
-uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end) {
+uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll) {
   const auto node = static_cast<uint32_t>(nodes_.size());
   Box bounds = Box::Empty();
   Box centers = bounds;
@@ -78,7 +80,7 @@ uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end
     largest_index = std::max(largest_index, indices_[i]);
   }
   nodes_.push_back({bounds, largest_index, 0, begin, end});
-  if (end - begin <= kLeafBoxes) return node;
+  if (end - begin <= kLeafBoxes || poll.Step(end - begin)) return node;
   int axis = 0;
   (centers.high - centers.low).maxCoeff(&axis);
   const uint32_t middle = begin + (end - begin) / 2;
@@ -88,32 +90,39 @@ uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end
                      const double y = center(j)[axis];
                      return x < y || (x == y && i < j);
                    });
-  Build(boxes, begin, middle);
-  nodes_[node].second = Build(boxes, middle, end);
+  Build(boxes, begin, middle, poll);
+  nodes_[node].second = Build(boxes, middle, end, poll);
   return node;
 }
 
 void BoxTree::AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const {
-  if (nodes_.empty()) return;
-  // Halves leave at most 32 levels.
-  constexpr int kMostWaiting = 40;
-  uint32_t stack[kMostWaiting];
-  int height = 0;
-  stack[height++] = 0;
-  while (height > 0) {
-    const uint32_t index = stack[--height];
+  Cursor cursor = Begin();
+  AppendMeeting(box, first, std::numeric_limits<uint64_t>::max(), cursor, found);
+}
+
+BoxTree::Cursor BoxTree::Begin() const {
+  Cursor cursor;
+  if (!nodes_.empty()) cursor.waiting_[cursor.height_++] = 0;
+  return cursor;
+}
+
+bool BoxTree::AppendMeeting(const Box& box, uint32_t first, uint64_t nodes, Cursor& cursor,
+                            std::vector<uint32_t>& found) const {
+  for (; cursor.height_ > 0 && nodes > 0; --nodes) {
+    const uint32_t index = cursor.waiting_[--cursor.height_];
     const Node& node = nodes_[index];
     if (node.largest_index < first || !node.box.Meets(box)) continue;
     if (node.second != 0) {
-      HULLD_DCHECK(height + 2 <= kMostWaiting);
-      stack[height++] = node.second;
-      stack[height++] = index + 1;
+      HULLD_DCHECK(cursor.height_ + 2 <= Cursor::kMostWaiting);
+      cursor.waiting_[cursor.height_++] = node.second;
+      cursor.waiting_[cursor.height_++] = index + 1;
       continue;
     }
     for (uint32_t i = node.begin; i < node.end; ++i) {
       if (indices_[i] >= first && boxes_[i].Meets(box)) found.push_back(indices_[i]);
     }
   }
+  return cursor.height_ == 0;
 }
 
 }  // namespace hulld

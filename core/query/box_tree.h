@@ -4,9 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/placed_hull.h"
 
@@ -34,12 +36,28 @@ Box GrownBy(const Box& box, double clearance);
 // A hierarchy of boxes that finds those which meet a given one. Immutable once built.
 class BoxTree {
  public:
-  // Cost: O(n log n).
-  explicit BoxTree(std::span<const Box> boxes);
+  // A search that can be left and taken up again: the nodes that it has still to look at.
+  class Cursor {
+   private:
+    friend class BoxTree;
+    // Halves leave at most 32 levels.
+    static constexpr int kMostWaiting = 40;
+    uint32_t waiting_[kMostWaiting];
+    int height_ = 0;
+  };
+
+  // Cost: O(n log n). A tree that was stopped by should_stop lacks boxes: drop it.
+  explicit BoxTree(std::span<const Box> boxes, const std::function<bool()>& should_stop = {});
 
   // Appends the indices of all boxes that meet `box`, from index `first` on, in no particular
   // order. Cost: O(log n) beyond what it finds, where boxes overlap little.
   void AppendMeeting(const Box& box, uint32_t first, std::vector<uint32_t>& found) const;
+
+  // The same piece by piece: Begin, then AppendMeeting until it returns true. Each piece looks at
+  // `nodes` nodes at most, and so appends at most kLeafBoxes indices for each.
+  Cursor Begin() const;
+  bool AppendMeeting(const Box& box, uint32_t first, uint64_t nodes, Cursor& cursor,
+                     std::vector<uint32_t>& found) const;
 
   // For searches of two trees at once. Nodes are known by number; that of the root is 0.
   bool empty() const { return nodes_.empty(); }
@@ -69,7 +87,7 @@ class BoxTree {
     uint32_t end;
   };
 
-  uint32_t Build(std::span<const Box> boxes, uint32_t begin, uint32_t end);
+  uint32_t Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll);
 
   template <typename T>
   std::span<const T> Part(const std::vector<T>& all, uint32_t leaf) const {

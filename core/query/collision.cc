@@ -210,19 +210,25 @@ absl::StatusOr<Answer> CertifiedSearchOfEither(const PlacedHull& a, const Placed
 }
 
 // The textbook's answer, and what else is wanted as the search finds it.
-absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
-                                const QueryOptions& options) {
-  absl::StatusOr<Answer> answer = TextbookSat(a, b, options);
-  if (!answer.ok() || !NeedsMore(options)) return answer;
+absl::StatusOr<Answer> WithTheRest(Answer answer, const PlacedHull& a, const PlacedHull& b,
+                                   const QueryOptions& options) {
+  if (!NeedsMore(options)) return answer;
   QueryOptions rest = options;
   rest.want_axis = false;
   rest.want_analysis = false;
   absl::StatusOr<Answer> more = CertifiedSearchOfEither(a, b, rest, nullptr);
   if (!more.ok()) return more;
-  more->rung = answer->rung;
-  more->axis = std::move(answer->axis);
-  more->analysis = std::move(answer->analysis);
+  more->rung = answer.rung;
+  more->axis = std::move(answer.axis);
+  more->analysis = std::move(answer.analysis);
   return more;
+}
+
+absl::StatusOr<Answer> Textbook(const PlacedHull& a, const PlacedHull& b,
+                                const QueryOptions& options) {
+  absl::StatusOr<Answer> answer = TextbookSat(a, b, options);
+  if (!answer.ok()) return answer;
+  return WithTheRest(*std::move(answer), a, b, options);
 }
 
 Answer AnswerOfEmpty(const QueryOptions& options) {
@@ -253,6 +259,37 @@ Answer AnswerOfEmpty(const QueryOptions& options) {
 }
 
 }  // namespace
+
+absl::StatusOr<TextbookCheck> TextbookCheck::Begin(const PlacedHull& a, const PlacedHull& b,
+                                                   const QueryOptions& options) {
+  HULLD_CHECK(options.method == Method::kTextbookSat);
+  if (absl::Status status = ValidateOptions(options); !status.ok()) return status;
+  TextbookCheck check(a, b, options);
+  if (a.empty() || b.empty()) return check;
+  const auto start = TextbookSearch::Clock::now();
+  absl::StatusOr<TextbookSearch> search = TextbookSearch::Begin(a, b, options);
+  if (!search.ok()) return search.status();
+  check.search_ = *std::move(search);
+  check.time_ = TextbookSearch::Clock::now() - start;
+  return check;
+}
+
+absl::StatusOr<bool> TextbookCheck::Advance(std::chrono::steady_clock::time_point end) {
+  if (!search_.has_value()) return true;
+  const auto start = TextbookSearch::Clock::now();
+  const absl::StatusOr<bool> done = search_->Advance(end);
+  time_ += TextbookSearch::Clock::now() - start;
+  return done;
+}
+
+absl::StatusOr<Answer> TextbookCheck::Finish() {
+  if (!search_.has_value()) return AnswerOfEmpty(*options_);
+  const auto start = TextbookSearch::Clock::now();
+  absl::StatusOr<Answer> answer = WithTheRest(search_->Finish(), *a_, *b_, *options_);
+  time_ += TextbookSearch::Clock::now() - start;
+  if (answer.ok() && options_->want_analysis) answer->analysis->time = time_;
+  return answer;
+}
 
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {

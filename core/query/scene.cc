@@ -3,6 +3,8 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <iterator>
 #include <map>
 #include <utility>
@@ -16,76 +18,114 @@
 namespace hulld {
 namespace {
 
-// Between two calls of emit as many placements are searched as gave so many candidates last time,
-// about: enough to keep the threads busy, few enough for answers to flow and memory to stay small.
-constexpr uint64_t kCandidatesPerSlice = 16384;
-constexpr uint32_t kFirstSlicePlacements = 16;
-constexpr uint32_t kMostSlicePlacements = 1024;
+// The candidates of so many placements are gathered side by side: about as many as gave so many
+// candidates last time, enough to keep the threads busy.
+constexpr uint64_t kCandidatesPerWindow = 16384;
+constexpr uint32_t kFirstPlacements = 16;
+constexpr uint32_t kMostPlacements = 1024;
+// What a thread takes at a time: some microseconds.
+constexpr size_t kPairsPerTask = 64;
+// Nodes of the tree between two polls.
+constexpr uint64_t kNodesPerPoll = 1024;
+// Beyond so many candidates a bit for each placement takes less.
+constexpr size_t kMostListed = 1024;
+constexpr size_t kWordBits = 64;
 
-// What the search of one placement counted.
-struct RungTally {
-  uint64_t candidates = 0;
+// What a thread found of its pairs.
+struct Part {
+  std::vector<SceneAnswer> answers;
   RungCounts rungs;
 };
 
+// Gathers the candidates of a window of placements, then asks about them, a bounded number at a
+// time: threads share both, and what is held does not grow with what collides.
 class Search {
  public:
   Search(const SceneSearch& scene, const SceneOptions& options)
-      : scene_(scene), options_(options) {}
+      : scene_(scene), options_(options), threads_(std::max(1, options.threads)) {
+    totals_.pairs = scene.pairs();
+    pairs_.reserve(kMostEmittedAnswers);
+  }
 
   absl::StatusOr<SceneTotals> Run(const std::function<void(std::span<const SceneAnswer>)>& emit) {
-    SceneTotals totals;
-    totals.pairs = scene_.pairs();
-    const int threads = std::max(1, options_.threads);
-    std::vector<std::vector<SceneAnswer>> slice(kMostSlicePlacements);
-    std::vector<RungTally> slice_rungs(kMostSlicePlacements);
-    uint32_t slice_placements = kFirstSlicePlacements;
-    std::vector<SceneAnswer> answers;
+    std::vector<SceneCandidates> window(kMostPlacements);
+    uint32_t width = kFirstPlacements;
     for (uint32_t begin = 0, size = 0; begin < scene_.size(); begin += size) {
-      size = std::min(slice_placements, scene_.size() - begin);
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
-      for (uint32_t i = 0; i < size; ++i) {
-        slice[i].clear();
-        slice_rungs[i] = {};
-        if (!Stopped()) SearchFrom(begin + i, slice[i], slice_rungs[i]);
+      size = std::min(width, scene_.size() - begin);
+      const uint64_t before = totals_.candidates;
+      Gather(begin, std::span(window).first(size));
+      for (uint32_t i = 0; i < size && !Stopped(); ++i) {
+        while (const std::optional<uint32_t> b = window[i].Next()) {
+          pairs_.push_back({begin + i, *b});
+          if (pairs_.size() == kMostEmittedAnswers && !AskAndEmit(emit)) break;
+        }
       }
-      if (Stopped()) return absl::CancelledError("stopped in a scene");
-      answers.clear();
-      uint64_t candidates = 0;
-      for (uint32_t i = 0; i < size; ++i) {
-        std::move(slice[i].begin(), slice[i].end(), std::back_inserter(answers));
-        candidates += slice_rungs[i].candidates;
-        totals.rungs += slice_rungs[i].rungs;
-      }
-      totals.candidates += candidates;
-      totals.found += answers.size();
-      if (!answers.empty()) emit(answers);
-      const uint64_t wished = kCandidatesPerSlice * size / std::max<uint64_t>(candidates, 1);
-      slice_placements = static_cast<uint32_t>(
-          std::clamp<uint64_t>(wished, 1, std::min(2 * size, kMostSlicePlacements)));
+      if (Stopped() || !AskAndEmit(emit)) return absl::CancelledError("stopped in a scene");
+      const uint64_t candidates = std::max<uint64_t>(totals_.candidates - before, 1);
+      width = static_cast<uint32_t>(std::clamp<uint64_t>(kCandidatesPerWindow * size / candidates,
+                                                         1, std::min(2 * size, kMostPlacements)));
     }
-    return totals;
+    return totals_;
   }
 
  private:
-  bool Stopped() const { return StopPoll(options_.query.should_stop, 1).Poll(); }
+  // A caller that said stop is not asked again.
+  bool Stopped() {
+    if (!stopped_ && StopPoll(options_.query.should_stop, 1).Poll()) stopped_ = true;
+    return stopped_;
+  }
 
-  // Answers placement a with all after it.
-  void SearchFrom(uint32_t a, std::vector<SceneAnswer>& answers, RungTally& tally) const {
-    std::vector<uint32_t> candidates;
-    scene_.Candidates(a, candidates);
-    for (const uint32_t b : candidates) {
-      ++tally.candidates;
-      absl::StatusOr<Answer> answer = scene_.Ask(a, b);
-      if (absl::IsCancelled(answer.status())) break;
-      if (answer.ok()) tally.rungs.Add(answer->rung);
+  void Gather(uint32_t begin, std::span<SceneCandidates> window) {
+#pragma omp parallel for schedule(dynamic, 4) num_threads(threads_)
+    for (size_t i = 0; i < window.size(); ++i) {
+      window[i].Start(scene_, begin + static_cast<uint32_t>(i));
+      while (!Stopped() && !window[i].Gather(kNodesPerPoll)) {
+      }
+    }
+  }
+
+  // Answers the pairs that wait, in their order. False: stopped, and nothing was emitted.
+  bool AskAndEmit(const std::function<void(std::span<const SceneAnswer>)>& emit) {
+    const size_t tasks = (pairs_.size() + kPairsPerTask - 1) / kPairsPerTask;
+    if (parts_.size() < tasks) parts_.resize(tasks);
+#pragma omp parallel for schedule(dynamic) num_threads(threads_)
+    for (size_t task = 0; task < tasks; ++task) {
+      parts_[task] = {};
+      if (!Stopped()) Ask(task);
+    }
+    if (Stopped()) return false;
+    std::vector<SceneAnswer> answers;
+    for (size_t task = 0; task < tasks; ++task) {
+      std::vector<SceneAnswer>& found = parts_[task].answers;
+      std::move(found.begin(), found.end(), std::back_inserter(answers));
+      totals_.rungs += parts_[task].rungs;
+    }
+    totals_.candidates += pairs_.size();
+    totals_.found += answers.size();
+    pairs_.clear();
+    if (!answers.empty()) emit(answers);
+    return true;
+  }
+
+  void Ask(size_t task) {
+    const size_t end = std::min(pairs_.size(), (task + 1) * kPairsPerTask);
+    for (size_t i = task * kPairsPerTask; i < end; ++i) {
+      absl::StatusOr<Answer> answer = scene_.Ask(pairs_[i].a, pairs_[i].b);
+      if (absl::IsCancelled(answer.status())) return;
+      if (answer.ok()) parts_[task].rungs.Add(answer->rung);
       if (answer.ok() && !scene_.IsFound(*answer)) continue;
-      answers.push_back({{a, b}, std::move(answer)});
+      parts_[task].answers.push_back({pairs_[i], std::move(answer)});
     }
   }
 
   const SceneSearch& scene_;
   const SceneOptions& options_;
+  const int threads_;
+  std::atomic<bool> stopped_ = false;
+  SceneTotals totals_;
+  // Candidates to be asked about, and what was found of them.
+  std::vector<PlacedPair> pairs_;
+  std::vector<Part> parts_;
 };
 
 }  // namespace
@@ -102,14 +142,26 @@ SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOpti
     ignored_.insert(std::minmax(pair.first, pair.second));
   }
   const auto count = static_cast<uint32_t>(placements.size());
-  boxes_.resize(count);
-#pragma omp parallel for schedule(static) num_threads(std::max(1, options.threads))
-  for (uint32_t i = 0; i < count; ++i) {
-    boxes_[i] = IsBody(i) ? BoundingBox(options.bodies[i]) : BoundingBox(placements_[i]);
-  }
-  tree_ = BoxTree(boxes_);
   pairs_ = CountPairs();
   size_ = options.movers ? std::min(*options.movers, count) : count;
+}
+
+bool SceneSearch::BuildTree() {
+  const std::function<bool()>& should_stop = options_->query.should_stop;
+  const auto count = static_cast<uint32_t>(placements_.size());
+  boxes_.resize(count);
+#pragma omp parallel num_threads(std::max(1, options_->threads))
+  {
+    StopPoll poll(should_stop);
+#pragma omp for schedule(static)
+    for (uint32_t i = 0; i < count; ++i) {
+      if (poll.Step()) continue;
+      boxes_[i] = IsBody(i) ? BoundingBox(options_->bodies[i]) : BoundingBox(placements_[i]);
+    }
+  }
+  if (StopPoll(should_stop, 1).Poll()) return false;
+  tree_ = BoxTree(boxes_, should_stop);
+  return !StopPoll(should_stop, 1).Poll();
 }
 
 absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
@@ -120,7 +172,9 @@ absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placem
                                                    " placements; give one each, or none"));
   }
   HULLD_CHECK(options.bodies.empty() || options.bodies.size() == placements.size());
-  return SceneSearch(placements, options);
+  SceneSearch scene(placements, options);
+  if (!scene.BuildTree()) return absl::CancelledError("stopped in a scene");
+  return scene;
 }
 
 bool SceneSearch::IsIgnored(uint32_t a, uint32_t b) const {
@@ -149,15 +203,6 @@ uint64_t SceneSearch::CountPairs() const {
   return pairs;
 }
 
-void SceneSearch::Candidates(uint32_t a, std::vector<uint32_t>& candidates) const {
-  HULLD_DCHECK(a < size_);
-  const Box box = GrownBy(boxes_[a], options_->query.clearance.value_or(0));
-  candidates.clear();
-  tree_.AppendMeeting(box, a + 1, candidates);
-  std::erase_if(candidates, [&](uint32_t b) { return IsIgnored(a, b); });
-  std::sort(candidates.begin(), candidates.end());
-}
-
 bool SceneSearch::IsFound(const Answer& answer) const {
   if (options_->query.clearance) return answer.within_clearance.value_or(false);
   return answer.relation != Relation::kSeparated;
@@ -180,6 +225,54 @@ absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b,
   QueryOptions options = options_->query;
   options.threads = 1;
   return AskWith(a, b, options, pieces);
+}
+
+void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {
+  HULLD_DCHECK(a < scene.size());
+  scene_ = &scene;
+  a_ = a;
+  box_ = GrownBy(scene.boxes_[a], scene.options_->query.clearance.value_or(0));
+  cursor_ = scene.tree_.Begin();
+  is_gathered_ = false;
+  listed_.clear();
+  marked_.clear();
+  is_marked_ = false;
+  next_ = 0;
+}
+
+bool SceneCandidates::Gather(uint64_t nodes) {
+  if (is_gathered_) return true;
+  const size_t before = listed_.size();
+  is_gathered_ = scene_->tree_.AppendMeeting(box_, a_ + 1, nodes, cursor_, listed_);
+  const auto is_ignored = [this](uint32_t b) { return scene_->IsIgnored(a_, b); };
+  listed_.erase(
+      std::remove_if(listed_.begin() + static_cast<ptrdiff_t>(before), listed_.end(), is_ignored),
+      listed_.end());
+  if (listed_.size() > kMostListed && !is_marked_) {
+    marked_.assign(scene_->placements_.size() / kWordBits + 1, 0);
+    is_marked_ = true;
+  }
+  if (is_marked_) {
+    for (const uint32_t b : listed_) marked_[b / kWordBits] |= uint64_t{1} << b % kWordBits;
+    listed_.clear();
+  } else if (is_gathered_) {
+    std::sort(listed_.begin(), listed_.end());
+  }
+  return is_gathered_;
+}
+
+std::optional<uint32_t> SceneCandidates::Next() {
+  HULLD_DCHECK(is_gathered_);
+  if (!is_marked_) {
+    if (next_ == listed_.size()) return std::nullopt;
+    return listed_[next_++];
+  }
+  while (next_ < marked_.size() && marked_[next_] == 0) ++next_;
+  if (next_ == marked_.size()) return std::nullopt;
+  uint64_t& word = marked_[next_];
+  const auto bit = static_cast<uint64_t>(std::countr_zero(word));
+  word &= word - 1;
+  return static_cast<uint32_t>(next_ * kWordBits + bit);
 }
 
 absl::StatusOr<SceneTotals> FindCollisions(

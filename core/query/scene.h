@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -60,13 +61,14 @@ struct SceneTotals {
   RungCounts rungs;
 };
 
-// A scene for callers that have threads of their own: FindCollisions is Candidates of every
-// placement, and of each candidate Ask. Const functions may be called by several threads at once.
+// A scene for callers that have threads of their own: FindCollisions is the SceneCandidates of
+// every placement, and of each candidate Ask. Const functions may be called by several threads at
+// once.
 class SceneSearch {
  public:
   // Both must outlive this; bodies, if there are any, are one for each placement. Cost: O(n log n);
   // boxes are computed on options.threads. INVALID_ARGUMENT: `groups` is neither empty nor one for
-  // each placement.
+  // each placement. CANCELLED: should_stop said so.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
 
@@ -74,10 +76,6 @@ class SceneSearch {
   uint64_t pairs() const { return pairs_; }
   // Placements that have candidates of their own: all, or the movers.
   uint32_t size() const { return size_; }
-
-  // The placements after `a` whose boxes meet that of `a` (grown by the clearance) and that the
-  // groups leave, ascending. Requires a < size(). Cost: O(log n) beyond what it finds.
-  void Candidates(uint32_t a, std::vector<uint32_t>& candidates) const;
 
   // The answer of a candidate, and what else is wanted of it if it is found. pieces: where not
   // null, becomes the pair that decided of a candidate with a body (BodyAnswer::pieces). CANCELLED:
@@ -88,9 +86,18 @@ class SceneSearch {
   // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.
   bool IsFound(const Answer& answer) const;
 
+  // What this holds: the boxes and their tree.
+  size_t MemoryBytes() const {
+    return boxes_.capacity() * sizeof(Box) + tree_.MemoryBytes() + sizeof *this;
+  }
+
  private:
+  friend class SceneCandidates;
+
   SceneSearch(std::span<const PlacedHull> placements, const SceneOptions& options);
 
+  // False: should_stop said so, and what was built is to be dropped.
+  bool BuildTree();
   bool IsIgnored(uint32_t a, uint32_t b) const;
   bool IsBody(uint32_t placement) const {
     return !options_->bodies.empty() && !options_->bodies[placement].body().is_hull();
@@ -110,10 +117,48 @@ class SceneSearch {
   uint32_t size_ = 0;
 };
 
+// The candidates of one placement: those after it whose boxes meet its own (grown by the clearance)
+// and that the groups leave, ascending. They are found piece by piece, so that a caller may leave
+// off between any two, and take n / 8 bytes at most, however many of the n placements they are.
+class SceneCandidates {
+ public:
+  // Begins with placement `a` of a scene, which must outlive this. Requires a < scene.size().
+  void Start(const SceneSearch& scene, uint32_t a);
+
+  // Looks at `nodes` nodes of the tree at most. Whether all candidates are gathered by now. Cost:
+  // O(nodes); all of it is O(log n) beyond what it finds.
+  bool Gather(uint64_t nodes);
+
+  // The next candidate; none after the last. Requires that all are gathered.
+  std::optional<uint32_t> Next();
+
+  size_t MemoryBytes() const {
+    return listed_.capacity() * sizeof(uint32_t) + marked_.capacity() * sizeof(uint64_t);
+  }
+
+ private:
+  const SceneSearch* scene_ = nullptr;
+  uint32_t a_ = 0;
+  Box box_;
+  BoxTree::Cursor cursor_;
+  bool is_gathered_ = false;
+  // A few are listed. Beyond that, a bit marks each, which also sorts them.
+  std::vector<uint32_t> listed_;
+  std::vector<uint64_t> marked_;
+  bool is_marked_ = false;
+  // The first that is not taken yet: an index into one or the other.
+  size_t next_ = 0;
+};
+
+// The answers that FindCollisions holds at a time. A choice: three or four MiB with certificates,
+// and enough for many threads.
+inline constexpr size_t kMostEmittedAnswers = 4096;
+
 // Which of all pairs of placements collide: a tree of bounding boxes leaves the pairs whose boxes
 // meet, and each of these is answered as CheckCollision answers it. Answers are handed to `emit`,
 // on the calling thread, in ascending order of (a, b); neither they nor their order depend on the
-// number of threads. `emit` may wait, which holds the search back.
+// number of threads. `emit` may wait, which holds the search back. However many pairs collide, at
+// most kMostEmittedAnswers of them are held at a time.
 // INVALID_ARGUMENT: `groups` is neither empty nor one for each placement. CANCELLED: should_stop
 // said so; what was emitted before stands. Cost: O(n log n) beyond the candidates.
 absl::StatusOr<SceneTotals> FindCollisions(

@@ -214,27 +214,33 @@ void LowerTo(std::atomic<uint64_t>& lowest, uint64_t value) {
 // The lowest axes that separate and that show a zero gap; axes beyond a separating one are skipped,
 // which hides none lower.
 struct Scan {
+  using Clock = TextbookSearch::Clock;
+
   std::atomic<uint64_t> separated = kNone;
   std::atomic<uint64_t> zero = kNone;
   std::atomic<bool> stopped = false;
+  // Blocks of axes are taken in their order, and who takes one tests it.
+  std::atomic<uint64_t> next_axis = 0;
 
-  void Run(AxisTable& axes, const QueryOptions& options) {
-    const auto blocks = static_cast<int64_t>((axes.size() + kAxesPerPoll - 1) / kAxesPerPoll);
+  // Goes on until `end`. Whether nothing is left to test.
+  bool Run(AxisTable& axes, const QueryOptions& options, Clock::time_point end) {
+    std::atomic<bool> paused = false;
 #pragma omp parallel num_threads(std::max(1, options.threads)) if (options.threads > 1)
     {
       StopPoll poll(options.should_stop, 1);
-#pragma omp for schedule(dynamic)
-      for (int64_t block = 0; block < blocks; ++block) {
-        if (stopped.load(std::memory_order_relaxed)) continue;
-        const uint64_t first = static_cast<uint64_t>(block) * kAxesPerPoll;
-        if (first > separated.load(std::memory_order_relaxed)) continue;
-        if (poll.Step()) {
-          stopped = true;
-          continue;
-        }
+      while (!paused.load(std::memory_order_relaxed) && !stopped.load(std::memory_order_relaxed)) {
+        const uint64_t first = next_axis.fetch_add(kAxesPerPoll, std::memory_order_relaxed);
+        if (IsLeft(first, axes) && poll.Step()) stopped = true;
+        if (!IsLeft(first, axes) || poll.stopped()) break;
         RunBlock(axes, first, std::min(first + kAxesPerPoll, axes.size()));
+        if (Clock::now() >= end) paused = true;
       }
     }
+    return !stopped && !IsLeft(next_axis, axes);
+  }
+
+  bool IsLeft(uint64_t axis, const AxisTable& axes) const {
+    return axis < axes.size() && axis <= separated.load(std::memory_order_relaxed);
   }
 
   void RunBlock(AxisTable& axes, uint64_t first, uint64_t end) {
@@ -257,22 +263,47 @@ absl::Status CheckCount(uint64_t count, const QueryOptions& options) {
 
 }  // namespace
 
-absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull& placed_b,
-                                   const QueryOptions& options) {
+struct TextbookSearch::State {
+  State(const PlacedHull& a, const PlacedHull& b, const QueryOptions& given_options)
+      : options(given_options), filter(a, b), exact(filter), axes(exact, filter) {}
+
+  const QueryOptions& options;
+  FloatPair filter;
+  ExactPair exact;
+  AxisTable axes;
+  Scan scan;
+};
+
+TextbookSearch::TextbookSearch(std::unique_ptr<State> state) : state_(std::move(state)) {}
+TextbookSearch::TextbookSearch(TextbookSearch&&) noexcept = default;
+TextbookSearch& TextbookSearch::operator=(TextbookSearch&&) noexcept = default;
+TextbookSearch::~TextbookSearch() = default;
+
+absl::StatusOr<TextbookSearch> TextbookSearch::Begin(const PlacedHull& placed_a,
+                                                     const PlacedHull& placed_b,
+                                                     const QueryOptions& options) {
   const Hull& a = placed_a.hull();
   const Hull& b = placed_b.hull();
   HULLD_CHECK(!a.empty() && !b.empty());
   // The limit is checked before anything is computed, and again with the axes of a flat difference.
   const uint64_t solid = a.facet_count() + b.facet_count() + a.edges().size() * b.edges().size();
   if (absl::Status status = CheckCount(solid, options); !status.ok()) return status;
-  const FloatPair filter(placed_a, placed_b);
-  ExactPair exact(filter);
-  AxisTable axes(exact, filter);
-  if (absl::Status status = CheckCount(axes.size(), options); !status.ok()) return status;
-  Scan scan;
-  scan.Run(axes, options);
-  if (scan.stopped) return absl::CancelledError("stopped in textbook SAT");
+  auto state = std::make_unique<State>(placed_a, placed_b, options);
+  if (absl::Status status = CheckCount(state->axes.size(), options); !status.ok()) return status;
+  return TextbookSearch(std::move(state));
+}
 
+absl::StatusOr<bool> TextbookSearch::Advance(Clock::time_point end) {
+  const bool done = state_->scan.Run(state_->axes, state_->options, end);
+  if (state_->scan.stopped) return absl::CancelledError("stopped in textbook SAT");
+  return done;
+}
+
+Answer TextbookSearch::Finish() {
+  const QueryOptions& options = state_->options;
+  const Scan& scan = state_->scan;
+  AxisTable& axes = state_->axes;
+  HULLD_CHECK(!scan.stopped && !scan.IsLeft(scan.next_axis, axes));
   Answer answer;
   answer.rung = Rung::kExact;
   uint64_t found = kNone;
@@ -296,11 +327,20 @@ absl::StatusOr<Answer> TextbookSat(const PlacedHull& placed_a, const PlacedHull&
     answer.analysis = analysis;
   }
   if (options.want_axis && found != kNone) {
-    SeparatingAxis axis = DescribeAxis(exact, axes.Oriented(found));
+    SeparatingAxis axis = DescribeAxis(state_->exact, axes.Oriented(found));
     axis.kind = axes.KindOf(found);
     answer.axis = std::move(axis);
   }
   return answer;
+}
+
+absl::StatusOr<Answer> TextbookSat(const PlacedHull& a, const PlacedHull& b,
+                                   const QueryOptions& options) {
+  absl::StatusOr<TextbookSearch> search = TextbookSearch::Begin(a, b, options);
+  if (!search.ok()) return search.status();
+  const absl::StatusOr<bool> done = search->Advance(TextbookSearch::Clock::time_point::max());
+  if (!done.ok()) return done.status();
+  return search->Finish();
 }
 
 }  // namespace hulld

@@ -3,6 +3,9 @@
 
 #include <absl/status/statusor.h>
 
+#include <chrono>
+#include <memory>
+
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/answer.h"
 #include "core/query/terms/query_options.h"
@@ -25,6 +28,32 @@ namespace hulld {
 // CANCELLED: should_stop.
 absl::StatusOr<Answer> TextbookSat(const PlacedHull& a, const PlacedHull& b,
                                    const QueryOptions& options);
+
+// The same in pieces, for callers that must let others have their turn.
+class TextbookSearch {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // All must outlive the search. Errors as TextbookSat's, but for CANCELLED.
+  static absl::StatusOr<TextbookSearch> Begin(const PlacedHull& a, const PlacedHull& b,
+                                              const QueryOptions& options);
+  TextbookSearch(TextbookSearch&&) noexcept;
+  TextbookSearch& operator=(TextbookSearch&&) noexcept;
+  ~TextbookSearch();
+
+  // Tests axes until `end`, but some at least. Whether the answer is known. CANCELLED: should_stop.
+  absl::StatusOr<bool> Advance(Clock::time_point end);
+
+  // Requires that Advance said so.
+  Answer Finish();
+
+ private:
+  struct State;
+
+  explicit TextbookSearch(std::unique_ptr<State> state);
+
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace hulld
 

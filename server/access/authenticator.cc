@@ -26,6 +26,12 @@ void Authenticator::SetTokens(TokenTable tokens) {
   auto table = std::make_shared<const TokenTable>(std::move(tokens));
   const std::lock_guard lock(mutex_);
   tokens_ = std::move(table);
+  generation_.fetch_add(1, std::memory_order_release);
+}
+
+bool Authenticator::Knows(const Caller& caller) const {
+  const std::shared_ptr<const TokenTable> table = tokens();
+  return table == nullptr || table->Knows(caller);
 }
 
 absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc rpc) const {

@@ -4,6 +4,8 @@
 #include <absl/status/statusor.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -23,8 +25,13 @@ class Authenticator {
   // PERMISSION_DENIED: the token's role does not allow the call.
   absl::StatusOr<Caller> Authenticate(const Metadata& metadata, Rpc rpc) const;
 
-  // From now on callers need one of these tokens; calls that run go on.
+  // From now on callers need one of these tokens. Calls that run are for others to end (Knows).
   void SetTokens(TokenTable tokens);
+
+  // Whether the token of a caller that was let in is still valid for what it was.
+  bool Knows(const Caller& caller) const;
+  // How often the tokens changed: what was found of a caller holds as long as this stays.
+  uint64_t generation() const { return generation_.load(std::memory_order_acquire); }
 
  private:
   std::shared_ptr<const TokenTable> tokens() const;
@@ -32,6 +39,7 @@ class Authenticator {
   mutable std::mutex mutex_;
   // Null: no tokens are needed. Guarded by the mutex.
   std::shared_ptr<const TokenTable> tokens_;
+  std::atomic<uint64_t> generation_ = 0;
 };
 
 }  // namespace hulld::server

@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
+#include <cstdint>
 #include <string>
 
 namespace hulld::server {
@@ -37,6 +38,8 @@ struct Caller {
   Permission permission = Permission::kAdmin;
   // What the IDs that the caller sees start with: ends in "/", or is empty for all.
   std::string prefix;
+  // Tells the tokens apart that had this name one after another. Never shown.
+  uint64_t token = 0;
 
   bool sees_all() const { return prefix.empty(); }
 

@@ -63,6 +63,11 @@ void Guard::Reload() {
   if (!config_.tokens_file.empty()) Complain("the tokens", ReloadTokens(), &tokens_complaint_);
 }
 
+void Guard::OnTokensChanged(std::function<void()> changed) {
+  const std::lock_guard lock(mutex_);
+  tokens_changed_ = std::move(changed);
+}
+
 absl::Status Guard::ReloadTls() {
   absl::StatusOr<TlsIdentity> loaded = LoadTlsIdentity(config_);
   if (!loaded.ok()) return loaded.status();
@@ -87,6 +92,7 @@ absl::Status Guard::ReloadTokens() {
   tokens_ = *std::move(table);
   authenticator_.SetTokens(tokens_);
   spdlog::info("{} tokens in force", tokens_.size());
+  if (tokens_changed_) tokens_changed_();
   return absl::OkStatus();
 }
 

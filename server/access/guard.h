@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -18,7 +19,8 @@ namespace hulld::server {
 
 // Who may connect and who may call, as the files of --tls-cert, --tls-key, --tls-client-ca and
 // --tokens-file say. It looks at the files every Config::kReloadInterval; what is new and valid is
-// taken for connections and calls from then on, what is broken is reported and leaves what was
+// taken for connections and calls from then on (and calls that run on tokens that are gone are
+// ended), what is broken is reported and leaves what was
 // there.
 class Guard {
  public:
@@ -35,6 +37,10 @@ class Guard {
 
   // Looks at the files now. Any thread.
   void Reload();
+
+  // Called whenever other tokens are in force, on the thread that noticed; null: no longer. Once
+  // this returns, the one before is not running.
+  void OnTokensChanged(std::function<void()> changed);
 
  private:
   explicit Guard(const Config& config) : config_(config) {}
@@ -56,6 +62,8 @@ class Guard {
   TokenTable tokens_;
   std::string tls_complaint_;
   std::string tokens_complaint_;
+
+  std::function<void()> tokens_changed_;
 
   bool ending_ = false;
   std::condition_variable end_;

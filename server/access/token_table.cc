@@ -105,6 +105,9 @@ absl::Status TokenTable::AddLine(const std::string& line) {
   }
   const std::string bytes = absl::HexStringToBytes(hash.substr(sizeof kHashScheme - 1));
   std::copy(bytes.begin(), bytes.end(), entry.hash.begin());
+  for (size_t i = 0; i < sizeof entry.caller.token; ++i) {
+    entry.caller.token = entry.caller.token << 8 | entry.hash[i];
+  }
   for (const Entry& other : entries_) {
     if (other.caller.name == name) {
       return absl::InvalidArgumentError(absl::StrCat("the name \"", name, "\" is taken above"));
@@ -127,6 +130,11 @@ std::optional<Caller> TokenTable::Find(const std::string& token) const {
   }
   if (found == nullptr) return std::nullopt;
   return found->caller;
+}
+
+bool TokenTable::Knows(const Caller& caller) const {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& entry) { return entry.caller == caller; });
 }
 
 absl::StatusOr<TokenTable> ReadTokensFile(const std::string& path) {

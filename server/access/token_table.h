@@ -33,6 +33,9 @@ class TokenTable {
   // Whose token this is. The time does not depend on how much of a hash is right.
   std::optional<Caller> Find(const std::string& token) const;
 
+  // Whether a token still makes its owner this caller. Cost: O(tokens), some nanoseconds each.
+  bool Knows(const Caller& caller) const;
+
   size_t size() const { return entries_.size(); }
 
   bool operator==(const TokenTable&) const = default;

@@ -75,7 +75,10 @@ void BackupStream::OnSent() {
   RunOn(readers_, [this] {
     const absl::StatusOr<bool> more = NextMessage();
     if (!more.ok()) return FinishCall(more.status());
-    if (!*more) return FinishCall(absl::OkStatus());
+    if (!*more) {
+      call().metrics().BackupSaved().SetToCurrentTime();
+      return FinishCall(absl::OkStatus());
+    }
     Send();
   });
 }

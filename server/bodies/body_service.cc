@@ -84,7 +84,9 @@ grpc::ServerUnaryReactor* BodyService::PutBody(grpc::CallbackServerContext* cont
                                                const grpc::ByteBuffer* request,
                                                grpc::ByteBuffer* response) {
   return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
-                        [this](PutCall* call) { readers_.Submit([this, call] { Put(call); }); });
+                        [this](PutCall* call) {
+                          readers_.Submit([this, call] { Put(call); }, call->call().client());
+                        });
 }
 
 grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* context,
@@ -118,24 +120,24 @@ void BodyService::Put(PutCall* call) {
   absl::StatusOr<StoredBody> body =
       DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  registry_.PutBody(
-      *std::move(body), IfRevision(call->request()),
-      [this, call](const absl::StatusOr<PutBodyResult>& result) {
-        if (!result.ok()) return call->End(result.status());
-        const BodyRecord& record = result->body;
-        call->call().Log(LogLevel::kInfo, result->created ? "body created" : "body replaced",
-                         {{"body", record.body_id}});
-        v1::PutBodyResponse& response = call->response();
-        EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());
-        v1::BodyInfo* const info = response.mutable_body();
-        info->set_body_id(record.body_id);
-        info->set_create_revision(record.create_revision);
-        info->set_revision(record.revision);
-        info->set_piece_count(result->piece_count);
-        response.set_created(result->created);
-        response.set_durability(EncodeDurability(registry_.store().durability()));
-        call->End(absl::OkStatus());
-      });
+  registry_.PutBody(*std::move(body), IfRevision(call->request()),
+                    [this, call](const absl::StatusOr<PutBodyResult>& result) {
+                      if (!result.ok()) return call->End(result.status());
+                      const BodyRecord& record = result->body;
+                      call->call().LogChange(result->created ? "body created" : "body replaced",
+                                             {"body", record.body_id}, record.revision);
+                      v1::PutBodyResponse& response = call->response();
+                      EncodeHeader(registry_.store(), result->store_revision,
+                                   response.mutable_header());
+                      v1::BodyInfo* const info = response.mutable_body();
+                      info->set_body_id(record.body_id);
+                      info->set_create_revision(record.create_revision);
+                      info->set_revision(record.revision);
+                      info->set_piece_count(result->piece_count);
+                      response.set_created(result->created);
+                      response.set_durability(EncodeDurability(registry_.store().durability()));
+                      call->End(absl::OkStatus());
+                    });
 }
 
 absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
@@ -185,7 +187,7 @@ void BodyService::Delete(DeleteCall* call) {
   registry_.DeleteBody(
       id, IfRevision(call->request()), [this, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
-        call->call().Log(LogLevel::kInfo, "body deleted", {{"body", call->request().body_id()}});
+        call->call().LogChange("body deleted", {"body", call->request().body_id()}, *revision);
         EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
         call->End(absl::OkStatus());
       });

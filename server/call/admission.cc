@@ -51,12 +51,22 @@ CallKind KindOf(Rpc rpc) {
   HULLD_UNREACHABLE();
 }
 
+bool UsesWriters(Rpc rpc) { return rpc == Rpc::kAppendPoints || rpc == Rpc::kReplaceHull; }
+
+Admission::Ticket::Ticket(Admission* admission, Rpc rpc)
+    : admission_(admission), rpc_(rpc), kind_(KindOf(rpc)) {}
+
 Admission::Ticket::Ticket(Ticket&& other) noexcept
     : admission_(std::exchange(other.admission_, nullptr)),
+      rpc_(other.rpc_),
       kind_(other.kind_),
-      client_(std::move(other.client_)),
+      client_(other.client_),
+      revocable_(other.revocable_),
+      is_revocable_(other.is_revocable_),
       watched_(other.watched_),
       is_watched_(other.is_watched_) {}
+
+ClientId Admission::Ticket::client() const { return client_->second.id; }
 
 Admission::Ticket::~Ticket() {
   if (admission_ != nullptr) admission_->Leave(*this);
@@ -66,8 +76,9 @@ Admission::Admission(const Limits& limits, Metrics& metrics)
     : limits_(limits), metrics_(metrics), request_memory_(limits.request_memory) {
   metrics_.AddGauge("hulld_request_bytes", "Bytes that requests under way take.",
                     [this] { return static_cast<double>(request_memory_.taken_bytes()); });
-  metrics_.AddGauge("hulld_requests_running", "Calls that run now, open streams included.",
-                    [this] { return static_cast<double>(running()); });
+  for (size_t i = 0; i < kRpcCount; ++i) {
+    running_gauges_[i] = &metrics_.RunningCalls(static_cast<Rpc>(i));
+  }
   if (limits_.max_request_time > std::chrono::milliseconds::zero()) {
     watchman_ = std::thread([this] { CancelOverdue(); });
   }
@@ -83,12 +94,22 @@ Admission::~Admission() {
   if (watchman_.joinable()) watchman_.join();
 }
 
-absl::Status Admission::CheckRoom(CallKind kind, const std::string& client) {
-  if (running_ >= limits_.max_calls) {
-    return Overloaded(absl::StrCat(running(), " calls are running"), limits_.max_calls, "max-calls",
-                      kRetryCall);
+absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
+  const CallKind kind = KindOf(rpc);
+  // What lasts leaves a part to single calls.
+  const auto room = [kind](uint64_t limit) {
+    return kind == CallKind::kUnary ? limit : limit - limit / Limits::kKeptForSingleCalls;
+  };
+  const auto kept = [&](uint64_t limit) {
+    return room(limit) == limit
+               ? std::string()
+               : absl::StrCat(", and the last ", limit - room(limit), " are kept for single calls");
+  };
+  if (running_ >= room(limits_.max_calls)) {
+    return Overloaded(absl::StrCat(running(), " calls are running", kept(limits_.max_calls)),
+                      limits_.max_calls, "max-calls", kRetryCall);
   }
-  if (const size_t waiting = backlog_ ? backlog_() : 0; waiting >= limits_.max_waiting_calls) {
+  if (const size_t waiting = backlog_ ? backlog_(rpc) : 0; waiting >= limits_.max_waiting_calls) {
     return Overloaded(absl::StrCat(waiting, " calls wait for a thread"), limits_.max_waiting_calls,
                       "max-waiting-calls", kRetryCall);
   }
@@ -96,32 +117,75 @@ absl::Status Admission::CheckRoom(CallKind kind, const std::string& client) {
     return Overloaded(absl::StrCat(batches_, " batches and scenes are running"),
                       limits_.max_concurrent_batches, "max-concurrent-batches", kRetryBatch);
   }
-  if (kind != CallKind::kStream) return absl::OkStatus();
-  const auto open = streams_.find(client);
-  if (open == streams_.end() || open->second < limits_.max_streams_per_client) {
-    return absl::OkStatus();
+  if (kind == CallKind::kStream && client.streams >= limits_.max_streams_per_client) {
+    return Overloaded(absl::StrCat("this client has ", client.streams, " streams open"),
+                      limits_.max_streams_per_client, "max-streams-per-client", kRetryBatch);
   }
-  return Overloaded(absl::StrCat("this client has ", open->second, " streams open"),
-                    limits_.max_streams_per_client, "max-streams-per-client", kRetryBatch);
+  if (kind == CallKind::kBatch && client.batches >= limits_.max_batches_per_client) {
+    return Overloaded(
+        absl::StrCat("this client has ", client.batches, " batches and scenes running"),
+        limits_.max_batches_per_client, "max-batches-per-client", kRetryBatch);
+  }
+  if (client.calls >= room(limits_.max_calls_per_client)) {
+    return Overloaded(absl::StrCat("this client has ", client.calls, " calls running",
+                                   kept(limits_.max_calls_per_client)),
+                      limits_.max_calls_per_client, "max-calls-per-client", kRetryCall);
+  }
+  return absl::OkStatus();
 }
 
-absl::StatusOr<Admission::Ticket> Admission::Admit(Rpc rpc,
-                                                   const std::function<std::string()>& client,
-                                                   grpc_call* call) {
-  Ticket ticket(nullptr, KindOf(rpc));
-  if (ticket.kind_ == CallKind::kStream) ticket.client_ = client();
+absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
+  Ticket ticket(nullptr, arrival.rpc);
   const std::lock_guard lock(mutex_);
   if (draining_) return Draining();
+  const auto known = clients_.find(arrival.client);
   // What tells the operator how the server is must work when it is full, too.
-  if (rpc != Rpc::kGetStatus) {
-    if (absl::Status s = CheckRoom(ticket.kind_, ticket.client_); !s.ok()) return s;
+  if (arrival.rpc != Rpc::kGetStatus) {
+    const absl::Status room =
+        CheckRoom(arrival.rpc, known == clients_.end() ? Ticket::Client{} : known->second);
+    if (!room.ok()) return room;
   }
+  ticket.client_ =
+      known != clients_.end()
+          ? &*known
+          : &*clients_.emplace(arrival.client, Ticket::Client{.id = ++last_client_}).first;
   ticket.admission_ = this;
   running_.fetch_add(1, std::memory_order_relaxed);
-  if (ticket.kind_ == CallKind::kBatch) ++batches_;
-  if (ticket.kind_ == CallKind::kStream) ++streams_[ticket.client_];
-  Watch(call, &ticket);
+  running_gauges_[static_cast<size_t>(arrival.rpc)]->Increment();
+  Ticket::Client& client = ticket.client_->second;
+  ++client.calls;
+  if (ticket.kind_ == CallKind::kBatch) {
+    ++client.batches;
+    ++batches_;
+  }
+  if (ticket.kind_ == CallKind::kStream) ++client.streams;
+  if (!arrival.caller.name.empty() && arrival.lifetime != nullptr) {
+    ticket.revocable_ =
+        revocable_.insert(revocable_.end(), {arrival.caller, arrival.call, arrival.lifetime});
+    ticket.is_revocable_ = true;
+  }
+  Watch(arrival.call, &ticket);
   return ticket;
+}
+
+size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid) {
+  std::vector<grpc_call*> calls;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const Ticket::Revocable& revocable : revocable_) {
+      if (is_valid(revocable.caller)) continue;
+      revocable.lifetime->Revoke();
+      grpc_call_ref(revocable.call);
+      calls.push_back(revocable.call);
+    }
+  }
+  // gRPC may call back, and those calls may leave, before this returns.
+  for (grpc_call* const call : calls) {
+    grpc_call_cancel_with_status(call, GRPC_STATUS_UNAUTHENTICATED, CallLifetime::kRevoked,
+                                 nullptr);
+    grpc_call_unref(call);
+  }
+  return calls.size();
 }
 
 void Admission::Watch(grpc_call* call, Ticket* ticket) {
@@ -177,15 +241,16 @@ void Admission::Leave(Ticket& ticket) {
       watched = ticket.watched_->call;
       (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
     }
+    if (ticket.is_revocable_) revocable_.erase(ticket.revocable_);
+    Ticket::Client& client = ticket.client_->second;
+    HULLD_CHECK(client.calls > 0);
     if (ticket.kind_ == CallKind::kBatch) {
-      HULLD_CHECK(batches_ > 0);
+      --client.batches;
       --batches_;
     }
-    if (ticket.kind_ == CallKind::kStream) {
-      const auto open = streams_.find(ticket.client_);
-      HULLD_CHECK(open != streams_.end());
-      if (--open->second == 0) streams_.erase(open);
-    }
+    if (ticket.kind_ == CallKind::kStream) --client.streams;
+    if (--client.calls == 0) clients_.erase(clients_.find(ticket.client_->first));
+    running_gauges_[static_cast<size_t>(ticket.rpc_)]->Decrement();
     if (running_.fetch_sub(1, std::memory_order_relaxed) == 1) idle_.notify_all();
   }
   if (watched != nullptr) grpc_call_unref(watched);

@@ -3,7 +3,9 @@
 
 #include <absl/status/statusor.h>
 #include <grpc/grpc.h>
+#include <prometheus/gauge.h>
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -16,8 +18,11 @@
 #include <thread>
 #include <unordered_map>
 
+#include "server/access/caller.h"
+#include "server/call/call_lifetime.h"
 #include "server/call/request_memory.h"
 #include "server/contract/rpc.h"
+#include "server/process/fair_queue.h"
 #include "server/process/metrics.h"
 #include "server/settings/config.h"
 
@@ -39,8 +44,15 @@ CallKind KindOf(Rpc rpc);
 
 class Authenticator;
 
+// Whether a call waits for the writers' pool; others wait for the readers' and for that of answers.
+bool UsesWriters(Rpc rpc);
+
 // Lets calls in while the limits leave room and until the server drains, counts those that run, and
-// cancels those that neither end nor poll for their end, as when a client reads no more.
+// cancels those that neither end nor poll for their end, as when a client reads no more, and those
+// whose token is no longer valid.
+//
+// Each client has its share: so many calls, streams and batches. A part of all calls, and of each
+// client's, is kept for single calls, so what lasts never keeps them out.
 class Admission {
  public:
   // Who tells who calls; set before the first call, and outlives this. Without one everyone may do
@@ -55,19 +67,38 @@ class Admission {
     Ticket& operator=(Ticket&&) = delete;
     ~Ticket();
 
+    // Whose share of the threads it uses.
+    ClientId client() const;
+
    private:
     friend class Admission;
+    struct Client {
+      ClientId id;
+      uint64_t calls = 0;
+      uint64_t batches = 0;
+      uint64_t streams = 0;
+    };
+    // The nodes of an unordered_map stay where they are.
+    using Clients = std::unordered_map<std::string, Client>;
     struct Watched {
       std::chrono::steady_clock::time_point end;
       grpc_call* call;
       bool is_cancelled = false;
     };
-    Ticket(Admission* admission, CallKind kind) : admission_(admission), kind_(kind) {}
+    struct Revocable {
+      Caller caller;
+      grpc_call* call;
+      CallLifetime* lifetime;
+    };
+    Ticket(Admission* admission, Rpc rpc);
 
     Admission* admission_;
+    Rpc rpc_;
     CallKind kind_;
-    // Empty unless the call is a stream.
-    std::string client_;
+    Clients::value_type* client_ = nullptr;
+    // Set for calls with a token.
+    std::list<Revocable>::iterator revocable_;
+    bool is_revocable_ = false;
     // Set for downloads and batches, while --max-request-time limits them.
     std::list<Watched>::iterator watched_;
     bool is_watched_ = false;
@@ -86,13 +117,29 @@ class Admission {
   // What the requests that were let in take.
   RequestMemory& request_memory() { return request_memory_; }
 
-  // What waits for a thread, bounded by --max-waiting-calls. Set before the first call.
-  void SetBacklog(std::function<size_t()> backlog) { backlog_ = std::move(backlog); }
+  // What waits for a thread where this call would, bounded by --max-waiting-calls. Set before the
+  // first call.
+  void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
-  // Lets a call in. client: who calls, asked for streams alone. call: gRPC's.
-  // UNAVAILABLE once the server drains; RESOURCE_EXHAUSTED naming the limit, with a time to retry.
-  absl::StatusOr<Ticket> Admit(Rpc rpc, const std::function<std::string()>& client,
-                               grpc_call* call);
+  // What is to be known of a call.
+  struct Arrival {
+    Rpc rpc;
+    // Whose share it uses.
+    std::string client;
+    // gRPC's.
+    grpc_call* call = nullptr;
+    // Whose token it carries, if it does, and what ends when that is no longer valid, which must
+    // outlive the ticket.
+    Caller caller = {};
+    CallLifetime* lifetime = nullptr;
+  };
+
+  // Lets a call in. UNAVAILABLE once the server drains; RESOURCE_EXHAUSTED naming the limit, with a
+  // time to retry.
+  absl::StatusOr<Ticket> Admit(const Arrival& arrival);
+
+  // Ends every call of a token that `is_valid` does not know any more: UNAUTHENTICATED. How many.
+  size_t EndRevoked(const std::function<bool(const Caller&)>& is_valid);
 
   void BeginDrain();
 
@@ -104,7 +151,7 @@ class Admission {
 
  private:
   // Both require the mutex; unchecked, as a std::mutex cannot tell who holds it.
-  absl::Status CheckRoom(CallKind kind, const std::string& client);
+  absl::Status CheckRoom(Rpc rpc, const Ticket::Client& client);
   void Watch(grpc_call* call, Ticket* ticket);
 
   void Leave(Ticket& ticket);
@@ -114,9 +161,11 @@ class Admission {
   const Limits limits_;
   Metrics& metrics_;
   RequestMemory request_memory_;
-  std::function<size_t()> backlog_;
+  std::function<size_t(Rpc)> backlog_;
 
   const Authenticator* authenticator_ = nullptr;
+  // hulld_requests_running{rpc}.
+  std::array<prometheus::Gauge*, kRpcCount> running_gauges_;
 
   std::mutex mutex_;
   // The rest is guarded by the mutex, `running_` for changes.
@@ -124,7 +173,10 @@ class Admission {
   bool draining_ = false;
   std::atomic<size_t> running_ = 0;
   size_t batches_ = 0;
-  std::unordered_map<std::string, uint64_t> streams_;
+  // Those that have calls here alone.
+  Ticket::Clients clients_;
+  ClientId last_client_ = kNoClient;
+  std::list<Ticket::Revocable> revocable_;
   // In the order in which they end, as all are given the same time.
   std::list<Ticket::Watched> watched_;
   // Those of which the time was up: nothing more is done about them.

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <iterator>
 #include <utility>
 
 #include "server/access/authenticator.h"
@@ -14,6 +15,7 @@ namespace hulld::server {
 namespace {
 
 constexpr char kRequestIdKey[] = "x-request-id";
+constexpr char kTraceKey[] = "traceparent";
 // What gRPC's own retries honour, too.
 constexpr char kRetryKey[] = "grpc-retry-pushback-ms";
 
@@ -42,12 +44,25 @@ absl::Status Call::Begin() {
     request_id_told_ = true;
     if (IsRequestId(id)) std::call_once(request_id_made_, [&] { request_id_ = id; });
   }
+  // Two of them say nothing.
+  if (metadata.count(kTraceKey) == 1) {
+    const grpc::string_ref text = metadata.find(kTraceKey)->second;
+    trace_ = TraceContext::Parse({text.data(), text.size()});
+  }
+  const Authenticator* const authenticator = admission_.authenticator();
+  const uint64_t generation = authenticator == nullptr ? 0 : authenticator->generation();
   if (absl::Status s = Authenticate(); !s.ok()) return s;
 
-  absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
-      rpc_, [this] { return Client(); }, context_.c_call());
+  absl::StatusOr<Admission::Ticket> ticket =
+      admission_.Admit({rpc_, Client(), context_.c_call(), caller_, &lifetime_});
   if (!ticket.ok()) return ticket.status();
   ticket_.emplace(*std::move(ticket));
+  // The tokens may have changed before it could be found among the calls that run.
+  if (authenticator != nullptr && authenticator->generation() != generation &&
+      !caller_.name.empty() && !authenticator->Knows(caller_)) {
+    lifetime_.Revoke();
+    return lifetime_.StopStatus();
+  }
   if (KindOf(rpc_) != CallKind::kStream) lifetime_.LimitTime(admission_.limits().max_request_time);
   return absl::OkStatus();
 }
@@ -73,9 +88,8 @@ absl::Status Call::Authenticate() {
 // connection.
 std::string Call::Client() const {
   if (!caller_.name.empty()) return "token:" + caller_.name;
-  const std::string peer = context_.peer();
-  if (!peer.starts_with("ipv4:") && !peer.starts_with("ipv6:")) return peer;
-  return peer.substr(0, peer.rfind(':'));
+  if (!peer_.starts_with("ipv4:") && !peer_.starts_with("ipv6:")) return peer_;
+  return peer_.substr(0, peer_.rfind(':'));
 }
 
 void Call::BeginMessage() {
@@ -97,16 +111,32 @@ void Call::CountLimit(const absl::Status& status) const {
 
 void Call::Log(LogLevel level, const std::string& message, LogFields fields) const {
   if (!IsLogged(level)) return;
-  fields.insert(fields.begin(),
-                {LogField("rpc", RpcName(rpc_)), LogField("request_id", request_id())});
-  LogEvent(level, message, fields);
+  LogFields all = {{"rpc", RpcName(rpc_)}, {"request_id", request_id()}};
+  if (trace_.has_value()) {
+    all.push_back({"trace_id", trace_->trace_id()});
+    all.push_back({"parent_id", trace_->parent_id()});
+  }
+  all.insert(all.end(), std::make_move_iterator(fields.begin()),
+             std::make_move_iterator(fields.end()));
+  LogEvent(level, message, all);
+}
+
+void Call::LogChange(const std::string& message, const LogField& changed, uint64_t revision,
+                     const LogFields& fields) const {
+  LogFields all;
+  if (!caller_.name.empty()) all.push_back({"token", caller_.name});
+  all.push_back({"peer", peer_});
+  all.push_back(changed);
+  all.push_back({"revision", revision});
+  all.insert(all.end(), fields.begin(), fields.end());
+  Log(LogLevel::kInfo, message, std::move(all));
 }
 
 void Call::LogSlow(Clock::duration duration, const absl::Status& status, const char* what) const {
   const auto threshold = admission_.limits().slow_request;
   if (threshold == std::chrono::milliseconds::zero() || duration < threshold) return;
   Log(LogLevel::kWarn, what,
-      {{"peer", context_.peer()},
+      {{"peer", peer_},
        {"code", absl::StatusCodeToString(status.code())},
        {"milliseconds", Milliseconds(duration)},
        {"pairs", pairs_.load(std::memory_order_relaxed)},
@@ -117,6 +147,8 @@ grpc::Status Call::End(const absl::Status& status) {
   const Clock::duration duration = Clock::now() - arrival_;
   metrics().CountCall(rpc_, status.code(), duration);
   if (KindOf(rpc_) != CallKind::kStream) LogSlow(duration, status, "slow request");
+  metrics().CountToken(caller_.name);
+  if (trace_.has_value()) context_.AddTrailingMetadata(kTraceKey, trace_->text());
   if (!status.ok() || request_id_told_) context_.AddTrailingMetadata(kRequestIdKey, request_id());
   if (status.ok()) return grpc::Status::OK;
   CountLimit(status);
@@ -125,7 +157,7 @@ grpc::Status Call::End(const absl::Status& status) {
   const LogLevel level = IsFault(status.code()) ? LogLevel::kError : LogLevel::kDebug;
   if (IsLogged(level)) {
     Log(level, "request failed",
-        {{"peer", context_.peer()},
+        {{"peer", peer_},
          {"code", absl::StatusCodeToString(status.code())},
          {"milliseconds", Milliseconds(duration)},
          {"error", std::string(status.message())}});

@@ -15,6 +15,7 @@
 #include "server/access/caller.h"
 #include "server/call/admission.h"
 #include "server/call/call_lifetime.h"
+#include "server/call/trace_context.h"
 #include "server/contract/rpc.h"
 #include "server/process/log.h"
 
@@ -40,6 +41,11 @@ class Call {
   // and have nothing said of them. All that is logged about the call carries it, and the reply of a
   // call that is logged or fails, or whose client gave one.
   const std::string& request_id() const;
+  // Whose share of the threads it uses. Requires that Begin succeeded.
+  ClientId client() const {
+    HULLD_CHECK(ticket_.has_value());
+    return ticket_->client();
+  }
   Metrics& metrics() const { return admission_.metrics(); }
   RequestMemory& request_memory() const { return admission_.request_memory(); }
 
@@ -68,8 +74,12 @@ class Call {
   // Counts a limit that was met without ending the call, as by one pair of a batch.
   void CountLimit(const absl::Status& status) const;
 
-  // Logs one line about this call.
+  // Logs one line about this call, with the trace that it is part of.
   void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
+  // Logs a change of a hull or a body, as {"hull", ID}, and who made it: the token's name and the
+  // peer.
+  void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
+                 const LogFields& fields = {}) const;
 
   // What the reactor is to finish with.
   grpc::Status End(const absl::Status& status);
@@ -90,6 +100,9 @@ class Call {
   mutable std::once_flag request_id_made_;
   // The client gave one, or something names it: the reply is to carry it.
   mutable std::atomic<bool> request_id_told_ = false;
+  // Known from the start: a connection that is gone has no peer.
+  const std::string peer_ = context_.peer();
+  std::optional<TraceContext> trace_;
   CallLifetime lifetime_;
   std::atomic<uint64_t> pairs_ = 0;
   std::atomic<uint64_t> points_ = 0;

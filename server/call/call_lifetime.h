@@ -7,16 +7,26 @@
 #include <atomic>
 #include <chrono>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {
 
-// Whether a call still has someone who waits for its answer. Polled by any thread.
+// Whether a call still has someone who waits for its answer. Polled by any thread. Its clock is the
+// monotonic one: a call neither ends early nor lasts because somebody set the time of day.
 class CallLifetime {
  public:
-  using Clock = std::chrono::system_clock;
+  using Clock = std::chrono::steady_clock;
+  using WallClock = std::chrono::system_clock;
 
-  explicit CallLifetime(Clock::time_point deadline) : deadline_(deadline) {}
+  // deadline: as gRPC gives it, in the time of day; it is `wall_now` while Clock says `now`.
+  explicit CallLifetime(WallClock::time_point deadline,
+                        WallClock::time_point wall_now = WallClock::now(),
+                        Clock::time_point now = Clock::now())
+      : deadline_(Monotonic(deadline, wall_now, now)) {}
+
+  // When the client gives up.
+  Clock::time_point deadline() const { return deadline_; }
 
   // Ends the call after `limit` (--max-request-time), from now on; zero: never. A stream that lasts
   // as long as its client likes begins anew with every message.
@@ -28,12 +38,20 @@ class CallLifetime {
   }
 
   void Cancel() { cancelled_.store(true, std::memory_order_relaxed); }
+  // The token of the call is no longer valid.
+  void Revoke() {
+    revoked_.store(true, std::memory_order_relaxed);
+    Cancel();
+  }
 
   bool ShouldStop() const { return cancelled_.load(std::memory_order_relaxed) || Expired(); }
 
-  // Why the call stopped. Requires ShouldStop() a moment ago; unchecked, as the system clock may
-  // have been set back since.
+  // Why the call stopped. Requires ShouldStop(); unchecked, as EndMessage may have lifted the limit
+  // since.
   absl::Status StopStatus() const {
+    if (revoked_.load(std::memory_order_relaxed)) {
+      return WithReason(absl::UnauthenticatedError(kRevoked), v1::ERROR_REASON_TOKEN_UNKNOWN);
+    }
     if (Clock::now() >= deadline_) {
       return absl::DeadlineExceededError(
           "the deadline passed while the call was running; give it more time or ask for less");
@@ -46,7 +64,19 @@ class CallLifetime {
     return absl::CancelledError("the call was cancelled");
   }
 
+  static constexpr char kRevoked[] =
+      "the call's token is no longer valid; ask whoever runs the server for another";
+
  private:
+  static Clock::time_point Monotonic(WallClock::time_point deadline, WallClock::time_point wall_now,
+                                     Clock::time_point now) {
+    if (deadline == WallClock::time_point::max()) return Clock::time_point::max();
+    // Far away is as good as never, and must not overflow.
+    constexpr auto kFar = std::chrono::hours(24 * 365);
+    if (deadline - kFar > wall_now) return Clock::time_point::max();
+    return now + std::chrono::duration_cast<Clock::duration>(deadline - wall_now);
+  }
+
   bool Expired() const {
     const Clock::time_point now = Clock::now();
     return now >= deadline_ || now.time_since_epoch() >= limit_end_.load(std::memory_order_relaxed);
@@ -57,6 +87,7 @@ class CallLifetime {
   std::chrono::milliseconds limit_{0};
   std::atomic<Clock::duration> limit_end_ = Clock::duration::max();
   std::atomic<bool> cancelled_ = false;
+  std::atomic<bool> revoked_ = false;
 };
 
 }  // namespace hulld::server

@@ -58,7 +58,8 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   // Runs `step` on a pool or lane, which keeps this alive until then.
   template <typename Pool, typename Step>
   void RunOn(Pool& pool, Step step) {
-    pool.Submit([self = this->shared_from_this(), step = std::move(step)]() mutable { step(); });
+    pool.Submit([self = this->shared_from_this(), step = std::move(step)]() mutable { step(); },
+                call_.client());
   }
 
   // Runs a reaction of gRPC's, which keeps this alive until it returns.

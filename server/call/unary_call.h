@@ -47,7 +47,8 @@ class UnaryCall : public grpc::ServerUnaryReactor {
   template <typename Work>
   void EndOn(WorkerPool& pool, Work work) {
     pool.Submit(
-        [this, work = std::move(work)] { End(call_.ShouldStop() ? call_.StopStatus() : work()); });
+        [this, work = std::move(work)] { End(call_.ShouldStop() ? call_.StopStatus() : work()); },
+        call_.client());
   }
 
   // Sends the response, or the error; the call must not be touched afterwards.

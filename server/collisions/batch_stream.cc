@@ -40,9 +40,8 @@ WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
                          Executor& executor, const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, {readers, pool},
-                    {kFirstPairs, kMostPairs}),
-      registry_(registry),
+    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, registry,
+                    {readers, pool}, {kFirstPairs, kMostPairs}),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()) {}
 
@@ -54,37 +53,40 @@ bool BatchStream::IsShort() const {
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
-                       registry_.limits(), call().lifetime());
+                       registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
   options_ = *std::move(options);
+  team_options_ = options_;
+  team_options_.threads = team_threads_;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           registry_.limits().max_placements, "the batch");
+                           registry().limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
   call().AddPairs(pair_count_);
-  return ValidatePairs(request().pairs(), table_.size(), registry_.limits().max_pairs_per_batch,
+  return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");
 }
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
   const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true};
-  if (!may_wait) return table_.TryResolve(registry_, options_, plan);
-  if (absl::Status s = table_.Resolve(registry_, options_, plan); !s.ok()) return s;
+  if (!may_wait) return table_.TryResolve(registry(), options_, plan);
+  if (absl::Status s = table_.Resolve(registry(), options_, plan); !s.ok()) return s;
   return true;
 }
 
-uint64_t BatchStream::Begin() {
-  table_.EncodeHeader(registry_.store(), head_.mutable_header());
-  has_head_ = true;
-  size_t next = 0;
-  while ((next = table_.EncodeHulls(next, head_.mutable_hulls(),
-                                    head_.mutable_placement_problems())) < table_.table_rows()) {
-    const size_t bytes = head_.ByteSizeLong();
-    Queue(std::exchange(head_, {}), bytes);
+bool BatchStream::QueueHead() {
+  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head_.mutable_header());
+  next_row_ =
+      table_.EncodeHulls(next_row_, head_.mutable_hulls(), head_.mutable_placement_problems());
+  if (next_row_ == table_.table_rows()) {
+    has_head_ = true;
+    return false;
   }
-  return pair_count_;
+  const size_t bytes = head_.ByteSizeLong();
+  Queue(std::exchange(head_, {}), bytes);
+  return true;
 }
 
 PlacedPair BatchStream::PairAt(uint64_t i) const {
@@ -115,41 +117,71 @@ void BatchStream::Submit(PairsPiece& piece) {
 }
 
 absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
-  BatchColumns columns({}, request().wanted(), piece.next);
+  const bool is_textbook = options_.method == Method::kTextbookSat;
+  if (is_textbook && IsForTeam(PairAt(piece.next))) end = Clock::now() + Executor::kSliceTime;
+  const uint64_t first = piece.next;
+  BatchColumns columns({}, request().wanted(), first);
+  RungCounts counts;
+  absl::Status status;
+  uint64_t pairs = 0;
   do {
-    const uint64_t until = std::min(piece.end, piece.next + kPairsPerLook);
-    if (absl::Status s = Answer(piece.next, until, &columns); !s.ok()) return s;
-    piece.next = until;
-  } while (piece.next < piece.end && Clock::now() < end);
+    status = is_textbook ? AnswerByTextbook(piece, end, &columns, &counts)
+                         : Answer(piece, &columns, &counts);
+    ++pairs;
+  } while (status.ok() && piece.next < piece.end &&
+           (is_textbook ? Clock::now() < end : pairs % kPairsPerLook != 0 || Clock::now() < end));
+  if (!status.ok()) return status;
+  call().metrics().CountPairs(counts);
   piece.is_done = piece.next == piece.end;
+  if (piece.next == first) return absl::OkStatus();
   for (v1::BatchCheckCollisionsResponse& reply : columns.Take()) piece.Add(std::move(reply));
   return absl::OkStatus();
 }
 
-absl::Status BatchStream::Answer(uint64_t begin, uint64_t end, BatchColumns* columns) {
-  RungCounts counts;
-  QueryOptions options = options_;
-  for (uint64_t i = begin; i < end; ++i) {
-    const PlacedPair pair = PairAt(i);
-    if (!IsAnswerable(pair)) {
-      columns->Add(
-          [&](v1::AnswerColumns* to) { return AddUnansweredPair(table_, request().wanted(), to); });
-      continue;
-    }
-    options.threads = IsForTeam(pair) ? team_threads_ : 1;
-    PlacedAnswer answer = AskPlaced(table_, pair.a, pair.b, options, nullptr);
-    if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
-    if (answer.answer.ok()) {
-      counts.Add(answer.answer->rung);
-    } else {
-      answer.answer = NameQueryLimit(answer.answer.status(), options);
-      call().CountLimit(answer.answer.status());
-    }
-    columns->Add([&](v1::AnswerColumns* to) {
-      return AddPlacedAnswer(table_, pair.a, pair.b, answer, request().wanted(), to);
-    });
+absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts) {
+  const PlacedPair pair = PairAt(piece.next);
+  if (!IsAnswerable(pair)) {
+    columns->Add(
+        [&](v1::AnswerColumns* to) { return AddUnansweredPair(table_, request().wanted(), to); });
+    ++piece.next;
+    return absl::OkStatus();
   }
-  call().metrics().CountPairs(counts);
+  return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
+}
+
+absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point end,
+                                           BatchColumns* columns, RungCounts* counts) {
+  const PlacedPair pair = PairAt(piece.next);
+  const bool is_for_hulls = !table_.is_body(pair.a) && !table_.is_body(pair.b);
+  if (!IsAnswerable(pair) || !is_for_hulls) return Answer(piece, columns, counts);
+  if (!piece.check.has_value()) {
+    absl::StatusOr<TextbookCheck> begun =
+        TextbookCheck::Begin(table_.placed()[pair.a], table_.placed()[pair.b],
+                             IsForTeam(pair) ? team_options_ : options_);
+    if (!begun.ok()) return Add({begun.status(), std::nullopt}, piece, columns, counts);
+    piece.check = *std::move(begun);
+  }
+  const absl::StatusOr<bool> done = piece.check->Advance(end);
+  if (!done.ok()) return done.status();
+  if (!*done) return absl::OkStatus();
+  PlacedAnswer answer = {piece.check->Finish(), std::nullopt};
+  piece.check.reset();
+  return Add(std::move(answer), piece, columns, counts);
+}
+
+absl::Status BatchStream::Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
+                              RungCounts* counts) {
+  if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
+  if (answer.answer.ok()) {
+    counts->Add(answer.answer->rung);
+  } else {
+    answer.answer = NameQueryLimit(answer.answer.status(), options_);
+    call().CountLimit(answer.answer.status());
+  }
+  const PlacedPair pair = PairAt(piece.next++);
+  columns->Add([&](v1::AnswerColumns* to) {
+    return AddPlacedAnswer(table_, pair.a, pair.b, answer, request().wanted(), to);
+  });
   return absl::OkStatus();
 }
 

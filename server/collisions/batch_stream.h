@@ -6,11 +6,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/query/batch.h"
+#include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/placement_table.h"
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
@@ -20,19 +23,21 @@
 
 namespace hulld::server {
 
+// A range of pairs, and how far the textbook came with the next of them, if it began.
+struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
+  std::optional<TextbookCheck> check;
+};
+
 // One BatchCheckCollisions call: resolves every hull once, on a reader thread, then answers ranges
 // of pairs on all threads of the pool.
-class BatchStream
-    : public PiecedReplies<v1::BatchCheckCollisionsRequest, v1::BatchCheckCollisionsResponse,
-                           Piece<v1::BatchCheckCollisionsResponse>> {
+class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
+                                         v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
                              Registry& registry, WorkerPool& readers, TaskPool& pool,
                              Executor& executor, const grpc::ByteBuffer& request);
 
  private:
-  using PairsPiece = Piece<v1::BatchCheckCollisionsResponse>;
-
   BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
               WorkerPool& readers, TaskPool& pool, Executor& executor,
               const grpc::ByteBuffer& request);
@@ -41,8 +46,10 @@ class BatchStream
   absl::Status Validate() override;
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
+  size_t HeldBytes() const override { return table_.MemoryBytes(); }
   // The rest requires the mutex.
-  uint64_t Begin() override;
+  bool QueueHead() override;
+  uint64_t CountUnits() override { return pair_count_; }
   uint64_t EndOfPiece(uint64_t begin, uint64_t end) const override;
   void Submit(PairsPiece& piece) override;
   void Deliver(PairsPiece& piece) override;
@@ -54,9 +61,13 @@ class BatchStream
   PlacedPair PairAt(uint64_t i) const;
   bool IsAnswerable(const PlacedPair& pair) const;
   bool IsForTeam(const PlacedPair& pair) const;
-  absl::Status Answer(uint64_t begin, uint64_t end, BatchColumns* columns);
+  // Each answers the next pair of the piece; by the textbook, a part of that at least. CANCELLED.
+  absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
+  absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
+                                RungCounts* counts);
+  absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
+                   RungCounts* counts);
 
-  Registry& registry_;
   // The size of the team, and the turns of this call on it.
   const int team_threads_;
   TaskPool::Lane team_lane_;
@@ -64,10 +75,14 @@ class BatchStream
   // Written before the first piece.
   uint64_t pair_count_ = 0;
   QueryOptions options_;
+  // The same for a pair that is worth the team.
+  QueryOptions team_options_;
   PlacementTable table_;
 
   // Guarded by the mutex.
-  // The last part of the table of hulls, for the first answers.
+  // The first row of the table of hulls that is still to be told, and the last part of the table,
+  // for the first answers.
+  size_t next_row_ = 0;
   v1::BatchCheckCollisionsResponse head_;
   bool has_head_ = false;
 };

@@ -23,8 +23,10 @@ BodyQuestion::Side::Side(HullView view, const Pose& X_W, bool canonical)
       placed_(own_ != nullptr ? *own_ : view_.body->query, X_W) {}
 
 BodyQuestion::BodyQuestion(TaskPool& pool, HullView a, const Pose& X_WA, HullView b,
-                           const Pose& X_WB, const QueryOptions& options, Done done)
+                           const Pose& X_WB, const QueryOptions& options, ClientId client,
+                           Done done)
     : options_(options),
+      client_(client),
       a_(std::move(a), X_WA, options.WantsCanonical()),
       b_(std::move(b), X_WB, options.WantsCanonical()),
       search_(a_.placed(), b_.placed(), options_),
@@ -32,10 +34,10 @@ BodyQuestion::BodyQuestion(TaskPool& pool, HullView a, const Pose& X_WA, HullVie
       lane_(pool) {}
 
 void BodyQuestion::Start(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
-                         const QueryOptions& options, Done done) {
-  const std::shared_ptr<BodyQuestion> question(
-      new BodyQuestion(pool, std::move(a), X_WA, std::move(b), X_WB, options, std::move(done)));
-  pool.Submit([question] { question->RunSlice(); });
+                         const QueryOptions& options, ClientId client, Done done) {
+  const std::shared_ptr<BodyQuestion> question(new BodyQuestion(
+      pool, std::move(a), X_WA, std::move(b), X_WB, options, client, std::move(done)));
+  pool.Submit([question] { question->RunSlice(); }, client);
 }
 
 void BodyQuestion::RunSlice() {
@@ -46,7 +48,7 @@ void BodyQuestion::RunSlice() {
     if (*ended) return done_(search_.Take(), a_, b_);
     if (std::chrono::steady_clock::now() >= end) break;
   }
-  lane_.Submit([self = shared_from_this()] { self->RunSlice(); });
+  lane_.Submit([self = shared_from_this()] { self->RunSlice(); }, client_);
 }
 
 }  // namespace hulld::server

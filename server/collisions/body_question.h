@@ -9,6 +9,7 @@
 #include "core/query/body/body_search.h"
 #include "core/query/body/placed_body.h"
 #include "core/query/terms/query_options.h"
+#include "server/process/fair_queue.h"
 #include "server/process/task_pool.h"
 #include "server/registry/bodies/body_resolution.h"
 
@@ -37,17 +38,18 @@ class BodyQuestion : public std::enable_shared_from_this<BodyQuestion> {
   };
   using Done = std::function<void(absl::StatusOr<BodyAnswer>, const Side& a, const Side& b)>;
 
-  // `done` is called once, on a thread of the pool. Requires valid options for bodies
-  // (ValidateBodyOptions). CANCELLED: options.should_stop said so.
+  // client: who waits for it. `done` is called once, on a thread of the pool. Requires valid
+  // options for bodies (ValidateBodyOptions). CANCELLED: options.should_stop said so.
   static void Start(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
-                    const QueryOptions& options, Done done);
+                    const QueryOptions& options, ClientId client, Done done);
 
  private:
   BodyQuestion(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
-               const QueryOptions& options, Done done);
+               const QueryOptions& options, ClientId client, Done done);
   void RunSlice();
 
   const QueryOptions options_;
+  const ClientId client_;
   const Side a_;
   const Side b_;
   BodySearch search_;

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <array>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -123,8 +124,8 @@ struct CollisionService::PairQuery {
     return IsQuickToRelate(placed_a().query_hull()) && IsQuickToRelate(placed_b().query_hull());
   }
   bool IsForTeam() const { return IsTextbookForTeam(options, placed_a(), placed_b()); }
-  absl::Status Answer(const v1::Wanted& wanted, Metrics& metrics,
-                      v1::CheckCollisionResponse* response) const;
+  absl::Status Encode(const absl::StatusOr<Answer>& answer, const v1::Wanted& wanted,
+                      Metrics& metrics, v1::CheckCollisionResponse* response) const;
   const PlacedHull& placed_a() const {
     HULLD_CHECK(a.has_value());
     return *a;
@@ -171,9 +172,18 @@ void CollisionService::PairQuery::Place(const Registry& registry, Resolved resol
   EncodeVersions(registry.store(), resolved.store_revision, *views[0], *views[1], response);
 }
 
-absl::Status CollisionService::PairQuery::Answer(const v1::Wanted& wanted, Metrics& metrics,
+struct CollisionService::TextbookQuery {
+  TextbookQuery(PairQuery given_pair, bool for_team)
+      : pair(std::move(given_pair)), is_for_team(for_team) {}
+
+  PairQuery pair;
+  const bool is_for_team;
+  std::optional<TextbookCheck> check;
+};
+
+absl::Status CollisionService::PairQuery::Encode(const absl::StatusOr<Answer>& answer,
+                                                 const v1::Wanted& wanted, Metrics& metrics,
                                                  v1::CheckCollisionResponse* response) const {
-  const auto answer = hulld::CheckCollision(placed_a(), placed_b(), options);
   if (!answer.ok()) return NameQueryLimit(answer.status(), options);
   RungCounts counts;
   counts.Add(answer->rung);
@@ -197,16 +207,21 @@ void CollisionService::Check(CheckCall* call) {
   lookup.canonical = query->options.WantsCanonical();
   lookup.prefix = call->call().caller().prefix;
   std::optional<Resolved> ready = TryResolvePlaced(registry_, HullIds(request), lookup);
-  if (ready.has_value()) return Answer(*std::move(query), *std::move(ready), call);
+  if (ready.has_value()) return AnswerPair(*std::move(query), *std::move(ready), call);
   // Waits for the store, or for canonical snapshots or boxes of pieces to be made.
-  readers_.Submit([this, call, lookup, query = *std::move(query)]() mutable {
-    Answer(std::move(query),
-           ResolvePlaced(registry_, HullIds(call->request()), lookup, query.options.should_stop),
-           call);
-  });
+  const ClientId client = call->call().client();
+  readers_.Submit(
+      [this, call, lookup, query = *std::move(query)]() mutable {
+        AnswerPair(
+            std::move(query),
+            ResolvePlaced(registry_, HullIds(call->request()), lookup, query.options.should_stop),
+            call);
+      },
+      client);
 }
 
-void CollisionService::Answer(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call) {
+void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved,
+                                  CheckCall* call) {
   if (absl::Status problem = FirstProblem(resolved); !problem.ok()) return call->End(problem);
   const bool has_body = resolved->hulls[0]->body != nullptr || resolved->hulls[1]->body != nullptr;
   if (has_body) return AnswerBodies(query, *std::move(resolved), call);
@@ -220,6 +235,7 @@ void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, C
                  &call->response());
   BodyQuestion::Start(pool_, *std::move(resolved.hulls[0]), query.X_WA,
                       *std::move(resolved.hulls[1]), query.X_WB, query.options,
+                      call->call().client(),
                       [this, call](const absl::StatusOr<BodyAnswer>& answer,
                                    const BodyQuestion::Side& a, const BodyQuestion::Side& b) {
                         if (!answer.ok()) return call->End(answer.status());
@@ -235,16 +251,41 @@ void CollisionService::Compute(PairQuery query, CheckCall* call) {
   const v1::Wanted& wanted = call->request().wanted();
   v1::CheckCollisionResponse* const response = &call->response();
   Metrics& metrics = call->call().metrics();
-  if (query.options.WantsRelationOnly() && query.IsQuick()) {
-    return call->End(query.Answer(wanted, metrics, response));
+  if (query.options.method == Method::kTextbookSat) {
+    const bool is_for_team = query.IsForTeam();
+    if (is_for_team) query.options.threads = executor_.threads();
+    return SubmitPiece(std::make_shared<TextbookQuery>(std::move(query), is_for_team), call);
   }
-  const bool is_for_team = query.IsForTeam();
-  if (is_for_team) query.options.threads = executor_.threads();
-  TaskPool& pool = is_for_team ? executor_.opener() : pool_;
   // `wanted` lives until the call ends.
-  pool.Submit([call, response, &wanted, &metrics, query = std::move(query)] {
-    call->End(query.Answer(wanted, metrics, response));
-  });
+  const auto answer = [call, response, &wanted, &metrics](const PairQuery& pair) {
+    call->End(pair.Encode(hulld::CheckCollision(pair.placed_a(), pair.placed_b(), pair.options),
+                          wanted, metrics, response));
+  };
+  if (query.options.WantsRelationOnly() && query.IsQuick()) return answer(query);
+  pool_.Submit([answer, query = std::move(query)] { answer(query); }, call->call().client());
+}
+
+void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCall* call) {
+  TaskPool& pool = query->is_for_team ? executor_.opener() : pool_;
+  const ClientId client = call->call().client();
+  pool.Submit(
+      [this, query = std::move(query), call] {
+        const PairQuery& pair = query->pair;
+        const auto end = std::chrono::steady_clock::now() +
+                         (query->is_for_team ? Executor::kSliceTime : TaskPool::kSliceTime);
+        if (!query->check.has_value()) {
+          absl::StatusOr<TextbookCheck> begun =
+              TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
+          if (!begun.ok()) return call->End(NameQueryLimit(begun.status(), pair.options));
+          query->check = *std::move(begun);
+        }
+        const absl::StatusOr<bool> done = query->check->Advance(end);
+        if (!done.ok()) return call->End(done.status());
+        if (!*done) return SubmitPiece(query, call);
+        call->End(pair.Encode(query->check->Finish(), call->request().wanted(),
+                              call->call().metrics(), &call->response()));
+      },
+      client);
 }
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,

@@ -3,6 +3,8 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <memory>
+
 #include "hulld/v1/collision.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call_stream.h"
@@ -27,7 +29,8 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
 // of moderate size and ready. Everything else is computed by `pool`: single pairs and the steps of
 // streams ahead of slices of batches, scenes and long steps. What may wait for the store, and what
 // makes canonical snapshots, runs on `readers`, hulls of one pair, or `long_readers`, hulls of
-// many. Pairs for TEXTBOOK_SAT whose loop over axes is worth a team of threads go to the executor.
+// many. Pairs for TEXTBOOK_SAT are answered in pieces, between which others have their turn; those
+// whose loop over axes is worth a team of threads go to the executor.
 class CollisionService : public CollisionServiceOfBytes {
  public:
   CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
@@ -54,10 +57,14 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
-  void Answer(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call);
+  void AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call);
   void AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call);
   // Answers the query on the thread that suits it.
   void Compute(PairQuery query, CheckCall* call);
+  // The next piece of a query for the textbook, which lasts as long as its hulls are large: others
+  // have their turn after each.
+  struct TextbookQuery;
+  void SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCall* call);
 
   Registry& registry_;
   Admission& admission_;

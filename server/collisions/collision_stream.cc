@@ -161,7 +161,7 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
   // A pair among the pairs of two placements, and among those that are asked about.
   constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
   charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
-  return registry_.CheckMemory();
+  return registry_.CheckMemory(MemoryUse::kReading);
 }
 
 // Checks all of the update before it applies any.
@@ -179,7 +179,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
 }
 
 absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
-  if (absl::Status s = table_.Resolve(registry_, options_, plan); !s.ok()) return s;
+  if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
   }

@@ -52,7 +52,7 @@ class CollisionStream
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
-        charge_(registry.memory()) {}
+        charge_(registry.memory(), MemoryUse::kReading) {}
 
   void Open() override { Read(); }
   void OnMessage() override;

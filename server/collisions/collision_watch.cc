@@ -264,7 +264,7 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
 absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
   if (absl::Status s = pairs_.AskAbout(changed, table_.placed()); !s.ok()) return s;
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
-  if (absl::Status s = registry_.CheckMemory(); !s.ok()) return s;
+  if (absl::Status s = registry_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   call().AddPairs(pairs_.asked().size());
   next_hull_ = next_problem_ = next_pair_ = 0;
   is_telling_ = true;

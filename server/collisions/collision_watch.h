@@ -46,7 +46,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
-        charge_(registry.memory()) {}
+        charge_(registry.memory(), MemoryUse::kReading) {}
 
   void Open() override {
     Locked([] {});

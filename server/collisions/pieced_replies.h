@@ -18,6 +18,7 @@
 #include "server/call/queued_stream.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -40,6 +41,9 @@ struct Piece {
   uint64_t units = 0;
   std::chrono::steady_clock::duration elapsed{0};
 
+  // What the rest of the piece holds in memory, beside the replies.
+  size_t held_bytes() const { return 0; }
+
   void Add(Reply reply) {
     const size_t size = reply.ByteSizeLong();
     bytes += size;
@@ -51,8 +55,10 @@ struct Piece {
 // A stream whose answers are computed in pieces by all threads of a pool and sent in order. A piece
 // is worked on by one slice at a time, each of about TaskPool::kSliceTime, so that other calls get
 // their turn. A bounded number of pieces is under way, and each holds a bounded number of bytes;
-// while a bounded number of bytes waits for the client, no slice starts. So memory is bounded, and
-// a client that does not read holds up no other.
+// while a bounded number of bytes waits for the client, no slice starts, and no more is told of
+// what comes first. So memory is bounded, and a client that does not read holds up no other. What
+// the call holds counts against --memory-limit: what HeldBytes says, and its answers, as long as
+// they are on the wire.
 //
 // Work: what a piece keeps from one slice to the next, derived from Piece<Reply>.
 template <typename Request, typename Reply, typename Work>
@@ -66,6 +72,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kMostUnsentBytes = size_t{4} * Config::kReplyMessageBytes;
   // Bytes that a piece may hold while another is before it.
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
+  // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
+  static constexpr size_t kSmallBytes = 256 << 10;
   // Replies up to this size join the one that waits before them.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
 
@@ -82,12 +90,15 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   };
 
   PiecedReplies(const grpc::ByteBuffer& request, grpc::CallbackServerContext& context,
-                Admission& admission, Rpc rpc, const Threads& threads, const Shape& shape)
+                Admission& admission, Rpc rpc, Registry& registry, const Threads& threads,
+                const Shape& shape)
       : Base(request, context, admission, rpc),
+        registry_(registry),
         readers_(threads.readers),
         lane_(threads.pool),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
+        charge_(registry.memory(), MemoryUse::kReading),
         piece_units_(shape.first_units) {}
 
   // Whether preparing takes about a slice when nothing has to be waited for.
@@ -97,6 +108,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
   virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
   virtual absl::Status Prepare() { return absl::OkStatus(); }
+  // What the call holds until it ends, pieces apart. Called without the mutex after each of these
+  // steps.
+  virtual size_t HeldBytes() const = 0;
+
+  Registry& registry() { return registry_; }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
   // without the mutex, on any thread, by one thread at a time for each piece.
@@ -104,8 +120,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
 
   // The rest requires the mutex.
 
-  // Queues what comes first; the number of units.
-  virtual uint64_t Begin() = 0;
+  // Queues a message of what comes before all answers, or keeps it for the first of them. Whether
+  // more of that is to come. Called as the client reads, once the hulls are resolved.
+  virtual bool QueueHead() = 0;
+  // The number of units. Requires that the call is prepared.
+  virtual uint64_t CountUnits() = 0;
   // Where the piece that starts at `begin` ends, at most `end`; for units whose cost is known.
   virtual uint64_t EndOfPiece(uint64_t begin, uint64_t end) const {
     static_cast<void>(begin);
@@ -167,6 +186,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   void OpenWith(absl::Status status, bool may_wait) {
+    if (status.ok()) status = Charge();
     if (status.ok()) {
       const absl::StatusOr<bool> resolved = ResolveHulls(may_wait);
       if (resolved.ok() && !*resolved) {
@@ -175,18 +195,33 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       }
       status = resolved.status();
     }
-    if (status.ok()) status = Prepare();
+    if (status.ok()) {
+      // What is known goes out while the rest is prepared.
+      this->Locked([this] { is_head_left_ = true; });
+      status = Prepare();
+    }
+    if (status.ok()) status = Charge();
     if (this->call().ShouldStop()) status = this->call().StopStatus();
     this->Locked([this, &status] {
       opening_ = false;
       if (!status.ok()) return this->End(status);
-      unit_count_ = Begin();
+      unit_count_ = CountUnits();
     });
+  }
+
+  // RESOURCE_EXHAUSTED: there is no room for what the call holds. A small call is let in all the
+  // same, as hulls in memory are served to those that name few.
+  absl::Status Charge() {
+    fixed_bytes_ = HeldBytes();
+    charge_.Set(fixed_bytes_);
+    if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
+    return registry_.CheckMemory(MemoryUse::kReading);
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
 
   void StartWork() final {
+    while (is_head_left_ && this->unsent_bytes() < kMostUnsentBytes) is_head_left_ = QueueHead();
     if (opening_) return;
     while (!pieces_.empty() && !pieces_.front()->is_running) {
       Work& front = *pieces_.front();
@@ -194,10 +229,20 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       if (!front.is_done) break;
       pieces_.pop_front();
     }
+    NoteHeldBytes();
+    if (is_head_left_) return;
     if (this->unsent_bytes() < kMostUnsentBytes) StartSlices();
     if (!pieces_.empty() || next_unit_ < unit_count_) return;
     OnAllDelivered();
     this->End(absl::OkStatus());
+  }
+
+  void NoteHeldBytes() {
+    size_t bytes = fixed_bytes_ + this->unsent_bytes();
+    for (const std::unique_ptr<Work>& piece : pieces_) {
+      if (!piece->is_running) bytes += piece->bytes + piece->held_bytes();
+    }
+    charge_.Set(bytes);
   }
 
   void StartSlices() {
@@ -227,13 +272,20 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     piece_units_ = static_cast<uint64_t>(std::clamp(wished, 1.0, static_cast<double>(most_units_)));
   }
 
+  Registry& registry_;
   WorkerPool& readers_;
   TaskPool::Lane lane_;
   const size_t most_pieces_;
   const uint64_t most_units_;
 
+  // While the call is opened they belong to the thread that does.
+  MemoryCharge charge_;
+  size_t fixed_bytes_ = 0;
+
   // The rest is guarded by the mutex; a running piece belongs to its slice.
   bool opening_ = true;
+  // Something of what comes first is to be queued.
+  bool is_head_left_ = false;
   uint64_t unit_count_ = 0;
   uint64_t next_unit_ = 0;
   // The size of the next piece.

@@ -159,14 +159,15 @@ size_t PlacementTable::MemoryBytes() const {
   size_t of_ids = 0;
   for (const std::string& id : ids_) of_ids += id.capacity();
   return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull)) + named_.size() * sizeof named_[0] +
-         ids_.size() * (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) +
-                        sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
+         ids_.size() *
+             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
+              sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
          entries_.size() * sizeof(uint32_t) + of_ids + BodyBytes();
 }
 
 // Known once they are resolved.
 size_t PlacementTable::BodyBytes() const {
-  size_t bytes = bodies_.capacity() * sizeof(PlacedBody);
+  size_t bytes = bodies_.capacity() * sizeof(PlacedBody) + known_.BodyBytes();
   for (const auto& body : bodies_of_hulls_) {
     if (body != nullptr) bytes += sizeof(QueryBody) + body->boxes().MemoryBytes();
   }
@@ -179,8 +180,19 @@ PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPl
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
                                      const ReadPlan& plan) {
+  KnownPlaced known;
+  return ResolveFrom(registry, known, options, plan);
+}
+
+absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& options,
+                                     const ReadPlan& plan) {
+  return ResolveFrom(registry, known_, options, plan);
+}
+
+absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
+                                         const QueryOptions& options, const ReadPlan& plan) {
   absl::StatusOr<Resolved> resolved =
-      ResolvePlaced(registry, ids_, LookupFor(options, plan), options.should_stop);
+      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
   Take(registry, *std::move(resolved), options.WantsCanonical());
   return absl::OkStatus();

@@ -46,7 +46,11 @@ class PlacementTable {
   // with `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // The same, but false, at once, where it would have to wait or to make something.
+  // The same for a caller that does so again and again: only hulls that changed since are looked
+  // up.
+  absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
+
+  // The same as Resolve, but false, at once, where it would have to wait or to make something.
   bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   size_t size() const { return entries_.size(); }
@@ -122,6 +126,8 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
+  absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
+                           const ReadPlan& plan);
   PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
   void Take(const Registry& registry, Resolved resolved, bool canonical);
   void TakeBodies();
@@ -138,6 +144,8 @@ class PlacementTable {
   std::vector<std::string> ids_;
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
+  // For Refresh.
+  KnownPlaced known_;
   // What is asked of each: its own, or NoHull's.
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;

@@ -17,8 +17,10 @@ constexpr uint64_t kFirstPlacements = 4;
 constexpr uint64_t kMostPlacements = 1024;
 // The tree of this many placements is built in about a slice.
 constexpr int kMostShortPlacements = 512;
-// Candidates or placements between two looks at the clock.
+// Candidates, placements or parts of a gathering between two looks at the clock, and the nodes of
+// such a part, which takes about as long as a candidate.
 constexpr uint64_t kStepsPerLook = 16;
+constexpr uint64_t kNodesPerStep = 16;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
@@ -58,9 +60,8 @@ WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission
 SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
                          Registry& registry, WorkerPool& readers, TaskPool& pool,
                          const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, {readers, pool},
-                    {kFirstPlacements, kMostPlacements}),
-      registry_(registry) {}
+    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, registry, {readers, pool},
+                    {kFirstPlacements, kMostPlacements}) {}
 
 bool SceneStream::IsShort() const {
   return request().placements_size() + request().packed_placements().hulls_size() <=
@@ -70,11 +71,11 @@ bool SceneStream::IsShort() const {
 absl::Status SceneStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request().wanted(), request().tolerance(),
-                       registry_.limits(), call().lifetime());
+                       registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           registry_.limits().max_placements, "the scene");
+                           registry().limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
@@ -89,14 +90,12 @@ absl::Status SceneStream::Validate() {
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
   // The box of each placement, and at least a pair of it.
   const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true};
-  if (!may_wait) return table_.TryResolve(registry_, options_.query, plan);
-  if (absl::Status s = table_.Resolve(registry_, options_.query, plan); !s.ok()) return s;
+  if (!may_wait) return table_.TryResolve(registry(), options_.query, plan);
+  if (absl::Status s = table_.Resolve(registry(), options_.query, plan); !s.ok()) return s;
   return true;
 }
 
 absl::Status SceneStream::Prepare() {
-  // What is known goes out while the tree is built.
-  Locked([this] { QueueHead(); });
   options_.bodies = table_.bodies();
   absl::StatusOr<SceneSearch> search = SceneSearch::Make(table_.placed(), options_);
   if (!search.ok()) return search.status();
@@ -105,15 +104,19 @@ absl::Status SceneStream::Prepare() {
   return absl::OkStatus();
 }
 
-void SceneStream::QueueHead() {
+size_t SceneStream::HeldBytes() const {
+  return table_.MemoryBytes() + ignored_groups_.capacity() * sizeof(GroupPair) +
+         (search_.has_value() ? search_->MemoryBytes() : 0);
+}
+
+bool SceneStream::QueueHead() {
   v1::FindCollisionsResponse head;
-  table_.EncodeHeader(registry_.store(), head.mutable_header());
-  size_t next = 0;
-  do {
-    next = table_.EncodeHulls(next, head.mutable_hulls(), head.mutable_placement_problems());
-    const size_t bytes = head.ByteSizeLong();
-    Queue(std::exchange(head, {}), bytes);
-  } while (next < table_.table_rows());
+  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
+  next_row_ =
+      table_.EncodeHulls(next_row_, head.mutable_hulls(), head.mutable_placement_problems());
+  const size_t bytes = head.ByteSizeLong();
+  Queue(std::move(head), bytes);
+  return next_row_ < table_.table_rows();
 }
 
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
@@ -123,23 +126,23 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
     if (piece.next == piece.end) break;
     const auto a = static_cast<uint32_t>(piece.next);
     if (!piece.has_candidates) {
-      search_->Candidates(a, piece.candidates);
-      piece.next_candidate = 0;
+      piece.candidates.Start(*search_, a);
       piece.has_candidates = true;
     }
-    if (piece.next_candidate == piece.candidates.size()) {
+    if (!piece.candidates.Gather(kNodesPerStep)) continue;
+    const std::optional<uint32_t> b = piece.candidates.Next();
+    if (!b.has_value()) {
       piece.has_candidates = false;
       ++piece.next;
       continue;
     }
-    const uint32_t b = piece.candidates[piece.next_candidate++];
     PlacedAnswer answer;
-    answer.answer = search_->Ask(a, b, &answer.pieces);
+    answer.answer = search_->Ask(a, *b, &answer.pieces);
     if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
     piece.totals.set_candidates(piece.totals.candidates() + 1);
     if (answer.answer.ok()) piece.rungs.Add(answer.answer->rung);
     if (answer.answer.ok() && !search_->IsFound(*answer.answer)) continue;
-    reply_bytes += AddFound(a, b, answer, piece, &reply);
+    reply_bytes += AddFound(a, *b, answer, piece, &reply);
     if (reply_bytes < FullMessageBytes(request().wanted())) continue;
     piece.Add(std::exchange(reply, {}));
     reply_bytes = 0;

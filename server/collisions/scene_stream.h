@@ -22,18 +22,19 @@ namespace hulld::server {
 
 // A range of placements, each to be asked about with those after it.
 struct ScenePiece : Piece<v1::FindCollisionsResponse> {
-  // The candidates of placement `next`, once they are known; those from next_candidate on are still
-  // to be asked about.
+  // The candidates of placement `next` that are still to be asked about, once they were begun with.
   bool has_candidates = false;
-  std::vector<uint32_t> candidates;
-  size_t next_candidate = 0;
+  SceneCandidates candidates;
   // What was counted since the piece was delivered last.
   v1::SceneTotals totals;
   RungCounts rungs;
+
+  size_t held_bytes() const { return candidates.MemoryBytes(); }
 };
 
 // One FindCollisions call: resolves every hull once and builds the tree of boxes, on a reader
-// thread, then searches ranges of placements on all threads of the pool.
+// thread, then searches ranges of placements on all threads of the pool. Gathering the candidates
+// of one placement is cut into slices like asking about them.
 class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
@@ -50,18 +51,17 @@ class SceneStream
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;
+  size_t HeldBytes() const override;
   // The rest requires the mutex.
-  uint64_t Begin() override { return search_->size(); }
+  bool QueueHead() override;
+  uint64_t CountUnits() override { return search_->size(); }
   void Deliver(ScenePiece& piece) override;
   bool Join(const v1::FindCollisionsResponse& reply, v1::FindCollisionsResponse* waiting) override;
   void OnAllDelivered() override;
-  void QueueHead();
 
   // Without the mutex.
   size_t AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece,
                   v1::FindCollisionsResponse* reply);
-
-  Registry& registry_;
 
   // Written before the first piece.
   SceneOptions options_;
@@ -70,6 +70,8 @@ class SceneStream
   std::optional<SceneSearch> search_;
 
   // Guarded by the mutex.
+  // The first row of the table of hulls that is still to be told.
+  size_t next_row_ = 0;
   v1::SceneTotals totals_;
 };
 

@@ -47,8 +47,18 @@ void AppendStream::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();
   Locked([this] {
-    if (session_.has_value()) registry_.CloseAppend(*session_);
+    if (!session_.has_value()) return;
+    LogApplied();
+    registry_.CloseAppend(*session_);
   });
+}
+
+// Called while gRPC still has the call.
+void AppendStream::LogApplied() {
+  if (applied_chunks_ == 0) return;
+  call().LogChange(
+      "points appended", {"hull", hull_id_}, last_revision_,
+      {{"writer", writer_id_}, {"chunks", applied_chunks_}, {"points", applied_points_}});
 }
 
 void AppendStream::StartWork() {
@@ -98,8 +108,9 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (!opened.ok()) return Fail(opened.status());
   session_ = opened->session;
+  hull_id_ = opened->hull.hull_id;
   if (session_->created_hull) {
-    call().Log(LogLevel::kInfo, "hull created", {{"hull", opened->hull.hull_id}});
+    call().LogChange("hull created", {"hull", opened->hull.hull_id}, opened->hull.revision);
   }
   if (end().has_value()) return;
   v1::AppendPointsResponse opened_reply;
@@ -140,6 +151,11 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
   HULLD_DCHECK(unbuilt_ >= 0 && uncommitted_ >= 0);
   if (!result.ok()) return FailAt(sequence, OrStopped(result.status()));
   call().metrics().CountPoints(result->counts);
+  if (!result->already_applied) {
+    ++applied_chunks_;
+    applied_points_ += result->counts.received;
+    last_revision_ = result->hull_revision;
+  }
   if (call().ShouldStop()) return;  // the client is gone
   // `opened` is on its way before the first chunk is read, so what waits can only be an ack.
   if (LastWaiting() == nullptr) Queue({});

@@ -42,12 +42,18 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   void HandleChunk(const v1::AppendChunk& message);
   void HandleOpened(const absl::StatusOr<OpenResult>& opened);
   void HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result);
+  void LogApplied();
   void Fail(const absl::Status& status);
   void FailAt(uint64_t sequence, const absl::Status& status);
 
   Registry& registry_;
   std::optional<AppendSession> session_;
+  std::string hull_id_;
   std::string writer_id_;
+  // What is committed of this stream, for the line in the log that tells of it.
+  uint64_t applied_chunks_ = 0;
+  uint64_t applied_points_ = 0;
+  uint64_t last_revision_ = 0;
   bool opening_ = false;
   // Chunks that still hold their points, and those that are not committed or refused.
   int unbuilt_ = 0;

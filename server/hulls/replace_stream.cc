@@ -86,7 +86,8 @@ absl::Status ReplaceStream::Build() {
     return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
-  if (absl::Status s = registry_.CheckMemory(); !s.ok()) return Prefixed(name, s);
+  if (absl::Status s = registry_.CheckMemory(MemoryUse::kWriting); !s.ok())
+    return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
       {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call().ShouldStop(); }});
@@ -106,8 +107,8 @@ void ReplaceStream::Commit() {
     // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());
-    call().Log(LogLevel::kInfo, result->created ? "hull created" : "hull replaced",
-               {{"hull", result->hull.hull_id}});
+    call().LogChange(result->created ? "hull created" : "hull replaced",
+                     {"hull", result->hull.hull_id}, result->hull.revision);
     call().metrics().CountPoints(result->hull.counts);
     v1::ReplaceHullResponse response;
     EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());

@@ -31,7 +31,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
         registry_(registry),
         writers_(writers),
         response_(response),
-        charge_(registry.memory()) {}
+        charge_(registry.memory(), MemoryUse::kWriting) {}
 
   void Open() override { Read(); }
   void OnMessage() override;

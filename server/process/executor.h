@@ -1,6 +1,7 @@
 #ifndef HULLD_SERVER_PROCESS_EXECUTOR_H_
 #define HULLD_SERVER_PROCESS_EXECUTOR_H_
 
+#include <chrono>
 #include <optional>
 
 #include "server/process/task_pool.h"
@@ -9,11 +10,14 @@ namespace hulld::server {
 
 // The one thread that opens OpenMP regions, for pairs whose textbook axes are worth a team: OpenMP
 // keeps a team for each thread that opens one, so a second opener would double the threads. Pairs
-// are answered one after the other, each on the whole team: those of single calls first, then those
-// of batches in turn. At the end of a region the team waits for its slowest thread, so only work
-// that lasts far longer than that wait belongs here.
+// are answered in slices, each on the whole team: those of single calls first, in the turns of
+// their clients, then those of batches. At the end of a region the team waits for its slowest
+// thread, so only work that lasts far longer than that wait belongs here.
 class Executor {
  public:
+  // How long a slice may take: far longer than that wait, and too short for others to notice.
+  static constexpr std::chrono::microseconds kSliceTime{20'000};
+
   // threads: of the team. metrics: what waits of batches. Requires threads > 0.
   explicit Executor(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
 

@@ -3,10 +3,10 @@
 #include <malloc.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdio>
-#include <thread>
+
+#include "server/settings/cpu_limit.h"
 
 namespace hulld::server {
 namespace {
@@ -29,9 +29,7 @@ size_t AnonymousBytes() {
 
 }  // namespace
 
-void BoundArenas() {
-  mallopt(M_ARENA_MAX, static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
-}
+void BoundArenas() { mallopt(M_ARENA_MAX, DefaultThreads()); }
 
 bool GiveBackFreeMemory() {
   const struct mallinfo2 heap = mallinfo2();

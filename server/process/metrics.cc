@@ -1,5 +1,6 @@
 #include "server/process/metrics.h"
 
+#include <grpcpp/grpcpp.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 
 #include "core/base/check.h"
 #include "server/contract/status_map.h"
+#include "server/process/descriptors.h"
 
 namespace hulld::server {
 namespace {
@@ -75,6 +77,19 @@ StoreMetrics AddStore(prometheus::Registry& registry) {
           .Add({}),
       AddGauges(registry, "hulld_cache_limit_bytes", "Bytes that may count (--memory-limit).")
           .Add({}),
+      AddHistograms(registry, "hulld_snapshot_duration_seconds",
+                    "Making the canonical snapshot of a version of a hull.")
+          .Add({}, LatencyBuckets()),
+      AddGauges(registry, "hulld_store_disk_bytes", "Bytes of the store's files.").Add({}),
+      AddGauges(registry, "hulld_store_log_bytes", "Bytes of the store's log, of these.").Add({}),
+      AddGauges(registry, "hulld_store_free_bytes", "Bytes that the store's disk has left.")
+          .Add({}),
+      AddCounters(registry, "hulld_store_stalls_total",
+                  "How often the store slowed down or stopped changes to keep up.")
+          .Add({}),
+      AddGauges(registry, "hulld_store_stalled",
+                "1 while the store slows down or stops changes, else 0.")
+          .Add({}),
   };
 }
 
@@ -112,6 +127,8 @@ Metrics::Metrics()
       queue_tasks_(AddGauges(registry_, "hulld_queue_tasks", "Tasks that wait for a thread.")),
       queue_wait_(AddHistograms(registry_, "hulld_queue_wait_seconds",
                                 "How long tasks waited for a thread.")),
+      token_calls_(AddCounters(registry_, "hulld_token_requests_total",
+                               "Calls that ended, by the name of their token.")),
       exact_fallbacks_(AddCounters(registry_, "hulld_exact_fallbacks_total",
                                    "Pairs that floating point left open for exact arithmetic.")
                            .Add({})),
@@ -127,11 +144,17 @@ Metrics::Metrics()
       points_inside_(AddCounters(registry_, "hulld_points_inside_total",
                                  "Points of committed chunks that were no vertices.")
                          .Add({})),
-      store_(AddStore(registry_)) {
+      store_(AddStore(registry_)),
+      backup_saved_(AddGauges(registry_, "hulld_backup_saved_timestamp_seconds",
+                              "When the last backup was read to its end, Unix time; 0: never.")
+                        .Add({})) {
+  auto& running = AddGauges(registry_, "hulld_requests_running",
+                            "Calls that run now, open streams included, by rpc.");
   auto& call_seconds = AddHistograms(registry_, "hulld_request_duration_seconds",
                                      "How long calls took, from their arrival to their end.");
   for (size_t i = 0; i < kRpcCount; ++i) {
     const std::string rpc = RpcName(static_cast<Rpc>(i));
+    running_[i] = &running.Add({{"rpc", rpc}});
     calls_ok_[i] = &calls_.Add({{"rpc", rpc}, {"code", "OK"}});
     call_seconds_[i] = &call_seconds.Add({{"rpc", rpc}}, LatencyBuckets());
     message_seconds_[i] = nullptr;
@@ -150,12 +173,15 @@ Metrics::Metrics()
 }
 
 void Metrics::AddProcess() {
-  AddGauges(registry_, "hulld_build_info", "1, with the version as a label.")
-      .Add({{"version", HULLD_VERSION}})
+  AddGauges(registry_, "hulld_build_info",
+            "1, with the versions of hulld, its compiler and gRPC as labels.")
+      .Add({{"version", HULLD_VERSION}, {"compiler", __VERSION__}, {"grpc", grpc::Version()}})
       .Set(1);
   AddGauges(registry_, "process_start_time_seconds", "When this server started, Unix time.")
       .Add({})
       .SetToCurrentTime();
+  AddGauge("process_max_fds", "Descriptors that the process may have open.",
+           [] { return static_cast<double>(MostDescriptors()); });
   AddGauge("process_resident_memory_bytes", "Resident memory of the process.", ResidentBytes);
   prometheus::Counter& processor =
       AddCounters(registry_, "process_cpu_seconds_total", "Processor time of the process.").Add({});
@@ -190,6 +216,19 @@ void Metrics::CountAuthFailure(const std::string& reason) {
   auth_failures_.Add({{"reason", reason}}).Increment();
 }
 
+void Metrics::CountToken(const std::string& token) {
+  if (token.empty()) return;
+  const std::lock_guard lock(tokens_mutex_);
+  auto known = tokens_.find(token);
+  if (known == tokens_.end()) {
+    const std::string name = tokens_.size() < kMostTokens ? token : "other";
+    prometheus::Counter& counter = token_calls_.Add({{"token", name}});
+    if (name != token) return counter.Increment();
+    known = tokens_.emplace(token, &counter).first;
+  }
+  known->second->Increment();
+}
+
 void Metrics::CountPoints(const PointCounts& counts) {
   const auto add = [](prometheus::Counter& counter, uint64_t count) {
     if (count > 0) counter.Increment(static_cast<double>(count));
@@ -210,6 +249,10 @@ void Metrics::CountPairs(const RungCounts& counts) {
 
 PoolMetrics Metrics::AddPool(const std::string& pool) {
   return {queue_tasks_.Add({{"pool", pool}}), queue_wait_.Add({{"pool", pool}}, LatencyBuckets())};
+}
+
+prometheus::Gauge& Metrics::AddGauge(const std::string& name, const std::string& help) {
+  return AddGauges(registry_, name, help).Add({});
 }
 
 void Metrics::AddGauge(const std::string& name, const std::string& help,

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -45,6 +46,17 @@ struct StoreMetrics {
   // hulld_cache_bytes: what counts against the limit; hulld_cache_limit_bytes: --memory-limit.
   prometheus::Gauge& cache_bytes;
   prometheus::Gauge& cache_limit_bytes;
+  // hulld_snapshot_duration_seconds: making the canonical snapshot of a version.
+  prometheus::Histogram& snapshot_seconds;
+  // hulld_store_disk_bytes, and hulld_store_log_bytes of these; hulld_store_free_bytes: what the
+  // disk has left.
+  prometheus::Gauge& disk_bytes;
+  prometheus::Gauge& log_bytes;
+  prometheus::Gauge& free_bytes;
+  // hulld_store_stalls_total: how often the store slowed down or stopped changes, as it could not
+  // keep up; hulld_store_stalled: 1 while it does.
+  prometheus::Counter& stalls;
+  prometheus::Gauge& stalled;
 };
 
 // What one pool of threads reports.
@@ -73,6 +85,10 @@ class Metrics : public prometheus::Collectable {
   void CountLimit(const std::string& limit);
   // hulld_auth_failures_total: the reason is "unauthenticated" or "permission_denied".
   void CountAuthFailure(const std::string& reason);
+  // hulld_token_requests_total{token}: nothing is counted without a name. Beyond kMostTokens names
+  // the rest are "other": a file may name any number of tokens.
+  void CountToken(const std::string& token);
+  static constexpr size_t kMostTokens = 100;
   // hulld_points_received_total, _kept_, _duplicate_ and _inside_total, of one committed chunk.
   void CountPoints(const PointCounts& counts);
   // hulld_pairs_total{rung}, hulld_exact_fallbacks_total.
@@ -82,6 +98,15 @@ class Metrics : public prometheus::Collectable {
   // The pool is named once.
   PoolMetrics AddPool(const std::string& pool);
 
+  // hulld_requests_running{rpc}: calls that run now, open streams included.
+  prometheus::Gauge& RunningCalls(Rpc rpc) { return *running_[static_cast<size_t>(rpc)]; }
+
+  // hulld_backup_saved_timestamp_seconds: when the last backup was read to its end, Unix time; 0
+  // before the first.
+  prometheus::Gauge& BackupSaved() { return backup_saved_; }
+
+  // A gauge that others keep up to date.
+  prometheus::Gauge& AddGauge(const std::string& name, const std::string& help);
   // A gauge that is read whenever Prometheus asks. What `read` uses must outlive the exposition.
   void AddGauge(const std::string& name, const std::string& help, std::function<double()> read);
 
@@ -101,6 +126,11 @@ class Metrics : public prometheus::Collectable {
   prometheus::Family<prometheus::Counter>& auth_failures_;
   prometheus::Family<prometheus::Gauge>& queue_tasks_;
   prometheus::Family<prometheus::Histogram>& queue_wait_;
+  prometheus::Family<prometheus::Counter>& token_calls_;
+  std::mutex tokens_mutex_;
+  // By name; guarded by the mutex.
+  std::map<std::string, prometheus::Counter*> tokens_;
+  std::array<prometheus::Gauge*, kRpcCount> running_;
   std::array<prometheus::Counter*, kRpcCount> calls_ok_;
   std::array<prometheus::Histogram*, kRpcCount> call_seconds_;
   std::array<prometheus::Histogram*, kRpcCount> message_seconds_;
@@ -111,6 +141,7 @@ class Metrics : public prometheus::Collectable {
   prometheus::Counter& points_duplicate_;
   prometheus::Counter& points_inside_;
   StoreMetrics store_;
+  prometheus::Gauge& backup_saved_;
   // Bring up to date what is only read when asked for.
   mutable std::mutex refresh_mutex_;
   std::vector<std::function<void()>> refresh_;

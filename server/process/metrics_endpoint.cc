@@ -2,38 +2,149 @@
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <prometheus/exposer.h>
+#include <prometheus/text_serializer.h>
 
-#include <exception>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <chrono>
+#include <optional>
+#include <thread>
 #include <utility>
-#include <vector>
 
 #include "server/process/listen_address.h"
 
 namespace hulld::server {
 namespace {
 
-constexpr char kFlag[] = "--metrics-address";
-constexpr size_t kThreads = 2;
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using boost::system::error_code;
+using tcp = boost::asio::ip::tcp;
 
-// Metrics that someone else owns.
-class Borrowed : public prometheus::Collectable {
+constexpr char kFlag[] = "--metrics-address";
+// A scraper or two and a person need few; others are closed at once.
+constexpr size_t kMostConnections = 64;
+constexpr uint32_t kMostHeaderBytes = 8 << 10;
+// For a request to come, and for its reply to be taken.
+constexpr std::chrono::seconds kTimeout{20};
+// After descriptors ran out.
+constexpr std::chrono::milliseconds kAcceptPause{100};
+
+// One connection. It owns itself while something is awaited of it.
+class Connection : public std::enable_shared_from_this<Connection> {
  public:
-  explicit Borrowed(const Metrics& metrics) : metrics_(metrics) {}
-  std::vector<prometheus::MetricFamily> Collect() const override { return metrics_.Collect(); }
+  Connection(tcp::socket socket, const Metrics& metrics, size_t& connections)
+      : stream_(std::move(socket)), metrics_(metrics), connections_(connections) {
+    ++connections_;
+  }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+  ~Connection() { --connections_; }
+
+  void Read() {
+    parser_.emplace();
+    parser_->header_limit(kMostHeaderBytes);
+    parser_->body_limit(0);
+    stream_.expires_after(kTimeout);
+    http::async_read(stream_, buffer_, *parser_,
+                     [self = shared_from_this()](error_code error, size_t /*size*/) {
+                       // What is malformed or too long is not answered.
+                       if (!error) self->Answer();
+                     });
+  }
 
  private:
+  void Answer() {
+    const auto& request = parser_->get();
+    const bool is_read =
+        request.method() == http::verb::get || request.method() == http::verb::head;
+    const beast::string_view path = request.target().substr(0, request.target().find('?'));
+    if (!is_read) return Send(http::status::method_not_allowed, "Only GET is served.\n");
+    if (path != "/metrics") return Send(http::status::not_found, "Metrics are at /metrics.\n");
+    Send(http::status::ok, prometheus::TextSerializer().Serialize(metrics_.Collect()));
+  }
+
+  void Send(http::status status, std::string body) {
+    const auto& request = parser_->get();
+    response_ = {};
+    response_.result(status);
+    response_.keep_alive(request.keep_alive());
+    response_.set(http::field::content_type, "text/plain; version=0.0.4; charset=utf-8");
+    if (status == http::status::method_not_allowed) response_.set(http::field::allow, "GET, HEAD");
+    response_.body() = std::move(body);
+    response_.prepare_payload();
+    if (request.method() == http::verb::head) response_.body().clear();
+    stream_.expires_after(kTimeout);
+    http::async_write(stream_, response_,
+                      [self = shared_from_this()](error_code error, size_t /*size*/) {
+                        if (!error && self->response_.keep_alive()) return self->Read();
+                        error_code ignored;
+                        self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+                      });
+  }
+
+  beast::tcp_stream stream_;
   const Metrics& metrics_;
+  size_t& connections_;
+  beast::flat_buffer buffer_{kMostHeaderBytes};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  http::response<http::string_body> response_;
 };
 
-// As civetweb takes it, which knows no names.
-std::string BindAddress(const ListenAddress& address) {
-  if (address.host == "localhost") return absl::StrCat("127.0.0.1:", address.port);
-  const bool is_v6 = address.host.find(':') != std::string::npos;
-  return absl::StrCat(is_v6 ? "[" : "", address.host, is_v6 ? "]:" : ":", address.port);
-}
-
 }  // namespace
+
+// The port and its thread. All but the constructor and the destructor runs on that thread.
+class MetricsEndpoint::Listener {
+ public:
+  explicit Listener(const Metrics& metrics) : metrics_(metrics) {}
+  ~Listener() {
+    context_.stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  // The port; none when it cannot be bound.
+  std::optional<int> Listen(const ListenAddress& address) {
+    error_code error;
+    const auto found =
+        tcp::resolver(context_).resolve(address.host, address.port, tcp::resolver::passive, error);
+    if (error || found.empty()) return std::nullopt;
+    const tcp::endpoint endpoint = *found.begin();
+    acceptor_.open(endpoint.protocol(), error);
+    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor_.bind(endpoint, error);
+    if (!error) acceptor_.listen(tcp::acceptor::max_listen_connections, error);
+    if (error) return std::nullopt;
+    Accept();
+    thread_ = std::thread([this] { context_.run(); });
+    return acceptor_.local_endpoint().port();
+  }
+
+ private:
+  void Accept() {
+    acceptor_.async_accept([this](error_code error, tcp::socket socket) {
+      if (error) {
+        pause_.expires_after(kAcceptPause);
+        return pause_.async_wait([this](error_code) { Accept(); });
+      }
+      if (connections_ < kMostConnections) {
+        std::make_shared<Connection>(std::move(socket), metrics_, connections_)->Read();
+      }
+      Accept();
+    });
+  }
+
+  const Metrics& metrics_;
+  size_t connections_ = 0;
+  // Destroys the connections that are left, which count themselves.
+  asio::io_context context_{1};
+  tcp::acceptor acceptor_{context_};
+  asio::steady_timer pause_{context_};
+  std::thread thread_;
+};
 
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed) {
   absl::StatusOr<ListenAddress> parsed = ParseListenAddress(address, kFlag);
@@ -50,7 +161,8 @@ absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bo
   return parsed;
 }
 
-MetricsEndpoint::MetricsEndpoint() = default;
+MetricsEndpoint::MetricsEndpoint(std::unique_ptr<Listener> listener)
+    : listener_(std::move(listener)) {}
 MetricsEndpoint::~MetricsEndpoint() = default;
 
 absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const std::string& address,
@@ -58,16 +170,11 @@ absl::StatusOr<std::unique_ptr<MetricsEndpoint>> MetricsEndpoint::Start(const st
                                                                         const Metrics& metrics) {
   const absl::StatusOr<ListenAddress> parsed = ParseMetricsAddress(address, exposed);
   if (!parsed.ok()) return parsed.status();
-  std::unique_ptr<MetricsEndpoint> endpoint(new MetricsEndpoint);
-  endpoint->metrics_ = std::make_shared<Borrowed>(metrics);
-  try {
-    endpoint->exposer_ = std::make_unique<prometheus::Exposer>(BindAddress(*parsed), kThreads);
-    endpoint->exposer_->RegisterCollectable(endpoint->metrics_);
-    const std::vector<int> ports = endpoint->exposer_->GetListeningPorts();
-    endpoint->address_ = parsed->Format(ports.empty() ? 0 : ports.front());
-  } catch (const std::exception&) {  // civetweb does not say why
-    return ExplainBindFailure(*parsed, kFlag);
-  }
+  std::unique_ptr<MetricsEndpoint> endpoint(
+      new MetricsEndpoint(std::make_unique<Listener>(metrics)));
+  const std::optional<int> port = endpoint->listener_->Listen(*parsed);
+  if (!port.has_value()) return ExplainBindFailure(*parsed, kFlag);
+  endpoint->address_ = parsed->Format(*port);
   return endpoint;
 }
 

@@ -9,16 +9,14 @@
 #include "server/process/listen_address.h"
 #include "server/process/metrics.h"
 
-namespace prometheus {
-class Exposer;
-}  // namespace prometheus
-
 namespace hulld::server {
 
 // INVALID_ARGUMENT: --metrics-address is malformed, or not local although not `exposed`.
 absl::StatusOr<ListenAddress> ParseMetricsAddress(const std::string& address, bool exposed);
 
 // Where Prometheus reads the metrics over HTTP: GET /metrics, neither encrypted nor authenticated.
+// One thread serves a bounded number of connections, none of which holds up another: requests
+// without a body, of a few KiB, and each in limited time.
 class MetricsEndpoint {
  public:
   // address: "host:port" or "[v6]:port"; port 0 picks a free one. exposed: whether other machines
@@ -36,12 +34,12 @@ class MetricsEndpoint {
   const std::string& address() const { return address_; }
 
  private:
-  MetricsEndpoint();
+  class Listener;
+
+  explicit MetricsEndpoint(std::unique_ptr<Listener> listener);
 
   std::string address_;
-  // The exposer only borrows it.
-  std::shared_ptr<prometheus::Collectable> metrics_;
-  std::unique_ptr<prometheus::Exposer> exposer_;
+  std::unique_ptr<Listener> listener_;
 };
 
 }  // namespace hulld::server

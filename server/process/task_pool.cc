@@ -13,8 +13,8 @@ using Clock = std::chrono::steady_clock;
 
 TaskPool::Lane::~Lane() { HULLD_CHECK(slices_.empty()); }
 
-void TaskPool::Lane::Submit(std::function<void()> slice) {
-  pool_.SubmitSlice(*this, std::move(slice));
+void TaskPool::Lane::Submit(std::function<void()> slice, ClientId client) {
+  pool_.SubmitSlice(*this, std::move(slice), client);
 }
 
 TaskPool::TaskPool(int threads, std::optional<PoolMetrics> single_metrics,
@@ -38,11 +38,11 @@ TaskPool::~TaskPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void TaskPool::Submit(std::function<void()> task) {
+void TaskPool::Submit(std::function<void()> task, ClientId client) {
   NoteSingleCall();
   {
     const std::lock_guard lock(mutex_);
-    single_calls_.push_back({std::move(task), Clock::now(), false});
+    single_calls_.Push(client, {std::move(task), Clock::now(), false});
     NoteWaiting();
   }
   ready_.notify_one();
@@ -52,10 +52,11 @@ void TaskPool::NoteSingleCall() {
   last_single_call_.store(Clock::now().time_since_epoch(), std::memory_order_relaxed);
 }
 
-void TaskPool::SubmitSlice(Lane& lane, std::function<void()> slice) {
+void TaskPool::SubmitSlice(Lane& lane, std::function<void()> slice, ClientId client) {
   {
     const std::lock_guard lock(mutex_);
-    if (lane.slices_.empty()) lanes_.push_back(&lane);
+    lane.client_ = client;
+    if (lane.slices_.empty()) lanes_.Push(client, &lane);
     lane.slices_.push_back({std::move(slice), Clock::now(), true});
     ++slices_waiting_;
     NoteWaiting();
@@ -82,14 +83,12 @@ bool TaskPool::MayRunSlice() const {
 std::optional<TaskPool::Task> TaskPool::Next() {
   std::optional<Task> task;
   if (!single_calls_.empty()) {
-    task = std::move(single_calls_.front());
-    single_calls_.pop_front();
+    task = single_calls_.Pop();
   } else if (!lanes_.empty() && MayRunSlice()) {
-    Lane& lane = *lanes_.front();
-    lanes_.pop_front();
+    Lane& lane = *lanes_.Pop();
     task = std::move(lane.slices_.front());
     lane.slices_.pop_front();
-    if (!lane.slices_.empty()) lanes_.push_back(&lane);
+    if (!lane.slices_.empty()) lanes_.Push(lane.client_, &lane);
     --slices_waiting_;
     ++slices_running_;
   }

@@ -12,14 +12,16 @@
 #include <thread>
 #include <vector>
 
+#include "server/process/fair_queue.h"
 #include "server/process/metrics.h"
 
 namespace hulld::server {
 
 // The threads that compute answers, at the priority of the process. They take tasks from two
-// queues. Single calls come first, in the order in which they arrived. Slices of long calls come
-// next: each long call has a lane, and the lanes take turns, one slice each. A slice lasts about
-// kSliceTime, so a single call waits for at most one slice, and no thread waits for another.
+// queues. Single calls come first: clients take turns, and the calls of one client come in the
+// order in which they arrived. Slices of long calls come next: each long call has a lane, clients
+// take turns, and the lanes of one client too, one slice each. A slice lasts about kSliceTime, so a
+// single call waits for at most one slice, and no thread waits for another.
 //
 // Tasks must neither block nor wait; work that does belongs to a WorkerPool.
 class TaskPool {
@@ -55,14 +57,16 @@ class TaskPool {
     ~Lane();
 
     // Slices of a lane start in the order in which they were submitted, on any thread; several may
-    // run at the same time.
-    void Submit(std::function<void()> slice);
+    // run at the same time. client: who waits for it, the same for all of a lane.
+    void Submit(std::function<void()> slice, ClientId client = kNoClient);
 
    private:
     friend class TaskPool;
 
     TaskPool& pool_;
-    // Guarded by the pool's mutex. The lane takes part in the turns while there are any.
+    // The rest is guarded by the pool's mutex.
+    ClientId client_ = kNoClient;
+    // The lane takes part in the turns while there are any.
     std::deque<Task> slices_;
   };
 
@@ -76,8 +80,8 @@ class TaskPool {
 
   int threads() const { return static_cast<int>(threads_.size()); }
 
-  // Queues the answer of a single call ahead of all slices.
-  void Submit(std::function<void()> task);
+  // Queues the answer of a single call ahead of all slices. client: who waits for it.
+  void Submit(std::function<void()> task, ClientId client = kNoClient);
 
   // Says that a single call was answered without this pool, so that slices leave it a core.
   // Cost: ~30 ns.
@@ -89,7 +93,7 @@ class TaskPool {
  private:
   // Whether a single call came less than kReserveTime ago.
   bool IsReserved() const;
-  void SubmitSlice(Lane& lane, std::function<void()> slice);
+  void SubmitSlice(Lane& lane, std::function<void()> slice, ClientId client);
   void Work();
   // The rest requires the mutex.
   // The task whose turn it is; none when none may run now.
@@ -103,9 +107,9 @@ class TaskPool {
   std::mutex mutex_;
   // The rest is guarded by the mutex, `waiting_` for changes.
   std::condition_variable ready_;
-  std::deque<Task> single_calls_;
-  // Lanes with slices, in the order of their turns.
-  std::deque<Lane*> lanes_;
+  FairQueue<Task> single_calls_;
+  // Lanes with slices.
+  FairQueue<Lane*> lanes_;
   size_t slices_waiting_ = 0;
   int slices_running_ = 0;
   std::atomic<size_t> waiting_ = 0;

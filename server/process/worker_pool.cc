@@ -21,10 +21,10 @@ WorkerPool::~WorkerPool() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void WorkerPool::Submit(std::function<void()> task) {
+void WorkerPool::Submit(std::function<void()> task, ClientId client) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.push_back({std::move(task), std::chrono::steady_clock::now()});
+    tasks_.Push(client, {std::move(task), std::chrono::steady_clock::now()});
     NoteWaiting();
   }
   ready_.notify_one();
@@ -40,8 +40,7 @@ void WorkerPool::Work() {
   while (true) {
     ready_.wait(lock, [this] { return ending_ || !tasks_.empty(); });
     if (tasks_.empty()) return;
-    Task task = std::move(tasks_.front());
-    tasks_.pop_front();
+    Task task = tasks_.Pop();
     NoteWaiting();
     lock.unlock();
     if (metrics_.has_value()) {

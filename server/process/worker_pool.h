@@ -5,18 +5,19 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
-#include <deque>
 #include <functional>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
+#include "server/process/fair_queue.h"
 #include "server/process/metrics.h"
 
 namespace hulld::server {
 
-// A few threads that run tasks in the order in which they came, at the priority of the process.
+// A few threads that run tasks at the priority of the process: clients in turns, and those of one
+// client in the order in which they came.
 // gRPC calls back on as few as two threads, which must stay free to move bytes. Work that may wait
 // for the store or for a file runs here; work that only computes an answer, on a TaskPool.
 class WorkerPool {
@@ -28,7 +29,8 @@ class WorkerPool {
   // Runs what is queued, then ends.
   ~WorkerPool();
 
-  void Submit(std::function<void()> task);
+  // client: who waits for it.
+  void Submit(std::function<void()> task, ClientId client = kNoClient);
 
   // Tasks that wait for a thread.
   size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
@@ -46,7 +48,7 @@ class WorkerPool {
   std::optional<PoolMetrics> metrics_;
   std::mutex mutex_;
   std::condition_variable ready_;
-  std::deque<Task> tasks_;
+  FairQueue<Task> tasks_;
   std::atomic<size_t> waiting_ = 0;
   bool ending_ = false;
   std::vector<std::thread> threads_;

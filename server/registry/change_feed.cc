@@ -46,9 +46,12 @@ struct WatchInterest {
   uint64_t lost_revision = 0;
 };
 
-ChangeFeed::ChangeFeed(std::mutex& order, MemoryBudget& budget,
+ChangeFeed::ChangeFeed(FairMutex& order, MemoryBudget& budget,
                        std::chrono::milliseconds mark_interval)
-    : order_(order), mark_interval_(mark_interval), charge_(budget), thread_([this] { Run(); }) {}
+    : order_(order),
+      mark_interval_(mark_interval),
+      charge_(budget, MemoryUse::kReading),
+      thread_([this] { Run(); }) {}
 
 ChangeFeed::~ChangeFeed() {
   {
@@ -345,9 +348,9 @@ void ChangeFeed::Run() {
   while (!ending_) {
     if (due_.empty() && ready_.empty()) {
       if (watches_.empty()) {
-        wake_.wait(locked.lock());
+        locked.WaitOn([this](auto& lock) { wake_.wait(lock); });
       } else {
-        wake_.wait_until(locked.lock(), next_marks);
+        locked.WaitOn([&](auto& lock) { wake_.wait_until(lock, next_marks); });
       }
     }
     for (const auto& interest : std::exchange(due_, {})) {

@@ -90,7 +90,7 @@ class ChangeFeed {
 
   // What watches were not told yet counts against the budget. mark_interval: how often a watch is
   // told that the revision moved on.
-  ChangeFeed(std::mutex& order, MemoryBudget& budget, std::chrono::milliseconds mark_interval);
+  ChangeFeed(FairMutex& order, MemoryBudget& budget, std::chrono::milliseconds mark_interval);
   ChangeFeed(const ChangeFeed&) = delete;
   ChangeFeed& operator=(const ChangeFeed&) = delete;
   // Requires that all watches are closed.
@@ -161,7 +161,7 @@ class ChangeFeed {
   void Run();
   void NudgeForMarks();
 
-  std::mutex& order_;
+  FairMutex& order_;
   const std::chrono::milliseconds mark_interval_;
 
   // The rest is guarded by order_.

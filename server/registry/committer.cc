@@ -12,7 +12,7 @@
 
 namespace hulld::server {
 
-Committer::Committer(Store& store, std::mutex& order)
+Committer::Committer(Store& store, FairMutex& order)
     : store_(store), order_(order), thread_([this] { Run(); }) {}
 
 Committer::~Committer() {

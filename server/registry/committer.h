@@ -46,7 +46,7 @@ class Committer {
   using Completion = std::function<void(Locked& order, const absl::Status&)>;
 
   // Both must outlive this.
-  Committer(Store& store, std::mutex& order);
+  Committer(Store& store, FairMutex& order);
   Committer(const Committer&) = delete;
   Committer& operator=(const Committer&) = delete;
   // Commits what is queued, then ends.
@@ -72,7 +72,7 @@ class Committer {
   void Settle(std::vector<Pending>& batch, const absl::Status& status);
 
   Store& store_;
-  std::mutex& order_;
+  FairMutex& order_;
   StoreMetrics* metrics_ = nullptr;
 
   mutable std::mutex mutex_;

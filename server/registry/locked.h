@@ -1,6 +1,10 @@
 #ifndef HULLD_SERVER_REGISTRY_LOCKED_H_
 #define HULLD_SERVER_REGISTRY_LOCKED_H_
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -11,34 +15,124 @@
 
 namespace hulld::server {
 
+// How long a mutex was held at once, and for how much work.
+struct HoldStatistics {
+  // The longest hold within this minute and the one before. Waiting on a condition is none.
+  std::chrono::nanoseconds longest{0};
+  // Hulls that were looked up within one hold, at most.
+  uint64_t most_lookups = 0;
+};
+
+// A mutex that whoever waits for it gets before who lets go of it and wants it again: work that is
+// cut in slices lets others pass between them. It knows how long it was held.
+//
+// Who waits holds `entry_`. So who comes again waits until the first of the others has the mutex.
+class FairMutex {
+ public:
+  FairMutex() = default;
+  FairMutex(const FairMutex&) = delete;
+  FairMutex& operator=(const FairMutex&) = delete;
+
+  // As std::lock_guard wants them. Cost: two mutexes, and a look at the clock.
+  void lock() {
+    const std::lock_guard entry(entry_);
+    is_wanted_ = true;
+    mutex_.lock();
+    is_wanted_ = false;
+    BeginHold();
+  }
+  void unlock() {
+    EndHold();
+    mutex_.unlock();
+  }
+
+  // Whether a thread is the next to have it.
+  bool is_wanted() const { return is_wanted_; }
+
+  // Requires that it is held.
+  HoldStatistics Statistics() const {
+    const bool is_recent = MinuteOf(Clock::now()) <= minute_ + 1;
+    return {is_recent ? std::max(longest_, longest_before_) : std::chrono::nanoseconds(0),
+            std::max(most_lookups_, lookups_)};
+  }
+
+ private:
+  friend class Locked;
+  using Clock = std::chrono::steady_clock;
+
+  static int64_t MinuteOf(Clock::time_point time) {
+    return std::chrono::floor<std::chrono::minutes>(time.time_since_epoch()).count();
+  }
+  void BeginHold() {
+    since_ = Clock::now();
+    lookups_ = 0;
+  }
+  void EndHold() {
+    const Clock::time_point now = Clock::now();
+    if (const int64_t minute = MinuteOf(now); minute != minute_) {
+      longest_before_ = minute == minute_ + 1 ? longest_ : std::chrono::nanoseconds(0);
+      longest_ = std::chrono::nanoseconds(0);
+      minute_ = minute;
+    }
+    longest_ = std::max<std::chrono::nanoseconds>(longest_, now - since_);
+    most_lookups_ = std::max(most_lookups_, lookups_);
+  }
+
+  std::mutex entry_;
+  std::mutex mutex_;
+  // Written by who holds entry_.
+  std::atomic<bool> is_wanted_ = false;
+  // The rest is guarded by mutex_.
+  Clock::time_point since_;
+  uint64_t lookups_ = 0;
+  uint64_t most_lookups_ = 0;
+  int64_t minute_ = 0;
+  std::chrono::nanoseconds longest_{0};
+  std::chrono::nanoseconds longest_before_{0};
+};
+
 // A mutex that is held, and the work that is due once it is not: callbacks, which may call back,
 // and the end of large objects. A function that takes a Locked requires the mutex; its type is the
 // check. Not thread-safe.
 class Locked {
  public:
-  explicit Locked(std::mutex& mutex) : lock_(mutex) {}
+  explicit Locked(FairMutex& mutex) : mutex_(mutex) { Lock(); }
   Locked(const Locked&) = delete;
   Locked& operator=(const Locked&) = delete;
   ~Locked() {
-    if (lock_.owns_lock()) Unlock();
+    if (is_held_) Unlock();
   }
 
   // Whether it is this mutex that is held.
-  bool Holds(const std::mutex& mutex) const { return lock_.owns_lock() && lock_.mutex() == &mutex; }
+  bool Holds(const FairMutex& mutex) const { return is_held_ && &mutex_ == &mutex; }
 
   // Lets go of the mutex, and does what is due, in the order in which it was given.
   void Unlock() {
-    HULLD_CHECK(lock_.owns_lock());
+    HULLD_CHECK(is_held_);
     const std::vector<std::function<void()>> due = std::exchange(afterwards_, {});
-    lock_.unlock();
+    is_held_ = false;
+    mutex_.unlock();
     for (const std::function<void()>& task : due) task();
   }
   void Lock() {
-    HULLD_CHECK(!lock_.owns_lock());
-    lock_.lock();
+    HULLD_CHECK(!is_held_);
+    mutex_.lock();
+    is_held_ = true;
   }
-  // For condition variables, which let go of the mutex while they wait.
-  std::unique_lock<std::mutex>& lock() { return lock_; }
+  // For condition variables: wait(lock) lets go of the mutex while it waits.
+  template <typename Wait>
+  void WaitOn(const Wait& wait) {
+    HULLD_CHECK(is_held_);
+    mutex_.EndHold();
+    std::unique_lock lock(mutex_.mutex_, std::adopt_lock);
+    wait(lock);
+    lock.release();
+    mutex_.BeginHold();
+  }
+
+  // A hull is looked up. Counts those since the mutex was taken.
+  void NoteLookup() { ++mutex_.lookups_; }
+  uint64_t lookups() const { return mutex_.lookups_; }
 
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
   template <typename T>
@@ -51,7 +145,8 @@ class Locked {
   }
 
  private:
-  std::unique_lock<std::mutex> lock_;
+  FairMutex& mutex_;
+  bool is_held_ = false;
   std::vector<std::function<void()>> afterwards_;
 };
 

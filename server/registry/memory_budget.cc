@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
 
 #include "core/base/check.h"
@@ -10,14 +11,30 @@
 namespace hulld::server {
 namespace {
 
-// When hulls in use may have come to rest.
+// When calls may have let go of hulls, and hulls in use may have come to rest.
 constexpr std::chrono::milliseconds kRetry(1000);
 
 }  // namespace
 
-void MemoryBudget::Account::Set(uint64_t bytes) {
+void MemoryBudget::Books::Remove(Kind kind, uint64_t amount) {
+  HULLD_CHECK(bytes[kind] >= amount);
+  bytes[kind] -= amount;
+}
+
+void MemoryBudget::Account::Enter() {
+  Books& books = *budget_.books_;
+  books.Add(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
+  books.Add(is_for_writing_ ? kForWriting : kForReading, pinned_);
+}
+
+void MemoryBudget::Account::Leave() {
+  Books& books = *budget_.books_;
+  books.Remove(is_for_writing_ ? kForWriting : kAtRest, bytes_ + resting_);
+  books.Remove(is_for_writing_ ? kForWriting : kForReading, pinned_);
+}
+
+void MemoryBudget::Account::Set(uint64_t bytes, bool is_for_writing) {
   if (bytes == 0 && bytes_ == 0) return;
-  const std::lock_guard lock(budget_.mutex_);
   std::list<Account*>& used = budget_.used_;
   if (bytes_ == 0) {
     place_ = used.insert(used.begin(), this);
@@ -26,46 +43,119 @@ void MemoryBudget::Account::Set(uint64_t bytes) {
   } else {
     used.splice(used.begin(), used, place_);
   }
-  budget_.Exchange(bytes_, bytes);
+  const std::lock_guard lock(budget_.books_->mutex);
+  Leave();
   bytes_ = bytes;
+  is_for_writing_ = is_for_writing;
+  Enter();
 }
 
-void MemoryBudget::Charge(uint64_t before, uint64_t now) {
-  const std::lock_guard lock(mutex_);
-  Exchange(before, now);
+void MemoryBudget::Account::Hold(std::vector<std::shared_ptr<MemoryPart>> parts) {
+  if (parts == parts_) return;
+  {
+    const std::lock_guard lock(budget_.books_->mutex);
+    for (const auto* const moved : {&parts_, &parts}) {
+      for (const auto& part : *moved) {
+        part->Leave();
+        part->account_ = moved == &parts ? this : nullptr;
+        part->Enter();
+      }
+    }
+  }
+  parts_ = std::move(parts);
 }
 
-void MemoryBudget::Exchange(uint64_t before, uint64_t now) {
-  HULLD_CHECK(bytes_ >= before);
-  bytes_ = bytes_ - before + now;
+void MemoryBudget::Account::Close() {
+  Hold({});
+  Set(0, false);
+}
+
+void MemoryPart::Enter() {
+  if (account_ == nullptr) {
+    if (pins_ > 0) books_->Add(MemoryBudget::kForReading, bytes_);
+    return;
+  }
+  account_->Leave();
+  (pins_ > 0 ? account_->pinned_ : account_->resting_) += bytes_;
+  account_->Enter();
+}
+
+void MemoryPart::Leave() {
+  if (account_ == nullptr) {
+    if (pins_ > 0) books_->Remove(MemoryBudget::kForReading, bytes_);
+    return;
+  }
+  account_->Leave();
+  (pins_ > 0 ? account_->pinned_ : account_->resting_) -= bytes_;
+  account_->Enter();
+}
+
+void MemoryPart::SetBytes(uint64_t bytes) {
+  const std::lock_guard lock(books_->mutex);
+  if (bytes == bytes_) return;
+  Leave();
+  bytes_ = bytes;
+  Enter();
+}
+
+void MemoryPart::Pin(bool pins) {
+  const std::lock_guard lock(books_->mutex);
+  Leave();
+  pins_ += pins ? 1 : -1;
+  Enter();
+}
+
+void MemoryCharge::Set(uint64_t bytes) {
+  if (bytes == bytes_) return;
+  MemoryBudget::Books& books = *budget_->books_;
+  const auto kind = static_cast<MemoryBudget::Kind>(use_);
+  const std::lock_guard lock(books.mutex);
+  books.Remove(kind, std::exchange(bytes_, bytes));
+  books.Add(kind, bytes);
 }
 
 void MemoryBudget::Evict(Locked& owners) {
   HULLD_CHECK(owners.Holds(owners_));
-  const std::lock_guard lock(mutex_);
-  for (auto place = used_.end(); bytes_ > limit_bytes_ && place != used_.begin();) {
-    Account& account = **--place;
-    const uint64_t left = account.drop_(owners);
-    if (left < account.bytes_) ++evictions_;
-    Exchange(account.bytes_, left);
-    account.bytes_ = left;
-    if (left == 0) place = used_.erase(place);
+  const size_t most = std::min(kMostAsked, used_.size());
+  for (size_t asked = 0; asked < most && !used_.empty() && Total() > limit_bytes_; ++asked) {
+    Account& account = *used_.back();
+    used_.splice(used_.begin(), used_, account.place_);
+    const uint64_t before = Total();
+    account.drop_(owners);
+    if (Total() < before) ++evictions_;
   }
 }
 
-absl::Status MemoryBudget::Check(Locked& owners) {
+absl::Status MemoryBudget::Check(Locked& owners, MemoryUse use) {
   Evict(owners);
-  const uint64_t bytes = Statistics().bytes;
-  if (bytes <= limit_bytes_) return absl::OkStatus();
-  return Overloaded(
-      absl::StrCat("hulls in use, points on their way to them and streams of queries hold ", bytes,
-                   " bytes of memory"),
-      limit_bytes_, "memory-limit", kRetry);
+  if (!IsOver(use)) return absl::OkStatus();
+  const MemoryStatistics now = Statistics();
+  const std::string what =
+      use == MemoryUse::kReading
+          ? absl::StrCat("readers hold ", now.reading,
+                         " bytes of memory in hulls that calls ask about, streams and watches, "
+                         "more than their share of it")
+          : absl::StrCat("writers hold ", now.writing,
+                         " bytes of memory in hulls that change and points on their way to them, "
+                         "more than their share of it");
+  return Overloaded(what, share(use), "memory-limit", kRetry);
+}
+
+bool MemoryBudget::IsOver(MemoryUse use) const {
+  const std::lock_guard lock(books_->mutex);
+  return books_->bytes[static_cast<size_t>(use)] > share(use);
+}
+
+uint64_t MemoryBudget::Total() const {
+  const std::lock_guard lock(books_->mutex);
+  return books_->bytes[kForReading] + books_->bytes[kForWriting] + books_->bytes[kAtRest];
 }
 
 MemoryStatistics MemoryBudget::Statistics() const {
-  const std::lock_guard lock(mutex_);
-  return {bytes_, limit_bytes_, evictions_};
+  const std::lock_guard lock(books_->mutex);
+  const auto& bytes = books_->bytes;
+  return {bytes[kForReading] + bytes[kForWriting] + bytes[kAtRest], bytes[kForReading],
+          bytes[kForWriting], limit_bytes_, evictions_};
 }
 
 }  // namespace hulld::server

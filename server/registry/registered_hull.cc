@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/check.h"
@@ -15,7 +16,7 @@ RegisteredHull::RegisteredHull(const StoredHull& stored, const HullState& initia
       readable_from_store(readable),
       committed(stored),
       head(stored),
-      account(budget, [this](Locked& locked) { return DropUnused(locked); }) {}
+      account(budget, [this](Locked& locked) { DropUnused(locked); }) {}
 
 void RegisteredHull::DiscardBuilder(Locked& locked) {
   if (builder == nullptr) return;
@@ -68,15 +69,27 @@ void RegisteredHull::SetCommittedMark(Locked& locked, const LiveHull::Mark& mark
 
 std::shared_ptr<const ServedHull> RegisteredHull::Serve() {
   if (committed.record.vertex_count == 0) return EmptyServedHull();
-  if (served == nullptr && live != nullptr) {
-    if (canonical == nullptr) canonical = std::make_shared<CanonicalHull>();
+  if (live == nullptr) return nullptr;
+  if (served == nullptr) {
+    if (canonical == nullptr) {
+      canonical =
+          std::make_shared<CanonicalHull>(std::make_shared<MemoryPart>(account.budget(), nullptr));
+    }
     served = std::make_shared<const ServedHull>(
         live->VersionAt(committed_mark), committed_mark.low(), committed_mark.high(), canonical);
   }
-  return served;
+  std::shared_ptr<const Reading> reading = read_.lock();
+  if (reading == nullptr) {
+    CountParts();
+    reading = std::make_shared<const Reading>(account.parts(), served);
+    read_ = reading;
+  }
+  const ServedHull* const shown = reading->served.get();
+  return {std::move(reading), shown};
 }
 
 void RegisteredHull::DiscardServed(Locked& locked) {
+  read_.reset();
   locked.Discard(std::exchange(served, nullptr));
 }
 
@@ -97,23 +110,46 @@ void RegisteredHull::DiscardAll(Locked& locked) {
   SetCommittedMark(locked, {});
 }
 
-uint64_t RegisteredHull::MemoryBytes() const {
-  return builder_bytes + (live == nullptr ? 0 : live->MemoryBytes()) +
+void RegisteredHull::NoteUse() {
+  CountParts();
+  const bool is_for_writing = !readable_from_store || !state.quiet() || !chunks.empty();
+  account.Set(builder_bytes + (live == nullptr ? 0 : LiveHull::OwnBytes()), is_for_writing);
+}
+
+// A part whose address comes again is free memory that was used again: nobody held it.
+void RegisteredHull::CountParts() {
+  std::vector<std::shared_ptr<MemoryPart>> parts;
+  if (live != nullptr) {
+    for (const LiveHull::Shared& shared : live->SharedBy(committed_mark)) {
+      const auto known = std::ranges::find(account.parts(), shared.what, &MemoryPart::what);
+      parts.push_back(known != account.parts().end()
+                          ? *known
+                          : std::make_shared<MemoryPart>(account.budget(), shared.what));
+      parts.back()->SetBytes(shared.bytes);
+    }
+  }
+  if (canonical != nullptr) parts.push_back(canonical->part());
+  account.Hold(std::move(parts));
+}
+
+uint64_t RegisteredHull::SharedBytes() const {
+  return (live == nullptr ? 0 : live->MemoryBytes()) +
          (canonical == nullptr ? 0 : canonical->MemoryBytes());
 }
 
-uint64_t RegisteredHull::DropUnused(Locked& locked) {
-  if (!state.quiet() || !chunks.empty()) return MemoryBytes();
-  // What a reader holds would not go, and be there twice after the next one.
-  const bool is_read = served.use_count() > 1 || live.use_count() > 1;
-  if (readable_from_store) {
-    DiscardBuilder(locked);
-    if (!is_read) DiscardAll(locked);
-  } else if (!is_read) {
-    DiscardServed(locked);
-    locked.Discard(std::exchange(canonical, nullptr));
+void RegisteredHull::DropUnused(Locked& locked) {
+  if (state.quiet() && chunks.empty()) {
+    // What a reader holds would not go, and be there twice after the next one.
+    const bool is_read = IsRead();
+    if (readable_from_store) {
+      DiscardBuilder(locked);
+      if (!is_read) DiscardAll(locked);
+    } else if (!is_read) {
+      DiscardServed(locked);
+      locked.Discard(std::exchange(canonical, nullptr));
+    }
   }
-  return MemoryBytes();
+  NoteUse();
 }
 
 const std::shared_ptr<const ServedHull>& EmptyServedHull() {

@@ -13,6 +13,7 @@
 #include <string>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
@@ -58,17 +59,24 @@ struct RegisteredHull {
   // bounded where points take each other in and nobody asks. It costs a part of what appending
   // those points did.
   bool HoldsMuchElse() const;
-  // Counts what the hull holds now, and that it was used just now.
-  void NoteUse() { account.Set(MemoryBytes()); }
+  // Counts what the hull holds now, and that it was used just now. Cost: O(log n).
+  void NoteUse();
   // Drops the builder, unless a thread owns it.
   void DiscardBuilder(Locked& locked);
   // The committed hull has these points from now on. Requires that nothing is in flight.
   void SetLive(std::shared_ptr<LiveHull> points);
   // Up to there `live` is committed.
   void SetCommittedMark(Locked& locked, const LiveHull::Mark& mark);
+  // Whether Serve gives something: not when the points are to be read from the store first.
+  bool IsReady() const { return committed.record.vertex_count == 0 || live != nullptr; }
   // What readers are given of the committed hull; null when that is to be read from the store
-  // first. Cost: O(1).
+  // first. It counts as held for readers until the last of them lets go of it, whatever becomes of
+  // the hull. Cost: O(log n) for the first of them, O(1) for others.
   std::shared_ptr<const ServedHull> Serve();
+  // Whether a reader holds it.
+  bool IsRead() const { return !read_.expired() || live.use_count() > 1; }
+  // About what its current version shares with readers, in bytes.
+  uint64_t SharedBytes() const;
   // What is served is made anew when the next reader asks; the canonical snapshot stays.
   void DiscardServed(Locked& locked);
   // The points beyond what is committed were refused.
@@ -129,11 +137,23 @@ struct RegisteredHull {
   MemoryBudget::Account account;
 
  private:
+  // What is served, as long as a reader holds it. The memory counts until it is free.
+  struct Reading {
+    Reading(std::vector<std::shared_ptr<MemoryPart>> parts,
+            std::shared_ptr<const ServedHull> served_hull)
+        : pin(std::move(parts)), served(std::move(served_hull)) {}
+    const MemoryPin pin;
+    const std::shared_ptr<const ServedHull> served;
+  };
+
   void KeepBox();
-  // What the hull holds and can make again.
-  uint64_t MemoryBytes() const;
+  // Brings what the account says of parts up to date.
+  void CountParts();
   // Drops what is not in use, if it can be made again.
-  uint64_t DropUnused(Locked& locked);
+  void DropUnused(Locked& locked);
+
+  // What readers hold of `served`.
+  std::weak_ptr<const Reading> read_;
 };
 
 // What is served of a hull without vertices; one for all, and not counted.

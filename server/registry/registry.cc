@@ -21,6 +21,11 @@ Limits WithMemoryLimit(Limits limits) {
   return limits;
 }
 
+// The rest is for writers, whose hulls stay in memory where no store keeps them.
+uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
+  return memory_limit / (store.keeps_hulls() ? 2 : 4);
+}
+
 absl::Status Gone(const std::string& id, const char* how) {
   return WithReason(
       absl::FailedPreconditionError(absl::StrCat(
@@ -36,7 +41,7 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
     : store_(store),
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
-      memory_(limits_.memory_limit, mutex_),
+      memory_(limits_.memory_limit, ReadersShare(limits_.memory_limit, store), mutex_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
   preparers_.emplace(1, preparers);
@@ -171,6 +176,7 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
              return done(later, status);
            }
            Publish(hull->committed.record.revision);
+           NoteChange(*hull);
            feed_.NoteCreated(later, hull);
            done(later, hull);
          });
@@ -207,6 +213,7 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
         if (!status.ok()) return Answer<uint64_t>(later, done, status);
         Publish(revision);
         vertex_count_ -= hull->committed.record.vertex_count;
+        NoteChange(*hull);
         feed_.NoteDeleted(later, hull->committed.record, revision);
         Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
         Answer<uint64_t>(later, done, revision);
@@ -320,6 +327,7 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
   if (!status.ok()) return status;
   vertex_count_ += record.vertex_count;
   Publish(record.revision);
+  NoteChange(*hull);
   if (former == nullptr) {
     feed_.NoteCreated(locked, hull);
   } else {
@@ -335,8 +343,8 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
 void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
                       Committer::Completion finish) {
   HULLD_CHECK(hull->state.in_flight() > 0);
-  const auto charge =
-      std::make_shared<MemoryCharge>(memory_, change.vertices.capacity() * sizeof(Vector));
+  const auto charge = std::make_shared<MemoryCharge>(memory_, MemoryUse::kWriting,
+                                                     change.vertices.capacity() * sizeof(Vector));
   committer_.Submit(
       locked, std::move(change),
       [this, hull, charge, finish = std::move(finish)](Locked& later, const absl::Status& status) {
@@ -348,7 +356,10 @@ void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
         }
         finish(later, status);
         // One that has come to rest may be dropped.
-        if (hull->state.quiet()) memory_.Evict(later);
+        if (hull->state.quiet() && !hull->state.gone()) {
+          hull->NoteUse();
+          memory_.Evict(later);
+        }
         Advance(later, hull);
       });
 }
@@ -376,10 +387,15 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   writers_.Submit([this, hull] { RunNextChunk(hull); });
 }
 
+void Registry::NoteChange(const RegisteredHull& hull) {
+  recent_changes_.Note(hull.committed.record.hull_id);
+}
+
 // Several threads may find the same damage.
 void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
   if (hull.state.damaged() || hull.state.life() != HullState::Life::kPresent) return;
   hull.state.Damage(damage);
+  NoteChange(hull);
   ++cache_.damaged;
 }
 
@@ -401,24 +417,31 @@ HullPage Registry::List(const std::string& prefix, const std::string& after,
   return page;
 }
 
+HoldStatistics Registry::Holds() const {
+  const std::lock_guard lock(mutex_);
+  return mutex_.Statistics();
+}
+
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(mutex_);
   return {revision_, hulls_.size() - creating_, vertex_count_, bodies_.size()};
 }
 
 CacheStatistics Registry::Cache() const {
-  const MemoryStatistics memory = memory_.Statistics();
   const std::lock_guard lock(mutex_);
+  const MemoryStatistics memory = memory_.Statistics();
   CacheStatistics cache = cache_;
   cache.bytes = memory.bytes;
+  cache.reading_bytes = memory.reading;
+  cache.writing_bytes = memory.writing;
   cache.limit_bytes = memory.limit_bytes;
   cache.evictions = memory.evictions;
   return cache;
 }
 
-absl::Status Registry::CheckMemory() {
+absl::Status Registry::CheckMemory(MemoryUse use) {
   Locked locked(mutex_);
-  return memory_.Check(locked);
+  return memory_.Check(locked, use);
 }
 
 }  // namespace hulld::server

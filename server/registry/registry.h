@@ -22,6 +22,7 @@
 #include "server/registry/change_feed.h"
 #include "server/registry/committer.h"
 #include "server/registry/hull_state.h"
+#include "server/registry/known_hulls.h"
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
 #include "server/registry/registry_types.h"
@@ -49,7 +50,9 @@ struct PendingChunk;
 // until no change of their hull is in flight, since what they find must be committed.
 //
 // Readers and writers never wait for each other. One mutex guards all records and is held for
-// moments only. A chunk is built without it, by the one thread that owns the builder, which then
+// moments only: a reader of many hulls looks up kMostLookupsPerHold at a time, lets others pass,
+// and at the end looks again for those that changed meanwhile, so that all are of one revision.
+// A chunk is built without it, by the one thread that owns the builder, which then
 // appends what became vertices to the LiveHull. How far that is committed is a mark in the record;
 // the first reader after a commit makes the version at that mark, in O(1) under the mutex, and it
 // is served until the next commit. A reader waits for the store at most, when the hull is not in
@@ -69,6 +72,9 @@ struct PendingChunk;
 // takes the budget's mutex alone.
 class Registry {
  public:
+  // Some 50 us.
+  static constexpr uint64_t kMostLookupsPerHold = 128;
+
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
   // no chunk be pending when it is destroyed. preparers: where to report what waits to be prepared.
   Registry(Store& store, const Limits& limits, WorkerPool& writers,
@@ -114,7 +120,7 @@ class Registry {
   void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
   // As List.
   BodyPage ListBodies(const std::string& prefix, const std::string& after, size_t page_size) const;
-  // In the order of the IDs. Cost: O(log n) each.
+  // Cost: O(log n) each; others pass after each kMostLookupsPerHold.
   FoundBodies FindBodies(std::span<const std::string> ids) const;
   // Whether there may be a body. Takes no lock.
   bool has_bodies() const { return body_count_.load(std::memory_order_relaxed) > 0; }
@@ -123,27 +129,41 @@ class Registry {
   HullPage List(const std::string& prefix, const std::string& after, size_t page_size) const;
 
   RegistrySizes Sizes() const;
+  // How long, and for how much, the mutex of the records was held.
+  HoldStatistics Holds() const;
   CacheStatistics Cache() const;
   CommitStatistics Commits() const { return committer_.Statistics(); }
   // Where each batch is timed and counted; set before the first change, and outlives this.
-  void SetMetrics(StoreMetrics& metrics) { committer_.SetMetrics(metrics); }
-  // RESOURCE_EXHAUSTED: --memory-limit, although all that can be dropped was.
-  absl::Status CheckMemory();
+  void SetMetrics(StoreMetrics& metrics) {
+    snapshot_seconds_ = &metrics.snapshot_seconds;
+    committer_.SetMetrics(metrics);
+  }
+  // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
+  absl::Status CheckMemory(MemoryUse use);
 
   // The hulls, ready to be served, all current at one revision of the store. May read from the
   // store and prepare, hence not for gRPC's threads. CANCELLED when should_stop said so.
+  // RESOURCE_EXHAUSTED: hulls would have to be read from the store, or are more than
+  // kMostLookupsPerHold, and what readers hold is beyond their share of --memory-limit; without a
+  // time to retry, if these hulls are most of it.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
   // The same, but nullopt, at once, where it would have to read from the store or to prepare.
   std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
+  // As Resolve, for who asks for the same hulls again and again: `known` is kept in between, and
+  // only what changed since is looked up.
+  absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
+                                   const std::function<bool()>& should_stop,
+                                   const ReadPlan& plan = {});
   // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
   absl::StatusOr<std::pair<uint64_t, HullView>> Resolve(const std::string& id,
                                                         const std::function<bool()>& should_stop);
 
   // The canonical snapshot of what was resolved, made if nobody needed it before; it lives as long
   // as view.served. Not for gRPC's threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
-  // said so. Cost: that of building the hull.
+  // said so. RESOURCE_EXHAUSTED: it is not made yet, and readers hold more than their share of
+  // --memory-limit. Cost: that of building the hull.
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
                                         const std::function<bool()>& should_stop);
 
@@ -186,7 +206,6 @@ class Registry {
  private:
   struct OpenRequest;
   struct BuiltChunk;
-  class Lookup;
   enum class Verdict;
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
@@ -251,16 +270,27 @@ class Registry {
                    const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
   void Revert(Locked& locked, RegisteredHull& hull);
 
+  absl::Status LookUpDue(Locked& locked, std::span<const std::string> ids, KnownHulls& known,
+                         const std::function<bool()>& should_stop, const ReadPlan& plan,
+                         bool may_wait);
+  absl::Status LookUp(Locked& locked, const std::string& id, KnownHulls& hulls, uint32_t k,
+                      const std::function<bool()>& should_stop, const ReadPlan& plan,
+                      bool may_wait);
+  absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
   absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
                               const std::function<bool()>& should_stop);
   static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);
   void Prepare(Locked& locked, RegisteredHull& hull);
   void SchedulePreparing(const HullPointer& hull);
   void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
+  // Readers are given something else of it from now on.
+  void NoteChange(const RegisteredHull& hull);
 
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
   Store& store_;
+  // Where the making of canonical snapshots is timed, if anywhere.
+  prometheus::Histogram* snapshot_seconds_ = nullptr;
   // With the memory limit in force.
   const Limits limits_;
   WorkerPool& writers_;
@@ -268,7 +298,7 @@ class Registry {
 
   // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
   // builder that a thread owns.
-  mutable std::mutex mutex_;
+  mutable FairMutex mutex_;
   // The last one that is committed and visible; the last one that a change was given.
   uint64_t revision_ = 0;
   uint64_t assigned_revision_ = 0;
@@ -281,6 +311,8 @@ class Registry {
   std::atomic<size_t> body_count_ = 0;
   // Those of hulls_ whose creation is not committed yet.
   uint64_t creating_ = 0;
+  // For readers that look up hulls in slices, or again.
+  RecentChanges recent_changes_;
   // Hits, misses, loads and damaged; the rest is the budget's.
   CacheStatistics cache_;
   // Nothing more is prepared.

@@ -178,7 +178,7 @@ void Registry::Append(const AppendSession& session, Chunk chunk, std::function<b
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
   session.hull->chunks.push_back({session, std::move(chunk), std::move(should_stop),
                                   std::move(on_built), std::move(done),
-                                  MemoryCharge(memory_, bytes)});
+                                  MemoryCharge(memory_, MemoryUse::kWriting, bytes)});
   Advance(locked, session.hull);
 }
 
@@ -249,7 +249,7 @@ absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, Registere
   const HullRecord& record = hull.head.record;
   if (absl::Status s = CheckChunkRevision(pending.session, record, chunk); !s.ok()) return s;
   if (absl::Status s = CheckPointCount(record, chunk, limits_); !s.ok()) return s;
-  if (absl::Status s = memory_.Check(locked); !s.ok()) return s;
+  if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) return s;
   return Verdict::kNew;
 }
 
@@ -413,6 +413,7 @@ void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const Stored
                            uint64_t sequence) {
   const HullRecord before = std::exchange(hull->committed, after).record;
   hull->SetCommittedMark(locked, mark);
+  NoteChange(*hull);
   if (after.record.revision != before.revision) {
     Publish(after.record.revision);
     vertex_count_ += after.record.vertex_count - before.vertex_count;

@@ -1,10 +1,12 @@
 // Readers: hulls that are ready to be served, all current at one revision.
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 
 #include <chrono>
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/limit_error.h"
 #include "server/registry/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
@@ -19,151 +21,142 @@ bool Stopped(const std::function<bool()>& should_stop) { return should_stop && s
 
 absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
 
+// Nobody is told.
+absl::Status WouldWait() { return absl::UnavailableError("it would have to wait"); }
+
 }  // namespace
 
-// What one call of Resolve looks for. Used with the mutex held.
-class Registry::Lookup {
- public:
-  Lookup(Registry& registry, std::span<const std::string> ids, const ReadPlan& plan)
-      : registry_(registry), ids_(ids), plan_(plan), wanted_(ids.size()) {}
-
-  // Finds each hull. Returns whether all are in memory, or cannot be.
-  bool Find();
-  // Reads from the store what is not in memory. Releases the mutex meanwhile. Returns false once
-  // should_stop said so.
-  bool LoadMissing(Locked& locked, const std::function<bool()>& should_stop);
-  // Prepares one hull that Find found, if the plan says so. Releases the mutex meanwhile. Returns
-  // whether there was one.
-  bool PrepareNext(Locked& locked);
-  // What Find, which just said that all are ready, found.
-  Resolved Take();
-
- private:
-  struct Wanted {
-    HullPointer hull;
-    absl::Status failure;
-    // Stays in memory until all are there.
-    std::shared_ptr<LiveHull> held;
-    bool prepared = false;
-  };
-
-  Registry& registry_;
-  const std::span<const std::string> ids_;
-  const ReadPlan plan_;
-  std::vector<Wanted> wanted_;
-  bool counted_ = false;
-};
-
-bool Registry::Lookup::Find() {
-  bool ready = true;
-  for (size_t i = 0; i < ids_.size(); ++i) {
-    Wanted& wanted = wanted_[i];
-    if (wanted.hull == nullptr || wanted.hull->state.gone()) {
-      wanted = {};
-      wanted.hull = registry_.FindVisible(ids_[i]);
-      if (wanted.hull == nullptr) wanted.failure = registry_.NoSuchHull(ids_[i]);
+// Brings what is known of each hull up to this moment. The mutex is let go of after a number of
+// lookups; what changed by then is looked up again, so at the end all is of one moment. That comes
+// to an end, since a commit takes longer than a lookup. Releases the mutex also to read from the
+// store and to prepare; where it may not, UNAVAILABLE says that it would have to. CANCELLED:
+// should_stop said so.
+absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> ids,
+                                 KnownHulls& known, const std::function<bool()>& should_stop,
+                                 const ReadPlan& plan, bool may_wait) {
+  if (!known.next_change_.has_value()) known.next_change_ = recent_changes_.end();
+  while (true) {
+    uint64_t& next = *known.next_change_;
+    if (!recent_changes_.Knows(next)) {
+      next = recent_changes_.end();
+      locked.Unlock();
+      known.ForgetAll();
+      locked.Lock();
+    } else if (next < recent_changes_.end()) {
+      known.NoteChange(recent_changes_.at(next++));
+    } else if (!known.due_.empty()) {
+      KnownHulls::Known& due = known.hulls_[known.due_.back()];
+      const absl::Status status =
+          LookUp(locked, ids[due.first], known, known.due_.back(), should_stop, plan, may_wait);
+      if (!status.ok()) return status;
+      due.is_due = false;
+      known.due_.pop_back();
+    } else {
+      return absl::OkStatus();
     }
-    if (wanted.hull != nullptr && wanted.hull->state.damaged()) {
-      wanted.failure = wanted.hull->state.damage();
+    locked.NoteLookup();
+    if (locked.lookups() < kMostLookupsPerHold) continue;
+    locked.Unlock();
+    const bool stopped = Stopped(should_stop);
+    locked.Lock();
+    if (stopped) return Cancelled();
+    if (absl::Status s = CheckReaders(locked, known); !s.ok()) return s;
+  }
+}
+
+// Whether readers may hold more.
+absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
+  if (!memory_.IsOver(MemoryUse::kReading)) return absl::OkStatus();
+  const uint64_t share = memory_.share(MemoryUse::kReading);
+  // Trying again does not help who holds most of it.
+  if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
+    return LimitExceeded(
+        absl::StrCat("the hulls that the call names take ", bytes,
+                     " bytes of memory so far, and with what others hold that is more than the "
+                     "readers' share of it; name fewer hulls at a time"),
+        share, "memory-limit");
+  }
+  return memory_.Check(locked, MemoryUse::kReading);
+}
+
+// What readers are given of one hull now, or why there is nothing.
+absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls& hulls, uint32_t k,
+                              const std::function<bool()>& should_stop, const ReadPlan& plan,
+                              bool may_wait) {
+  KnownHulls::Known& known = hulls.hulls_[k];
+  bool was_missing = false;
+  while (true) {
+    const HullPointer hull = FindVisible(id);
+    if (hull == nullptr) {
+      known.view = NoSuchHull(id);
+      return absl::OkStatus();
     }
-    if (!wanted.failure.ok()) continue;
-    const bool found = wanted.hull->Serve() != nullptr;
-    wanted.held = wanted.hull->live;
-    if (!counted_) ++(found ? registry_.cache_.hits : registry_.cache_.misses);
-    ready = ready && found;
-  }
-  counted_ = true;
-  return ready;
-}
-
-bool Registry::Lookup::LoadMissing(Locked& locked, const std::function<bool()>& should_stop) {
-  for (Wanted& wanted : wanted_) {
-    if (!wanted.failure.ok() || wanted.hull->Serve() != nullptr) continue;
-    wanted.failure = registry_.LoadForReaders(locked, *wanted.hull, should_stop);
-    wanted.held = wanted.hull->live;
-    if (Stopped(should_stop) || absl::IsCancelled(wanted.failure)) return false;
-  }
-  return true;
-}
-
-bool Registry::Lookup::PrepareNext(Locked& locked) {
-  if (!plan_.prepare_first) return false;
-  for (Wanted& wanted : wanted_) {
-    if (!wanted.failure.ok() || std::exchange(wanted.prepared, true)) continue;
-    if (!WantsPreparing(*wanted.hull, plan_.expected_questions)) continue;
-    registry_.Prepare(locked, *wanted.hull);
-    return true;
-  }
-  return false;
-}
-
-Resolved Registry::Lookup::Take() {
-  Resolved resolved;
-  resolved.store_revision = registry_.revision_;
-  resolved.hulls.reserve(wanted_.size());
-  for (const Wanted& wanted : wanted_) {
-    if (!wanted.failure.ok()) {
-      resolved.hulls.emplace_back(wanted.failure);
+    if (hull->state.damaged()) {
+      known.view = hull->state.damage();
+      return absl::OkStatus();
+    }
+    const bool is_missing = !hull->IsReady();
+    const bool prepare = !is_missing && WantsPreparing(*hull, plan.expected_questions);
+    if (!may_wait && (is_missing || (prepare && plan.prepare_first))) return WouldWait();
+    if (is_missing) {
+      if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
+      if (!std::exchange(was_missing, true)) ++cache_.misses;
+      const absl::Status loaded = LoadForReaders(locked, *hull, should_stop);
+      if (Stopped(should_stop) || absl::IsCancelled(loaded)) return Cancelled();
+      if (loaded.ok() || hull->state.gone()) continue;
+      known.view = loaded;
+      return absl::OkStatus();
+    }
+    if (prepare && plan.prepare_first && !std::exchange(known.is_prepared, true)) {
+      Prepare(locked, *hull);
+      if (Stopped(should_stop)) return Cancelled();
       continue;
     }
-    std::shared_ptr<const ServedHull> served = wanted.hull->Serve();
-    HULLD_CHECK(served != nullptr);
-    resolved.hulls.emplace_back(HullView{wanted.hull->committed.record, std::move(served)});
-    wanted.hull->NoteUse();
-    if (WantsPreparing(*wanted.hull, plan_.expected_questions)) {
-      registry_.SchedulePreparing(wanted.hull);
-    }
+    if (!was_missing) ++cache_.hits;
+    if (prepare) SchedulePreparing(hull);
+    known.view = HullView{hull->committed.record, hull->Serve()};
+    known.bytes = hull->SharedBytes();
+    hull->NoteUse();
+    if (was_missing) memory_.Evict(locked);
+    return absl::OkStatus();
   }
-  return resolved;
 }
 
-// What is in memory is taken at once. Otherwise what is missing is read and all are looked for
-// again, since writers went on meanwhile; what was read stays, so that comes to an end.
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
                                            const std::function<bool()>& should_stop,
                                            const ReadPlan& plan) {
-  Locked locked(mutex_);
-  Lookup lookup(*this, ids, plan);
-  while (true) {
-    if (!lookup.Find()) {
-      if (!lookup.LoadMissing(locked, should_stop)) return Cancelled();
-    } else if (lookup.PrepareNext(locked)) {
-      if (Stopped(should_stop)) return Cancelled();
-    } else {
-      break;
-    }
+  KnownHulls known;
+  return Refresh(ids, known, should_stop, plan);
+}
+
+absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, KnownHulls& known,
+                                           const std::function<bool()>& should_stop,
+                                           const ReadPlan& plan) {
+  known.Begin(ids);
+  known.BeginLookup();
+  Resolved resolved;
+  {
+    Locked locked(mutex_);
+    const absl::Status status = LookUpDue(locked, ids, known, should_stop, plan, true);
+    if (!status.ok()) return status;
+    resolved.store_revision = revision_;
+    memory_.Evict(locked);
   }
-  Resolved resolved = lookup.Take();
-  memory_.Evict(locked);
+  resolved.hulls = known.Views(ids);
   return resolved;
 }
 
 std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
                                              const ReadPlan& plan) {
+  KnownHulls known;
+  known.Begin(ids);
   Resolved resolved;
-  Locked locked(mutex_);
-  std::vector<HullPointer> found;
-  for (const std::string& id : ids) {
-    const HullPointer hull = FindVisible(id);
-    if (hull == nullptr) {
-      resolved.hulls.emplace_back(NoSuchHull(id));
-      continue;
-    }
-    if (hull->state.damaged()) {
-      resolved.hulls.emplace_back(hull->state.damage());
-      continue;
-    }
-    std::shared_ptr<const ServedHull> served = hull->Serve();
-    if (served == nullptr) return std::nullopt;
-    const bool wants_preparing = WantsPreparing(*hull, plan.expected_questions);
-    if (wants_preparing && plan.prepare_first) return std::nullopt;
-    if (wants_preparing) SchedulePreparing(hull);
-    resolved.hulls.emplace_back(HullView{hull->committed.record, std::move(served)});
-    found.push_back(hull);
+  {
+    Locked locked(mutex_);
+    if (!LookUpDue(locked, ids, known, {}, plan, false).ok()) return std::nullopt;
+    resolved.store_revision = revision_;
   }
-  for (const HullPointer& hull : found) hull->NoteUse();
-  cache_.hits += found.size();
-  resolved.store_revision = revision_;
+  resolved.hulls = known.Views(ids);
   return resolved;
 }
 
@@ -179,7 +172,13 @@ absl::StatusOr<std::pair<uint64_t, HullView>> Registry::Resolve(
 absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
                                                 const std::function<bool()>& should_stop) {
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
+  if (absl::Status s = CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  const auto start = std::chrono::steady_clock::now();
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
+  if (snapshot_seconds_ != nullptr) {
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    snapshot_seconds_->Observe(taken.count());
+  }
   Locked locked(mutex_);
   const HullPointer hull = FindVisible(view.record.hull_id);
   const bool is_current =
@@ -196,7 +195,7 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
 absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
                                       const std::function<bool()>& should_stop) {
   bool failed = false;
-  while (hull.Serve() == nullptr && !hull.state.gone()) {
+  while (!hull.IsReady() && !hull.state.gone()) {
     if (hull.state.damaged()) return hull.state.damage();
     const bool is_ending = hull.state.life() == HullState::Life::kEnding;
     if (hull.loading || (failed && is_ending)) {
@@ -206,7 +205,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
       const auto may_go_on = [&] {
         return !hull.loading && !(failed && hull.state.life() == HullState::Life::kEnding);
       };
-      hull.changed.wait_for(locked.lock(), kCancellationPoll, may_go_on);
+      locked.WaitOn([&](auto& lock) { hull.changed.wait_for(lock, kCancellationPoll, may_go_on); });
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
@@ -257,6 +256,7 @@ void Registry::Prepare(Locked& locked, RegisteredHull& hull) {
   // Nothing came after: the mark lets go of what there was before.
   if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
   hull.DiscardServed(locked);
+  NoteChange(hull);
   hull.NoteUse();
 }
 

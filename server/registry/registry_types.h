@@ -104,7 +104,8 @@ struct BodyPage {
   bool more = false;
 };
 
-// Bodies that were all current at one revision of the store; null where there is none.
+// Bodies by ID, in the order asked for; null where there is none. Up to
+// Registry::kMostLookupsPerHold of them were all current at the revision.
 struct FoundBodies {
   uint64_t store_revision = 0;
   std::vector<std::shared_ptr<const Body>> bodies;
@@ -122,6 +123,9 @@ struct CacheStatistics {
   // Builders, points and what is prepared of them, canonical snapshots; points that wait to be
   // built, and vertices that wait for the store; and what calls hold for long (MemoryCharge).
   uint64_t bytes = 0;
+  // What of that is held for readers, and for writers (MemoryUse).
+  uint64_t reading_bytes = 0;
+  uint64_t writing_bytes = 0;
   uint64_t limit_bytes = 0;
   // Hulls that a reader asked for and that were in memory.
   uint64_t hits = 0;

@@ -13,7 +13,7 @@ absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarg
                                                                  const WatchStart& start,
                                                                  std::function<void()> on_ready) {
   Locked locked(mutex_);
-  if (absl::Status s = memory_.Check(locked); !s.ok()) return s;
+  if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   std::shared_ptr<ChangeWatch> watch = feed_.Open(target, std::move(on_ready));
   if (!start.tell_present) return watch;
   const bool resumes = start.after_revision > 0;

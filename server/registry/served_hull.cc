@@ -36,6 +36,11 @@ CanonicalHull::CanonicalHull(Hull hull) { Keep(std::move(hull)); }
 void CanonicalHull::Keep(Hull hull) {
   hull_.emplace(std::move(hull));
   hull_bytes_.store(hull_->MemoryBytes(), std::memory_order_release);
+  Count();
+}
+
+void CanonicalHull::Count() const {
+  if (part_ != nullptr) part_->SetBytes(MemoryBytes());
 }
 
 absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& record,
@@ -62,6 +67,7 @@ const QueryHull& CanonicalHull::query_hull() {
     HULLD_CHECK(is_made());
     query_hull_.emplace(*hull_);
     query_hull_bytes_.store(query_hull_->MemoryBytes(), std::memory_order_release);
+    Count();
   });
   return *query_hull_;
 }

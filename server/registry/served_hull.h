@@ -11,10 +11,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "core/hull/hull.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/query_hull.h"
+#include "server/registry/memory_budget.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
@@ -23,8 +25,9 @@ namespace hulld::server {
 // it: made by the first reader that needs it, and shared with those after it. Thread-safe.
 class CanonicalHull {
  public:
-  CanonicalHull() = default;
-  // One that is made already.
+  // part: where it counts what it holds.
+  explicit CanonicalHull(std::shared_ptr<MemoryPart> part) : part_(std::move(part)) {}
+  // One that is made already, and not counted.
   explicit CanonicalHull(Hull hull);
 
   // Null until it is made. Cost: O(1).
@@ -41,6 +44,7 @@ class CanonicalHull {
   // Whether query_hull() would only return.
   bool has_query_hull() const { return query_hull_bytes_.load(std::memory_order_acquire) > 0; }
 
+  const std::shared_ptr<MemoryPart>& part() const { return part_; }
   // What it holds by now. Bytes.
   size_t MemoryBytes() const {
     return hull_bytes_.load(std::memory_order_relaxed) +
@@ -51,7 +55,9 @@ class CanonicalHull {
   bool is_made() const { return hull_bytes_.load(std::memory_order_acquire) > 0; }
   // Requires that is_made() is false, and that no other thread makes it.
   void Keep(Hull hull);
+  void Count() const;
 
+  const std::shared_ptr<MemoryPart> part_;
   std::mutex mutex_;
   std::condition_variable changed_;
   // Guarded by the mutex: a thread makes it.

@@ -124,7 +124,7 @@ class Parser {
                   "in between can read and change what passes, tokens included")
         ->envname(EnvironmentName("insecure"))
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeLast);
-    Add("threads", config_.threads, "Threads of parallel queries; 0: one per core")
+    Add("threads", config_.threads, "Threads that compute answers; 0: as many as can run at a time")
         ->check(CLI::Range(0, 1024));
     AddStore();
     Add("drain-timeout", drain_timeout_seconds_,
@@ -197,7 +197,8 @@ class Parser {
     AddLimit(
         "memory-limit", limits.memory_limit,
         "Bytes of memory that hulls, points on their way to them, replacements under way and the "
-        "pairs of streams may hold, beside messages of calls and the store's own buffers; 0: half "
+        "placements, pairs and answers of batches, scenes and streams may hold, beside messages of "
+        "calls and the store's own buffers; 0: half "
         "of what the machine or the control group has",
         kAny, 0);
     AddLimit("request-memory", limits.request_memory,
@@ -218,10 +219,17 @@ class Parser {
              kAny);
     AddLimit("max-waiting-calls", limits.max_waiting_calls,
              "Calls that wait for a thread before others are refused", kAny);
+    AddLimit(
+        "max-calls-per-client", limits.max_calls_per_client,
+        "Calls of one client (a token or, without tokens, an address) that run at a time, open "
+        "streams included",
+        kAny);
     AddLimit("max-streams-per-client", limits.max_streams_per_client,
              "Streams of points or poses that one client has open", kAny);
     AddLimit("max-concurrent-batches", limits.max_concurrent_batches,
              "Batches and scenes that run at a time", kAny);
+    AddLimit("max-batches-per-client", limits.max_batches_per_client,
+             "Batches and scenes of one client that run at a time", kAny);
     Add("max-request-time", max_request_seconds_,
         "Seconds that one request may take; streams of points are exempt, streams of poses may "
         "take so long per message; 0: unlimited")

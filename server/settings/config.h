@@ -35,8 +35,9 @@ struct Limits {
   // GetBody's answer, at the longest IDs, stays under the 4 MiB that every gRPC client takes.
   uint64_t max_pieces_per_body = 10'000;
   // Bytes that hulls in memory may hold, replacements under way too, points that wait to be built
-  // or stored, and the placements and pairs of streams; beside messages of calls and the store's
-  // own buffers. 0: half of what the machine or the control group of the process has.
+  // or stored, and the placements, pairs and answers of batches, scenes and streams; beside
+  // messages of calls and the store's own buffers. 0: half of what the machine or the control group
+  // of the process has.
   uint64_t memory_limit = 0;
   // Bytes that requests may take from when they are parsed until they are answered, and the same
   // again for those that are on their way.
@@ -44,11 +45,17 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and watches. A client is a token
-  // or, without tokens, a peer address.
+  // Of max_calls and of max_calls_per_client, one in so many is kept for single calls: what lasts
+  // cannot fill them.
+  static constexpr uint64_t kKeptForSingleCalls = 4;
+  // Calls of one client that run, open streams included: fewer than max_waiting_calls, so that no
+  // client alone makes others be refused. A client is a token or, without tokens, a peer address.
+  uint64_t max_calls_per_client = 512;
+  // Of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and watches.
   uint64_t max_streams_per_client = 256;
-  // BatchCheckCollisions and FindCollisions that run; they take turns.
+  // BatchCheckCollisions and FindCollisions that run; they take turns. All, and of one client.
   uint64_t max_concurrent_batches = 32;
+  uint64_t max_batches_per_client = 16;
   // The longest time of one request, or one message of StreamCollisions; zero: unlimited.
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
@@ -68,7 +75,7 @@ struct Config {
   std::string tls_client_ca;
   // The tokens that may call (server/access/token_table.h); empty: everyone who can connect.
   std::string tokens_file;
-  // Threads of parallel queries; 0: one per core.
+  // Threads that compute answers; 0: DefaultThreads() of cpu_limit.h.
   int threads = 0;
   // Where hulls live: "rocksdb" or "memory".
   std::string store = "rocksdb";

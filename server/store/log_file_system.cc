@@ -45,20 +45,40 @@ class LogFileSystem::Directory : public rocksdb::FSDirectoryWrapper {
 class LogFileSystem::Log : public File {
  public:
   Log(LogFileSystem& system, std::string name, std::unique_ptr<rocksdb::FSWritableFile> file)
-      : File(system, std::move(file)), name_(std::move(name)) {}
+      : File(system, std::move(file)), name_(std::move(name)) {
+    const std::lock_guard lock(system_.mutex_);
+    system_.logs_[name_] = {0, 0, this};
+  }
+  ~Log() override {
+    const std::lock_guard lock(system_.mutex_);
+    const auto log = system_.logs_.find(name_);
+    if (log != system_.logs_.end() && log->second.open == this) log->second.open = nullptr;
+  }
 
   IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
                   IODebugContext* debug) override {
+    if (is_cut_) return AlreadyCut();
     const IOStatus status = FSWritableFileOwnerWrapper::Append(data, options, debug);
     return Note(data, status);
   }
   IOStatus Append(const rocksdb::Slice& data, const IOOptions& options,
                   const rocksdb::DataVerificationInfo& info, IODebugContext* debug) override {
+    if (is_cut_) return AlreadyCut();
     const IOStatus status = FSWritableFileOwnerWrapper::Append(data, options, info, debug);
     return Note(data, status);
   }
 
+  // Through the file that is open: when RocksDB closes it, it sets the size that it believes in.
+  IOStatus CutTo(uint64_t size) {
+    is_cut_ = true;
+    IOStatus cut = FSWritableFileOwnerWrapper::Truncate(size, IOOptions(), nullptr);
+    if (cut.ok()) cut = FSWritableFileOwnerWrapper::Sync(IOOptions(), nullptr);
+    return cut;
+  }
+
  private:
+  static IOStatus AlreadyCut() { return IOStatus::IOError("the log was cut after an error"); }
+
   // What a failed call wrote is not committed, however much it is.
   IOStatus Note(const rocksdb::Slice& data, const IOStatus& status) {
     const std::lock_guard lock(system_.mutex_);
@@ -67,6 +87,7 @@ class LogFileSystem::Log : public File {
   }
 
   const std::string name_;
+  std::atomic<bool> is_cut_ = false;
 };
 
 IOStatus LogFileSystem::NoteSync(const IOStatus& status) {
@@ -76,22 +97,28 @@ IOStatus LogFileSystem::NoteSync(const IOStatus& status) {
 
 void LogFileSystem::Commit() {
   const std::lock_guard lock(mutex_);
-  for (auto& [name, sizes] : logs_) sizes.committed = sizes.written;
+  for (auto& [name, log] : logs_) log.committed = log.written;
 }
 
 IOStatus LogFileSystem::CutUncommitted() {
   const std::lock_guard lock(mutex_);
-  for (auto& [name, sizes] : logs_) {
-    if (sizes.committed == sizes.written) continue;
-    std::unique_ptr<rocksdb::FSWritableFile> file;
-    IOStatus cut = ReopenWritableFile(name, rocksdb::FileOptions(), &file, nullptr);
-    if (cut.ok()) cut = file->Truncate(sizes.committed, IOOptions(), nullptr);
-    if (cut.ok()) cut = file->Sync(IOOptions(), nullptr);
-    if (cut.ok()) cut = file->Close(IOOptions(), nullptr);
+  for (auto& [name, log] : logs_) {
+    if (log.committed == log.written) continue;
+    const IOStatus cut = log.open != nullptr ? log.open->CutTo(log.committed) : Cut(name, log);
     if (!cut.ok()) return cut;
-    sizes.written = sizes.committed;
+    log.written = log.committed;
   }
   return IOStatus::OK();
+}
+
+// One that is closed.
+IOStatus LogFileSystem::Cut(const std::string& name, const LogState& log) {
+  std::unique_ptr<rocksdb::FSWritableFile> file;
+  IOStatus cut = ReopenWritableFile(name, rocksdb::FileOptions(), &file, nullptr);
+  if (cut.ok()) cut = file->Truncate(log.committed, IOOptions(), nullptr);
+  if (cut.ok()) cut = file->Sync(IOOptions(), nullptr);
+  if (cut.ok()) cut = file->Close(IOOptions(), nullptr);
+  return cut;
 }
 
 IOStatus LogFileSystem::NewWritableFile(const std::string& name,
@@ -103,10 +130,6 @@ IOStatus LogFileSystem::NewWritableFile(const std::string& name,
   if (!name.starts_with(directory_ + "/") || !name.ends_with(".log")) {
     *result = std::make_unique<File>(*this, std::move(*result));
     return opened;
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    logs_[name] = {};
   }
   *result = std::make_unique<Log>(*this, name, std::move(*result));
   return opened;

@@ -15,7 +15,7 @@ namespace hulld::server {
 
 // A file system that knows how much of RocksDB's write-ahead logs is committed, so that what a
 // failed write left at their end can be cut off: a change that was refused must not appear when
-// the log is read again.
+// the log is read again. A log that is cut while RocksDB has it open takes nothing more.
 //
 // It also hides how much room the disk has, on which RocksDB would resume by itself after an error
 // and write to a log that failed.
@@ -31,8 +31,9 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   // Syncs of files and directories that failed so far: RocksDB also refuses to write after one in
   // the background.
   uint64_t failed_syncs() const { return failed_syncs_.load(std::memory_order_relaxed); }
-  // Cuts off what is not. Requires that no database has the logs open (unchecked: only RocksDB
-  // knows; RocksDbStore::Reopen, the one caller, has just closed it).
+  // Cuts off what is not, and syncs that. Requires that nothing is written to the logs meanwhile
+  // (unchecked: RocksDbStore, the one caller, holds its log_mutex_, or has closed the database).
+  // An error: it may still be there, and the next call tries again.
   rocksdb::IOStatus CutUncommitted();
 
   rocksdb::IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,
@@ -50,17 +51,20 @@ class LogFileSystem : public rocksdb::FileSystemWrapper {
   class File;
   class Directory;
   class Log;
-  struct Sizes {
+  struct LogState {
     uint64_t written = 0;
     uint64_t committed = 0;
+    // Null once RocksDB has closed it.
+    Log* open = nullptr;
   };
 
   rocksdb::IOStatus NoteSync(const rocksdb::IOStatus& status);
+  rocksdb::IOStatus Cut(const std::string& name, const LogState& log);
 
   const std::string directory_;
   std::atomic<uint64_t> failed_syncs_ = 0;
   std::mutex mutex_;
-  std::map<std::string, Sizes> logs_;
+  std::map<std::string, LogState> logs_;
 };
 
 }  // namespace hulld::server

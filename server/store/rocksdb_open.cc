@@ -62,6 +62,10 @@ RocksDbStore::~RocksDbStore() {
   sync_wake_.notify_all();
   if (syncer_.joinable()) syncer_.join();
   if (relaxed_run_ && db_ != nullptr) EndRelaxedRun().IgnoreError();
+  // Once more, if what a failed write left could not be cut off when it failed.
+  db_ = nullptr;
+  if (failure_.ok() || files_->CutUncommitted().ok()) return;
+  spdlog::error("the log in {} may hold changes that were refused", options_.data_dir);
 }
 
 rocksdb::Options RocksDbStore::DbOptions() const {

@@ -8,7 +8,9 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <unordered_set>
 #include <utility>
 
@@ -90,10 +92,13 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   const rocksdb::Status status = db_->Write(options, &batch);
   if (status.ok()) {
     files_->Commit();
-  } else {
-    failure_ = WriteFailed(status);
+    return absl::OkStatus();
   }
-  return failure_;
+  failure_ = WriteFailed(status);
+  // The log may hold the batch, or a part of it, although it was not synced.
+  const rocksdb::Status cut = files_->CutUncommitted();
+  seen_failed_syncs_ = files_->failed_syncs();
+  return cut.ok() ? failure_ : OutcomeUnknown(status, cut, options_.data_dir);
 }
 
 absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
@@ -114,6 +119,37 @@ absl::StatusOr<std::string> RocksDbStore::MakeCopy() {
   if (status.ok()) return directory;
   std::filesystem::remove_all(directory, error);
   return WriteFailed(status);
+}
+
+std::optional<StoreDisk> RocksDbStore::disk() const {
+  StoreDisk disk;
+  std::error_code error;
+  std::filesystem::directory_iterator entry(DatabaseDirectory(options_.data_dir), error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    // A file may go meanwhile.
+    std::error_code gone;
+    const uintmax_t bytes = entry->file_size(gone);
+    if (gone) continue;
+    disk.bytes += bytes;
+    if (entry->path().extension() == ".log") disk.log_bytes += bytes;
+  }
+  const std::filesystem::space_info space = std::filesystem::space(options_.data_dir, error);
+  if (!error) disk.free_bytes = space.available;
+  // Not while it is opened anew, which takes as long as its log is long.
+  const std::shared_lock lock(db_mutex_, std::try_to_lock);
+  if (!lock.owns_lock() || db_ == nullptr) return disk;
+  uint64_t is_stopped = 0;
+  uint64_t delayed_rate = 0;
+  db_->GetIntProperty(rocksdb::DB::Properties::kIsWriteStopped, &is_stopped);
+  db_->GetIntProperty(rocksdb::DB::Properties::kActualDelayedWriteRate, &delayed_rate);
+  disk.is_stalled = is_stopped != 0 || delayed_rate != 0;
+  std::map<std::string, std::string> statistics;
+  db_->GetMapProperty(rocksdb::DB::Properties::kCFStats, &statistics);
+  for (const char* const name : {"io_stalls.total_slowdown", "io_stalls.total_stop"}) {
+    const auto found = statistics.find(name);
+    if (found != statistics.end()) disk.stalls += std::strtoull(found->second.c_str(), nullptr, 10);
+  }
+  return disk;
 }
 
 absl::Status RocksDbStore::Recover() {
@@ -178,7 +214,7 @@ absl::Status RocksDbStore::SyncLog() {
   const rocksdb::Status status = db_->SyncWAL();
   if (!status.ok() && !status.IsNotSupported()) {
     failure_ = WriteFailed(status);
-    spdlog::error("{}", std::string(failure_.message()));
+    spdlog::error("cannot sync the log in {}: {}", options_.data_dir, status.ToString());
   }
   return failure_;
 }

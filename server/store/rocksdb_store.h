@@ -74,6 +74,8 @@ class RocksDbStore : public Store {
             read_failures_.load(std::memory_order_relaxed)};
   }
 
+  std::optional<StoreDisk> disk() const override;
+
   // Hard links in <data-dir>/hulld-scratch/copy-..., in the layout of a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
 

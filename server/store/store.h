@@ -75,6 +75,18 @@ struct StoreFailures {
   uint64_t read = 0;
 };
 
+// What a store takes of its disk, and whether it keeps up with what is written.
+struct StoreDisk {
+  // All its files, and its log of these.
+  uint64_t bytes = 0;
+  uint64_t log_bytes = 0;
+  // What the disk has left for it.
+  uint64_t free_bytes = 0;
+  // How often changes were slowed down or stopped since it was opened, and whether they are.
+  uint64_t stalls = 0;
+  bool is_stalled = false;
+};
+
 // Where changes are kept, beside the registry that serves them. Any thread may read.
 class Store {
  public:
@@ -101,13 +113,17 @@ class Store {
                                                 const std::string& writer_id) = 0;
 
   // Keeps changes, all or none, before anyone can see them: one call at a time, in the order in
-  // which they take effect. An error refuses them all, and what is kept is as before. (Should this
-  // process be killed before Recover, the next one may find them, if the error was UNAVAILABLE.)
+  // which they take effect. An error refuses them all, and what is kept is as before, also for a
+  // process that opens the store after this one was killed; unless the error is UNAVAILABLE and
+  // says that this is not known: then the next process may find them, until Recover succeeds.
   virtual absl::Status Commit(std::span<const Change* const> changes) = 0;
   // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
   virtual absl::Status Recover() = 0;
 
   virtual StoreFailures failures() const { return {}; }
+
+  // None where nothing is on disk. Cost: O(files), some 10 us each.
+  virtual std::optional<StoreDisk> disk() const { return std::nullopt; }
 
   // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
   // directory, which the caller removes. FAILED_PRECONDITION: nothing is kept.

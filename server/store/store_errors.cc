@@ -9,15 +9,23 @@ namespace hulld::server {
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir) {
   const std::string cause = status.ToString();
   if (status.IsNoSpace()) {
-    return WithReason(
-        absl::ResourceExhaustedError(absl::StrCat(
-            "the disk that holds --data-dir ", data_dir, " is full (", cause,
-            "); nothing was changed; make room and append again, no restart is needed")),
-        v1::ERROR_REASON_DISK_FULL);
+    return WithReason(absl::ResourceExhaustedError(absl::StrCat(
+                          "the disk that holds --data-dir ", data_dir, " is full (", cause,
+                          "); nothing was changed; make room and repeat it, no restart is needed")),
+                      v1::ERROR_REASON_DISK_FULL);
   }
-  return absl::UnavailableError(
-      absl::StrCat("cannot write to --data-dir ", data_dir, " (", cause,
-                   "); append again once that is repaired, no restart is needed"));
+  return absl::UnavailableError(absl::StrCat(
+      "cannot write to --data-dir ", data_dir, " (", cause,
+      "); nothing was changed; repeat it once that is repaired, no restart is needed"));
+}
+
+absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
+                            const std::string& data_dir) {
+  return absl::UnavailableError(absl::StrCat(
+      "cannot write to --data-dir ", data_dir, " (", status.ToString(),
+      "), nor take back what is left of the write (", cut.ToString(),
+      "): nobody sees the change, but it may appear if the server is restarted before that is "
+      "repaired; look whether it did before you repeat it"));
 }
 
 absl::Status ReadError(const rocksdb::Status& status, const std::string& what) {

@@ -10,8 +10,12 @@
 // setting's value.
 namespace hulld::server {
 
-// A write failed. RESOURCE_EXHAUSTED: the disk is full; else UNAVAILABLE.
+// A write failed, and nothing is left of it. RESOURCE_EXHAUSTED: the disk is full; else
+// UNAVAILABLE.
 absl::Status WriteError(const rocksdb::Status& status, const std::string& data_dir);
+// UNAVAILABLE: a write failed, and so did taking back what it may have left in the log (`cut`).
+absl::Status OutcomeUnknown(const rocksdb::Status& status, const rocksdb::Status& cut,
+                            const std::string& data_dir);
 // A read failed. DATA_LOSS: what was read is damaged; else UNAVAILABLE. what: what was tried.
 absl::Status ReadError(const rocksdb::Status& status, const std::string& what);
 // UNAVAILABLE: the database could not be opened again after an error, not even for reading.

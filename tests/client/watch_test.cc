@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "client/client.h"
@@ -33,18 +34,19 @@ class Watches : public server::ServerTest {
     config_.data_dir = directory_ / "data";
     config_.listen = absl::StrCat("unix:", (directory_ / "socket").string());
     Restart(config_);
-    ClientOptions options;
-    options.server = server_->address();
+    options_.server = server_->address();
     // The client waits once it has lost the server: time for another one to start.
-    options.retry.wait = [this](std::chrono::milliseconds) {
+    options_.retry.wait = [this](std::chrono::milliseconds) {
       ++waits_;
+      if (loser_.joinable()) loser_.join();
       if (server_ != nullptr) return;
       Restart(config_);
       if (meanwhile_) meanwhile_();
     };
-    client_ = std::make_unique<Client>(options);
+    client_ = std::make_unique<Client>(options_);
   }
   ~Watches() override {
+    if (loser_.joinable()) loser_.join();
     client_.reset();
     server_.reset();
     std::filesystem::remove_all(directory_);
@@ -86,7 +88,10 @@ class Watches : public server::ServerTest {
   static inline int counter_ = 0;
   std::filesystem::path directory_;
   server::Config config_;
+  ClientOptions options_;
   std::unique_ptr<Client> client_;
+  // Ends the server, later.
+  std::thread loser_;
   std::function<void()> meanwhile_;
   int waits_ = 0;
 };
@@ -109,6 +114,35 @@ TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
   // Once for its creation and for its points, or once for both.
   EXPECT_THAT(told, testing::AnyOf(ElementsAre("c"), ElementsAre("c", "c")));
   EXPECT_GT(waits_, 0);
+}
+
+// The patience is for a server that is gone, not for one that has nothing to tell.
+TEST_F(Watches, QuietForLongGoOn) {
+  options_.timeout = std::chrono::seconds(2);
+  const Client client(options_);
+  Put("a", server::Cube());
+  const auto lose_later = [&] {
+    loser_ = std::thread([this] {
+      std::this_thread::sleep_for(options_.timeout + std::chrono::milliseconds(100));
+      TearDown();
+    });
+  };
+  const auto hulls = client.WatchHulls({});
+  auto hull_message = hulls->Next();
+  while (hull_message.ok() && !hull_message->synced()) hull_message = hulls->Next();
+  lose_later();
+  hull_message = hulls->Next();
+  EXPECT_TRUE(hull_message.ok()) << hull_message.status();
+
+  v1::CollisionWatchOpen open;
+  *open.add_placements() = server::PlacementOf("a", 0);
+  *open.add_placements() = server::PlacementOf("a", 0.5);
+  const auto pairs = client.WatchCollisions(open);
+  EXPECT_THAT(Events(Round(*pairs)), ElementsAre("ENTER 0 1"));
+  lose_later();
+  const auto pair_message = pairs->Next();
+  EXPECT_TRUE(pair_message.ok()) << pair_message.status();
+  EXPECT_GT(waits_, 1);
 }
 
 // Cubes of side 1 along x, as placements one by one and packed.

@@ -123,6 +123,15 @@ Option Command::AddTexts(const std::string& name, std::vector<std::string>* valu
   return Option(app_->add_option(name, *values, help), description);
 }
 
+Option Command::AddRepeated(const std::string& name, std::vector<std::string>* values,
+                            const std::string& help) {
+  OptionDescription* const description = Describe(name, help);
+  description->value_name = "TEXT";
+  CLI::Option* const option = app_->add_option(name, *values, help);
+  option->allow_extra_args(false);
+  return Option(option, description);
+}
+
 Option Command::AddParsed(const std::string& name,
                           std::function<absl::Status(const std::string&)> parse,
                           const std::string& help) {

@@ -68,6 +68,9 @@ class Command {
   Option AddText(const std::string& name, std::string* value, const std::string& help);
   Option AddTexts(const std::string& name, std::vector<std::string>* values,
                   const std::string& help);
+  // An option that may be given again and again, one value each time.
+  Option AddRepeated(const std::string& name, std::vector<std::string>* values,
+                     const std::string& help);
   // `parse` takes the value; the message of its error is shown behind the option's name.
   Option AddParsed(const std::string& name, std::function<absl::Status(const std::string&)> parse,
                    const std::string& help);

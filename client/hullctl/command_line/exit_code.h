@@ -24,7 +24,7 @@ enum class ExitCode {
 inline constexpr char kExitCodeHelp[] =
     "Exit codes:\n"
     "  0  done (a collision is an answer, not an error)\n"
-    "  1  the request failed: the server refused it, or an audit found something\n"
+    "  1  the request failed: the server refused it, or an audit or 'scene diff' found something\n"
     "  2  the command line or an input file is wrong, or a file cannot be written\n"
     "  3  no answer: the server cannot be reached, is draining, or took longer than --timeout\n"
     "  4  some items of a batch have no answer\n"

@@ -3,6 +3,8 @@
 
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/parts/split_append.h"
+#include "client/hullctl/parts/swell.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
@@ -16,6 +18,8 @@ struct AppendArguments {
   bool create = false;
   bool resume = false;
   std::string writer;
+  // Empty, "names" or "components".
+  std::string split;
 };
 
 // Sends files to one hull. The stream opens, and with --create the hull comes into being, once
@@ -133,7 +137,9 @@ void PrintJson(const Appender& appender, std::ostream& out) {
   out << MessageJson(acknowledged) << "\n";
 }
 
-void Print(const Invocation& run, const std::string& hull_id, const FileAppender& files) {
+// swell: as SwellOf; empty where nothing is known of it.
+void Print(const Invocation& run, const std::string& hull_id, const FileAppender& files,
+           const Swell& swell) {
   const Appender& appender = *files.appender();
   const AppendTotals& totals = appender.totals();
   const v1::PointCounts& counts = totals.counts;
@@ -165,6 +171,7 @@ void Print(const Invocation& run, const std::string& hull_id, const FileAppender
   }
   table.Row({"vertices", std::to_string(totals.vertex_count)})
       .Row({"revision", std::to_string(totals.hull_revision)});
+  if (!swell.text.empty()) table.Row({"volume", swell.text});
   table.Print(run.out);
 }
 
@@ -189,14 +196,36 @@ ExitCode FailAppend(const Invocation& run, const AppendArguments& arguments,
   return arguments.create ? ExitCode::kUsage : ExitCode::kRequestFailed;
 }
 
+// How much larger the hull is than the mesh of the files, where that can be told.
+Swell SwellOfFiles(const Invocation& run, const AppendArguments& arguments,
+                   const std::vector<ReadRequest>& plan, uint64_t points) {
+  const auto mesh = MeshOf(plan);
+  if (!mesh.has_value()) return {};
+  const auto swell = SwellOf(run.MakeClient(), arguments.hull_id, points, *mesh);
+  // The points are appended; that the hull cannot be read is no failure of that.
+  return swell.ok() ? *swell : Swell{};
+}
+
+ExitCode SplitAppend(const Invocation& run, const AppendArguments& arguments) {
+  const PointInput& input = arguments.input;
+  if (arguments.resume || !arguments.writer.empty() || input.skip_nonfinite ||
+      !input.format.empty() || input.chunk_points != 0) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--split goes with --create alone; the format is that of the file's name"));
+  }
+  const SplitBy split = arguments.split == "names" ? SplitBy::kName : SplitBy::kComponent;
+  return AppendParts(run, arguments.hull_id, input.files, split, arguments.create);
+}
+
 ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
+  if (!arguments.split.empty()) return SplitAppend(run, arguments);
   uint64_t total_bytes = 0;
   auto plan = PlanReads(arguments.input, &total_bytes);
   if (!plan.ok()) return run.FailUsage(plan.status());
   FileAppender files(run, arguments, total_bytes);
   FileAppender::Outcome outcome;
   for (auto request = plan->begin(); request != plan->end() && outcome.ok(); ++request) {
-    outcome = files.Read(std::move(*request));
+    outcome = files.Read(*request);
   }
   // Points read before a file's error are sent already: wait for them, so that the summary is true.
   const bool sent = files.appender() != nullptr;
@@ -204,7 +233,12 @@ ExitCode Append(const Invocation& run, const AppendArguments& arguments) {
   files.Clear();
   if (!outcome.stream.ok()) return FailAppend(run, arguments, files, outcome);
   if (outcome.file.ok() || (sent && files.appender()->totals().points_acknowledged > 0)) {
-    Print(run, arguments.hull_id, files);
+    const bool whole = outcome.file.ok() && files.appender() != nullptr;
+    const Swell swell =
+        whole ? SwellOfFiles(run, arguments, *plan, files.appender()->totals().points_acknowledged)
+              : Swell{};
+    Print(run, arguments.hull_id, files, swell);
+    WarnOfSwell(run, arguments.hull_id, swell.ratio);
   }
   return outcome.file.ok() ? ExitCode::kDone : FailAppend(run, arguments, files, outcome);
 }
@@ -227,16 +261,28 @@ void AddAppendCommand(Command program, Invocation* invocation) {
                "The same command was interrupted: leave out the chunks that this writer has "
                "committed")
       .Needs(writer);
+  command
+      .AddText("--split", &arguments->split,
+               "Make a hull ID/PART of each part: of what the file names (objects and groups of "
+               "obj, solids of stl, nodes of gltf), or of what hangs together")
+      .ValueName("HOW")
+      .OneOf({"names", "components"});
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf.\n"
       "--create makes the hull when there are points for it; files that are refused leave none.\n"
-      "--resume needs the same files, options and writer as before.");
+      "--resume needs the same files, options and writer as before.\n"
+      "Of meshes (obj, off, stl, gltf) it is said how much larger the hull is: its volume over "
+      "that\n"
+      "of the mesh, both summed exactly, where the mesh is closed. From 1.5 on there is a "
+      "warning.");
   command.SetExamples(
       {{"A new hull of a file", "hullctl append spider spider.obj --create"},
        {"Points as another program makes them", "scanner | hullctl append room - --create"},
        {"One that can be carried on with after an interruption",
         "hullctl append ball ball.xyz --create --writer lab"},
-       {"", "hullctl append ball ball.xyz --writer lab --resume"}});
+       {"", "hullctl append ball ball.xyz --writer lab --resume"},
+       {"Each object of a file as chair/OBJECT",
+        "hullctl append chair chair.obj --split names --create"}});
   command.OnGiven([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
 }
 

@@ -266,11 +266,6 @@ class BatchRun {
 };
 
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
-  if (arguments.colliding && run.json()) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        "--colliding leaves out pairs, but the messages of --output json answer each; 'hullctl "
-        "scene' finds those that collide"));
-  }
   const auto source = ByteSource::Open(arguments.file);
   if (!source.ok()) return run.FailUsage(source.status());
   const auto scene = ReadScene(source->get());
@@ -278,9 +273,22 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
   if (absl::Status rest = RefuseUpdates(source->get(), "batch"); !rest.ok()) {
     return run.FailUsage(rest);
   }
-  const auto pairs = PairsOf(*scene, arguments.file);
+  return AnswerPairs(run, arguments.file, *scene, arguments.wishes, arguments.colliding);
+}
+
+}  // namespace
+
+ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
+                     const QueryWishes& wishes, bool colliding) {
+  const BatchArguments arguments{file, wishes, colliding};
+  if (colliding && run.json()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--colliding leaves out pairs, but the messages of --output json answer each; 'hullctl "
+        "scene' finds those that collide"));
+  }
+  const auto pairs = PairsOf(scene, file);
   if (!pairs.ok()) return run.FailUsage(pairs.status());
-  BatchRun batch(run, arguments, *scene, *pairs);
+  BatchRun batch(run, arguments, scene, *pairs);
   if (absl::Status status = batch.Run(); !status.ok()) return run.Fail(status);
   const auto report = [&](uint64_t count, const char* what) {
     if (count == 0) return false;
@@ -295,8 +303,6 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
          : unchecked ? ExitCode::kCannotCheck
                      : ExitCode::kDone;
 }
-
-}  // namespace
 
 void AddBatchCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<BatchArguments>();

@@ -3,6 +3,8 @@
 
 #include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/invocation.h"
+#include "client/hullctl/command_line/query_options.h"
+#include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
 
@@ -35,6 +37,10 @@ void AddCompletionCommand(Command program, Invocation* invocation);
 void AddGenerateCommand(Command program, Invocation* invocation);
 // Hidden: writes man pages, for the build.
 void AddManCommand(Command program, Invocation* invocation);
+
+// Asks about the pairs of a scene that was read from `file`, as 'hullctl batch' does.
+ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
+                     const QueryWishes& wishes, bool colliding);
 
 }  // namespace hulld
 

@@ -10,6 +10,7 @@
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/scene/scene_commands.h"
 #include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
@@ -105,22 +106,19 @@ struct SceneArguments {
   QueryWishes wishes;
 };
 
-ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
-  const auto source = ByteSource::Open(arguments.file);
-  if (!source.ok()) return run.FailUsage(source.status());
-  auto read = ReadScene(source->get());
-  if (!read.ok()) return run.FailUsage(read.status());
-  if (absl::Status rest = RefuseUpdates(source->get(), "scene"); !rest.ok()) {
-    return run.FailUsage(rest);
-  }
-  if (read->pairs.has_value()) {
-    return run.FailUsage(absl::InvalidArgumentError(
-        absl::StrCat(arguments.file,
-                     ": it names pairs, but 'scene' finds them itself; ask with "
-                     "'hullctl batch', or leave them out")));
-  }
+// Reads what nothing may follow.
+absl::StatusOr<Scene> ReadWhole(const std::string& file) {
+  const auto source = ByteSource::Open(file);
+  if (!source.ok()) return source.status();
+  auto scene = ReadScene(source->get());
+  if (!scene.ok()) return scene.status();
+  if (absl::Status rest = RefuseUpdates(source->get(), "scene"); !rest.ok()) return rest;
+  return scene;
+}
+
+ExitCode Find(const Invocation& run, const QueryWishes& wishes, Scene* read) {
   double tolerance = read->request.tolerance();
-  arguments.wishes.Apply(read->request.mutable_wanted(), &tolerance);
+  wishes.Apply(read->request.mutable_wanted(), &tolerance);
   read->request.set_tolerance(tolerance);
   SceneRun scene(run, *read);
   if (absl::Status status = scene.Run(); !status.ok()) return run.Fail(status);
@@ -129,20 +127,71 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
   return ExitCode::kSomeFailed;
 }
 
+ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
+  if (arguments.file.empty()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "FILE is required: 'hullctl scene FILE', or 'hullctl scene apply|check|diff|delete FILE'"));
+  }
+  auto read = ReadWhole(arguments.file);
+  if (!read.ok()) return run.FailUsage(read.status());
+  if (read->pairs.has_value()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        absl::StrCat(arguments.file,
+                     ": it names pairs, but 'scene' finds them itself; ask with "
+                     "'hullctl scene check' or 'hullctl batch', or leave them out")));
+  }
+  return Find(run, arguments.wishes, &*read);
+}
+
+ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
+  auto read = ReadWhole(arguments.file);
+  if (!read.ok()) return run.FailUsage(read.status());
+  if (read->pairs.has_value()) {
+    return AnswerPairs(run, arguments.file, *read, arguments.wishes, /*colliding=*/false);
+  }
+  return Find(run, arguments.wishes, &*read);
+}
+
+void AddCheck(Command scene, const std::string* scene_file, Invocation* invocation) {
+  auto arguments = std::make_shared<SceneArguments>();
+  Command command = scene.AddCommand("check", "Answer what a scene file asks");
+  command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
+  AddWantedOptions(command, &arguments->wishes);
+  command.SetDetails(
+      "Where the file names pairs, each is answered, as by 'hullctl batch'; else all pairs that\n"
+      "collide, or are within the clearance, are found, as by 'hullctl scene FILE'. The hulls are\n"
+      "those of the server: 'hullctl scene apply' puts them there. 'hullctl scene apply --help'\n"
+      "shows how a scene in YAML asks.");
+  command.SetExamples({{"", "hullctl scene check cell.yaml --separation"}});
+  command.OnGiven([=] {
+    invocation->action = [=] {
+      const absl::Status alone = RefuseSecondFile(*scene_file);
+      return alone.ok() ? CheckScene(*invocation, *arguments) : invocation->FailUsage(alone);
+    };
+  });
+}
+
 }  // namespace
 
 void AddSceneCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<SceneArguments>();
-  Command command = program.AddCommand("scene", "Find all pairs of a scene that collide");
-  command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
+  Command command =
+      program.AddCommand("scene", "Find all pairs of a scene that collide; keep scenes as files");
+  command.AddText("FILE", &arguments->file, "The scene; - is standard input");
   AddWantedOptions(command, &arguments->wishes);
   command.SetDetails(std::string(kSceneFileHelp) +
                      "\nWith a clearance, pairs within it are found although they are separated.");
   command.SetExamples({{"", "hullctl scene scene.json"},
                        {"What comes within a centimetre",
                         "hullctl scene scene.txt --clearance 0.01 --separation"}});
-  command.OnGiven(
-      [=] { invocation->action = [=] { return FindInScene(*invocation, *arguments); }; });
+  command.OnGiven([=] {
+    // A command below this one has set what it does.
+    if (invocation->action == nullptr) {
+      invocation->action = [=] { return FindInScene(*invocation, *arguments); };
+    }
+  });
+  AddSceneSyncCommands(command, &arguments->file, invocation);
+  AddCheck(command, &arguments->file, invocation);
 }
 
 }  // namespace hulld

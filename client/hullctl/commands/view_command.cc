@@ -37,6 +37,11 @@ struct ViewArguments {
   std::string up = "y";
 };
 
+// Whether a file of that name is a scene rather than a mesh or points.
+bool IsSceneName(const std::string& name) {
+  return name.ends_with(".json") || name.ends_with(".yaml") || name.ends_with(".yml");
+}
+
 // A file that only this user can read and that sends a browser to the address. Other users see the
 // arguments of programs, so that the address itself must not be one.
 class AddressFile {
@@ -127,7 +132,7 @@ class Viewing {
     if (things.size() > 1) absl::StrAppend(&scene.title, " and ", things.size() - 1, " more");
     if (things.empty()) things.emplace_back();
     for (const std::string& thing : things) {
-      if (thing.ends_with(".json") && IsFile(thing)) {
+      if (IsSceneName(thing) && IsFile(thing)) {
         if (things.size() > 1) {
           return run_.FailUsage(absl::InvalidArgumentError(absl::StrCat(
               thing, " is a whole scene: its groups count its placements; give it alone")));
@@ -245,9 +250,10 @@ void AddViewCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ViewArguments>();
   Command command = program.AddCommand("view", "Look at hulls and files in a browser");
   command
-      .AddTexts("ID|PREFIX|FILE", &arguments->things,
-                "Hulls, hulls whose IDs start so, meshes, points, or a scene (.json); default: "
-                "all hulls")
+      .AddTexts(
+          "ID|PREFIX|FILE", &arguments->things,
+          "Hulls, hulls whose IDs start so, meshes, points, or a scene (.json, .yaml); default: "
+          "all hulls")
       .Completes(ValueKind::kHull);
   command.AddFlag("--demo", &arguments->demo,
                   "Show the textbook's scenes, keys 0 to 7, with hulls made for them");

@@ -10,6 +10,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/text_scene.h"
+#include "client/hullctl/scene/yaml_scene.h"
 
 namespace hulld {
 namespace {
@@ -159,6 +160,18 @@ absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
   return absl::InvalidArgumentError(absl::StrCat(source->name(), ": ", message));
 }
 
+// The rest of the source, behind `first`, as one YAML document.
+absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first) {
+  // Lines before it count in errors.
+  std::string text(static_cast<size_t>(source->line() - 1), '\n');
+  text.append(first);
+  for (std::string_view line; source->ReadLine(&line);) text.append("\n").append(line);
+  if (!source->status().ok()) return source->status();
+  const auto description = ParseYamlScene(text + "\n", source->name());
+  if (!description.ok()) return description.status();
+  return ToScene(*description, source->name());
+}
+
 // Which pairs of placements are never asked about together.
 class GroupRule {
  public:
@@ -233,7 +246,10 @@ absl::StatusOr<Scene> ReadScene(ByteSource* source) {
     if (first && !trimmed.empty() && trimmed.front() == '{') {
       return ReadJsonScene(source, std::string(line));
     }
-    if (!trimmed.empty() && trimmed.front() != '#') first = false;
+    if (first && !trimmed.empty() && trimmed.front() != '#') {
+      if (LooksLikeYaml(trimmed)) return ReadRestAsYaml(source, line);
+      first = false;
+    }
     if (absl::Status status = text.TakeLine(line); !status.ok()) return status;
   }
   if (!source->status().ok()) return source->status();

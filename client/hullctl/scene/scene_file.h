@@ -41,7 +41,8 @@ inline constexpr uint64_t kMostPairs = uint64_t{1} << 24;
 
 // What --help says of the formats.
 inline constexpr char kSceneFileHelp[] =
-    "FILE is a scene, as text or as JSON. As text, one item a line; # starts a comment:\n"
+    "FILE is a scene, as YAML ('hullctl scene apply --help' shows it), as text or as JSON.\n"
+    "As text, one item a line; # starts a comment:\n"
     "  place NAME HULL [[w x y z] tx ty tz]   a hull at a pose (none: as built)\n"
     "  pair NAME NAME                         ask about these two\n"
     "  all                                    ask about each two, as if no pair was named\n"
@@ -60,9 +61,10 @@ inline constexpr char kSceneFileHelp[] =
     "                       \"poses\":[1,0,0,0, 0,0,0,  1,0,0,0, 2,0,0]}}\n"
     "Updates of a stream may follow a JSON scene, one a line: see 'hullctl stream --help'.";
 
-// Reads the scene at the front of the source, and no further: a text to its end, a JSON object to
-// the end of the line that its last brace is on. INVALID_ARGUMENT "NAME:LINE: message", or "NAME:
-// message" for an object of several lines.
+// Reads the scene at the front of the source, and no further: a text or YAML to its end, a JSON
+// object to the end of the line that its last brace is on. INVALID_ARGUMENT "NAME:LINE: message",
+// "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for an object of several lines. YAML
+// names files and hulls that 'hullctl scene apply' puts on the server; none is opened here.
 absl::StatusOr<Scene> ReadScene(ByteSource* source);
 
 // The pairs of the scene, two indices each: named, or all that groups and movers leave.

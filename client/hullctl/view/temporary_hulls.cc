@@ -1,12 +1,12 @@
 #include "client/hullctl/view/temporary_hulls.h"
 
-#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <filesystem>
 
 #include "client/formats/point_file.h"
+#include "client/hullctl/command_line/hull_segment.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/view/bridge/random_name.h"
 
@@ -14,25 +14,10 @@ namespace hulld {
 namespace {
 
 constexpr size_t kPrefixBytes = 6;
-constexpr size_t kMostNameBytes = 100;
-
-// As a segment of an ID must be.
-std::string SegmentOf(std::string name) {
-  if (name.size() > kMostNameBytes) name.resize(kMostNameBytes);
-  for (char& c : name) {
-    const bool allowed =
-        absl::ascii_isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';
-    if (!allowed) c = '_';
-  }
-  const bool starts_well =
-      !name.empty() && absl::ascii_isalnum(static_cast<unsigned char>(name[0]));
-  return starts_well ? name : "x" + name;
-}
-
 }  // namespace
 
 TemporaryHulls::~TemporaryHulls() {
-  // Nobody is left to tell of a failure; the next start of the viewer does not depend on it.
+  // Nobody is left to tell of a failure; the next run does not depend on it.
   for (const std::string& id : ids_) static_cast<void>(client_.DeleteHull(id));
 }
 
@@ -43,7 +28,7 @@ absl::StatusOr<std::string> TemporaryHulls::AddFile(const std::string& path) {
   request.options.skip_nonfinite = true;
   std::string name = std::filesystem::path(path).filename().string();
   for (const std::string& id : ids_) {
-    if (id == prefix_ + SegmentOf(name)) name = absl::StrCat(ids_.size(), "-", name);
+    if (id == prefix_ + HullSegment(name)) name = absl::StrCat(ids_.size(), "-", name);
   }
   return Add(name, [&request](const Client::PointSink& sink) {
     return ReadPoints(request, [&sink](const PointBlock& block) { return sink(ToProto(block)); })
@@ -56,9 +41,9 @@ absl::StatusOr<std::string> TemporaryHulls::Add(
   if (prefix_.empty()) {
     const auto random = RandomHex(kPrefixBytes);
     if (!random.ok()) return random.status();
-    prefix_ = absl::StrCat("view/", *random, "/");
+    prefix_ = absl::StrCat(root_, "/", *random, "/");
   }
-  const std::string id = prefix_ + SegmentOf(name);
+  const std::string id = prefix_ + HullSegment(name);
   v1::ReplaceOpen open;
   open.set_hull_id(id);
   open.set_create_if_absent(true);

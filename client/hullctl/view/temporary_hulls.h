@@ -5,17 +5,20 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/client.h"
 
 namespace hulld {
 
-// Hulls that are on the server while hullctl shows them, under "view/RANDOM/". The destructor
+// Hulls that are on the server while hullctl needs them, under "ROOT/RANDOM/". The destructor
 // deletes them; a process that is killed leaves them there, for `hullctl delete`.
 class TemporaryHulls {
  public:
-  explicit TemporaryHulls(const Client& client) : client_(client) {}
+  // root: a segment of an ID.
+  explicit TemporaryHulls(const Client& client, std::string root = "view")
+      : client_(client), root_(std::move(root)) {}
   ~TemporaryHulls();
   TemporaryHulls(const TemporaryHulls&) = delete;
   TemporaryHulls& operator=(const TemporaryHulls&) = delete;
@@ -28,7 +31,8 @@ class TemporaryHulls {
 
  private:
   const Client& client_;
-  // "view/RANDOM/"; empty before the first.
+  const std::string root_;
+  // "ROOT/RANDOM/"; empty before the first.
   std::string prefix_;
   std::vector<std::string> ids_;
 };

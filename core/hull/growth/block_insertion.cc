@@ -86,6 +86,7 @@ class BlockInsertion {
   }
 
   ConflictLists::Outcome InsertSample(size_t stride) {
+    surface_.BeginInsertions(vertices_);
     ConflictLists lists(surface_, vertices_, poll_);
     if (surface_.triangle_count() <= kMostTrianglesToTest) {
       lists.Take(Sample(stride));
@@ -171,6 +172,7 @@ class BlockInsertion {
 
   // Inserts in rounds what conflict lists gave up and what no sample had.
   bool InsertRounds() {
+    surface_.BeginInsertions(vertices_);
     if (stride_before_ != 1) AppendSample(1, rest_);
     return InsertInRounds(surface_, vertices_, rest_, poll_);
   }

@@ -122,6 +122,9 @@ class Surface {
   // Steps of insertions since this was last asked, for a poll: one for each, and more for those
   // that change many triangles, or look for their place among many.
   uint64_t TakeSteps() { return std::exchange(steps_, 0); }
+  // To be called before many points are inserted: measures the surface for its present size while
+  // that goes on.
+  void BeginInsertions(const VertexTable& vertices);
   // Does what insertions in two steps leave undone: housekeeping for what comes.
   void FinishInsertions(const VertexTable& vertices);
 

@@ -271,12 +271,16 @@ double Surface::Reach(const VertexTable& vertices, const Vector& direction, Tria
   return 0;
 }
 
+void Surface::BeginInsertions(const VertexTable& vertices) {
+  if (alive_ >= next_update_) Update(vertices);
+}
+
 void Surface::FinishInsertions(const VertexTable& vertices) {
   // A map that was made fine for a large block takes more memory than it saves time from here on.
   while (directions_ && 2 * directions_->cell_count() > alive_ && directions_->Coarsen()) {
   }
-  // A centre is wanted now; to measure waits for the next single insertion, as a hull at rest would
-  // hold an unfinished map for nothing.
+  // A centre is wanted now; to measure waits for the next insertions, as a hull at rest would hold
+  // an unfinished map for nothing.
   if (!directions_ && alive_ >= next_update_) Update(vertices);
 }
 

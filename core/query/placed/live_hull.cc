@@ -249,17 +249,37 @@ LiveParts LiveHull::Prepared(const LiveParts& before, const Mark& mark) {
   return after;
 }
 
+size_t LiveHull::OwnBytes() { return sizeof(LiveHull) + sizeof(LiveParts); }
+
 size_t LiveHull::MemoryBytes() const {
+  size_t bytes = OwnBytes();
+  std::vector<Shared> shared;
   const std::lock_guard lock(mutex_);
-  const LiveParts& parts = *now_.parts_;
-  size_t bytes = sizeof(*this) + sizeof(LiveParts);
-  if (parts.base != nullptr) bytes += parts.base->MemoryBytes();
-  if (parts.tail != nullptr) bytes += parts.tail->MemoryBytes();
-  for (const auto& level : parts.levels) {
-    bytes += sizeof(PreparedLevel) + level->mapped.points.capacity() * sizeof(Vector) +
-             level->mapped.support.MemoryBytes();
-  }
+  AddShared(*now_.parts_, shared);
+  for (const Shared& part : shared) bytes += part.bytes;
   return bytes;
+}
+
+std::vector<LiveHull::Shared> LiveHull::SharedBy(const Mark& mark) const {
+  std::vector<Shared> shared;
+  const std::lock_guard lock(mutex_);
+  AddShared(*now_.parts_, shared);
+  if (mark.count_ > 0 && PartsFor(mark) != now_.parts_) AddShared(*PartsFor(mark), shared);
+  return shared;
+}
+
+// Those that are not among them.
+void LiveHull::AddShared(const LiveParts& parts, std::vector<Shared>& shared) {
+  const auto add = [&](const void* what, size_t bytes) {
+    const auto is_it = [what](const Shared& known) { return known.what == what; };
+    if (std::ranges::none_of(shared, is_it)) shared.push_back({what, bytes});
+  };
+  if (parts.base != nullptr) add(parts.base.get(), parts.base->MemoryBytes());
+  if (parts.tail != nullptr) add(parts.tail.get(), parts.tail->MemoryBytes());
+  for (const auto& level : parts.levels) {
+    add(level.get(), sizeof(PreparedLevel) + level->mapped.points.capacity() * sizeof(Vector) +
+                         level->mapped.support.MemoryBytes());
+  }
 }
 
 }  // namespace hulld

@@ -83,6 +83,16 @@ class LiveHull {
 
   // What it holds, shared with its versions. Bytes.
   size_t MemoryBytes() const;
+  // Something that it shares with versions, which may outlive it; told from others by its address,
+  // which is never followed.
+  struct Shared {
+    const void* what;
+    size_t bytes;
+  };
+  // What a version at `mark` shares, and what one after the last Append does; each once.
+  std::vector<Shared> SharedBy(const Mark& mark) const;
+  // MemoryBytes() without that.
+  static size_t OwnBytes();
   // Points that Prepare() moved so far, each as often as it was moved: for tests.
   uint64_t points_moved() const { return points_moved_.load(std::memory_order_relaxed); }
 
@@ -92,6 +102,7 @@ class LiveHull {
   // What serves a mark best. Requires the mutex.
   const Parts& PartsFor(const Mark& mark) const;
   LiveParts Prepared(const LiveParts& before, const Mark& mark);
+  static void AddShared(const LiveParts& parts, std::vector<Shared>& shared);
   static void Begin(std::vector<Vector> points, int dimension, Mark& next);
   static void AppendToTail(std::span<const Vector> points, Mark& next);
 

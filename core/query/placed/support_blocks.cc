@@ -1,5 +1,6 @@
 #include "core/query/placed/support_blocks.h"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -76,11 +77,69 @@ __attribute__((target("avx2"))) SupportPoint ScanAvx2(std::span<const SupportBlo
                                                       const PlainVector& n) {
   return ScanWhole(blocks, n);
 }
-#else
-SupportPoint ScanAvx2(std::span<const SupportBlock> blocks, const PlainVector& n) {
-  return ScanPortably(blocks, n);
+#endif
+
+#ifdef HULLD_HAS_NEON_PATH
+// ScanWhole with each four lanes as two registers of two, step by step. Of lanes wider than a
+// register the compiler compares one after the other.
+using Pair = double __attribute__((vector_size(16)));
+using PairIds = int64_t __attribute__((vector_size(16)));
+
+inline Pair LoadPair(const double* from) {
+  Pair pair;
+  std::memcpy(&pair, from, sizeof pair);
+  return pair;
+}
+
+SupportPoint ScanNeon(std::span<const SupportBlock> blocks, const PlainVector& n) {
+  const Pair x = {n.x, n.x};
+  const Pair y = {n.y, n.y};
+  const Pair z = {n.z, n.z};
+  const auto evaluate = [&](const SupportBlock& block, size_t i) __attribute__((always_inline)) {
+    return (x * LoadPair(block.x + i) + y * LoadPair(block.y + i)) + z * LoadPair(block.z + i);
+  };
+  Pair low = evaluate(blocks[0], 0);
+  Pair high = evaluate(blocks[0], 2);
+  PairIds low_ids = {0, 1};
+  PairIds high_ids = {2, 3};
+  PairIds ids = low_ids;
+  const PairIds two = {2, 2};
+  const PairIds four = {4, 4};
+  for (size_t i = 1; i < blocks.size(); ++i) {
+    ids += four;
+    const Pair low_values = evaluate(blocks[i], 0);
+    const Pair high_values = evaluate(blocks[i], 2);
+    const PairIds low_is_better = low_values > low;
+    const PairIds high_is_better = high_values > high;
+    low = low_is_better ? low_values : low;
+    low_ids = low_is_better ? ids : low_ids;
+    high = high_is_better ? high_values : high;
+    high_ids = high_is_better ? ids + two : high_ids;
+  }
+  Pair low_largest = low > high ? low : high;
+  Pair high_largest = high > low ? high : low;
+  const Pair low_turned = __builtin_shufflevector(low_largest, low_largest, 1, 0);
+  const Pair high_turned = __builtin_shufflevector(high_largest, high_largest, 1, 0);
+  low_largest = low_largest > low_turned ? low_largest : low_turned;
+  high_largest = high_largest > high_turned ? high_largest : high_turned;
+  const PairIds none = {kNone, kNone};
+  const PairIds low_first = low >= low_largest ? low_ids : none;
+  const PairIds high_first = high >= high_largest ? high_ids : none;
+  const PairIds both = low_first < high_first ? low_first : high_first;
+  const int64_t first = std::min<int64_t>(both[0], both[1]);
+  return {first == kNone ? 0 : static_cast<uint32_t>(first), low_largest[0]};
 }
 #endif
+
+SupportPoint Scan(std::span<const SupportBlock> blocks, const PlainVector& n) {
+#ifdef HULLD_HAS_AVX2_PATH
+  if (CurrentSimdPath() == SimdPath::kAvx2) return ScanAvx2(blocks, n);
+#endif
+#ifdef HULLD_HAS_NEON_PATH
+  if (CurrentSimdPath() == SimdPath::kNeon) return ScanNeon(blocks, n);
+#endif
+  return ScanPortably(blocks, n);
+}
 
 }  // namespace
 
@@ -88,10 +147,7 @@ SupportPoint FarthestOf(std::span<const SupportBlock> blocks, size_t count, cons
   HULLD_DCHECK(count > 0 && count <= 4 * blocks.size());
   const size_t whole = count / 4;
   SupportPoint best{0, -INFINITY};
-  if (whole > 0) {
-    const auto first = blocks.first(whole);
-    best = CurrentSimdPath() == SimdPath::kAvx2 ? ScanAvx2(first, n) : ScanPortably(first, n);
-  }
+  if (whole > 0) best = Scan(blocks.first(whole), n);
   for (size_t i = 4 * whole; i < count; ++i) {
     const SupportBlock& block = blocks[i / 4];
     const double value = SupportValue(n, block.x[i % 4], block.y[i % 4], block.z[i % 4]);

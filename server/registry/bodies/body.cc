@@ -17,8 +17,7 @@ std::shared_ptr<const PieceBoxes> Body::BoxesOf(std::span<const BodyPiece> piece
   const std::lock_guard lock(mutex_);
   boxes_ = boxes;
   box_revisions_ = std::move(hull_revisions);
-  charge_.Set(stored_->MemoryBytes() + boxes_->MemoryBytes() +
-              box_revisions_.capacity() * sizeof(uint64_t));
+  box_charge_.Set(boxes_->MemoryBytes() + box_revisions_.capacity() * sizeof(uint64_t));
   return boxes;
 }
 

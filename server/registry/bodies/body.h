@@ -27,7 +27,8 @@ class Body {
  public:
   Body(StoredBody stored, MemoryBudget& budget)
       : stored_(std::make_shared<StoredBody>(std::move(stored))),
-        charge_(budget, stored_->MemoryBytes()) {}
+        charge_(budget, MemoryUse::kWriting, stored_->MemoryBytes()),
+        box_charge_(budget, MemoryUse::kReading) {}
   // One that the store cannot give back. damage: not OK.
   Body(const std::string& id, absl::Status damage, MemoryBudget& budget)
       : Body(StoredBody{{id, 0, 0}, {}, {}}, budget) {
@@ -56,9 +57,11 @@ class Body {
   const std::shared_ptr<StoredBody> stored_;
   absl::Status damage_;
 
+  const MemoryCharge charge_;
+
   mutable std::mutex mutex_;
   // Guarded by mutex_.
-  mutable MemoryCharge charge_;
+  mutable MemoryCharge box_charge_;
   mutable std::vector<uint64_t> box_revisions_;
   mutable std::shared_ptr<const PieceBoxes> boxes_;
 };

@@ -3,7 +3,7 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
-#include <unordered_map>
+#include <algorithm>
 #include <utility>
 
 #include "server/contract/error_info.h"
@@ -13,32 +13,6 @@ namespace hulld::server {
 namespace {
 
 using Bodies = std::vector<std::shared_ptr<const Body>>;
-
-// The hulls to look up for some IDs: those that are none of bodies, then those of pieces. Each
-// once.
-class HullList {
- public:
-  HullList(std::span<const std::string> ids, const Bodies& bodies) {
-    for (size_t i = 0; i < ids.size(); ++i) {
-      if (bodies[i] == nullptr) Add(ids[i]);
-    }
-    for (const auto& body : bodies) {
-      if (body == nullptr) continue;
-      for (const std::string& id : body->hull_ids()) Add(id);
-    }
-  }
-
-  const std::vector<std::string>& ids() const { return ids_; }
-  size_t IndexOf(const std::string& id) const { return index_of_.at(id); }
-
- private:
-  void Add(const std::string& id) {
-    if (index_of_.emplace(id, ids_.size()).second) ids_.push_back(id);
-  }
-
-  std::vector<std::string> ids_;
-  std::unordered_map<std::string, size_t> index_of_;
-};
 
 // The first piece that has this hull.
 size_t PieceWith(const Body& body, size_t hull) {
@@ -61,20 +35,23 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
       {{"body_id", body_id}, {"piece", uint64_t{piece}}, {"hull_id", hull_id}});
 }
 
+// What was resolved of a hull, by ID.
+using FindHull = std::function<const absl::StatusOr<HullView>&(const std::string&)>;
+
 absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<const Body>& body,
-                                   const PlacedLookup& lookup, const HullList& list,
-                                   const std::vector<absl::StatusOr<HullView>>& found) {
+                                   const PlacedLookup& lookup, const FindHull& find_hull) {
   if (!body->damage().ok()) return body->damage();
   if (absl::Status s = CheckPiecePrefix(*body, lookup.prefix); !s.ok()) return s;
   constexpr size_t kPerHull = sizeof(HullView) + sizeof(const QueryHull*) + 2 * sizeof(uint64_t);
-  MemoryCharge charge(registry.memory(), body->pieces().size() * sizeof(BodyPiece) +
-                                             body->hull_ids().size() * kPerHull);
-  if (absl::Status s = registry.CheckMemory(); !s.ok()) return s;
+  MemoryCharge charge(
+      registry.memory(), MemoryUse::kReading,
+      body->pieces().size() * sizeof(BodyPiece) + body->hull_ids().size() * kPerHull);
+  if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   std::vector<HullView> hulls;
   std::vector<const QueryHull*> query_hulls;
   std::vector<uint64_t> revisions;
   for (size_t k = 0; k < body->hull_ids().size(); ++k) {
-    const absl::StatusOr<HullView>& hull = found[list.IndexOf(body->hull_ids()[k])];
+    const absl::StatusOr<HullView>& hull = find_hull(body->hull_ids()[k]);
     if (!hull.ok()) return WhyNoPiece(*body, k, hull.status());
     hulls.push_back(*hull);
     query_hulls.push_back(lookup.canonical ? &hull->served->canonical_query_hull()
@@ -110,24 +87,53 @@ absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& shou
   return absl::OkStatus();
 }
 
-absl::StatusOr<Resolved> ResolveHulls(Registry& registry, std::span<const std::string> ids,
-                                      const PlacedLookup& lookup,
+absl::StatusOr<Resolved> RefreshHulls(Registry& registry, std::span<const std::string> ids,
+                                      KnownHulls& known, const PlacedLookup& lookup,
                                       const std::function<bool()>& should_stop) {
   absl::StatusOr<Resolved> resolved =
-      registry.Resolve(ids, should_stop, lookup.canonical ? ReadPlan() : lookup.plan);
+      registry.Refresh(ids, known, should_stop, lookup.canonical ? ReadPlan() : lookup.plan);
   if (!resolved.ok() || !lookup.canonical) return resolved;
   if (absl::Status s = MakeCanonical(registry, should_stop, resolved->hulls); !s.ok()) return s;
   return resolved;
 }
 
-bool HasAny(const Bodies& bodies) {
-  for (const auto& body : bodies) {
-    if (body != nullptr) return true;
-  }
-  return false;
+// The bodies among the IDs; empty where there are none.
+Bodies BodiesAmong(const Registry& registry, std::span<const std::string> ids,
+                   const PlacedLookup& lookup) {
+  if (!lookup.takes_bodies || !registry.has_bodies()) return {};
+  Bodies bodies = registry.FindBodies(ids).bodies;
+  if (std::ranges::all_of(bodies, [](const auto& body) { return body == nullptr; })) return {};
+  return bodies;
 }
 
 }  // namespace
+
+void KnownPlaced::SetBodies(std::span<const std::string> ids, Bodies bodies) {
+  if (bodies == bodies_) return;
+  bodies_ = std::move(bodies);
+  hull_ids_.clear();
+  index_of_.clear();
+  hulls_ = {};
+  for (size_t i = 0; i < bodies_.size(); ++i) {
+    if (bodies_[i] == nullptr) AddHull(ids[i]);
+  }
+  for (const auto& body : bodies_) {
+    if (body == nullptr) continue;
+    for (const std::string& id : body->hull_ids()) AddHull(id);
+  }
+}
+
+void KnownPlaced::AddHull(const std::string& id) {
+  if (index_of_.emplace(id, hull_ids_.size()).second) hull_ids_.push_back(id);
+}
+
+size_t KnownPlaced::BodyBytes() const {
+  // An ID twice, and a node of the map.
+  constexpr size_t kPerHull = 2 * sizeof(std::string) + 4 * sizeof(size_t) + KnownHulls::kBytesEach;
+  size_t bytes = bodies_.capacity() * sizeof(bodies_[0]) + hull_ids_.size() * kPerHull;
+  for (const std::string& id : hull_ids_) bytes += 2 * id.capacity();
+  return bytes;
+}
 
 absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
   for (size_t hull = 0; hull < body.hull_ids().size(); ++hull) {
@@ -141,42 +147,46 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
   return absl::OkStatus();
 }
 
-// Bodies are looked for before and after the hulls. Where they are the same, they were current all
-// the while, so at the revision at which the hulls were, too.
 absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
-  if (!lookup.takes_bodies || !registry.has_bodies()) {
-    return ResolveHulls(registry, ids, lookup, should_stop);
-  }
-  Bodies bodies = registry.FindBodies(ids).bodies;
+  KnownPlaced known;
+  return RefreshPlaced(registry, ids, known, lookup, should_stop);
+}
+
+// Bodies are looked for before and after the hulls. Where they are the same, they were current all
+// the while, so at the revision at which the hulls were, too.
+absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
+                                       KnownPlaced& known, const PlacedLookup& lookup,
+                                       const std::function<bool()>& should_stop) {
+  Bodies bodies = BodiesAmong(registry, ids, lookup);
+  absl::StatusOr<Resolved> hulls;
   while (true) {
-    const HullList list(ids, bodies);
-    absl::StatusOr<Resolved> hulls = ResolveHulls(registry, list.ids(), lookup, should_stop);
-    if (!hulls.ok()) return hulls.status();
-    Bodies now = registry.FindBodies(ids).bodies;
-    if (now != bodies) {
-      bodies = std::move(now);
-      continue;
-    }
-    Resolved resolved;
-    resolved.store_revision = hulls->store_revision;
-    resolved.hulls.reserve(ids.size());
-    for (size_t i = 0; i < ids.size(); ++i) {
-      if (bodies[i] == nullptr) {
-        resolved.hulls.push_back(hulls->hulls[list.IndexOf(ids[i])]);
-      } else {
-        resolved.hulls.push_back(ServeBody(registry, bodies[i], lookup, list, hulls->hulls));
-      }
-    }
-    return resolved;
+    known.SetBodies(ids, std::move(bodies));
+    const auto hull_ids = known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids;
+    hulls = RefreshHulls(registry, hull_ids, known.hulls_, lookup, should_stop);
+    if (!hulls.ok()) return hulls;
+    bodies = BodiesAmong(registry, ids, lookup);
+    if (bodies == known.bodies_) break;
   }
+  if (!known.has_bodies()) return hulls;
+  const FindHull find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
+    return hulls->hulls[known.index_of_.at(id)];
+  };
+  Resolved resolved;
+  resolved.store_revision = hulls->store_revision;
+  resolved.hulls.reserve(ids.size());
+  for (size_t i = 0; i < ids.size(); ++i) {
+    resolved.hulls.push_back(bodies[i] == nullptr
+                                 ? find_hull(ids[i])
+                                 : ServeBody(registry, bodies[i], lookup, find_hull));
+  }
+  return resolved;
 }
 
 std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                          const PlacedLookup& lookup) {
-  const bool may_be_bodies = lookup.takes_bodies && registry.has_bodies();
-  if (may_be_bodies && HasAny(registry.FindBodies(ids).bodies)) return std::nullopt;
+  if (!BodiesAmong(registry, ids, lookup).empty()) return std::nullopt;
   std::optional<Resolved> resolved =
       registry.TryResolve(ids, lookup.canonical ? ReadPlan() : lookup.plan);
   if (!resolved.has_value() || !lookup.canonical) return resolved;

@@ -71,7 +71,7 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
   const auto shared = std::make_shared<Body>(std::move(body), memory_);
   Locked locked(mutex_);
   // Counted by now. What waits for others is not counted twice.
-  if (absl::Status s = memory_.Check(locked); !s.ok()) {
+  if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
   }
   PutBodyLocked(locked, shared, if_revision, done);
@@ -204,12 +204,17 @@ BodyPage Registry::ListBodies(const std::string& prefix, const std::string& afte
 FoundBodies Registry::FindBodies(std::span<const std::string> ids) const {
   FoundBodies found;
   found.bodies.reserve(ids.size());
-  const std::lock_guard lock(mutex_);
-  found.store_revision = revision_;
+  Locked locked(mutex_);
   for (const std::string& id : ids) {
+    if (locked.lookups() == kMostLookupsPerHold) {
+      locked.Unlock();
+      locked.Lock();
+    }
     const auto body = bodies_.find(id);
     found.bodies.push_back(body == bodies_.end() ? nullptr : body->second.committed);
+    locked.NoteLookup();
   }
+  found.store_revision = revision_;
   return found;
 }
 

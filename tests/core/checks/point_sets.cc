@@ -26,7 +26,11 @@ std::vector<Vector> ReadObjVertices(const std::string& path) {
 }
 
 Vector RandomSmallVector(Random& random) {
-  return Vector(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
+  // One after the other: the order of arguments is the compiler's choice.
+  const int z = random.Between(-3, 3);
+  const int y = random.Between(-3, 3);
+  const int x = random.Between(-3, 3);
+  return Vector(x, y, z);
 }
 
 }  // namespace

@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -148,6 +150,66 @@ TEST(Scene, CancellationEndsTheSearch) {
   EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);
   EXPECT_GT(emitted, 0u);
   EXPECT_LT(emitted, all);
+}
+
+// Every pair collides: what waits between two calls of emit must not grow with the scene.
+TEST(Scene, AnswersAreEmittedInBoundedPartsWhateverCollides) {
+  constexpr uint32_t kPlacements = 1000;
+  Random random(TestSeed(826));
+  const Hull ball = BuildHull(RandomOnSphere(random, 8, 1));
+  const QueryHull query(ball);
+  Scene scene;
+  for (uint32_t i = 0; i < kPlacements; ++i) {
+    scene.placements.push_back(*PlacedHull::Make(query, Pose()));
+  }
+  for (const int threads : {1, 2}) {
+    SceneOptions options;
+    options.threads = threads;
+    size_t largest = 0;
+    size_t found = 0;
+    const auto totals =
+        FindCollisions(scene.placements, options, [&](std::span<const SceneAnswer> answers) {
+          largest = std::max(largest, answers.size());
+          found += answers.size();
+        });
+    ASSERT_TRUE(totals.ok());
+    EXPECT_EQ(found, size_t{kPlacements} * (kPlacements - 1) / 2);
+    EXPECT_LE(largest, 4096u) << threads << " threads";
+  }
+}
+
+TEST(Scene, CandidatesAreGatheredInStepsAndTakeABitEachAtMost) {
+  constexpr uint32_t kPlacements = 5000;
+  Random random(TestSeed(827));
+  const Hull ball = BuildHull(RandomOnSphere(random, 8, 1));
+  const QueryHull query(ball);
+  // All but every third meet.
+  std::vector<PlacedHull> placements;
+  for (uint32_t i = 0; i < kPlacements; ++i) {
+    Pose pose;
+    if (i % 3 == 0) pose.t = Vector(100.0 * i, 0, 0);
+    placements.push_back(*PlacedHull::Make(query, pose));
+  }
+  const SceneOptions options;
+  const absl::StatusOr<SceneSearch> scene = SceneSearch::Make(placements, options);
+  ASSERT_TRUE(scene.ok());
+  SceneCandidates candidates;
+  for (const uint32_t a : {1u, 2u, 3u, 4000u, 4999u}) {
+    candidates.Start(*scene, a);
+    int steps = 1;
+    while (!candidates.Gather(16)) ++steps;
+    EXPECT_GT(steps, a < 3 ? 50 : 0);
+    std::vector<uint32_t> expected;
+    for (uint32_t b = a + 1; b < kPlacements && a % 3 != 0; ++b) {
+      if (b % 3 != 0) expected.push_back(b);
+    }
+    std::vector<uint32_t> found;
+    while (const std::optional<uint32_t> b = candidates.Next()) found.push_back(*b);
+    EXPECT_EQ(found, expected) << a;
+    EXPECT_EQ(candidates.Next(), std::nullopt);
+  }
+  // The list of a few, and a bit for each.
+  EXPECT_LT(candidates.MemoryBytes(), 2 * 1200 * sizeof(uint32_t) + kPlacements / 8 + 64);
 }
 
 TEST(Scene, BoxesHoldTheirHullsAtEveryScale) {

@@ -107,5 +107,49 @@ TEST(TextbookScenes, TwoRandomBalls) {
   ExpectScenes(small, other);
 }
 
+// Each piece tests one block of axes when it has no time at all.
+TEST(TextbookCheck, InPiecesGivesTheSameAnswerAndStopsBetweenThem) {
+  Random random(TestSeed(941));
+  const Hull a = BuildHull(RandomOnSphere(random, 60, 1));
+  const Hull b = BuildHull(RandomOnSphere(random, 60, 1));
+  const QueryHull query_a(a);
+  const QueryHull query_b(b);
+  for (const double x : {0.5, 1.9, 5.0}) {
+    for (const int threads : {1, 2}) {
+      const PlacedHull placed_a(query_a, Pose());
+      const PlacedHull placed_b(query_b, At({x, 0, 0}));
+      bool stop = false;
+      QueryOptions options;
+      options.method = Method::kTextbookSat;
+      options.threads = threads;
+      options.want_axis = true;
+      options.want_analysis = true;
+      options.should_stop = [&stop] { return stop; };
+      const absl::StatusOr<Answer> whole = CheckCollision(placed_a, placed_b, options);
+      ASSERT_TRUE(whole.ok());
+      absl::StatusOr<TextbookCheck> check = TextbookCheck::Begin(placed_a, placed_b, options);
+      ASSERT_TRUE(check.ok());
+      uint64_t pieces = 1;
+      while (!*check->Advance(TextbookSearch::Clock::time_point::min())) ++pieces;
+      constexpr uint64_t kAxesPerPoll = 64;
+      EXPECT_GE(pieces * threads, whole->analysis->axes_tested / kAxesPerPoll);
+      const absl::StatusOr<Answer> answer = check->Finish();
+      ASSERT_TRUE(answer.ok());
+      EXPECT_EQ(answer->relation, whole->relation);
+      EXPECT_EQ(answer->axis.has_value(), whole->axis.has_value());
+      EXPECT_EQ(answer->analysis->axes_total, whole->analysis->axes_total);
+      EXPECT_EQ(answer->analysis->axes_tested, whole->analysis->axes_tested);
+      EXPECT_EQ(answer->analysis->axis_index, whole->analysis->axis_index);
+      // Nobody waits for it any more after the first piece.
+      absl::StatusOr<TextbookCheck> stopped = TextbookCheck::Begin(placed_a, placed_b, options);
+      ASSERT_TRUE(stopped.ok());
+      if (*stopped->Advance(TextbookSearch::Clock::time_point::min())) continue;
+      stop = true;
+      EXPECT_TRUE(
+          absl::IsCancelled(stopped->Advance(TextbookSearch::Clock::time_point::max()).status()));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace hulld

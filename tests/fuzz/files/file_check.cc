@@ -15,6 +15,9 @@
 #include "client/formats/point_file.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/scene_file.h"
+#include "client/robot/joint_file.h"
+#include "client/robot/srdf_file.h"
+#include "client/robot/urdf_file.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld::fuzz {
@@ -198,6 +201,61 @@ FileVerdict CheckAnswer(std::string_view content) {
   return {finding, true};
 }
 
+bool AreFinite(const std::vector<double>& numbers) {
+  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
+}
+
+FileVerdict CheckUrdf(std::string_view content) {
+  const auto robot = ParseUrdf(std::string(content), kName);
+  if (!robot.ok()) return {CheckRefusal(robot.status()), false};
+  const auto links = static_cast<int>(robot->links.size());
+  for (int i = 0; i < links; ++i) {
+    const RobotLink& link = robot->links[static_cast<size_t>(i)];
+    if ((link.parent_joint < 0) != (i == 0)) return {"a root that is not the first link", false};
+    if (i == 0) continue;
+    const RobotJoint& joint = robot->joints[static_cast<size_t>(link.parent_joint)];
+    if (joint.child != i || joint.parent >= i) return {"a child before its parent", false};
+  }
+  // All that mimics comes to an end, and every link has a place.
+  const std::vector<double> values = AllJointValues(*robot, RestValues(*robot));
+  if (values.size() != robot->joints.size()) return {"a joint without a value", false};
+  if (LinkPoses(*robot, kNoMotion, values).size() != robot->links.size()) {
+    return {"a link without a place", false};
+  }
+  for (const LinkPair& pair : AdjacentPairs(*robot)) {
+    if (pair.first < 0 || pair.first >= pair.second || pair.second >= links) {
+      return {"neighbours that are no links", false};
+    }
+  }
+  return {"", true};
+}
+
+const Robot& SmallRobot() {
+  static const auto* const robot = new Robot(*ParseUrdf(
+      "<robot name='r'><link name='a'/><link name='b'/><joint name='j' type='continuous'>"
+      "<parent link='a'/><child link='b'/></joint></robot>",
+      kName));
+  return *robot;
+}
+
+FileVerdict CheckSrdf(std::string_view content) {
+  const auto pairs = ParseDisabledPairs(std::string(content), kName, SmallRobot());
+  if (!pairs.ok()) return {CheckRefusal(pairs.status()), false};
+  return {"", true};
+}
+
+FileVerdict CheckJoints(std::string_view content) {
+  ByteSource source(OpenInMemory(content), kName);
+  auto reader = WaypointReader::Open(&source, SmallRobot());
+  if (!reader.ok()) return {CheckRefusal(reader.status()), false};
+  for (std::vector<double> values;;) {
+    const auto more = reader->Next(&values);
+    if (!more.ok()) return {CheckRefusal(more.status()), false};
+    if (!*more) return {"", true};
+    if (values.size() != 1 || !AreFinite(values)) return {"a value that is not finite", false};
+  }
+}
+
 }  // namespace
 
 FileVerdict CheckFile(FileKind kind, std::string_view content) {
@@ -210,7 +268,14 @@ FileVerdict CheckFile(FileKind kind, std::string_view content) {
     case FileKind::kOffMesh:
       return CheckMesh(ReadOffMesh, content);
     case FileKind::kBatch:
+    case FileKind::kYamlScene:
       return CheckScene(content);
+    case FileKind::kUrdf:
+      return CheckUrdf(content);
+    case FileKind::kSrdf:
+      return CheckSrdf(content);
+    case FileKind::kJoints:
+      return CheckJoints(content);
     case FileKind::kAnswerJson:
       return CheckAnswer(content);
     case FileKind::kStreamJson: {
@@ -272,6 +337,28 @@ std::vector<SeedFile> SeedFiles() {
        R"({"storeId":"s","revision":"4"},"relation":"RELATION_TOUCHING","rung":4,"certificate":)"
        R"({"direction":{"x":1},"pairs":[{"indexA":4,"vertexA":{"x":1e308}}]},)"
        R"("withinClearance":false}})"},
+      {FileKind::kYamlScene,
+       "prefix: p/\nscale: mm\nhulls:\n  h: {box: [1, 2, 3]}\n  f: {file: a.stl, scale: 2}\n"
+       "  g: {points: [[0, 0, 0], [1, 0, 0]]}\nbodies:\n  b: [{hull: h, at: &p [1, 0, 0]}, "
+       "{id: x, at: {xyz: [0, 0, 1], rpy: [0, 0, 1]}}]\nplace:\n  a: {hull: h, group: q}\n"
+       "  c: {body: b, at: *p}\n  d: {id: x, group: q}\nignore: [[a, c]]\n"
+       "ask: {movers: [c], clearance: 0.1}\n"},
+      {FileKind::kYamlScene,
+       "# c\n---\nplace:\n  a: {id: x}\n  b:\n    id: \"y\"\n    at: [1, 0, 0, 1, 0, 0, 2]\n"
+       "ask: {pairs: [[a, b]], separation: true}\n"},
+      {FileKind::kUrdf,
+       "<?xml version=\"1.0\"?>\n<!-- c -->\n<robot name=\"r\"><link name=\"a\"><collision>"
+       "<origin xyz=\"0 0 1\" rpy=\"0 0 1\"/><geometry><capsule radius=\"1\" length=\"2\"/>"
+       "</geometry></collision></link><link name=\"b\"><collision><geometry><mesh "
+       "filename=\"a.stl\" scale=\"1 1 2\"/></geometry></collision></link><link name=\"c\"/>"
+       "<joint name=\"i\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/>"
+       "<axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"2\"/></joint><joint name=\"j\" "
+       "type=\"continuous\"><parent link=\"b\"/><child link=\"c\"/><mimic joint=\"i\" "
+       "multiplier=\"2\"/></joint></robot>"},
+      {FileKind::kSrdf,
+       "<robot name='r'><disable_default_collisions link='a'/><enable_collisions link1='a' "
+       "link2='b'/><disable_collisions link1='a' link2='b' reason='Never'/></robot>"},
+      {FileKind::kJoints, "time,j\n0,1.5\n# c\n\n1,-2e3\n"},
       {FileKind::kStreamJson,
        R"({"placements":[{"hullId":"a"},{"hullId":"b"}],"pairs":[0,1],"onlyChanges":true})"},
   };
@@ -325,6 +412,20 @@ const std::vector<std::string>& FileTokens() {
                                                                  "\\u0000",
                                                                  "\\ud800",
                                                                  "\"hullId\":",
+                                                                 "&a ",
+                                                                 "*a",
+                                                                 "<<: *p\n",
+                                                                 "place: ",
+                                                                 "  - ",
+                                                                 "<link name=\"z\"/>",
+                                                                 "<robot",
+                                                                 "</",
+                                                                 "/>",
+                                                                 "<!--",
+                                                                 "<![CDATA[",
+                                                                 "&lt;",
+                                                                 "&#x0;",
+                                                                 "mimic joint=\"j\"",
                                                                  "x,y,z\n",
                                                                  std::string(1, '\0'),
                                                                  std::string(300, '1'),

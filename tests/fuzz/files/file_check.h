@@ -8,7 +8,8 @@
 
 namespace hulld::fuzz {
 
-// What hullctl reads by code of this project: points, meshes, batches, and messages as JSON.
+// What hullctl reads by code of this project: points, meshes, batches,
+// scenes, robots, and messages as JSON.
 enum class FileKind {
   kObj,
   kOff,
@@ -22,8 +23,12 @@ enum class FileKind {
   kSceneJson,
   kAnswerJson,
   kStreamJson,
+  kYamlScene,
+  kUrdf,
+  kSrdf,
+  kJoints,
 };
-inline constexpr size_t kFileKinds = static_cast<size_t>(FileKind::kStreamJson) + 1;
+inline constexpr size_t kFileKinds = static_cast<size_t>(FileKind::kJoints) + 1;
 
 struct FileVerdict {
   // Empty when all is well.

@@ -31,8 +31,8 @@ TEST(TokenTable, FindsTheCallerByTheHashOfTheToken) {
       "B855"));
   ASSERT_TRUE(table.ok()) << table.status();
   EXPECT_EQ(table->size(), 2);
-  EXPECT_EQ(table->Find("abc"), (Caller{"a", Permission::kWrite, "cell-1/"}));
-  EXPECT_EQ(table->Find(""), (Caller{"b", Permission::kAdmin, ""}));
+  EXPECT_EQ(table->Find("abc"), (Caller{"a", Permission::kWrite, "cell-1/", 0xba7816bf8f01cfea}));
+  EXPECT_EQ(table->Find(""), (Caller{"b", Permission::kAdmin, "", 0xe3b0c44298fc1c14}));
   EXPECT_EQ(table->Find("abd"), std::nullopt);
   EXPECT_EQ(table->Find(std::string("sha256:") + kAbc), std::nullopt);
 }

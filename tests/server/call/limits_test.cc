@@ -151,6 +151,65 @@ TEST_F(LimitsTest, AClientHasSoManyStreamsAndGetsThemBack) {
   EXPECT_TRUE(fourth.is_open());
 }
 
+TEST_F(LimitsTest, AClientHasSoManyCallsWhateverTheServerHasLeft) {
+  Config config = TestConfig();
+  config.limits.max_calls_per_client = 1;
+  Restart(config);
+  Put("ball", Cube());
+  ASSERT_TRUE(WaitIdle());
+  Appender open(*hulls_, "ball", "w");
+  ASSERT_TRUE(open.is_open());
+  grpc::ClientContext context;
+  const grpc::Status refused = GetHull(&context);
+  ExpectRefused(refused, "max-calls-per-client");
+  ExpectRetryHint(context, refused, "100");
+  EXPECT_TRUE(open.Finish().ok());
+  ASSERT_TRUE(WaitIdle());
+  grpc::ClientContext again;
+  EXPECT_TRUE(GetHull(&again).ok());
+}
+
+// A textbook query of hours runs on the one thread that opens teams. One that lasts some
+// milliseconds, of the same kind, is answered meanwhile.
+TEST_F(LimitsTest, ALongTextbookQueryHoldsUpNoOther) {
+  Config config = TestConfig();
+  config.limits.max_textbook_axes = uint64_t{1} << 40;
+  Restart(config);
+  Put("large", Sphere(20'000));
+  Put("small", Sphere(150));
+  const auto query = [](const std::string& hull_id) {
+    v1::CheckCollisionRequest request;
+    request.set_method(v1::METHOD_TEXTBOOK_SAT);
+    *request.mutable_a() = PlacementOf(hull_id);
+    *request.mutable_b() = PlacementOf(hull_id, 0.5);
+    return request;
+  };
+  grpc::ClientContext long_context;
+  grpc::Status long_status;
+  std::thread long_query([&] {
+    v1::CheckCollisionResponse response;
+    long_status = collisions_->CheckCollision(&long_context, query("large"), &response);
+  });
+  const auto running = [this] {
+    const std::string text = prometheus::TextSerializer().Serialize(server_->metrics().Collect());
+    return text.find("hulld_requests_running{rpc=\"CheckCollision\"} 1") != std::string::npos;
+  };
+  // Bounded by the time limit of the test alone.
+  while (!running()) std::this_thread::yield();
+  grpc::ClientContext context;
+  // Where it has to wait for the long one, this ends the test.
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(2));
+  v1::CheckCollisionResponse response;
+  const grpc::Status status = collisions_->CheckCollision(&context, query("small"), &response);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(response.relation(), v1::RELATION_OVERLAPPING);
+  long_context.TryCancel();
+  long_query.join();
+  // It ran all the while: it was not answered, and could still be cancelled.
+  EXPECT_EQ(long_status.error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(WaitIdle());
+}
+
 TEST_F(LimitsTest, BatchesBeyondThoseThatTakeTurnsAreRefusedWithATimeToRetry) {
   Config config = TestConfig();
   config.limits.max_concurrent_batches = 1;
@@ -346,7 +405,7 @@ TEST(AdmissionTest, EveryOverdueCallIsCancelledWhileACancelledOneStays) {
   UnansweredCalls calls;
   const auto admit = [&] {
     return std::make_unique<Admission::Ticket>(
-        *admission.Admit(Rpc::kBatchCheckCollisions, {}, calls.Start()));
+        *admission.Admit({.rpc = Rpc::kBatchCheckCollisions, .client = "", .call = calls.Start()}));
   };
   std::unique_ptr<Admission::Ticket> first = admit();
   EXPECT_EQ(calls.Next(), GRPC_STATUS_CANCELLED);

@@ -59,8 +59,9 @@ class FaultyFileSystem::File : public rocksdb::FSWritableFileOwnerWrapper {
   }
   IOStatus Truncate(uint64_t size, const IOOptions& options, IODebugContext* debug) override {
     const std::shared_lock writing(system_.mutex_);
-    const IOStatus truncated = FSWritableFileOwnerWrapper::Truncate(size, options, debug);
     const std::lock_guard lock(system_.state_mutex_);
+    if (IOStatus error = system_.Error(false); !error.ok() && !error.IsNoSpace()) return error;
+    const IOStatus truncated = FSWritableFileOwnerWrapper::Truncate(size, options, debug);
     Written& file = system_.files_[name_];
     file.size = std::min(file.size, size);
     file.synced = std::min(file.synced, size);
@@ -131,9 +132,10 @@ class FaultyFileSystem::Directory : public rocksdb::FSDirectory {
   const std::filesystem::path name_;
 };
 
-void FaultyFileSystem::SetFault(Fault fault) {
+void FaultyFileSystem::SetFault(Fault fault, int64_t failures) {
   const std::lock_guard lock(state_mutex_);
   fault_ = fault;
+  failures_left_ = failures;
 }
 
 int64_t FaultyFileSystem::syncs() const {
@@ -168,7 +170,13 @@ std::vector<std::string> FaultyFileSystem::unsynced_directories() const {
   return names;
 }
 
-IOStatus FaultyFileSystem::Error(bool is_sync) const {
+IOStatus FaultyFileSystem::Error(bool is_sync) {
+  const IOStatus error = WhatFails(is_sync);
+  if (!error.ok() && --failures_left_ == 0) fault_ = Fault::kNone;
+  return error;
+}
+
+IOStatus FaultyFileSystem::WhatFails(bool is_sync) const {
   switch (fault_) {
     case Fault::kNone:
       return IOStatus::OK();
@@ -180,6 +188,8 @@ IOStatus FaultyFileSystem::Error(bool is_sync) const {
       return IOStatus::IOError("Read-only file system");
     case Fault::kSyncError:
       return is_sync ? IOStatus::IOError("Input/output error while syncing") : IOStatus::OK();
+    case Fault::kNoSpaceAtSync:
+      return is_sync ? IOStatus::NoSpace("No space left on device") : IOStatus::OK();
     case Fault::kReadError:
       return IOStatus::OK();
   }

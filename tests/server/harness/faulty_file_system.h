@@ -5,6 +5,7 @@
 #include <rocksdb/file_system.h>
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,6 +31,8 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
     kReadOnly,
     // Writes work, syncs fail.
     kSyncError,
+    // The same, as where a file system finds room for what was written only when it is synced.
+    kNoSpaceAtSync,
     // Reading tables fails, which are the files that end in .sst; the rest works.
     kReadError,
   };
@@ -37,7 +40,8 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   FaultyFileSystem() : FileSystemWrapper(rocksdb::FileSystem::Default()) {}
   const char* Name() const override { return "FaultyFileSystem"; }
 
-  void SetFault(Fault fault);
+  // failures: after so many the fault is over.
+  void SetFault(Fault fault, int64_t failures = std::numeric_limits<int64_t>::max());
   // Syncs of files so far.
   int64_t syncs() const;
 
@@ -83,15 +87,17 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
     std::optional<std::string> former;
   };
 
-  // What an operation fails with now. Requires state_mutex_ (unchecked: a std::mutex does not
-  // tell).
-  rocksdb::IOStatus Error(bool is_sync) const;
+  // What an operation fails with now; counts that it does. Requires state_mutex_ (unchecked: a
+  // std::mutex does not tell).
+  rocksdb::IOStatus Error(bool is_sync);
+  rocksdb::IOStatus WhatFails(bool is_sync) const;
 
   // Held shared while something is written, alone while survivors are copied.
   mutable std::shared_mutex mutex_;
   mutable std::mutex state_mutex_;
   // Guarded by state_mutex_.
   Fault fault_ = Fault::kNone;
+  int64_t failures_left_ = 0;
   int64_t syncs_ = 0;
   std::map<std::string, Written> files_;
   // Whether the entry of each that was made is synced.

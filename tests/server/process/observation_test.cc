@@ -6,8 +6,6 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <prometheus/text_serializer.h>
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -21,6 +19,7 @@
 #include <thread>
 
 #include "server/process/log.h"
+#include "tests/server/harness/captured_log.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -30,20 +29,26 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-// The reply to GET /metrics at "127.0.0.1:port".
-std::string HttpGetMetrics(const std::string& address) {
+// A connection to "127.0.0.1:port"; -1 when there is none.
+int Connect(const std::string& address) {
   const int fd = socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in name = {};
   name.sin_family = AF_INET;
   name.sin_port = htons(static_cast<uint16_t>(std::stoi(address.substr(address.find(':') + 1))));
   name.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  if (connect(fd, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0) return fd;
+  close(fd);
+  return -1;
+}
+
+// What comes back for these bytes at "127.0.0.1:port", until the server closes the connection.
+std::string HttpReply(const std::string& address, const std::string& request) {
+  const int fd = Connect(address);
   std::string reply;
-  if (connect(fd, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0) {
-    const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
-    EXPECT_EQ(send(fd, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
-    char buffer[4096];
-    for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) reply.append(buffer, n);
-  }
+  EXPECT_EQ(send(fd, request.data(), request.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(request.size()));
+  char buffer[4096];
+  for (ssize_t n = 0; (n = recv(fd, buffer, sizeof buffer, 0)) > 0;) reply.append(buffer, n);
   close(fd);
   return reply;
 }
@@ -76,10 +81,12 @@ TEST_F(Observation, MetricsAreServedOverHttpOnLoopbackAlone) {
   Config config = TestConfig();
   config.metrics_address = "127.0.0.1:0";
   Restart(config);
-  const std::string reply = HttpGetMetrics(server_->metrics_address());
+  const std::string reply = HttpReply(server_->metrics_address(), "GET /metrics HTTP/1.0\r\n\r\n");
   EXPECT_THAT(reply, StartsWith("HTTP/1.1 200"));
-  EXPECT_THAT(reply, HasSubstr("\nhulld_build_info{version=\"0.1.0\"} 1"));
-  EXPECT_THAT(reply, HasSubstr("\nhulld_requests_running 0"));
+  EXPECT_THAT(reply, HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8\r\n"));
+  EXPECT_THAT(reply, HasSubstr("\nhulld_build_info{"));
+  EXPECT_THAT(reply, HasSubstr("version=\"0.1.0\"} 1"));
+  EXPECT_THAT(reply, HasSubstr("\nhulld_requests_running{rpc=\"GetHull\"} 0"));
   EXPECT_THAT(reply, HasSubstr("\nprocess_resident_memory_bytes "));
   EXPECT_THAT(reply, HasSubstr("\nhulld_queue_tasks{pool=\"readers\"} 0"));
 
@@ -97,6 +104,91 @@ TEST_F(Observation, MetricsAreServedOverHttpOnLoopbackAlone) {
   config.metrics_address = "9551";
   EXPECT_THAT(std::string(Server::Start(config).status().message()),
               HasSubstr("--metrics-address is \"9551\""));
+}
+
+TEST_F(Observation, TheMetricsEndpointServesNothingElse) {
+  Config config = TestConfig();
+  config.metrics_address = "127.0.0.1:0";
+  Restart(config);
+  const auto reply = [this](const std::string& request) {
+    return HttpReply(server_->metrics_address(), request);
+  };
+  const std::string end = "\r\nConnection: close\r\n\r\n";
+  EXPECT_THAT(reply("GET / HTTP/1.1\r\nHost: h" + end), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(reply("GET /metrics/../etc/ HTTP/1.1\r\nHost: h" + end), StartsWith("HTTP/1.1 404"));
+  EXPECT_THAT(reply("GET /metrics?x=1 HTTP/1.1\r\nHost: h" + end), StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(reply("POST /metrics HTTP/1.1\r\nHost: h\r\nContent-Length: 0" + end),
+              StartsWith("HTTP/1.1 405"));
+  const std::string head = reply("HEAD /metrics HTTP/1.1\r\nHost: h" + end);
+  EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
+  EXPECT_TRUE(head.ends_with("\r\n\r\n"));
+  // A body, a header without an end, and what is no HTTP.
+  EXPECT_EQ(reply("GET /metrics HTTP/1.1\r\nContent-Length: 9\r\n\r\n123456789"), "");
+  EXPECT_EQ(reply("GET /metrics HTTP/1.1\r\nX: " + std::string(9000, 'x')), "");
+  EXPECT_EQ(reply("\x16\x03\x01 hello\r\n\r\n"), "");
+  // Two requests of one connection.
+  const std::string two =
+      reply("GET /metrics HTTP/1.1\r\nHost: h\r\n\r\nGET /none HTTP/1.1\r\nHost: h" + end);
+  EXPECT_THAT(two, StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(two, HasSubstr("HTTP/1.1 404"));
+}
+
+// A client that sends half a request, or reads no reply, holds up no other.
+TEST_F(Observation, AConnectionThatSaysNothingDoesNotHoldUpTheMetrics) {
+  Config config = TestConfig();
+  config.metrics_address = "127.0.0.1:0";
+  Restart(config);
+  std::vector<int> silent;
+  for (int i = 0; i < 8; ++i) {
+    silent.push_back(Connect(server_->metrics_address()));
+    EXPECT_EQ(send(silent.back(), "GET /me", 7, 0), 7);
+  }
+  EXPECT_THAT(HttpReply(server_->metrics_address(), "GET /metrics HTTP/1.0\r\n\r\n"),
+              StartsWith("HTTP/1.1 200"));
+  for (const int descriptor : silent) close(descriptor);
+}
+
+TEST_F(Observation, WhatIsOpenAndRunsIsShown) {
+  Put("a", Cube());
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  EXPECT_EQ(Metric("hulld_connections"), 1);
+  EXPECT_GT(Metric("process_open_fds"), 5);
+  EXPECT_GT(Metric("process_max_fds"), Metric("process_open_fds"));
+  const double before = Metric("process_open_fds");
+  {
+    Appender open(*hulls_, "a", "w");
+    ASSERT_TRUE(open.is_open());
+    EXPECT_EQ(Metric("hulld_requests_running{rpc=\"AppendPoints\"}"), 1);
+    EXPECT_EQ(Metric("hulld_requests_running{rpc=\"GetHull\"}"), 0);
+    ASSERT_TRUE(open.Finish().ok());
+  }
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  EXPECT_EQ(Metric("hulld_requests_running{rpc=\"AppendPoints\"}"), 0);
+  const std::string address = server_->address();
+  const int another = Connect(address);
+  // Both ends are in this process. Bounded by the time limit of the test alone.
+  while (Metric("hulld_connections") != 2) std::this_thread::yield();
+  EXPECT_GE(Metric("process_open_fds"), before + 2);
+  close(another);
+  while (Metric("hulld_connections") != 1) std::this_thread::yield();
+  // Nothing of this store is on a disk.
+  EXPECT_EQ(Metric("hulld_store_disk_bytes"), 0);
+  EXPECT_EQ(Metric("hulld_snapshot_duration_seconds_count"), 0);
+  Get("a");
+  EXPECT_EQ(Metric("hulld_snapshot_duration_seconds_count"), 1);
+}
+
+TEST_F(Observation, TokensAreCountedByNameUpToANumber) {
+  server::Metrics metrics;
+  metrics.CountToken("");
+  for (size_t i = 0; i < server::Metrics::kMostTokens + 7; ++i)
+    metrics.CountToken("t" + std::to_string(i));
+  metrics.CountToken("t0");
+  const std::string text = prometheus::TextSerializer().Serialize(metrics.Collect());
+  EXPECT_THAT(text, HasSubstr("hulld_token_requests_total{token=\"t0\"} 2\n"));
+  EXPECT_THAT(text, HasSubstr("hulld_token_requests_total{token=\"t99\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("hulld_token_requests_total{token=\"other\"} 7\n"));
+  EXPECT_THAT(text, Not(HasSubstr("token=\"t100\"")));
 }
 
 TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
@@ -119,6 +211,7 @@ TEST_F(Observation, CallsPointsHullsAndPairsAreCounted) {
   EXPECT_EQ(Metric("hulld_points_inside_total"), 1);
   EXPECT_EQ(Metric("hulld_hulls"), 1);
   EXPECT_EQ(Metric("hulld_vertices"), 8);
+  EXPECT_GT(Metric("hulld_registry_lock_hold_max_seconds"), 0);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"CreateHull\"}"), 1);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"OK\",rpc=\"CheckCollision\"}"), 2);
   EXPECT_EQ(Metric("hulld_requests_total{code=\"NOT_FOUND\",rpc=\"CheckCollision\"}"), 1);
@@ -265,24 +358,6 @@ TEST_F(Observation, ErrorsNameTheRequestInTheirDetails) {
                          message + "\x1a" + std::string(1, static_cast<char>(any.size())) + any));
 }
 
-// spdlog's default logger into a string, as the server writes it, until this goes.
-class CapturedLog {
- public:
-  CapturedLog() {
-    auto logger = std::make_shared<spdlog::logger>(
-        "captured", std::make_shared<spdlog::sinks::ostream_sink_mt>(text_));
-    logger->set_pattern("%l %v");
-    logger->set_level(spdlog::level::debug);
-    spdlog::set_default_logger(std::move(logger));
-  }
-  ~CapturedLog() { spdlog::set_default_logger(before_); }
-  std::string text() const { return text_.str(); }
-
- private:
-  const std::shared_ptr<spdlog::logger> before_ = spdlog::default_logger();
-  std::ostringstream text_;
-};
-
 TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
   const LineBudget::Clock::time_point start{};
   LineBudget budget(2, std::chrono::seconds(10));
@@ -335,7 +410,7 @@ TEST_F(Observation, LogLinesAboutACallNameItsRequest) {
   again.AddMetadata("x-request-id", "made-2");
   EXPECT_FALSE(hulls_->CreateHull(&again, request, &response).ok());
   server_.reset();  // so that nothing logs any more
-  EXPECT_THAT(log.text(), HasSubstr("info hull created rpc=CreateHull request_id=made-1 hull=a\n"));
+  EXPECT_THAT(log.text(), HasSubstr("info hull created rpc=CreateHull request_id=made-1 peer="));
   EXPECT_THAT(log.text(), HasSubstr("debug request failed rpc=CreateHull request_id=made-2 peer="));
   EXPECT_THAT(log.text(), HasSubstr(" code=ALREADY_EXISTS milliseconds="));
 }

@@ -99,7 +99,7 @@ class CommitterTest : public ::testing::Test {
     return ended->get_future();
   }
 
-  std::mutex order_;
+  FairMutex order_;
   // Guarded by order_.
   std::vector<Outcome> outcomes_;
   GatedStore store_;
@@ -184,7 +184,7 @@ TEST_F(CommitterTest, TheStoreRecoversBeforeTheNextBatch) {
 
 TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
   GatedStore store;
-  std::mutex order;
+  FairMutex order;
   int ended = 0;
   {
     Committer committer(store, order);
@@ -198,8 +198,8 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
 
 TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
   GatedStore store;
-  std::mutex order;
-  std::mutex another;
+  FairMutex order;
+  FairMutex another;
   EXPECT_DEATH(
       {
         Committer committer(store, order);

@@ -23,7 +23,7 @@ class MemoryBudgetTest : public ::testing::Test {
     Owner(MemoryBudgetTest& test, int owner_number, uint64_t in_use_bytes = 0)
         : number(owner_number), in_use(in_use_bytes), account(test.budget_, [this, &test](Locked&) {
             test.asked_.push_back(number);
-            return in_use;
+            account.Set(in_use, false);
           }) {}
     const int number;
     uint64_t in_use;
@@ -34,24 +34,26 @@ class MemoryBudgetTest : public ::testing::Test {
     Locked locked(owners_);
     budget_.Evict(locked);
   }
-  absl::Status Check() {
+  absl::Status Check(MemoryUse use) {
     Locked locked(owners_);
-    return budget_.Check(locked);
+    return budget_.Check(locked, use);
   }
   uint64_t bytes() const { return budget_.Statistics().bytes; }
+  uint64_t reading() const { return budget_.Statistics().reading; }
+  uint64_t writing() const { return budget_.Statistics().writing; }
 
-  std::mutex owners_;
-  MemoryBudget budget_{100, owners_};
+  FairMutex owners_;
+  MemoryBudget budget_{100, 40, owners_};
   // The numbers of the owners that were asked to let go, in order.
   std::vector<int> asked_;
 };
 
 TEST_F(MemoryBudgetTest, CountsAccountsAndCharges) {
   Owner owner(*this, 1);
-  owner.account.Set(30);
-  MemoryCharge charge(budget_, 20);
+  owner.account.Set(30, false);
+  MemoryCharge charge(budget_, MemoryUse::kWriting, 20);
   EXPECT_EQ(bytes(), 50);
-  owner.account.Set(10);
+  owner.account.Set(10, false);
   charge.Set(25);
   EXPECT_EQ(bytes(), 35);
   {
@@ -65,9 +67,9 @@ TEST_F(MemoryBudgetTest, CountsAccountsAndCharges) {
 
 TEST_F(MemoryBudgetTest, NoAccountLetsGoWithinTheLimit) {
   Owner owner(*this, 1);
-  owner.account.Set(100);
+  owner.account.Set(100, false);
   Evict();
-  EXPECT_TRUE(Check().ok());
+  EXPECT_TRUE(Check(MemoryUse::kWriting).ok());
   EXPECT_THAT(asked_, ElementsAre());
 }
 
@@ -75,8 +77,8 @@ TEST_F(MemoryBudgetTest, TheOneNotUsedForLongestGoesFirstAndNoMoreThanNeeded) {
   Owner a(*this, 1);
   Owner b(*this, 2);
   Owner c(*this, 3);
-  for (Owner* owner : {&a, &b, &c}) owner->account.Set(50);
-  a.account.Set(50);
+  for (Owner* owner : {&a, &b, &c}) owner->account.Set(50, false);
+  a.account.Set(50, false);
   Evict();
   EXPECT_THAT(asked_, ElementsAre(2));
   EXPECT_EQ(bytes(), 100);
@@ -86,15 +88,15 @@ TEST_F(MemoryBudgetTest, TheOneNotUsedForLongestGoesFirstAndNoMoreThanNeeded) {
 TEST_F(MemoryBudgetTest, WhatIsInUseStaysAndIsAskedAgain) {
   Owner busy(*this, 1, 60);
   Owner idle(*this, 2);
-  busy.account.Set(60);
-  idle.account.Set(60);
+  busy.account.Set(60, false);
+  idle.account.Set(60, false);
   Evict();
   EXPECT_THAT(asked_, ElementsAre(1, 2));
   EXPECT_EQ(bytes(), 60);
   EXPECT_EQ(budget_.Statistics().evictions, 1);
   // It grew since it was counted.
   busy.in_use = 110;
-  MemoryCharge charge(budget_, 50);
+  MemoryCharge charge(budget_, MemoryUse::kReading, 50);
   Evict();
   EXPECT_THAT(asked_, ElementsAre(1, 2, 1));
   EXPECT_EQ(bytes(), 160);
@@ -103,30 +105,81 @@ TEST_F(MemoryBudgetTest, WhatIsInUseStaysAndIsAskedAgain) {
   EXPECT_EQ(bytes(), 50);
 }
 
-TEST_F(MemoryBudgetTest, RefusesOnceNoAccountCanLetGoOfMore) {
-  Owner owner(*this, 1, 40);
-  owner.account.Set(80);
-  MemoryCharge charge(budget_, 60);
-  EXPECT_TRUE(Check().ok());
-  charge.Set(61);
-  const absl::Status refused = Check();
-  EXPECT_TRUE(absl::IsResourceExhausted(refused));
-  EXPECT_THAT(std::string(refused.message()), HasSubstr("hold 101 bytes"));
-  EXPECT_THAT(std::string(refused.message()), HasSubstr("--memory-limit"));
+// One that cannot let go is asked again after all others, and a few at a time.
+TEST_F(MemoryBudgetTest, OneEvictionAsksABoundedNumber) {
+  std::vector<std::unique_ptr<Owner>> owners;
+  for (int i = 0; i < 200; ++i) {
+    owners.push_back(std::make_unique<Owner>(*this, i, i < 150 ? 1 : 0));
+    owners.back()->account.Set(1, false);
+  }
+  const MemoryCharge charge(budget_, MemoryUse::kWriting, 50);
+  Evict();
+  EXPECT_EQ(asked_.size(), MemoryBudget::kMostAsked);
+  EXPECT_EQ(bytes(), 250);
+  for (int i = 0; i < 3; ++i) Evict();
+  EXPECT_EQ(bytes(), 200);
 }
 
-TEST_F(MemoryBudgetTest, AnEmptyAccountMayOutliveTheBudget) {
-  auto budget = std::make_unique<MemoryBudget>(100, owners_);
-  MemoryBudget::Account account(*budget, [](Locked&) { return 0; });
-  account.Set(50);
+TEST_F(MemoryBudgetTest, EachUseHasAShareOfItsOwn) {
+  MemoryCharge writing(budget_, MemoryUse::kWriting, 60);
+  MemoryCharge reading(budget_, MemoryUse::kReading, 40);
+  EXPECT_TRUE(Check(MemoryUse::kWriting).ok());
+  EXPECT_TRUE(Check(MemoryUse::kReading).ok());
+  writing.Set(61);
+  const absl::Status refused = Check(MemoryUse::kWriting);
+  EXPECT_TRUE(absl::IsResourceExhausted(refused));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("writers hold 61 bytes"));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("the limit is 60 (--memory-limit)"));
+  EXPECT_TRUE(Check(MemoryUse::kReading).ok());
+  writing.Set(60);
+  reading.Set(41);
+  EXPECT_TRUE(Check(MemoryUse::kWriting).ok());
+  EXPECT_THAT(std::string(Check(MemoryUse::kReading).message()),
+              HasSubstr("readers hold 41 bytes"));
+}
+
+TEST_F(MemoryBudgetTest, APartIsHeldForReadersWhileOneHoldsIt) {
+  Owner owner(*this, 1);
+  const auto part = std::make_shared<MemoryPart>(budget_, &owner, 30);
+  EXPECT_EQ(bytes(), 0);
+  owner.account.Set(5, false);
+  owner.account.Hold({part});
+  EXPECT_EQ(bytes(), 35);
+  {
+    const MemoryPin pin({part});
+    EXPECT_EQ(bytes(), 35);
+    EXPECT_EQ(reading(), 30);
+    const MemoryPin another({part});
+    EXPECT_EQ(reading(), 30);
+    part->SetBytes(40);
+    EXPECT_EQ(reading(), 40);
+    // A writer needs what readers hold, too.
+    owner.account.Set(5, true);
+    EXPECT_EQ(reading(), 0);
+    EXPECT_EQ(writing(), 45);
+    owner.account.Hold({});
+    EXPECT_EQ(reading(), 40);
+    EXPECT_EQ(writing(), 5);
+    owner.account.Close();
+    EXPECT_EQ(bytes(), 40);
+  }
+  EXPECT_EQ(bytes(), 0);
+}
+
+TEST_F(MemoryBudgetTest, AnEmptyAccountAndAPartMayOutliveTheBudget) {
+  auto budget = std::make_unique<MemoryBudget>(100, 50, owners_);
+  MemoryBudget::Account account(*budget, [](Locked&) {});
+  account.Set(50, false);
+  account.Hold({std::make_shared<MemoryPart>(*budget, &account, 10)});
+  const MemoryPin pin(account.parts());
   account.Close();
   budget = nullptr;
 }
 
 TEST(MemoryBudgetDeathTest, AnEvictionWithoutTheMutexOfTheOwnersEndsTheProcess) {
-  std::mutex owners;
-  std::mutex another;
-  MemoryBudget budget(100, owners);
+  FairMutex owners;
+  FairMutex another;
+  MemoryBudget budget(100, 50, owners);
   Locked locked(another);
   EXPECT_DEATH(budget.Evict(locked), "check failed");
 }

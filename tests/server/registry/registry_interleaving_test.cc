@@ -187,8 +187,9 @@ class RegistryInterleaving : public ::testing::Test {
   }
   // All hulls that nobody uses leave memory.
   void DropAll() {
-    const MemoryCharge charge(registry_.memory(), registry_.Cache().limit_bytes);
-    EXPECT_TRUE(registry_.CheckMemory().ok());
+    const MemoryCharge charge(registry_.memory(), MemoryUse::kReading,
+                              registry_.Cache().limit_bytes);
+    EXPECT_TRUE(registry_.CheckMemory(MemoryUse::kWriting).ok());
   }
 
   ScriptedStore store_;
@@ -551,8 +552,9 @@ TEST_F(RegistryInterleaving, EveryVersionHoldsWhatItsRecordSays) {
         }
         if (random() % 5 > 0) continue;
         // Whatever is quiet leaves memory, and chunks that come just now are refused.
-        const MemoryCharge charge(registry_.memory(), registry_.Cache().limit_bytes);
-        registry_.CheckMemory().IgnoreError();
+        const MemoryCharge charge(registry_.memory(), MemoryUse::kWriting,
+                                  registry_.Cache().limit_bytes);
+        registry_.CheckMemory(MemoryUse::kWriting).IgnoreError();
       }
     });
   }

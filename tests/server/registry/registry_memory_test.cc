@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <future>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -64,11 +65,15 @@ TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
     const uint64_t before = registry.Cache().bytes;
     ASSERT_TRUE(registry.Canonical(view, {}).ok());
     EXPECT_GE(registry.Cache().bytes, before + view.served->canonical()->MemoryBytes());
-    MemoryCharge charge(registry.memory(), registry.Cache().limit_bytes);
-    EXPECT_EQ(registry.CheckMemory().code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_GE(registry.Cache().reading_bytes, view.served->canonical()->MemoryBytes());
+    // What is asked of it comes on top.
+    const uint64_t without = registry.Cache().reading_bytes;
+    view.served->canonical_query_hull();
+    EXPECT_GT(registry.Cache().reading_bytes, without);
   }
-  const MemoryCharge charge(registry.memory(), registry.Cache().limit_bytes);
-  EXPECT_TRUE(registry.CheckMemory().ok());
+  EXPECT_EQ(registry.Cache().reading_bytes, 0);
+  const MemoryCharge charge(registry.memory(), MemoryUse::kReading, registry.Cache().limit_bytes);
+  EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
   EXPECT_EQ(registry.Cache().bytes, registry.Cache().limit_bytes);
 }
 
@@ -234,20 +239,139 @@ TEST(RegistryOfMemoryStore, WhatCallsHoldCountsUntilTheyEnd) {
   limits.memory_limit = 100'000;
   Registry registry(store, limits, writers);
   {
-    MemoryCharge charge(registry.memory());
-    charge.Set(100'000);
-    EXPECT_TRUE(registry.CheckMemory().ok());
-    charge.Set(100'001);
-    EXPECT_EQ(registry.CheckMemory().code(), absl::StatusCode::kResourceExhausted);
+    MemoryCharge charge(registry.memory(), MemoryUse::kWriting);
+    charge.Set(75'000);
+    EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
+    charge.Set(75'001);
+    EXPECT_EQ(registry.CheckMemory(MemoryUse::kWriting).code(),
+              absl::StatusCode::kResourceExhausted);
+    EXPECT_TRUE(registry.CheckMemory(MemoryUse::kReading).ok());
     charge.Set(60'000);
-    EXPECT_TRUE(registry.CheckMemory().ok());
+    EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
     EXPECT_EQ(registry.Cache().bytes, 60'000);
-    MemoryCharge other(registry.memory());
-    other.Set(60'000);
-    EXPECT_THAT(std::string(registry.CheckMemory().message()), HasSubstr("--memory-limit"));
+    MemoryCharge other(registry.memory(), MemoryUse::kReading);
+    other.Set(25'001);
+    EXPECT_THAT(std::string(registry.CheckMemory(MemoryUse::kReading).message()),
+                HasSubstr("--memory-limit"));
+    EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
   }
   EXPECT_EQ(registry.Cache().bytes, 0);
-  EXPECT_TRUE(registry.CheckMemory().ok());
+}
+
+// A batch that names every hull, of which only some fit into the readers' share.
+TEST_F(RegistryMemory, MoreColdHullsThanReadersMayHoldAreRefusedWhileAppendsGoOn) {
+  Limits limits;
+  limits.memory_limit = 2 << 20;
+  Start(limits);
+  const std::vector<Vector> sphere = SpherePoints(2000);
+  std::vector<std::string> ids;
+  for (int i = 0; i < 40; ++i) {
+    ids.push_back(std::to_string(i));
+    ASSERT_TRUE(hulls_->Put(ids.back(), sphere).ok());
+  }
+  Start(limits);
+  Registry& registry = hulls_->registry();
+  const std::vector<std::string> few(ids.begin(), ids.begin() + 5);
+  const absl::StatusOr<Resolved> held = registry.Resolve(few, {});
+  ASSERT_TRUE(held.ok()) << held.status();
+  EXPECT_GT(registry.Cache().reading_bytes, 5 * 2000 * sizeof(Vector));
+  const absl::Status refused = registry.Resolve(ids, {}).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted) << refused;
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("--memory-limit"));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("name fewer hulls"));
+  EXPECT_LT(registry.Cache().loads, 30);
+  EXPECT_LE(registry.Cache().bytes, limits.memory_limit);
+  // Those that it did not get are free again; what is held is served, and writers go on.
+  EXPECT_TRUE(registry.Resolve(few, {}).ok());
+  EXPECT_TRUE(hulls_->Put("39", {{5, 5, 5}}).ok());
+  EXPECT_TRUE(hulls_->Put("0", {{5, 5, 5}}).ok());
+  EXPECT_TRUE(hulls_->Put("new", sphere).ok());
+  EXPECT_TRUE(hulls_->View("38").ok());
+}
+
+// A stream, say, that never refreshes: what it holds counts until it goes, whatever becomes of the
+// hull.
+TEST_F(RegistryMemory, AVersionThatAReaderHoldsCountsUntilItIsLetGo) {
+  Start();
+  Registry& registry = hulls_->registry();
+  const std::vector<Vector> sphere = SpherePoints(2000);
+  for (const bool deleted : {false, true}) {
+    SCOPED_TRACE(deleted);
+    ASSERT_TRUE(hulls_->Put("h", sphere).ok());
+    std::optional<HullView> view = *hulls_->View("h");
+    ASSERT_TRUE(registry.Canonical(*view, {}).ok());
+    const uint64_t held = registry.Cache().reading_bytes;
+    EXPECT_GT(held, view->record.vertex_count * sizeof(Vector) +
+                        view->served->canonical()->MemoryBytes());
+    // Another version, then another LiveHull, then none of either.
+    ASSERT_TRUE(hulls_->Put("h", {{3. + deleted, 0, 0}}).ok());
+    EXPECT_EQ(registry.Cache().reading_bytes, held);
+    if (deleted) {
+      ASSERT_TRUE(hulls_->Delete("h").ok());
+      EXPECT_EQ(registry.Cache().bytes, held);
+    } else {
+      Replacement replacement;
+      replacement.hull_id = "h";
+      replacement.builder = std::make_shared<HullBuilder>();
+      replacement.counts = *replacement.builder->Add(CubeCorners());
+      ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
+    }
+    EXPECT_EQ(registry.Cache().reading_bytes, held);
+    view.reset();
+    EXPECT_EQ(registry.Cache().reading_bytes, 0);
+  }
+  EXPECT_EQ(registry.Cache().bytes, 0);
+}
+
+// Versions of one hull share most of what they are, which counts once.
+TEST_F(RegistryMemory, WhatVersionsShareCountsOnce) {
+  Start();
+  Registry& registry = hulls_->registry();
+  ASSERT_TRUE(hulls_->Put("h", SpherePoints(2000)).ok());
+  std::vector<HullView> views = {*hulls_->View("h")};
+  const uint64_t one = registry.Cache().reading_bytes;
+  for (int i = 1; i <= 50; ++i) {
+    ASSERT_TRUE(hulls_->Put("h", {{1. + i, 0, 0}}).ok());
+    views.push_back(*hulls_->View("h"));
+  }
+  EXPECT_LT(registry.Cache().reading_bytes, one + one / 2);
+  views.clear();
+  EXPECT_EQ(registry.Cache().reading_bytes, 0);
+}
+
+// A view may outlive the registry.
+TEST_F(RegistryMemory, AVersionMayOutliveTheRegistry) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const HullView view = *hulls_->View("h");
+  hulls_ = nullptr;
+  EXPECT_EQ(CanonicalOf(view).vertices().size(), 8);
+}
+
+TEST_F(RegistryMemory, IdleStreamsRefuseNoAppendsAndWritersNoStreams) {
+  Limits limits;
+  limits.memory_limit = 2 << 20;
+  Start(limits);
+  Registry& registry = hulls_->registry();
+  {
+    const MemoryCharge idle(registry.memory(), MemoryUse::kReading, 100 << 20);
+    EXPECT_EQ(registry.CheckMemory(MemoryUse::kReading).code(),
+              absl::StatusCode::kResourceExhausted);
+    for (int i = 0; i < 20; ++i) {
+      const auto put = hulls_->Put(std::to_string(i), SpherePoints(500));
+      EXPECT_TRUE(put.ok()) << put.status();
+    }
+    // What must be read from the store is not; what is in memory is served.
+    EXPECT_TRUE(hulls_->Create("empty").ok());
+    EXPECT_TRUE(hulls_->View("empty").ok());
+    const absl::Status refused = hulls_->View("0").status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("readers hold"));
+  }
+  const MemoryCharge busy(registry.memory(), MemoryUse::kWriting, 100 << 20);
+  EXPECT_EQ(hulls_->Put("0", CubeCorners()).status().code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_TRUE(registry.CheckMemory(MemoryUse::kReading).ok());
+  for (int i = 0; i < 20; ++i) EXPECT_TRUE(hulls_->View(std::to_string(i)).ok());
 }
 
 TEST_F(RegistryMemory, AReplacementCountsWhileItIsStoredAndAsAHullAfterwards) {

@@ -88,6 +88,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"max-waiting-calls", "20"},
                                                        {"max-streams-per-client", "21"},
                                                        {"max-concurrent-batches", "22"},
+                                                       {"max-calls-per-client", "29"},
+                                                       {"max-batches-per-client", "30"},
                                                        {"max-request-time", "2.5"},
                                                        {"slow-request", "0.25"},
                                                        {"metrics-address", "127.0.0.1:1"},
@@ -138,6 +140,8 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.limits.max_waiting_calls, 20);
     EXPECT_EQ(config.limits.max_streams_per_client, 21);
     EXPECT_EQ(config.limits.max_concurrent_batches, 22);
+    EXPECT_EQ(config.limits.max_calls_per_client, 29);
+    EXPECT_EQ(config.limits.max_batches_per_client, 30);
     EXPECT_EQ(config.limits.max_request_time, std::chrono::milliseconds(2500));
     EXPECT_EQ(config.limits.slow_request, std::chrono::milliseconds(250));
     EXPECT_EQ(config.metrics_address, "127.0.0.1:1");

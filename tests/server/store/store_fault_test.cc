@@ -6,6 +6,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <random>
@@ -64,6 +65,16 @@ class StoreFault : public StoreTest {
     EXPECT_EQ(hulls_->View("h")->record, after.record);
   }
 
+  // The points that the hull "h" took, as the store in a directory keeps it.
+  uint64_t ReceivedIn(const std::string& name) {
+    rocksdb::Env* const faulty = std::exchange(env_, nullptr);
+    absl::StatusOr<std::unique_ptr<RocksDbStore>> store = OpenStore(name);
+    env_ = faulty;
+    EXPECT_TRUE(store.ok()) << store.status();
+    if (!store.ok()) return 0;
+    return DurableRegistry(*std::move(store)).View("h")->record.counts.received;
+  }
+
   const std::shared_ptr<FaultyFileSystem> files_ = std::make_shared<FaultyFileSystem>();
   const std::unique_ptr<rocksdb::Env> faulty_env_ = rocksdb::NewCompositeEnv(files_);
 };
@@ -82,6 +93,71 @@ TEST_F(StoreFault, ADiskMountedForReadingRefusesChangesAndNothingElse) {
 
 TEST_F(StoreFault, WhatCannotBeSyncedIsNotAcked) {
   ExpectRefusedThenWell(Fault::kSyncError, absl::StatusCode::kUnavailable, "syncing");
+}
+
+// As a process leaves the store that is killed now, or a machine whose power goes out: what was
+// refused with the words that nothing was changed must not be there. Where that cannot be had, the
+// answer says so.
+TEST_F(StoreFault, WhatChangedNothingIsNotFoundByTheNextProcess) {
+  constexpr int64_t kForever = std::numeric_limits<int64_t>::max();
+  struct Case {
+    Fault fault;
+    int64_t failures;
+    absl::StatusCode code;
+    bool is_certain;
+  };
+  std::mt19937_64 random(5);
+  for (const Case& c : {Case{Fault::kNoSpace, kForever, absl::StatusCode::kResourceExhausted, true},
+                        {Fault::kNoSpaceAtSync, 1, absl::StatusCode::kResourceExhausted, true},
+                        {Fault::kNoSpaceAtSync, kForever, absl::StatusCode::kUnavailable, false},
+                        {Fault::kSyncError, 1, absl::StatusCode::kUnavailable, true},
+                        {Fault::kSyncError, kForever, absl::StatusCode::kUnavailable, false},
+                        {Fault::kIoError, kForever, absl::StatusCode::kUnavailable, false}}) {
+    SCOPED_TRACE(absl::StrCat("fault ", static_cast<int>(c.fault), ", failures ", c.failures));
+    hulls_ = nullptr;
+    std::filesystem::remove_all(directory_ + "/data");
+    Start();
+    ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+    const uint64_t syncs = hulls_->store().failures().sync;
+    files_->SetFault(c.fault, c.failures);
+    const absl::Status refused = hulls_->Put("h", {{9, 9, 9}}).status();
+    EXPECT_EQ(refused.code(), c.code) << refused;
+    EXPECT_THAT(std::string(refused.message()),
+                HasSubstr(c.is_certain ? "nothing was changed" : "it may appear"));
+    const bool is_sync = c.fault == Fault::kNoSpaceAtSync || c.fault == Fault::kSyncError;
+    EXPECT_EQ(hulls_->store().failures().sync - syncs, is_sync ? 1 : 0);
+    for (const bool is_outage : {false, true}) {
+      const std::string left = directory_ + "/left";
+      std::filesystem::remove_all(left);
+      if (is_outage) {
+        files_->CopySurvivors(directory_ + "/data", left, random);
+      } else {
+        std::filesystem::copy(directory_ + "/data", left, std::filesystem::copy_options::recursive);
+      }
+      const uint64_t received = ReceivedIn("left");
+      EXPECT_TRUE(received == 8 || (received == 9 && !c.is_certain)) << received;
+    }
+    // Once the disk is well, it is gone for certain, and takes the place that is free.
+    files_->SetFault(Fault::kNone);
+    ASSERT_TRUE(hulls_->Create("other").ok());
+    std::filesystem::remove_all(directory_ + "/left");
+    std::filesystem::copy(directory_ + "/data", directory_ + "/left",
+                          std::filesystem::copy_options::recursive);
+    EXPECT_EQ(ReceivedIn("left"), 8);
+    ASSERT_TRUE(hulls_->Put("h", {{7, 7, 7}}).ok());
+    EXPECT_EQ(hulls_->View("h")->served->high(), Vector(7, 7, 7));
+  }
+}
+
+// An end of the process that nothing came before is no kill, and leaves no more behind.
+TEST_F(StoreFault, WhatWasRefusedDoesNotOutliveAnEnd) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  files_->SetFault(Fault::kNoSpaceAtSync);
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
+  files_->SetFault(Fault::kNone);
+  Start();
+  EXPECT_EQ(hulls_->View("h")->record.counts.received, 8);
 }
 
 TEST_F(StoreFault, FailuresAreCountedByWhatFailed) {

@@ -3,7 +3,6 @@
 import {DrawnGroup} from 'hulld/drawn_group.js';
 import {MARK_COLOURS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
-import {shellGeometry} from 'hulld/shell.js';
 import {THREE} from 'hulld/three.js';
 
 // Shells of larger hulls are not drawn: they take longer to make than people wait.
@@ -86,4 +85,75 @@ export class ShellView extends DrawnGroup {
     }
     this.stage.draw();
   }
+}
+
+// A shell at a given distance around a hull: its facets moved outwards, with flat strips for the
+// round parts over edges and vertices. What is within the distance of the hull lies inside of the
+// round shell, which this one follows from within.
+function shellGeometry(hull, distance) {
+  const sizes = hull.facets.subarray(0, hull.facetCount);
+  const corners = hull.facets.subarray(hull.facetCount);
+  const [cx, cy, cz] = hull.centre;
+  const positions = [];
+  const indices = [];
+  // Of each directed edge, where its two ends went.
+  const moved = new Map();
+  // Of each vertex, where its copies are, with the facet that follows each around it.
+  const around = new Map();
+  let first = 0;
+  for (let f = 0; f < sizes.length; ++f) {
+    const facet = corners.subarray(first, first + sizes[f]);
+    first += sizes[f];
+    const n = normalOf(hull.xyz, facet);
+    const base = positions.length / 3;
+    facet.forEach((v, i) => {
+      positions.push(
+          hull.xyz[3 * v] - cx + distance * n[0], hull.xyz[3 * v + 1] - cy + distance * n[1],
+          hull.xyz[3 * v + 2] - cz + distance * n[2]);
+      const j = (i + 1) % facet.length;
+      moved.set(`${v} ${facet[j]}`, [base + i, base + j]);
+      const previous = facet[(i + facet.length - 1) % facet.length];
+      if (!around.has(v)) around.set(v, new Map());
+      around.get(v).set(previous, {copy: base + i, next: facet[j]});
+      if (i > 0 && i < facet.length - 1) indices.push(base, base + i, base + i + 1);
+    });
+  }
+  for (const [edge, [a, b]] of moved) {
+    const [v, w] = edge.split(' ').map(Number);
+    const back = v < w && moved.get(`${w} ${v}`);
+    if (back) indices.push(a, back[1], back[0], a, back[0], b);
+  }
+  for (const ring of around.values()) fillVertex(ring, indices);
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
+  geometry.setIndex(indices);
+  geometry.computeBoundingSphere();
+  return geometry;
+}
+
+// A fan over the copies of one vertex, in the order of the facets around it.
+function fillVertex(ring, indices) {
+  const start = ring.keys().next().value;
+  const copies = [];
+  let at = start;
+  for (let i = 0; i < ring.size && ring.has(at); ++i) {
+    const {copy, next} = ring.get(at);
+    copies.push(copy);
+    at = next;
+  }
+  for (let i = 1; i + 1 < copies.length; ++i) indices.push(copies[0], copies[i + 1], copies[i]);
+}
+
+// By Newell's method, which takes any polygon.
+function normalOf(xyz, facet) {
+  const n = [0, 0, 0];
+  facet.forEach((v, i) => {
+    const w = facet[(i + 1) % facet.length];
+    for (let k = 0; k < 3; ++k) {
+      const [p, q] = [(k + 1) % 3, (k + 2) % 3];
+      n[k] += (xyz[3 * v + p] - xyz[3 * w + p]) * (xyz[3 * v + q] + xyz[3 * w + q]);
+    }
+  });
+  const length = Math.hypot(...n) || 1;
+  return n.map((value) => value / length);
 }

@@ -58,6 +58,22 @@ TEST(HullCost, NoSinglePointStalls) {
   }
 }
 
+// Most points of a ball are inside, and the map of directions rejects them, however they come: few
+// look for their place by walking over the surface.
+TEST(HullCost, InsidePointsAreRejectedWithoutAWalk) {
+  const uint64_t seed = TestSeed(509);
+  Random random(seed);
+  const std::vector<Vector> ball = RandomInBall(random, 50000, 1);
+  for (const size_t chunk : {size_t{1}, size_t{100}, size_t{1000}, size_t{10000}, ball.size()}) {
+    HullBuilder builder;
+    for (size_t i = 0; i < ball.size(); i += chunk) {
+      ASSERT_TRUE(builder.Add(std::span(ball).subspan(i, chunk)).ok());
+    }
+    EXPECT_LT(builder.housekeeping_steps(), ball.size()) << chunk << " seed " << seed;
+    EXPECT_GT(builder.housekeeping_steps(), builder.vertex_count());
+  }
+}
+
 // What a block keeps so as to be undone depends on what it changes, not on the hull that it meets.
 TEST(HullCost, UndoingCostsWhatChanges) {
   const uint64_t seed = TestSeed(507);

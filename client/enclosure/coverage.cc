@@ -1,0 +1,296 @@
+#include "client/enclosure/coverage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "client/enclosure/convex_region.h"
+#include "client/enclosure/exact_number.h"
+
+namespace hulld {
+namespace {
+
+using Point = std::array<double, 3>;
+
+// The point (x/w, y/w, z/w), w > 0, without common divisor.
+struct Corner {
+  BigVector xyz;
+  BigInteger w;
+};
+// A convex polygon, or a segment or a point where the triangle is one.
+using Polygon = std::vector<Corner>;
+
+void Reduce(Corner* corner) {
+  BigInteger divisor = corner->w;
+  for (const BigInteger& x : corner->xyz) divisor = gcd(divisor, x);
+  if (divisor <= 1) return;
+  for (BigInteger& x : corner->xyz) x /= divisor;
+  corner->w /= divisor;
+}
+
+// w times the height of the corner over the boundary.
+BigInteger HeightOf(const HalfSpace& half, const Corner& corner) {
+  return Dot(half.normal(), corner.xyz) - half.offset() * corner.w;
+}
+
+// Where the way from a, at height h < 0, to b, at height k > 0, meets the boundary.
+Corner Crossing(const Corner& a, const BigInteger& h, const Corner& b, const BigInteger& k) {
+  Corner crossing = {k * a.xyz - h * b.xyz, k * a.w - h * b.w};
+  Reduce(&crossing);
+  return crossing;
+}
+
+// The two parts of a polygon. The one outside is empty where no corner is strictly outside; else
+// the one inside is empty where no corner is strictly inside, for what is on the boundary then has
+// less than the polygon's dimension: pieces are closed, so what covers the rest covers that, too.
+struct Parts {
+  Polygon inside;
+  Polygon outside;
+};
+
+Parts Cut(const Polygon& polygon, const HalfSpace& half) {
+  Parts parts;
+  std::vector<BigInteger> heights;
+  for (const Corner& corner : polygon) heights.push_back(HeightOf(half, corner));
+  const auto is_above = [](const BigInteger& h) { return h > 0; };
+  const auto is_below = [](const BigInteger& h) { return h < 0; };
+  if (std::none_of(heights.begin(), heights.end(), is_above)) {
+    parts.inside = polygon;
+    return parts;
+  }
+  if (std::none_of(heights.begin(), heights.end(), is_below)) {
+    parts.outside = polygon;
+    return parts;
+  }
+  for (size_t i = 0; i < polygon.size(); ++i) {
+    const size_t next = (i + 1) % polygon.size();
+    if (heights[i] <= 0) parts.inside.push_back(polygon[i]);
+    if (heights[i] >= 0) parts.outside.push_back(polygon[i]);
+    if (heights[i] < 0 && heights[next] > 0) {
+      parts.inside.push_back(Crossing(polygon[i], heights[i], polygon[next], heights[next]));
+      parts.outside.push_back(parts.inside.back());
+    } else if (heights[i] > 0 && heights[next] < 0) {
+      parts.inside.push_back(Crossing(polygon[next], heights[next], polygon[i], heights[i]));
+      parts.outside.push_back(parts.inside.back());
+    }
+  }
+  return parts;
+}
+
+// The distance of p from the triangle a b c. Source: Ericson 2005, Real-Time Collision Detection,
+// 5.1.5.
+double DistanceToTriangle(const Point& p, const Point& a, const Point& b, const Point& c) {
+  const auto minus = [](const Point& x, const Point& y) {
+    return Point{x[0] - y[0], x[1] - y[1], x[2] - y[2]};
+  };
+  const auto dot = [](const Point& x, const Point& y) {
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+  };
+  const auto from = [&](const Point& origin, const Point& u, double s, const Point& v, double t) {
+    const Point d = minus(p, origin);
+    return std::hypot(d[0] - s * u[0] - t * v[0], d[1] - s * u[1] - t * v[1],
+                      d[2] - s * u[2] - t * v[2]);
+  };
+  const Point ab = minus(b, a);
+  const Point ac = minus(c, a);
+  const Point ap = minus(p, a);
+  const double d1 = dot(ab, ap);
+  const double d2 = dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return from(a, ab, 0, ac, 0);
+  const Point bp = minus(p, b);
+  const double d3 = dot(ab, bp);
+  const double d4 = dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return from(b, ab, 0, ac, 0);
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) return from(a, ab, d1 / (d1 - d3), ac, 0);
+  const Point cp = minus(p, c);
+  const double d5 = dot(ab, cp);
+  const double d6 = dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return from(c, ab, 0, ac, 0);
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0 && d2 >= 0 && d6 <= 0 && d2 > d6) return from(a, ab, 0, ac, d2 / (d2 - d6));
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0 && (d4 - d3) + (d5 - d6) > 0) {
+    return from(b, minus(c, b), (d4 - d3) / ((d4 - d3) + (d5 - d6)), ac, 0);
+  }
+  const double sum = va + vb + vc;
+  if (sum == 0) return std::min(from(a, ab, 0, ac, 0), from(b, ab, 0, ac, 0));
+  return from(a, ab, vb / sum, ac, vc / sum);
+}
+
+Point VertexOf(const HullMesh& mesh, size_t index) {
+  const double* const p = mesh.xyz.data() + 3 * index;
+  return {p[0], p[1], p[2]};
+}
+
+// The distance of a point outside from a piece: that of the nearest facet.
+double DistanceTo(const HullMesh& piece, const Point& p) {
+  double least = std::numeric_limits<double>::infinity();
+  if (piece.facet_sizes.empty() && piece.vertex_count() > 0) {
+    const Point a = VertexOf(piece, 0);
+    const Point b = VertexOf(piece, piece.vertex_count() - 1);
+    return DistanceToTriangle(p, a, b, b);
+  }
+  size_t begin = 0;
+  for (const uint32_t size : piece.facet_sizes) {
+    const Point a = VertexOf(piece, piece.facet_indices[begin]);
+    for (size_t i = 2; i < size; ++i) {
+      least = std::min(least,
+                       DistanceToTriangle(p, a, VertexOf(piece, piece.facet_indices[begin + i - 1]),
+                                          VertexOf(piece, piece.facet_indices[begin + i])));
+    }
+    begin += size;
+  }
+  return least;
+}
+
+// One mesh against pieces that stand ready.
+class Cover {
+ public:
+  Cover(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh)
+      : pieces_(pieces), mesh_(mesh) {
+    for (const HullMesh& piece : pieces) grid_.Include(piece.xyz);
+    for (const Point& p : mesh.vertices) grid_.Include(p);
+  }
+
+  absl::Status Prepare() {
+    for (const HullMesh& piece : pieces_) {
+      auto region = ConvexRegion::Make(piece, grid_);
+      if (!region.ok()) return region.status();
+      regions_.push_back(*std::move(region));
+    }
+    for (const Point& p : mesh_.vertices) {
+      on_grid_.push_back(OnGrid(p, grid_));
+      std::vector<bool>& held = holds_.emplace_back();
+      for (const ConvexRegion& region : regions_) held.push_back(region.Holds(p, on_grid_.back()));
+    }
+    return absl::OkStatus();
+  }
+
+  void Take(size_t triangle, Coverage* coverage) {
+    const auto& corners = mesh_.triangles[triangle];
+    for (size_t piece = 0; piece < regions_.size(); ++piece) {
+      if (std::all_of(corners.begin(), corners.end(),
+                      [&](uint32_t v) { return holds_[v][piece]; })) {
+        return;
+      }
+    }
+    ++coverage->clipped;
+    Polygon whole;
+    for (const uint32_t v : corners) whole.push_back({on_grid_[v], 1});
+    std::vector<Polygon> left = {whole};
+    for (size_t piece = 0; piece < regions_.size() && !left.empty(); ++piece) {
+      Subtract(regions_[piece], corners, &left);
+    }
+    if (left.empty()) return;
+    coverage->uncovered.push_back(Measure(triangle, left));
+    coverage->distance = std::max(coverage->distance, coverage->uncovered.back().distance);
+  }
+
+ private:
+  // Replaces the polygons by what is outside of the region.
+  void Subtract(const ConvexRegion& region, const std::array<uint32_t, 3>& triangle,
+                std::vector<Polygon>* left) const {
+    if (region.empty()) return;
+    // Only half spaces that cut the triangle matter. One that has no corner of it strictly inside,
+    // and one outside, leaves nothing with a part inside.
+    std::vector<const HalfSpace*> cutting;
+    for (const HalfSpace& half : region.half_spaces()) {
+      int least = 1;
+      int most = -1;
+      for (const uint32_t v : triangle) {
+        const int side = half.Side(mesh_.vertices[v], on_grid_[v]);
+        least = std::min(least, side);
+        most = std::max(most, side);
+      }
+      if (most <= 0) continue;
+      if (least >= 0) return;
+      cutting.push_back(&half);
+    }
+    std::vector<Polygon> outside;
+    for (const Polygon& polygon : *left) SubtractFrom(polygon, cutting, &outside);
+    *left = std::move(outside);
+  }
+
+  static void SubtractFrom(const Polygon& polygon, const std::vector<const HalfSpace*>& cutting,
+                           std::vector<Polygon>* outside) {
+    Polygon rest = polygon;
+    std::vector<Polygon> cut_off;
+    for (const HalfSpace* half : cutting) {
+      Parts parts = Cut(rest, *half);
+      if (!parts.outside.empty()) cut_off.push_back(std::move(parts.outside));
+      rest = std::move(parts.inside);
+      if (rest.empty()) break;
+    }
+    // Nothing of it is in the region: it stays whole, not in parts.
+    if (rest.empty()) {
+      outside->push_back(polygon);
+      return;
+    }
+    for (Polygon& part : cut_off) outside->push_back(std::move(part));
+  }
+
+  Point Rounded(const Corner& corner) const {
+    Point p;
+    for (size_t i = 0; i < 3; ++i) {
+      p[i] = std::ldexp(ApproximateQuotient(corner.xyz[i], corner.w), grid_.exponent());
+    }
+    return p;
+  }
+
+  UncoveredTriangle Measure(size_t triangle, const std::vector<Polygon>& left) const {
+    UncoveredTriangle found;
+    found.triangle = triangle;
+    found.distance = -1;
+    for (const Polygon& polygon : left) {
+      std::vector<Point> corners;
+      for (const Corner& corner : polygon) {
+        corners.push_back(Rounded(corner));
+        double distance = std::numeric_limits<double>::infinity();
+        for (const HullMesh& piece : pieces_) {
+          distance = std::min(distance, DistanceTo(piece, corners.back()));
+        }
+        if (distance <= found.distance) continue;
+        found.distance = distance;
+        found.point = corners.back();
+      }
+      for (size_t i = 2; i < corners.size(); ++i) {
+        found.area += AreaOf(corners[0], corners[i - 1], corners[i]);
+      }
+    }
+    return found;
+  }
+
+  static double AreaOf(const Point& a, const Point& b, const Point& c) {
+    const Point u = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    const Point v = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+    return std::hypot(u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                      u[0] * v[1] - u[1] * v[0]) /
+           2;
+  }
+
+  const std::vector<HullMesh>& pieces_;
+  const TriangleMesh& mesh_;
+  CommonExponent grid_;
+  std::vector<ConvexRegion> regions_;
+  std::vector<BigVector> on_grid_;
+  // For each vertex, which pieces hold it.
+  std::vector<std::vector<bool>> holds_;
+};
+
+}  // namespace
+
+absl::StatusOr<Coverage> CoverMesh(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh,
+                                   const std::function<void(uint64_t done)>& progress) {
+  Cover cover(pieces, mesh);
+  if (absl::Status ready = cover.Prepare(); !ready.ok()) return ready;
+  Coverage coverage;
+  for (size_t i = 0; i < mesh.triangles.size(); ++i) {
+    cover.Take(i, &coverage);
+    if (i % 1024 == 0) progress(i);
+  }
+  return coverage;
+}
+
+}  // namespace hulld

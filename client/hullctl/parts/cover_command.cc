@@ -1,0 +1,164 @@
+#include "client/hullctl/parts/cover_command.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "client/enclosure/coverage.h"
+#include "client/formats/text_number.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+
+namespace hulld {
+namespace {
+
+// How many triangles that stick out are listed, the farthest first.
+constexpr uint64_t kDefaultLimit = 10;
+
+struct CoverArguments {
+  // Hulls, then the mesh.
+  std::vector<std::string> words;
+  uint64_t limit = kDefaultLimit;
+};
+
+// The hulls of the words; one that ends in a slash stands for all whose IDs start so.
+absl::StatusOr<std::vector<HullMesh>> FetchPieces(const Client& client,
+                                                  std::vector<std::string> words) {
+  std::vector<std::string> ids;
+  for (const std::string& word : words) {
+    if (word.back() != '/') {
+      ids.push_back(word);
+      continue;
+    }
+    const auto list = client.ListAllHulls(word);
+    if (!list.ok()) return list.status();
+    if (list->hulls().empty()) {
+      return absl::NotFoundError(absl::StrCat("no hull starts with ", Quoted(word)));
+    }
+    for (const v1::HullInfo& hull : list->hulls()) ids.push_back(hull.hull_id());
+  }
+  std::vector<HullMesh> pieces;
+  for (const std::string& id : ids) {
+    auto mesh = client.GetHullMesh(id);
+    if (!mesh.ok()) return mesh.status();
+    pieces.push_back(*std::move(mesh));
+  }
+  return pieces;
+}
+
+std::string PointText(const std::array<double, 3>& p) {
+  return absl::StrCat(ShortestText(p[0]), " ", ShortestText(p[1]), " ", ShortestText(p[2]));
+}
+
+void PrintJson(const Invocation& run, const TriangleMesh& mesh, const Coverage& coverage) {
+  JsonObject object;
+  object.AddJson("enclosed", coverage.uncovered.empty() ? "true" : "false")
+      .Add("triangles", uint64_t{mesh.triangles.size()})
+      .Add("outside", uint64_t{coverage.uncovered.size()});
+  std::string list = "[";
+  for (const UncoveredTriangle& found : coverage.uncovered) {
+    JsonObject one;
+    one.Add("triangle", uint64_t{found.triangle})
+        .AddJson("distance", ShortestText(found.distance))
+        .AddJson("area", ShortestText(found.area))
+        .AddJson("point",
+                 absl::StrCat("[", ShortestText(found.point[0]), ",", ShortestText(found.point[1]),
+                              ",", ShortestText(found.point[2]), "]"));
+    absl::StrAppend(&list, list.size() > 1 ? "," : "", one.Close());
+  }
+  run.out << object.AddJson("trianglesOutside", list + "]").Close() << "\n";
+}
+
+void Print(const Invocation& run, const CoverArguments& arguments, const TriangleMesh& mesh,
+           size_t pieces, const Coverage& coverage) {
+  if (run.names()) {
+    run.out << (coverage.uncovered.empty() ? "ENCLOSED" : "OUTSIDE") << "\n";
+    return;
+  }
+  if (coverage.uncovered.empty()) {
+    run.out << "ENCLOSED: each of the " << mesh.triangles.size() << " triangles is in the "
+            << (pieces == 1 ? "hull" : "hulls together") << " (exact)\n";
+    return;
+  }
+  double area = 0;
+  for (const UncoveredTriangle& found : coverage.uncovered) area += found.area;
+  run.out << "OUTSIDE: " << coverage.uncovered.size() << " of " << mesh.triangles.size()
+          << " triangles stick out (exact), " << (pieces == 1 ? "by " : "at least by ")
+          << ShortestText(coverage.distance) << ", with an area of " << ShortestText(area) << "\n";
+  uint64_t listed = 0;
+  for (const UncoveredTriangle& found : coverage.uncovered) {
+    if (listed++ == arguments.limit) break;
+    run.out << "triangle " << found.triangle << "\tby " << ShortestText(found.distance) << "\tat "
+            << PointText(found.point) << "\n";
+  }
+  if (coverage.uncovered.size() > arguments.limit) {
+    run.out << "# " << coverage.uncovered.size() - arguments.limit
+            << " more; raise --limit to see them\n";
+  }
+}
+
+ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
+  if (arguments.words.size() < 2) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "name the hulls, and the file of the mesh behind them: hullctl cover HULL... FILE"));
+  }
+  std::vector<std::string> hulls = arguments.words;
+  const std::string file = hulls.back();
+  hulls.pop_back();
+  const auto mesh = ReadMesh(file);
+  if (!mesh.ok()) return run.FailUsage(mesh.status());
+  if (mesh->triangles.empty()) {
+    return run.FailUsage(absl::InvalidArgumentError(file + ": there is no triangle in it"));
+  }
+  const Client client = run.MakeClient();
+  const auto pieces = FetchPieces(client, std::move(hulls));
+  if (!pieces.ok()) return run.Fail(pieces.status());
+  ProgressBar bar(run.err, run.shows_progress, "triangles", mesh->triangles.size());
+  auto coverage = CoverMesh(*pieces, *mesh, [&bar](uint64_t done) { bar.Update(done); });
+  bar.Clear();
+  if (!coverage.ok()) return run.Fail(coverage.status());
+  std::stable_sort(coverage->uncovered.begin(), coverage->uncovered.end(),
+                   [](const UncoveredTriangle& a, const UncoveredTriangle& b) {
+                     return a.distance > b.distance;
+                   });
+  if (run.json()) {
+    PrintJson(run, *mesh, *coverage);
+  } else {
+    Print(run, arguments, *mesh, pieces->size(), *coverage);
+  }
+  return ExitCode::kDone;
+}
+
+}  // namespace
+
+void AddCoverCommand(Command program, Invocation* invocation) {
+  auto arguments = std::make_shared<CoverArguments>();
+  Command command = program.AddCommand("cover", "Ask whether hulls enclose a mesh");
+  command
+      .AddTexts("HULL", &arguments->words,
+                "Names of the hulls, then the mesh (obj, off, stl, gltf)")
+      .Required()
+      .Completes(ValueKind::kHull);
+  command.AddNumber(
+      "--limit", 0, kAnyNumber,
+      absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),
+      [arguments](uint64_t number) { arguments->limit = number; });
+  command.SetDetails(
+      "Whether each point of each triangle of the mesh is in one of the hulls, boundaries "
+      "included.\n"
+      "That is decided exactly, by cutting triangles in integers of any length: no triangle that\n"
+      "sticks out is missed, none is named that does not. By how much is computed in floating\n"
+      "point: for one hull it is the largest distance, for several it is at least that large. It\n"
+      "is the surface that is asked about: one hull that holds it holds all inside of it; several\n"
+      "may leave a hollow within a solid. A name that ends in / stands for all hulls that start\n"
+      "so. Triangles count from 0, in the order of the file; polygons are fans of them. That\n"
+      "something sticks out is an answer: exit code 0.");
+  command.SetExamples({{"", "hullctl cover bracket bracket.stl"},
+                       {"The parts of a mesh together", "hullctl cover chair/ chair.obj"}});
+  command.OnGiven(
+      [=] { invocation->action = [=] { return AnswerCover(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

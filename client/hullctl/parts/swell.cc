@@ -1,0 +1,69 @@
+#include "client/hullctl/parts/swell.h"
+
+#include <absl/strings/str_format.h>
+#include <sys/stat.h>
+
+#include <utility>
+
+#include "client/enclosure/mesh_volume.h"
+
+namespace hulld {
+namespace {
+
+constexpr off_t kMostBytes = off_t{64} << 20;
+
+bool IsMeshFormat(PointFormat format) {
+  return format == PointFormat::kObj || format == PointFormat::kOff ||
+         format == PointFormat::kStl || format == PointFormat::kGltf;
+}
+
+}  // namespace
+
+std::string SwellText(std::optional<double> ratio) {
+  if (!ratio.has_value()) return "not compared: the mesh is not closed";
+  return absl::StrFormat("%.4g times that of the mesh", *ratio);
+}
+
+void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio) {
+  if (!ratio.has_value() || *ratio < kSwellToWarn) return;
+  run.err << "hullctl: warning: the hull " << hull_id << " has " << absl::StrFormat("%.4g", *ratio)
+          << " times the volume of its mesh; parts of it stand better for it (--split, or a convex "
+             "decomposition)\n";
+}
+
+std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files) {
+  TriangleMesh all;
+  off_t bytes = 0;
+  for (const ReadRequest& file : files) {
+    struct stat info = {};
+    const bool is_file = stat(file.path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
+    bytes += info.st_size;
+    // What --format says of a file, its name may not.
+    const auto named = PointFormatOfPath(file.path);
+    const bool has_mesh = IsMeshFormat(file.format) && named.ok() && *named == file.format;
+    if (!is_file || !has_mesh || bytes > kMostBytes) return std::nullopt;
+    auto mesh = ReadMesh(file.path);
+    // The points were read; that the faces are broken is not worth an error.
+    if (!mesh.ok()) return std::nullopt;
+    const auto first = static_cast<uint32_t>(all.vertices.size());
+    all.vertices.insert(all.vertices.end(), mesh->vertices.begin(), mesh->vertices.end());
+    for (auto [a, b, c] : mesh->triangles) {
+      all.triangles.push_back({a + first, b + first, c + first});
+    }
+  }
+  if (all.triangles.empty()) return std::nullopt;
+  return all;
+}
+
+absl::StatusOr<Swell> SwellOf(const Client& client, const std::string& hull_id, uint64_t points,
+                              const TriangleMesh& mesh) {
+  const auto hull = client.GetHullMesh(hull_id);
+  if (!hull.ok()) return hull.status();
+  Swell swell;
+  if (hull->header.hull().counts().received() != points) return swell;
+  swell.ratio = VolumeRatio(*hull, mesh);
+  swell.text = SwellText(swell.ratio);
+  return swell;
+}
+
+}  // namespace hulld

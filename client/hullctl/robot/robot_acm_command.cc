@@ -1,0 +1,149 @@
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+#include "client/hullctl/command_line/interrupt.h"
+#include "client/hullctl/command_line/output_file.h"
+#include "client/hullctl/load/point_generator.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/robot/robot_commands.h"
+#include "client/hullctl/robot/robot_model.h"
+#include "client/hullctl/robot/waypoint_stream.h"
+
+namespace hulld {
+namespace {
+
+constexpr uint64_t kDefaultSamples = 10000;
+
+struct AcmArguments {
+  RobotArguments robot;
+  uint64_t samples = kDefaultSamples;
+  uint64_t seed = 1;
+  std::string file;
+};
+
+// Values of the free joints, each uniform within its limits; a whole turn where there are none.
+std::vector<double> RandomValues(const Robot& robot, Xoshiro256* random) {
+  std::vector<double> values;
+  for (const int j : robot.FreeJoints()) {
+    const RobotJoint& joint = robot.joints[static_cast<size_t>(j)];
+    const std::array<double, 2> range =
+        joint.limits.value_or(std::array<double, 2>{-std::numbers::pi, std::numbers::pi});
+    const double t = random->NextUnit();
+    values.push_back((1 - t) * range[0] + t * range[1]);
+  }
+  return values;
+}
+
+// In how many samples the shapes of two links collided.
+struct Tally {
+  uint64_t colliding = 0;
+  // The last sample counted, so that several shapes of a link count once.
+  uint64_t last = ~uint64_t{0};
+};
+
+std::vector<DisabledPair> Judge(const std::set<LinkPair>& adjacent,
+                                const std::map<LinkPair, Tally>& tallies, uint64_t samples) {
+  std::vector<DisabledPair> pairs;
+  for (const LinkPair& links : adjacent) pairs.push_back({links, "Adjacent"});
+  for (const auto& [links, tally] : tallies) {
+    if (tally.colliding == 0) pairs.push_back({links, "Never"});
+    if (tally.colliding == samples) pairs.push_back({links, "Always"});
+  }
+  std::sort(pairs.begin(), pairs.end(),
+            [](const DisabledPair& a, const DisabledPair& b) { return a.links < b.links; });
+  return pairs;
+}
+
+absl::Status Sample(const Invocation& run, const AcmArguments& arguments, const RobotModel& model,
+                    const Client& client, const std::atomic<bool>& stopped,
+                    std::map<LinkPair, Tally>* tallies, const std::vector<uint32_t>& pairs) {
+  WaypointStream::Scope scope;
+  for (const RobotPart& part : model.parts) scope.moving.push_back(part.hull_id);
+  scope.pairs = pairs;
+  absl::Status problem;
+  WaypointStream stream(
+      client, std::move(scope),
+      [&](uint64_t sample, size_t pair, const AnswerRow& row, const std::string& cause) {
+        const LinkPair links =
+            MakeLinkPair(model.parts[pairs[2 * pair]].link, model.parts[pairs[2 * pair + 1]].link);
+        if (row.relation == v1::RELATION_UNSPECIFIED) {
+          problem = absl::InternalError(absl::StrCat("a pair has no answer: ", cause));
+        }
+        Tally& tally = (*tallies)[links];
+        if (row.relation == v1::RELATION_SEPARATED || tally.last == sample) return;
+        tally.last = sample;
+        ++tally.colliding;
+      });
+  ProgressBar bar(run.err, run.shows_progress, "samples", arguments.samples);
+  Xoshiro256 random(arguments.seed);
+  for (uint64_t done = 0; done < arguments.samples && !stopped;) {
+    const auto count =
+        static_cast<size_t>(std::min<uint64_t>(stream.lanes(), arguments.samples - done));
+    std::vector<double> poses;
+    for (size_t i = 0; i < count; ++i) {
+      model.AppendPoses(kNoMotion, RandomValues(model.robot, &random), &poses);
+    }
+    if (absl::Status asked = stream.Ask(count, poses); !asked.ok()) return asked;
+    if (!problem.ok()) return problem;
+    bar.Update(done += count);
+  }
+  bar.Clear();
+  if (stopped) return absl::CancelledError("stopped; nothing was written");
+  return stream.Close();
+}
+
+ExitCode MakeAcm(const Invocation& run, const AcmArguments& arguments) {
+  auto model = ReadRobot(arguments.robot);
+  if (!model.ok()) return run.FailUsage(model.status());
+  std::atomic<bool> stopped = false;
+  const Interrupt interrupt([&stopped] { stopped = true; });
+  const Client client = run.MakeClient();
+  TemporaryHulls temporary(client, "robot");
+  absl::Status status = RegisterHulls(arguments.robot, client, &temporary, &*model);
+  const std::set<LinkPair> adjacent = AdjacentPairs(model->robot);
+  const std::vector<uint32_t> pairs = model->PairsWithout(adjacent);
+  std::map<LinkPair, Tally> tallies;
+  if (status.ok() && !pairs.empty()) {
+    status = Sample(run, arguments, *model, client, stopped, &tallies, pairs);
+  }
+  if (!status.ok()) return run.Fail(status);
+  const std::vector<DisabledPair> disabled = Judge(adjacent, tallies, arguments.samples);
+  const std::string comment = absl::StrCat("Adjacent: connected by a joint. Never, Always: in ",
+                                           arguments.samples, " random configurations (seed ",
+                                           arguments.seed, "), which is evidence and no proof.");
+  const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
+    WriteSrdf(model->robot, disabled, comment, out);
+  });
+  return written.ok() ? ExitCode::kDone : run.FailUsage(written);
+}
+
+}  // namespace
+
+void AddRobotAcmCommand(Command robot, Invocation* invocation) {
+  auto arguments = std::make_shared<AcmArguments>();
+  Command command = robot.AddCommand("acm", "Write the pairs that never or always collide as SRDF");
+  AddRobotArguments(command, &arguments->robot);
+  command.AddNumber("--samples", 1, uint64_t{1} << 32,
+                    absl::StrCat("How many configurations (default ", kDefaultSamples, ")"),
+                    [arguments](uint64_t number) { arguments->samples = number; });
+  command.AddNumber("--seed", 0, kAnyNumber, "Another seed, other configurations (default 1)",
+                    [arguments](uint64_t number) { arguments->seed = number; });
+  command.AddText("-o,--out", &arguments->file, "File to write (default: standard output)")
+      .ValueName("FILE");
+  command.SetDetails(
+      std::string(kRobotHelp) +
+      "\nEach joint takes values uniform within its limits, or a whole turn where it has none. "
+      "The\n"
+      "same options sample the same configurations. Links that a joint connects are written as\n"
+      "Adjacent and not sampled. Touching counts as colliding.");
+  command.SetExamples({{"", "hullctl robot acm arm.urdf --samples 10000 -o arm.srdf"}});
+  command.OnGiven([=] { invocation->action = [=] { return MakeAcm(*invocation, *arguments); }; });
+}
+
+}  // namespace hulld

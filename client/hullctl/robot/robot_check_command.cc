@@ -1,0 +1,504 @@
+#include <absl/strings/str_cat.h>
+
+#include <array>
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/interrupt.h"
+#include "client/hullctl/command_line/query_options.h"
+#include "client/hullctl/printing/answer_text.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/progress_bar.h"
+#include "client/hullctl/robot/robot_commands.h"
+#include "client/hullctl/robot/robot_model.h"
+#include "client/hullctl/robot/waypoint_stream.h"
+#include "client/hullctl/scene/scene_file.h"
+#include "client/hullctl/view/view_scene.h"
+#include "client/robot/joint_file.h"
+
+namespace hulld {
+namespace {
+
+// Values beyond limits that are told one by one; of the rest, how many there are.
+constexpr size_t kMostWarnings = 5;
+
+struct CheckArguments {
+  RobotArguments robot;
+  std::string srdf;
+  std::string joints;
+  // NAME=VALUE each.
+  std::vector<std::string> joint_values;
+  RigidPose X_WB = kNoMotion;
+  std::string scene;
+  // NAME,NAME each.
+  std::vector<std::string> ignored;
+  bool adjacent = false;
+  bool first = false;
+  QueryWishes wishes;
+};
+
+// Who is asked about: the parts of the robot, then what stands around it.
+struct Cast {
+  std::vector<std::string> names;
+  std::vector<std::string> fixed_hulls;
+  std::vector<double> fixed_poses;
+};
+
+// One run: the robot, its waypoints one after another, and what is printed about them.
+class RobotCheck {
+ public:
+  RobotCheck(const Invocation& run, const CheckArguments& arguments, RobotModel model)
+      : run_(run),
+        arguments_(arguments),
+        model_(std::move(model)),
+        client_(run.MakeClient()),
+        temporary_(client_, "robot"),
+        bar_(run.err, run.shows_progress, "checks", 0) {}
+
+  ExitCode Run();
+
+ private:
+  using Waypoint = std::vector<double>;
+
+  absl::Status AddScene();
+  absl::Status ChoosePairs();
+  absl::StatusOr<Waypoint> GivenValues() const;
+  absl::Status OpenWaypoints();
+  absl::StatusOr<bool> ReadWaypoint(Waypoint* free_values);
+  absl::StatusOr<bool> NextWaypoint(Waypoint* free_values);
+  void WarnOfLimits(uint64_t waypoint, const Waypoint& free_values);
+  absl::Status AskAll(WaypointStream* stream);
+  void Take(uint64_t waypoint, size_t pair, const AnswerRow& row, const std::string& problem);
+  void TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem);
+  void TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides);
+  void PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row);
+  void PrintHead();
+  void PrintTotals();
+  std::string PlaceOf(uint64_t waypoint) const;
+  const std::string& NameOf(size_t pair, size_t side) const {
+    return cast_.names[pairs_[2 * pair + side]];
+  }
+
+  const Invocation& run_;
+  const CheckArguments& arguments_;
+  RobotModel model_;
+  const Client client_;
+  TemporaryHulls temporary_;
+  ProgressBar bar_;
+  Cast cast_;
+  std::vector<uint32_t> pairs_;
+  // Pairs of links with shapes that are not asked about, and why.
+  size_t left_out_ = 0;
+  std::string left_out_by_;
+
+  std::unique_ptr<ByteSource> source_;
+  std::optional<WaypointReader> reader_;
+  bool given_was_read_ = false;
+  // The first waypoints, which tell whether there is more than one: then only changes are told.
+  std::deque<Waypoint> pending_;
+  bool many_ = false;
+  std::vector<uint64_t> lines_;
+  std::atomic<bool> stopped_ = false;
+
+  std::array<uint64_t, 5> counts_ = {};
+  uint64_t waypoints_ = 0;
+  uint64_t failed_ = 0;
+  uint64_t beyond_limits_ = 0;
+  uint64_t in_contact_ = 0;
+  std::optional<uint64_t> last_contact_;
+  struct Contact {
+    uint64_t waypoint;
+    size_t pair;
+    v1::Relation relation;
+  };
+  std::optional<Contact> first_;
+  // Which pairs collided at the waypoint before.
+  std::vector<bool> collides_;
+};
+
+absl::Status RobotCheck::AddScene() {
+  for (const RobotPart& part : model_.parts) cast_.names.push_back(part.name);
+  if (arguments_.scene.empty()) return absl::OkStatus();
+  const auto source = ByteSource::Open(arguments_.scene);
+  if (!source.ok()) return source.status();
+  const auto scene = ReadScene(source->get());
+  if (!scene.ok()) return scene.status();
+  for (uint32_t i = 0; i < scene->size(); ++i) {
+    cast_.names.push_back(scene->NameOf(i));
+    cast_.fixed_hulls.push_back(*scene->HullOf(i));
+    const Pose7 pose = NumbersOf(scene->PlacementOf(i).pose());
+    cast_.fixed_poses.insert(cast_.fixed_poses.end(), pose.begin(), pose.end());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status RobotCheck::ChoosePairs() {
+  std::set<LinkPair> out;
+  if (!arguments_.srdf.empty()) {
+    auto disabled = ReadDisabledPairs(arguments_.srdf, model_.robot);
+    if (!disabled.ok()) return disabled.status();
+    out = *std::move(disabled);
+    left_out_by_ = arguments_.srdf;
+  } else if (!arguments_.adjacent) {
+    out = AdjacentPairs(model_.robot);
+    left_out_by_ = "being adjacent";
+  }
+  pairs_ = model_.PairsWithout(out);
+  left_out_ = (model_.PairsWithout({}).size() - pairs_.size()) / 2;
+  const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
+  for (uint32_t a = 0; a < robot_parts; ++a) {
+    for (uint32_t b = robot_parts; b < cast_.names.size(); ++b) pairs_.insert(pairs_.end(), {a, b});
+  }
+  for (const std::string& ignored : arguments_.ignored) {
+    const size_t comma = ignored.find(',');
+    const std::string one = ignored.substr(0, comma);
+    const std::string other = comma == std::string::npos ? "" : ignored.substr(comma + 1);
+    std::vector<uint32_t> kept;
+    for (size_t i = 0; i < pairs_.size(); i += 2) {
+      const auto is = [&](uint32_t part, const std::string& name) {
+        return cast_.names[part] == name ||
+               (part < robot_parts &&
+                model_.robot.links[static_cast<size_t>(model_.parts[part].link)].name == name);
+      };
+      const uint32_t a = pairs_[i];
+      const uint32_t b = pairs_[i + 1];
+      if ((is(a, one) && is(b, other)) || (is(a, other) && is(b, one))) continue;
+      kept.insert(kept.end(), {a, b});
+    }
+    if (kept.size() == pairs_.size()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--ignore: ", Quoted(ignored), " is no pair that would be asked about; it takes two ",
+          "names of links or placements, as in forearm_link,table"));
+    }
+    pairs_ = std::move(kept);
+  }
+  if (pairs_.empty()) {
+    return absl::InvalidArgumentError(
+        "no pair of links is left to ask about; --adjacent asks about adjacent ones, too");
+  }
+  return absl::OkStatus();
+}
+
+// Those at rest, but for what --joint says.
+absl::StatusOr<RobotCheck::Waypoint> RobotCheck::GivenValues() const {
+  Waypoint values = RestValues(model_.robot);
+  const std::vector<int> free = model_.robot.FreeJoints();
+  for (const std::string& given : arguments_.joint_values) {
+    const size_t equals = given.find('=');
+    const std::string name = given.substr(0, equals);
+    const int joint = model_.robot.FindJoint(name);
+    const auto place = std::find(free.begin(), free.end(), joint);
+    if (joint < 0 || place == free.end()) {
+      return absl::InvalidArgumentError(absl::StrCat("--joint: ", Quoted(name), " is no joint of ",
+                                                     model_.robot.name, " with a value"));
+    }
+    double* const value = &values[static_cast<size_t>(place - free.begin())];
+    const std::string text = equals == std::string::npos ? "" : given.substr(equals + 1);
+    if (ParseDouble(text, value) != NumberText::kNumber || !std::isfinite(*value)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--joint: ", Quoted(given), " is not NAME=NUMBER"));
+    }
+  }
+  return values;
+}
+
+absl::Status RobotCheck::OpenWaypoints() {
+  if (!arguments_.joints.empty()) {
+    auto source = ByteSource::Open(arguments_.joints);
+    if (!source.ok()) return source.status();
+    source_ = *std::move(source);
+    auto reader = WaypointReader::Open(source_.get(), model_.robot);
+    if (!reader.ok()) return reader.status();
+    reader_ = *std::move(reader);
+  }
+  Waypoint values;
+  while (pending_.size() < 2) {
+    const auto more = ReadWaypoint(&values);
+    if (!more.ok()) return more.status();
+    if (!*more) break;
+    pending_.push_back(values);
+  }
+  many_ = pending_.size() > 1;
+  if (!pending_.empty()) return absl::OkStatus();
+  return absl::InvalidArgumentError(absl::StrCat(source_->name(), ": there is no waypoint in it"));
+}
+
+absl::StatusOr<bool> RobotCheck::ReadWaypoint(Waypoint* free_values) {
+  if (reader_.has_value()) {
+    auto more = reader_->Next(free_values);
+    if (more.ok() && *more) lines_.push_back(reader_->line());
+    return more;
+  }
+  if (given_was_read_) return false;
+  given_was_read_ = true;
+  auto given = GivenValues();
+  if (!given.ok()) return given.status();
+  *free_values = *std::move(given);
+  return true;
+}
+
+absl::StatusOr<bool> RobotCheck::NextWaypoint(Waypoint* free_values) {
+  if (pending_.empty()) return ReadWaypoint(free_values);
+  *free_values = std::move(pending_.front());
+  pending_.pop_front();
+  return true;
+}
+
+std::string RobotCheck::PlaceOf(uint64_t waypoint) const {
+  std::string place = absl::StrCat("waypoint ", waypoint + 1);
+  if (waypoint < lines_.size()) {
+    absl::StrAppend(&place, " (", source_->name(), ":", lines_[waypoint], ")");
+  }
+  return place;
+}
+
+void RobotCheck::WarnOfLimits(uint64_t waypoint, const Waypoint& free_values) {
+  const std::vector<std::string> problems =
+      LimitProblems(model_.robot, AllJointValues(model_.robot, free_values));
+  if (problems.empty()) return;
+  if (beyond_limits_++ >= kMostWarnings) return;
+  bar_.Clear();
+  for (const std::string& problem : problems) {
+    run_.err << "hullctl: warning: ";
+    if (reader_.has_value()) run_.err << source_->name() << ":" << lines_[waypoint] << ": ";
+    run_.err << problem << "\n";
+  }
+}
+
+absl::Status RobotCheck::AskAll(WaypointStream* stream) {
+  bool more = true;
+  while (more && !stopped_ && !(arguments_.first && first_.has_value())) {
+    std::vector<double> poses;
+    size_t count = 0;
+    while (count < stream->lanes()) {
+      Waypoint values;
+      const auto next = NextWaypoint(&values);
+      if (!next.ok()) return next.status();
+      more = *next;
+      if (!more) break;
+      WarnOfLimits(waypoints_ + count, values);
+      model_.AppendPoses(arguments_.X_WB, values, &poses);
+      ++count;
+    }
+    if (count == 0) break;
+    if (absl::Status asked = stream->Ask(count, poses); !asked.ok()) return asked;
+    waypoints_ += count;
+    bar_.Update(waypoints_ * pairs_.size() / 2);
+  }
+  return stream->Close();
+}
+
+void RobotCheck::PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row) {
+  bar_.Clear();
+  if (run_.json()) {
+    JsonObject object;
+    object.Add("waypoint", waypoint + 1).Add("a", NameOf(pair, 0)).Add("b", NameOf(pair, 1));
+    if (*event != '\0') object.Add("event", event);
+    AddRow(row, &object);
+    run_.out << object.Close() << "\n";
+    return;
+  }
+  if (*event != '\0') run_.out << waypoint + 1 << "\t" << event << "\t";
+  run_.out << NameOf(pair, 0) << "\t" << NameOf(pair, 1) << "\t"
+           << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint)) << "\n";
+}
+
+void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
+                      const std::string& problem) {
+  // With --first, what the message of the first contact holds beyond it is passed over.
+  if (arguments_.first && first_.has_value() && waypoint > first_->waypoint) return;
+  ++counts_[static_cast<size_t>(row.relation)];
+  const bool collides =
+      row.relation == v1::RELATION_TOUCHING || row.relation == v1::RELATION_OVERLAPPING;
+  if (collides && !first_.has_value()) first_ = Contact{waypoint, pair, row.relation};
+  if (collides && last_contact_ != waypoint) {
+    ++in_contact_;
+    last_contact_ = waypoint;
+  }
+  if (row.relation == v1::RELATION_UNSPECIFIED) {
+    TellOfFailure(waypoint, pair, problem);
+  } else if (many_) {
+    TakeOfMany(waypoint, pair, row, collides);
+  } else {
+    PrintRow(waypoint, "", pair, row);
+  }
+}
+
+void RobotCheck::TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem) {
+  bar_.Clear();
+  if (failed_++ >= kMostWarnings) return;
+  run_.err << "hullctl: " << NameOf(pair, 0) << " with " << NameOf(pair, 1) << " at "
+           << PlaceOf(waypoint) << ": " << problem << "\n";
+}
+
+void RobotCheck::TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides) {
+  if (collides == collides_[pair]) return;
+  collides_[pair] = collides;
+  PrintRow(waypoint, collides ? "ENTER" : "LEAVE", pair, row);
+}
+
+void RobotCheck::PrintHead() {
+  if (run_.json() || run_.names()) return;
+  for (const RobotPart& part : model_.parts) {
+    if (part.hull.excess == 0) continue;
+    run_.out << "# " << part.name << ": "
+             << (part.kind == ShapeKind::kCylinder ? "a cylinder"
+                 : part.kind == ShapeKind::kSphere ? "a sphere"
+                                                   : "a capsule")
+             << " within a polyhedron that reaches at most " << ShortestText(part.hull.excess)
+             << " beyond it\n";
+  }
+  run_.out << "# " << pairs_.size() / 2 << " pairs";
+  if (left_out_ > 0) run_.out << "; " << left_out_ << " left out by " << left_out_by_;
+  // Warnings come behind it.
+  run_.out << "\n" << std::flush;
+}
+
+void RobotCheck::PrintTotals() {
+  if (run_.json() || run_.names()) return;
+  run_.out << "# separated " << counts_[v1::RELATION_SEPARATED] << " touching "
+           << counts_[v1::RELATION_TOUCHING] << " overlapping "
+           << counts_[v1::RELATION_OVERLAPPING];
+  if (arguments_.wishes.tolerance.value_or(0) > 0) {
+    run_.out << " within_tolerance " << counts_[v1::RELATION_WITHIN_TOLERANCE];
+  }
+  run_.out << " failed " << failed_ << "\n";
+  if (!many_) return;
+  if (!arguments_.first) {
+    run_.out << "# " << in_contact_ << " of " << waypoints_ << " waypoints in contact\n";
+  }
+  if (first_.has_value()) {
+    run_.out << "# first contact at " << PlaceOf(first_->waypoint) << ": "
+             << NameOf(first_->pair, 0) << " with " << NameOf(first_->pair, 1) << ", "
+             << RelationText(first_->relation) << "\n";
+  } else {
+    run_.out << "# no contact\n";
+  }
+}
+
+ExitCode RobotCheck::Run() {
+  for (const auto prepare :
+       {&RobotCheck::AddScene, &RobotCheck::ChoosePairs, &RobotCheck::OpenWaypoints}) {
+    if (absl::Status ready = (this->*prepare)(); !ready.ok()) return run_.FailUsage(ready);
+  }
+  const Interrupt interrupt([this] { stopped_ = true; });
+  absl::Status status = RegisterHulls(arguments_.robot, client_, &temporary_, &model_);
+  if (!status.ok()) return run_.Fail(status);
+  WaypointStream::Scope scope;
+  for (const RobotPart& part : model_.parts) scope.moving.push_back(part.hull_id);
+  scope.fixed = cast_.fixed_hulls;
+  scope.fixed_poses = cast_.fixed_poses;
+  scope.pairs = pairs_;
+  double tolerance = 0;
+  arguments_.wishes.Apply(&scope.wanted, &tolerance);
+  scope.tolerance = tolerance;
+  // One waypoint is looked at closely.
+  if (!many_ && tolerance == 0) scope.wanted.set_separation(true);
+  collides_.assign(pairs_.size() / 2, false);
+  PrintHead();
+  WaypointStream stream(client_, std::move(scope),
+                        [this](uint64_t waypoint, size_t pair, const AnswerRow& row,
+                               const std::string& problem) { Take(waypoint, pair, row, problem); });
+  status = AskAll(&stream);
+  bar_.Clear();
+  if (!status.ok()) {
+    return absl::IsInvalidArgument(status) ? run_.FailUsage(status) : run_.Fail(status);
+  }
+  PrintTotals();
+  if (beyond_limits_ > kMostWarnings) {
+    run_.err << "hullctl: warning: " << beyond_limits_
+             << " waypoints are beyond limits of joints\n";
+  }
+  if (stopped_) run_.err << "hullctl: stopped after " << waypoints_ << " waypoints\n";
+  if (failed_ == 0) return stopped_ ? ExitCode::kRequestFailed : ExitCode::kDone;
+  run_.err << "hullctl: " << failed_ << " checks have no answer\n";
+  return ExitCode::kSomeFailed;
+}
+
+ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
+  auto model = ReadRobot(arguments.robot);
+  if (!model.ok()) return run.FailUsage(model.status());
+  return RobotCheck(run, arguments, *std::move(model)).Run();
+}
+
+}  // namespace
+
+void AddRobotCheckCommand(Command robot, Invocation* invocation) {
+  auto arguments = std::make_shared<CheckArguments>();
+  Command command = robot.AddCommand("check", "Ask what collides on a robot, and with a scene");
+  AddRobotArguments(command, &arguments->robot);
+  command
+      .AddText(
+          "--srdf", &arguments->srdf,
+          "Leave out the pairs of links that this semantic description disables, and no others")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
+  command.AddFlag("--adjacent", &arguments->adjacent,
+                  "Without --srdf: ask about links that a joint connects, too");
+  command
+      .AddText(
+          "--joints", &arguments->joints,
+          "A table of values: a header of joints, a row for each waypoint; - is standard input")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
+  command
+      .AddRepeated("--joint", &arguments->joint_values,
+                   "Without --joints: the value of a joint; may be given again")
+      .ValueName("NAME=VALUE");
+  command
+      .AddParsed(
+          "--base",
+          [arguments](const std::string& text) {
+            const auto pose = ParsePose(text);
+            if (pose.ok()) arguments->X_WB = NumbersOf(*pose);
+            return pose.status();
+          },
+          "Where the robot stands: [w,x,y,z,]x,y,z (default: the origin)")
+      .ValueName("POSE");
+  command
+      .AddText("--scene", &arguments->scene,
+               "What stands around it, as for 'hullctl scene'; its hulls are on the server")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
+  command
+      .AddRepeated("--ignore", &arguments->ignored,
+                   "Leave out two links, or a link and a placement; may be given again")
+      .ValueName("NAME,NAME");
+  command.AddFlag("--first", &arguments->first, "End at the first waypoint in contact");
+  AddWantedOptions(command, &arguments->wishes);
+  command.SetDetails(
+      std::string(kRobotHelp) +
+      "\nPairs of shapes on one link are never asked about. Without --srdf, links that a joint\n"
+      "connects are left out, too, as MoveIt does: they touch by design. With --srdf, exactly the\n"
+      "pairs that it disables are.\n"
+      "\nA joint without a value is at 0, or in the middle of its limits where they exclude 0. A\n"
+      "value beyond limits is warned of, not changed. One configuration prints every pair and its\n"
+      "separation. Several waypoints are one stream: pairs are printed as they begin (ENTER) and\n"
+      "end (LEAVE) to collide or touch, and the first contact is named. Only the waypoints "
+      "themselves are\n"
+      "checked, not the motion between them. A collision is an answer: exit code 0.");
+  command.SetExamples(
+      {{"As it stands, with all joints at rest", "hullctl robot check arm.urdf --srdf arm.srdf"},
+       {"One joint bent", "hullctl robot check arm.urdf --joint elbow_joint=2.5"},
+       {"A trajectory within a cell",
+        "hullctl robot check arm.urdf --joints path.csv --scene cell.yaml --ignore "
+        "base_link,floor"},
+       {"Until the first contact", "hullctl robot check arm.urdf --joints path.csv --first"}});
+  command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
+}
+
+void AddRobotCommand(Command program, Invocation* invocation) {
+  Command command = program.AddCommand("robot", "Ask what collides on a robot (URDF)");
+  AddRobotCheckCommand(command, invocation);
+  AddRobotAcmCommand(command, invocation);
+  command.SetExamples({{"", "hullctl robot check arm.urdf --srdf arm.srdf"},
+                       {"", "hullctl robot acm arm.urdf --samples 10000 -o arm.srdf"}});
+  command.RequireCommand();
+}
+
+}  // namespace hulld

@@ -1,0 +1,113 @@
+#include "client/hullctl/robot/waypoint_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace hulld {
+namespace {
+
+constexpr size_t kPoseNumbers = 7;
+// So many that the round trip is small beside them. Observed, 18 pairs of a UR5: 2.4 million pairs
+// a second.
+constexpr size_t kPairsPerMessage = 4096;
+constexpr size_t kMostLanes = 1024;
+
+}  // namespace
+
+WaypointStream::WaypointStream(const Client& client, Scope scope, Receiver receive)
+    : client_(client), scope_(std::move(scope)), receive_(std::move(receive)) {
+  const size_t pairs = std::max<size_t>(1, scope_.pairs.size() / 2);
+  lanes_ = std::clamp<size_t>(kPairsPerMessage / pairs, 1, kMostLanes);
+}
+
+absl::Status WaypointStream::Ask(size_t count, const std::vector<double>& poses) {
+  const auto answer = stream_ == nullptr ? Open(count, poses) : Update(count, poses);
+  return answer.ok() ? Take(*answer, count) : answer.status();
+}
+
+absl::Status WaypointStream::Close() {
+  return stream_ == nullptr ? absl::OkStatus() : stream_->Close();
+}
+
+absl::StatusOr<v1::StreamCollisionsResponse> WaypointStream::Open(
+    size_t count, const std::vector<double>& poses) {
+  const auto moving = static_cast<uint32_t>(scope_.moving.size());
+  const auto all_moving = static_cast<uint32_t>(count) * moving;
+  v1::CollisionStreamOpen open;
+  v1::PackedPlacements* const packed = open.mutable_packed_placements();
+  for (const std::string& hull : scope_.moving) packed->add_hull_ids(hull);
+  for (const std::string& hull : scope_.fixed) packed->add_hull_ids(hull);
+  for (uint32_t placement = 0; placement < all_moving; ++placement) {
+    packed->add_hulls(placement % moving);
+  }
+  for (uint32_t i = 0; i < scope_.fixed.size(); ++i) packed->add_hulls(moving + i);
+  packed->mutable_poses()->Add(poses.begin(), poses.end());
+  packed->mutable_poses()->Add(scope_.fixed_poses.begin(), scope_.fixed_poses.end());
+  for (uint32_t lane = 0; lane < count; ++lane) {
+    for (const uint32_t part : scope_.pairs) {
+      open.add_pairs(part < moving ? lane * moving + part : all_moving + (part - moving));
+    }
+  }
+  *open.mutable_wanted() = scope_.wanted;
+  open.set_tolerance(scope_.tolerance);
+  open_lanes_ = count;
+  stream_ = client_.OpenCollisionStream();
+  return stream_->Open(std::move(open));
+}
+
+absl::StatusOr<v1::StreamCollisionsResponse> WaypointStream::Update(
+    size_t count, const std::vector<double>& poses) {
+  if (count > open_lanes_) {
+    return absl::InternalError("a message has more waypoints than the first one");
+  }
+  v1::CollisionStreamUpdate update;
+  for (uint32_t i = 0; i < count * scope_.moving.size(); ++i) update.add_placements(i);
+  update.mutable_poses()->Add(poses.begin(), poses.end());
+  return stream_->Update(std::move(update));
+}
+
+std::string WaypointStream::ProblemOf(uint32_t lane, size_t pair) const {
+  const auto moving = static_cast<uint32_t>(scope_.moving.size());
+  for (const size_t side : {2 * pair, 2 * pair + 1}) {
+    const uint32_t part = scope_.pairs[side];
+    const uint32_t placement = part < moving
+                                   ? lane * moving + part
+                                   : static_cast<uint32_t>(open_lanes_) * moving + part - moving;
+    const auto found = placement_problems_.find(placement);
+    if (found != placement_problems_.end()) return found->second;
+  }
+  return "the server gave no cause";
+}
+
+absl::Status WaypointStream::Take(const v1::StreamCollisionsResponse& answer, size_t count) {
+  const size_t pairs = scope_.pairs.size() / 2;
+  const auto rows = static_cast<size_t>(answer.pairs_size());
+  if (rows != count * pairs || !AreParallel(answer.columns(), rows)) {
+    return absl::InternalError("the answer's columns and pairs disagree");
+  }
+  for (const v1::PlacementProblem& problem : answer.placement_problems()) {
+    placement_problems_[problem.placement()] = problem.message();
+  }
+  std::unordered_map<uint64_t, std::string> problems;
+  for (const v1::PairProblem& problem : answer.columns().pair_problems()) {
+    problems[problem.row()] = problem.message();
+  }
+  for (size_t i = 0; i < rows; ++i) {
+    if (answer.pairs(static_cast<int>(i)) != i) {
+      return absl::InternalError("the answer leaves out a pair that moved");
+    }
+    const AnswerRow row = RowAt(answer.columns(), static_cast<int>(i));
+    const size_t lane = i / pairs;
+    std::string problem;
+    if (row.relation == v1::RELATION_UNSPECIFIED) {
+      const auto found = problems.find(i);
+      problem = found != problems.end() ? found->second
+                                        : ProblemOf(static_cast<uint32_t>(lane), i % pairs);
+    }
+    receive_(waypoints_ + lane, i % pairs, row, problem);
+  }
+  waypoints_ += count;
+  return absl::OkStatus();
+}
+
+}  // namespace hulld

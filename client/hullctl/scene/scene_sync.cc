@@ -1,0 +1,90 @@
+#include "client/hullctl/scene/scene_sync.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "client/enclosure/convex_region.h"
+#include "client/formats/point_file.h"
+
+namespace hulld {
+namespace {
+
+// About a MiB a message.
+constexpr size_t kNumbersPerMessage = 3 * 40000;
+
+absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
+  const auto format = PointFormatOfPath(hull.file);
+  if (!format.ok()) return format.status();
+  std::vector<double> xyz;
+  const auto counts = ReadPoints({hull.file, *format, {}, {}}, [&](const PointBlock& block) {
+    for (const double x : block.xyz) xyz.push_back(hull.scale.Apply(x));
+    for (const float x : block.xyz_float) xyz.push_back(hull.scale.Apply(static_cast<double>(x)));
+    return absl::OkStatus();
+  });
+  if (!counts.ok()) return counts.status();
+  if (xyz.empty()) return absl::InvalidArgumentError(absl::StrCat(hull.file, ": holds no point"));
+  const auto is_finite = [](double x) { return std::isfinite(x); };
+  if (std::all_of(xyz.begin(), xyz.end(), is_finite)) return xyz;
+  return absl::InvalidArgumentError(
+      absl::StrCat(hull.file, ": scaled, a coordinate is beyond the largest double"));
+}
+
+}  // namespace
+
+absl::StatusOr<std::vector<double>> PointsOf(const HullDefinition& hull) {
+  if (hull.file.empty()) return hull.xyz;
+  auto xyz = ReadFile(hull);
+  if (xyz.ok()) return xyz;
+  const std::string message(xyz.status().message().data(), xyz.status().message().size());
+  return absl::InvalidArgumentError(absl::StrCat(hull.where, ": ", message));
+}
+
+absl::StatusOr<HullChange> Compare(const Client& client, const std::string& hull_id,
+                                   const std::vector<double>& xyz) {
+  const auto mesh = client.GetHullMesh(hull_id);
+  if (absl::IsNotFound(mesh.status())) return HullChange::kCreate;
+  if (!mesh.ok()) return mesh.status();
+  const auto same = IsHullOf(*mesh, xyz);
+  if (!same.ok()) return same.status();
+  return *same ? HullChange::kNone : HullChange::kReplace;
+}
+
+absl::Status PutHull(const Client& client, const std::string& hull_id,
+                     const std::vector<double>& xyz) {
+  v1::ReplaceOpen open;
+  open.set_hull_id(hull_id);
+  open.set_create_if_absent(true);
+  return client
+      .ReplaceHull(open,
+                   [&xyz](const Client::PointSink& sink) {
+                     for (size_t begin = 0; begin < xyz.size(); begin += kNumbersPerMessage) {
+                       const size_t end = std::min(begin + kNumbersPerMessage, xyz.size());
+                       v1::PointBlock points;
+                       points.mutable_xyz()->Add(xyz.begin() + static_cast<ptrdiff_t>(begin),
+                                                 xyz.begin() + static_cast<ptrdiff_t>(end));
+                       if (absl::Status sent = sink(points); !sent.ok()) return sent;
+                     }
+                     return absl::OkStatus();
+                   })
+      .status();
+}
+
+absl::StatusOr<std::vector<std::string>> Strangers(const Client& client,
+                                                   const SceneDescription& scene) {
+  std::vector<std::string> strangers;
+  if (scene.prefix.empty()) return strangers;
+  std::set<std::string> defined;
+  for (const HullDefinition& hull : scene.hulls) defined.insert(hull.hull_id);
+  const auto list = client.ListAllHulls(scene.prefix);
+  if (!list.ok()) return list.status();
+  for (const v1::HullInfo& hull : list->hulls()) {
+    if (!defined.contains(hull.hull_id())) strangers.push_back(hull.hull_id());
+  }
+  return strangers;
+}
+
+}  // namespace hulld

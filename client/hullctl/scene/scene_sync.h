@@ -1,0 +1,37 @@
+#ifndef HULLD_CLIENT_HULLCTL_SCENE_SCENE_SYNC_H_
+#define HULLD_CLIENT_HULLCTL_SCENE_SCENE_SYNC_H_
+
+#include <absl/status/statusor.h>
+
+#include <string>
+#include <vector>
+
+#include "client/client.h"
+#include "client/hullctl/scene/scene_description.h"
+
+namespace hulld {
+
+// What it takes to make the server's hull that of the file.
+enum class HullChange { kNone, kCreate, kReplace };
+
+// The points of a definition, scaled, x y z each. INVALID_ARGUMENT starts with where the definition
+// is and names the file and what is wrong with it.
+absl::StatusOr<std::vector<double>> PointsOf(const HullDefinition& hull);
+
+// Whether the server has the hull of these points under that ID: exact, each point in the hull and
+// each vertex one of them. Reads only.
+absl::StatusOr<HullChange> Compare(const Client& client, const std::string& hull_id,
+                                   const std::vector<double>& xyz);
+
+// Puts the hull of the points there, at once for all readers.
+absl::Status PutHull(const Client& client, const std::string& hull_id,
+                     const std::vector<double>& xyz);
+
+// The hulls of the server under the scene's prefix that the scene does not define. None where it
+// has no prefix.
+absl::StatusOr<std::vector<std::string>> Strangers(const Client& client,
+                                                   const SceneDescription& scene);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_SCENE_SCENE_SYNC_H_

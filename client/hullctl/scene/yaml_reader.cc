@@ -1,0 +1,148 @@
+#include "client/hullctl/scene/yaml_reader.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <set>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/help/suggestion.h"
+
+namespace hulld {
+namespace {
+
+// What a scene may weigh; many placements are for JSON and its packed form.
+constexpr size_t kMostBytes = size_t{64} << 20;
+
+std::string PlaceText(const std::string& name, const YAML::Mark& mark) {
+  if (mark.is_null()) return name;
+  return absl::StrCat(name, ":", mark.line + 1, ":", mark.column + 1);
+}
+
+}  // namespace
+
+absl::StatusOr<YamlReader> YamlReader::Parse(const std::string& text, const std::string& name) {
+  if (text.size() > kMostBytes) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(name, ": more than ", kMostBytes, " bytes; write so large a scene as JSON"));
+  }
+  std::vector<YAML::Node> documents;
+  try {
+    documents = YAML::LoadAll(text);
+  } catch (const YAML::Exception& problem) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(PlaceText(name, problem.mark), ": not read as YAML: ", problem.msg));
+  } catch (const std::exception& problem) {
+    return absl::InvalidArgumentError(absl::StrCat(name, ": not read as YAML: ", problem.what()));
+  }
+  if (documents.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(name, ": there is no scene in it"));
+  }
+  if (documents.size() > 1) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(PlaceText(name, documents[1].Mark()), ": a second document; a scene is one"));
+  }
+  return YamlReader(documents.front(), name);
+}
+
+std::string YamlReader::PlaceOf(const YAML::Node& node) const {
+  return PlaceText(name_, node.Mark());
+}
+
+absl::Status YamlReader::ErrorAt(const YAML::Node& node, const std::string& message) const {
+  return absl::InvalidArgumentError(absl::StrCat(PlaceOf(node), ": ", message));
+}
+
+absl::StatusOr<YamlReader::Entries> YamlReader::EntriesOf(const YAML::Node& node,
+                                                          const std::string& what) const {
+  if (!node.IsMap()) return ErrorAt(node, absl::StrCat(what, " is no mapping of keys to values"));
+  Entries entries;
+  std::set<std::string> seen;
+  for (const auto& entry : node) {
+    if (!entry.first.IsScalar() || entry.first.Scalar().empty()) {
+      return ErrorAt(entry.first, absl::StrCat("a key of ", what, " is no text"));
+    }
+    const std::string& key = entry.first.Scalar();
+    if (!seen.insert(key).second) {
+      return ErrorAt(entry.first, absl::StrCat(what, " has the key ", Quoted(key), " twice"));
+    }
+    entries.emplace_back(key, entry.second);
+  }
+  return entries;
+}
+
+absl::StatusOr<YamlReader::Entries> YamlReader::EntriesOf(
+    const YAML::Node& node, const std::string& what, const std::vector<std::string>& known) const {
+  auto entries = EntriesOf(node, what);
+  if (!entries.ok()) return entries;
+  for (const auto& entry : node) {
+    const std::string& key = entry.first.Scalar();
+    if (std::find(known.begin(), known.end(), key) != known.end()) continue;
+    const std::string hint = Suggestion(key, known);
+    return ErrorAt(entry.first, absl::StrCat(what, " has no key ", Quoted(key),
+                                             hint.empty() ? absl::StrCat("; keys are ",
+                                                                         absl::StrJoin(known, ", "))
+                                                          : hint));
+  }
+  return entries;
+}
+
+absl::StatusOr<std::string> YamlReader::Text(const YAML::Node& node, const std::string& key) const {
+  if (node.IsScalar() && !node.Scalar().empty()) return node.Scalar();
+  return ErrorAt(node, absl::StrCat(key, " takes a text"));
+}
+
+absl::StatusOr<double> YamlReader::Number(const YAML::Node& node, const std::string& key) const {
+  double number = 0;
+  if (!node.IsScalar()) return ErrorAt(node, absl::StrCat(key, " takes a number"));
+  const NumberText kind = ParseDouble(node.Scalar(), &number);
+  if (kind != NumberText::kNumber) {
+    return ErrorAt(node, absl::StrCat(key, ": ", NumberProblem(kind, node.Scalar())));
+  }
+  if (!std::isfinite(number)) {
+    return ErrorAt(node, absl::StrCat(key, ": ", Quoted(node.Scalar()), " is not finite"));
+  }
+  return number;
+}
+
+absl::StatusOr<bool> YamlReader::Truth(const YAML::Node& node, const std::string& key) const {
+  if (node.IsScalar() && node.Scalar() == "true") return true;
+  if (node.IsScalar() && node.Scalar() == "false") return false;
+  return ErrorAt(node, absl::StrCat(key, " is true or false"));
+}
+
+absl::StatusOr<std::vector<double>> YamlReader::Numbers(const YAML::Node& node,
+                                                        const std::string& key,
+                                                        const std::vector<size_t>& counts) const {
+  if (!node.IsSequence()) {
+    return ErrorAt(node, absl::StrCat(key, " takes a list of numbers, as in [0, 0, 1]"));
+  }
+  std::vector<double> numbers;
+  for (const YAML::Node& entry : node) {
+    const auto number = Number(entry, key);
+    if (!number.ok()) return number.status();
+    numbers.push_back(*number);
+  }
+  if (counts.empty() || std::find(counts.begin(), counts.end(), numbers.size()) != counts.end()) {
+    return numbers;
+  }
+  return ErrorAt(node, absl::StrCat(key, " takes ", absl::StrJoin(counts, " or "),
+                                    " numbers, here are ", numbers.size()));
+}
+
+absl::StatusOr<std::vector<std::string>> YamlReader::Texts(const YAML::Node& node,
+                                                           const std::string& key) const {
+  if (!node.IsSequence()) return ErrorAt(node, absl::StrCat(key, " takes a list, as in [a, b]"));
+  std::vector<std::string> texts;
+  for (const YAML::Node& entry : node) {
+    auto text = Text(entry, key);
+    if (!text.ok()) return text.status();
+    texts.push_back(*std::move(text));
+  }
+  return texts;
+}
+
+}  // namespace hulld

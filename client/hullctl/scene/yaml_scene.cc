@@ -1,0 +1,604 @@
+#include "client/hullctl/scene/yaml_scene.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "client/formats/byte_source.h"
+#include "client/formats/text_number.h"
+#include "client/hullctl/help/suggestion.h"
+#include "client/hullctl/scene/yaml_reader.h"
+
+namespace hulld {
+namespace {
+
+struct UnitName {
+  const char* name;
+  LengthScale scale;
+};
+
+// Millimetres and centimetres are divided by a whole number, so that the result is rounded once.
+constexpr UnitName kUnits[] = {
+    {"mm", {1, 1000}}, {"cm", {1, 100}}, {"m", {1, 1}}, {"in", {0.0254, 1}}, {"ft", {0.3048, 1}}};
+
+// The folder of a file, with the slash behind it; empty for none.
+std::string FolderOf(const std::string& path) {
+  const size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash + 1);
+}
+
+// Reads one document, part by part; names are known before they are used, whatever the order of
+// the parts in the file.
+class SceneParser {
+ public:
+  SceneParser(const YamlReader& yaml, std::string file) : yaml_(yaml), file_(std::move(file)) {}
+
+  absl::StatusOr<SceneDescription> Run() {
+    const auto entries =
+        yaml_.EntriesOf(yaml_.root(), "the scene",
+                        {"prefix", "scale", "hulls", "bodies", "place", "ignore", "ask"});
+    if (!entries.ok()) return entries.status();
+    using Part = absl::Status (SceneParser::*)(const YAML::Node&);
+    // In the order in which they build on one another.
+    const std::pair<const char*, Part> parts[] = {
+        {"prefix", &SceneParser::TakePrefix}, {"scale", &SceneParser::TakeScale},
+        {"hulls", &SceneParser::TakeHulls},   {"bodies", &SceneParser::TakeBodies},
+        {"place", &SceneParser::TakePlaces},  {"ignore", &SceneParser::TakeIgnored},
+        {"ask", &SceneParser::TakeAsk}};
+    for (const auto& [key, take] : parts) {
+      for (const auto& [name, node] : *entries) {
+        if (name != key) continue;
+        if (absl::Status taken = (this->*take)(node); !taken.ok()) return taken;
+      }
+    }
+    return std::move(scene_);
+  }
+
+ private:
+  using Entries = YamlReader::Entries;
+
+  absl::Status TakePrefix(const YAML::Node& node) {
+    auto prefix = yaml_.Text(node, "prefix");
+    if (!prefix.ok()) return prefix.status();
+    scene_.prefix = *std::move(prefix);
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeScale(const YAML::Node& node) {
+    const auto scale = ScaleOf(node);
+    if (!scale.ok()) return scale.status();
+    scale_ = *scale;
+    return absl::OkStatus();
+  }
+
+  absl::StatusOr<LengthScale> ScaleOf(const YAML::Node& node) const {
+    const auto text = yaml_.Text(node, "scale");
+    if (!text.ok()) return text.status();
+    for (const UnitName& unit : kUnits) {
+      if (*text == unit.name) return unit.scale;
+    }
+    LengthScale scale;
+    const bool is_number = ParseDouble(*text, &scale.factor) == NumberText::kNumber;
+    if (is_number && std::isfinite(scale.factor) && scale.factor != 0) return scale;
+    return yaml_.ErrorAt(node, absl::StrCat("scale: ", Quoted(*text),
+                                            " is no unit and no number other than 0; units are "
+                                            "mm, cm, m, in and ft, of a scene in metres"));
+  }
+
+  absl::Status TakeHulls(const YAML::Node& node) {
+    const auto entries = yaml_.EntriesOf(node, "hulls");
+    if (!entries.ok()) return entries.status();
+    for (const auto& [name, value] : *entries) {
+      HullDefinition hull;
+      hull.name = name;
+      hull.hull_id = scene_.prefix + name;
+      hull.scale = scale_;
+      hull.where = yaml_.PlaceOf(value);
+      if (absl::Status taken = TakeHull(value, &hull); !taken.ok()) return taken;
+      hull_ids_[name] = hull.hull_id;
+      scene_.hulls.push_back(std::move(hull));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeHull(const YAML::Node& node, HullDefinition* hull) const {
+    const std::string what = absl::StrCat("hull ", Quoted(hull->name));
+    const auto entries = yaml_.EntriesOf(node, what, {"file", "scale", "points", "box"});
+    if (!entries.ok()) return entries.status();
+    int sources = 0;
+    bool scaled = false;
+    for (const auto& [key, value] : *entries) {
+      absl::Status taken;
+      if (key == "scale") {
+        const auto scale = ScaleOf(value);
+        if (!scale.ok()) return scale.status();
+        hull->scale = *scale;
+        scaled = true;
+        continue;
+      }
+      ++sources;
+      if (key == "file") {
+        auto file = yaml_.Text(value, "file");
+        if (!file.ok()) return file.status();
+        hull->file = file->front() == '/' ? *file : FolderOf(file_) + *file;
+      } else {
+        taken = key == "box" ? TakeBox(value, hull) : TakePoints(value, hull);
+      }
+      if (!taken.ok()) return taken;
+    }
+    if (sources != 1) {
+      return yaml_.ErrorAt(node, absl::StrCat(what, " takes one of file, points and box"));
+    }
+    if (scaled && hull->file.empty()) {
+      return yaml_.ErrorAt(node, absl::StrCat(what, ": scale goes with a file"));
+    }
+    return absl::OkStatus();
+  }
+
+  // Edges; the box stands around the origin.
+  absl::Status TakeBox(const YAML::Node& node, HullDefinition* hull) const {
+    const auto size = yaml_.Numbers(node, "box", {3});
+    if (!size.ok()) return size.status();
+    for (const double edge : *size) {
+      if (edge < 0) return yaml_.ErrorAt(node, "box takes edges of at least 0");
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const double half = (*size)[axis] / 2;
+        hull->xyz.push_back((corner >> axis) % 2 == 0 ? -half : half);
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakePoints(const YAML::Node& node, HullDefinition* hull) const {
+    if (!node.IsSequence() || node.size() == 0) {
+      return yaml_.ErrorAt(node, "points takes a list of points, as in [[0, 0, 0], [1, 0, 0]]");
+    }
+    for (const YAML::Node& point : node) {
+      const auto xyz = yaml_.Numbers(point, "a point", {3});
+      if (!xyz.ok()) return xyz.status();
+      hull->xyz.insert(hull->xyz.end(), xyz->begin(), xyz->end());
+    }
+    return absl::OkStatus();
+  }
+
+  // A translation, a quaternion and a translation, or both by name.
+  absl::StatusOr<RigidPose> PoseOf(const YAML::Node& node) const {
+    if (!node.IsMap()) {
+      const auto numbers = yaml_.Numbers(node, "at", {3, 7});
+      if (!numbers.ok()) return numbers.status();
+      RigidPose pose = kNoMotion;
+      std::copy(numbers->begin(), numbers->end(), pose.end() - numbers->size());
+      return CheckedPose(node, pose);
+    }
+    const auto entries = yaml_.EntriesOf(node, "at", {"xyz", "rpy", "quaternion"});
+    if (!entries.ok()) return entries.status();
+    RigidPose pose = kNoMotion;
+    int rotations = 0;
+    for (const auto& [key, value] : *entries) {
+      const size_t count = key == "quaternion" ? 4 : 3;
+      const auto numbers = yaml_.Numbers(value, key, {count});
+      if (!numbers.ok()) return numbers.status();
+      const double* const x = numbers->data();
+      if (key == "xyz") {
+        std::copy(x, x + 3, pose.begin() + 4);
+      } else if (key == "quaternion") {
+        std::copy(x, x + 4, pose.begin());
+        ++rotations;
+      } else {
+        const RigidPose turned = RotationOf({x[0], x[1], x[2]});
+        std::copy(turned.begin(), turned.begin() + 4, pose.begin());
+        ++rotations;
+      }
+    }
+    if (rotations > 1) return yaml_.ErrorAt(node, "at takes rpy or a quaternion, not both");
+    return CheckedPose(node, pose);
+  }
+
+  absl::StatusOr<RigidPose> CheckedPose(const YAML::Node& node, const RigidPose& pose) const {
+    const bool turns = pose[0] != 0 || pose[1] != 0 || pose[2] != 0 || pose[3] != 0;
+    if (turns) return pose;
+    return yaml_.ErrorAt(node, "at: a quaternion 0 0 0 0 is no rotation");
+  }
+
+  // The ID of a hull that the file defines.
+  absl::StatusOr<std::string> DefinedHull(const YAML::Node& node) const {
+    const auto name = yaml_.Text(node, "hull");
+    if (!name.ok()) return name.status();
+    const auto found = hull_ids_.find(*name);
+    if (found != hull_ids_.end()) return found->second;
+    std::vector<std::string> known;
+    for (const auto& [defined, id] : hull_ids_) known.push_back(defined);
+    const std::string hint = Suggestion(*name, known);
+    return yaml_.ErrorAt(
+        node,
+        absl::StrCat("hull ", Quoted(*name), " is not among hulls",
+                     hint.empty() ? "; one that the server has anyway is named by id" : hint));
+  }
+
+  absl::Status TakeBodies(const YAML::Node& node) {
+    const auto entries = yaml_.EntriesOf(node, "bodies");
+    if (!entries.ok()) return entries.status();
+    for (const auto& [name, value] : *entries) {
+      if (hull_ids_.contains(name)) {
+        return yaml_.ErrorAt(value, absl::StrCat("there is a hull ", Quoted(name),
+                                                 "; hulls and bodies share their names"));
+      }
+      BodyDefinition body;
+      body.name = name;
+      if (!value.IsSequence() || value.size() == 0) {
+        return yaml_.ErrorAt(value, absl::StrCat("body ", Quoted(name),
+                                                 " takes a list of pieces, {hull: NAME, at: POSE} "
+                                                 "each"));
+      }
+      std::set<std::string> taken;
+      for (const YAML::Node& piece : value) {
+        if (absl::Status added = TakePiece(piece, &taken, &body); !added.ok()) return added;
+      }
+      bodies_[name] = static_cast<int>(scene_.bodies.size());
+      scene_.bodies.push_back(std::move(body));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakePiece(const YAML::Node& node, std::set<std::string>* taken,
+                         BodyDefinition* body) const {
+    const std::string what = absl::StrCat("a piece of body ", Quoted(body->name));
+    const auto entries = yaml_.EntriesOf(node, what, {"hull", "id", "at"});
+    if (!entries.ok()) return entries.status();
+    PieceDefinition piece;
+    for (const auto& [key, value] : *entries) {
+      if (key == "at") {
+        const auto pose = PoseOf(value);
+        if (!pose.ok()) return pose.status();
+        piece.X_BP = *pose;
+        continue;
+      }
+      if (!piece.hull_id.empty()) return yaml_.ErrorAt(value, what + " takes hull or id, not both");
+      auto id = key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id");
+      if (!id.ok()) return id.status();
+      piece.name = value.Scalar();
+      piece.hull_id = *std::move(id);
+    }
+    if (piece.hull_id.empty()) return yaml_.ErrorAt(node, what + " lacks hull or id");
+    const std::string name = piece.name;
+    for (int number = 2; !taken->insert(piece.name).second; ++number) {
+      piece.name = absl::StrCat(name, "-", number);
+    }
+    body->pieces.push_back(std::move(piece));
+    return absl::OkStatus();
+  }
+
+  absl::Status TakePlaces(const YAML::Node& node) {
+    const auto entries = yaml_.EntriesOf(node, "place");
+    if (!entries.ok()) return entries.status();
+    for (const auto& [name, value] : *entries) {
+      PlacementDefinition placement;
+      placement.name = name;
+      if (absl::Status taken = TakePlace(value, &placement); !taken.ok()) return taken;
+      pieces_ +=
+          placement.body < 0 ? 1 : scene_.bodies[static_cast<size_t>(placement.body)].pieces.size();
+      if (pieces_ > kMostPieces) {
+        return yaml_.ErrorAt(value, absl::StrCat("more than ", kMostPieces, " pieces are placed"));
+      }
+      places_[name] = static_cast<int>(scene_.placements.size());
+      if (!placement.group.empty()) groups_.insert(placement.group);
+      scene_.placements.push_back(std::move(placement));
+    }
+    for (const auto& [name, value] : *entries) {
+      if (!groups_.contains(name)) continue;
+      return yaml_.ErrorAt(value, absl::StrCat(Quoted(name), " names a placement and a group; ",
+                                               "ignore could not tell which it means"));
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakePlace(const YAML::Node& node, PlacementDefinition* placement) const {
+    const std::string what = absl::StrCat("placement ", Quoted(placement->name));
+    const auto entries = yaml_.EntriesOf(node, what, {"hull", "body", "id", "at", "group"});
+    if (!entries.ok()) return entries.status();
+    int objects = 0;
+    for (const auto& [key, value] : *entries) {
+      if (key == "at") {
+        const auto pose = PoseOf(value);
+        if (!pose.ok()) return pose.status();
+        placement->X_WO = *pose;
+        continue;
+      }
+      if (key == "group") {
+        auto group = yaml_.Text(value, "group");
+        if (!group.ok()) return group.status();
+        placement->group = *std::move(group);
+        continue;
+      }
+      ++objects;
+      if (key == "body") {
+        const auto body = BodyOf(value);
+        if (!body.ok()) return body.status();
+        placement->body = *body;
+        continue;
+      }
+      auto id = key == "hull" ? DefinedHull(value) : yaml_.Text(value, "id");
+      if (!id.ok()) return id.status();
+      placement->hull_id = *std::move(id);
+    }
+    if (objects == 1) return absl::OkStatus();
+    return yaml_.ErrorAt(node, what + " takes one of hull, body and id");
+  }
+
+  absl::StatusOr<int> BodyOf(const YAML::Node& node) const {
+    const auto name = yaml_.Text(node, "body");
+    if (!name.ok()) return name.status();
+    return Find(node, *name, bodies_, "body", "bodies");
+  }
+
+  absl::StatusOr<int> Find(const YAML::Node& node, const std::string& name,
+                           const std::map<std::string, int>& among, const char* what,
+                           const char* where) const {
+    const auto found = among.find(name);
+    if (found != among.end()) return found->second;
+    std::vector<std::string> known;
+    for (const auto& [key, index] : among) known.push_back(key);
+    return yaml_.ErrorAt(node, absl::StrCat(what, " ", Quoted(name), " is not among ", where,
+                                            Suggestion(name, known)));
+  }
+
+  absl::StatusOr<std::vector<std::string>> TwoNames(const YAML::Node& node,
+                                                    const std::string& key) const {
+    auto names = yaml_.Texts(node, key);
+    if (names.ok() && names->size() != 2) {
+      return yaml_.ErrorAt(node, absl::StrCat(key, " takes two names each, as in [[a, b]]"));
+    }
+    return names;
+  }
+
+  absl::Status TakeIgnored(const YAML::Node& node) {
+    if (!node.IsSequence()) {
+      return yaml_.ErrorAt(node, "ignore takes a list of pairs, as in [[a, b]]");
+    }
+    for (const YAML::Node& entry : node) {
+      auto names = TwoNames(entry, "ignore");
+      if (!names.ok()) return names.status();
+      for (size_t i = 0; i < 2; ++i) {
+        const std::string& name = (*names)[i];
+        if (places_.contains(name) || groups_.contains(name)) continue;
+        std::vector<std::string> known(groups_.begin(), groups_.end());
+        for (const auto& [place, index] : places_) known.push_back(place);
+        return yaml_.ErrorAt(entry[i],
+                             absl::StrCat("ignore: ", Quoted(name), " is no placement and no group",
+                                          Suggestion(name, known)));
+      }
+      scene_.ignored.emplace_back((*names)[0], (*names)[1]);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeAsk(const YAML::Node& node) {
+    const auto entries =
+        yaml_.EntriesOf(node, "ask",
+                        {"pairs", "movers", "axis", "separation", "max_error", "witness",
+                         "certificate", "analysis", "clearance", "tolerance"});
+    if (!entries.ok()) return entries.status();
+    for (const auto& [key, value] : *entries) {
+      absl::Status taken = key == "pairs"    ? TakePairs(value)
+                           : key == "movers" ? TakeMovers(value)
+                                             : TakeWish(key, value);
+      if (!taken.ok()) return taken;
+    }
+    if (scene_.pairs.has_value() && !scene_.movers.empty()) {
+      return yaml_.ErrorAt(node, "ask: pairs and movers do not go together");
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakePairs(const YAML::Node& node) {
+    if (!node.IsSequence()) {
+      return yaml_.ErrorAt(node, "pairs takes a list of pairs, as in [[a, b]]");
+    }
+    scene_.pairs.emplace();
+    for (const YAML::Node& entry : node) {
+      const auto names = TwoNames(entry, "pairs");
+      if (!names.ok()) return names.status();
+      int side[2] = {0, 0};
+      for (size_t i = 0; i < 2; ++i) {
+        const auto place = Find(entry[i], (*names)[i], places_, "placement", "place");
+        if (!place.ok()) return place.status();
+        side[i] = *place;
+      }
+      scene_.pairs->emplace_back(side[0], side[1]);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeMovers(const YAML::Node& node) {
+    const auto names = yaml_.Texts(node, "movers");
+    if (!names.ok()) return names.status();
+    for (size_t i = 0; i < names->size(); ++i) {
+      const auto place = Find(node[i], (*names)[i], places_, "placement", "place");
+      if (!place.ok()) return place.status();
+      std::vector<int>& movers = scene_.movers;
+      if (std::find(movers.begin(), movers.end(), *place) == movers.end()) movers.push_back(*place);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeWish(const std::string& key, const YAML::Node& node) {
+    if (key == "max_error" || key == "clearance" || key == "tolerance") {
+      const auto length = yaml_.Number(node, key);
+      if (!length.ok()) return length.status();
+      if (*length < 0) return yaml_.ErrorAt(node, absl::StrCat(key, " must be at least 0"));
+      if (key == "tolerance") {
+        scene_.tolerance = *length;
+      } else if (key == "clearance") {
+        scene_.wanted.set_clearance(*length);
+      } else {
+        scene_.wanted.set_max_error(*length);
+      }
+      return absl::OkStatus();
+    }
+    const auto truth = yaml_.Truth(node, key);
+    if (!truth.ok()) return truth.status();
+    if (key == "axis") scene_.wanted.set_axis(*truth);
+    if (key == "separation") scene_.wanted.set_separation(*truth);
+    if (key == "witness") scene_.wanted.set_witness(*truth);
+    if (key == "certificate") scene_.wanted.set_certificate(*truth);
+    if (key == "analysis") scene_.wanted.set_analysis(*truth);
+    return absl::OkStatus();
+  }
+
+  const YamlReader& yaml_;
+  const std::string file_;
+  LengthScale scale_;
+  SceneDescription scene_;
+  std::map<std::string, std::string> hull_ids_;
+  std::map<std::string, int> bodies_;
+  std::map<std::string, int> places_;
+  std::set<std::string> groups_;
+  size_t pieces_ = 0;
+};
+
+// Which placements are asked about together, as the contract says it: a class for each placement
+// that stands alone and for each group, and the pairs of classes that are ignored.
+class Classes {
+ public:
+  explicit Classes(const SceneDescription& scene) {
+    std::set<std::string> singled_out;
+    for (const auto& [a, b] : scene.ignored) singled_out.insert({a, b});
+    std::map<std::string, uint32_t> of_group;
+    for (const PlacementDefinition& placement : scene.placements) {
+      const bool alone = placement.group.empty() || singled_out.contains(placement.name);
+      uint32_t number = next_;
+      if (!alone) number = of_group.emplace(placement.group, next_).first->second;
+      if (number == next_) ++next_;
+      class_.push_back(number);
+      members_[placement.name].insert(number);
+      if (!placement.group.empty()) members_[placement.group].insert(number);
+      if (!placement.group.empty()) groups_.insert(placement.group);
+    }
+    for (const std::string& group : groups_) Ignore(group, group);
+    for (const auto& [a, b] : scene.ignored) Ignore(a, b);
+  }
+
+  uint32_t of(size_t placement) const { return class_[placement]; }
+  const std::set<std::pair<uint32_t, uint32_t>>& ignored() const { return ignored_; }
+
+ private:
+  void Ignore(const std::string& a, const std::string& b) {
+    for (const uint32_t one : members_[a]) {
+      for (const uint32_t other : members_[b]) {
+        if (one != other) ignored_.insert({std::min(one, other), std::max(one, other)});
+      }
+    }
+  }
+
+  uint32_t next_ = 0;
+  std::vector<uint32_t> class_;
+  std::map<std::string, std::set<uint32_t>> members_;
+  std::set<std::string> groups_;
+  std::set<std::pair<uint32_t, uint32_t>> ignored_;
+};
+
+void AddPlacement(const std::string& hull_id, const RigidPose& X_WP,
+                  v1::FindCollisionsRequest* request) {
+  v1::Placement& placement = *request->add_placements();
+  placement.set_hull_id(hull_id);
+  if (X_WP == kNoMotion) return;
+  v1::Pose& pose = *placement.mutable_pose();
+  if (X_WP[1] != 0 || X_WP[2] != 0 || X_WP[3] != 0) {
+    v1::Quaternion& rotation = *pose.mutable_rotation();
+    rotation.set_w(X_WP[0]);
+    rotation.set_x(X_WP[1]);
+    rotation.set_y(X_WP[2]);
+    rotation.set_z(X_WP[3]);
+  }
+  v1::Vector3& translation = *pose.mutable_translation();
+  translation.set_x(X_WP[4]);
+  translation.set_y(X_WP[5]);
+  translation.set_z(X_WP[6]);
+}
+
+// Adds a placement, or its pieces; returns their indices.
+std::vector<uint32_t> AddPieces(const SceneDescription& from, const PlacementDefinition& placement,
+                                Scene* scene) {
+  if (placement.body < 0) {
+    AddPlacement(placement.hull_id, placement.X_WO, &scene->request);
+    scene->names.push_back(placement.name);
+    return {scene->size() - 1};
+  }
+  std::vector<uint32_t> indices;
+  for (const PieceDefinition& piece : from.bodies[static_cast<size_t>(placement.body)].pieces) {
+    AddPlacement(piece.hull_id, Compose(placement.X_WO, piece.X_BP), &scene->request);
+    scene->names.push_back(absl::StrCat(placement.name, "/", piece.name));
+    indices.push_back(scene->size() - 1);
+  }
+  return indices;
+}
+
+}  // namespace
+
+bool LooksLikeYaml(std::string_view line) {
+  if (line.substr(0, 3) == "---" || line.substr(0, 5) == "%YAML") return true;
+  const std::string_view word = NextToken(&line);
+  const size_t colon = word.find(':');
+  return colon != std::string_view::npos && colon > 0;
+}
+
+absl::StatusOr<SceneDescription> ParseYamlScene(const std::string& text, const std::string& name) {
+  const auto yaml = YamlReader::Parse(text, name);
+  if (!yaml.ok()) return yaml.status();
+  return SceneParser(*yaml, name).Run();
+}
+
+absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path) {
+  const auto text = ReadText(path);
+  if (!text.ok()) return text.status();
+  return ParseYamlScene(*text, path);
+}
+
+absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name) {
+  Scene scene;
+  const Classes classes(description);
+  const size_t count = description.placements.size();
+  std::vector<size_t> order(description.movers.begin(), description.movers.end());
+  const std::set<size_t> first(order.begin(), order.end());
+  for (size_t i = 0; i < count; ++i) {
+    if (!first.contains(i)) order.push_back(i);
+  }
+  std::vector<std::vector<uint32_t>> pieces(count);
+  uint32_t movers = 0;
+  for (const size_t i : order) {
+    pieces[i] = AddPieces(description, description.placements[i], &scene);
+    scene.request.mutable_groups()->Resize(static_cast<int>(scene.size()), classes.of(i));
+    if (first.contains(i)) movers = scene.size();
+  }
+  if (!first.empty()) scene.request.set_movers(movers);
+  scene.request.set_ignore_same_group(true);
+  for (const auto& [a, b] : classes.ignored()) {
+    scene.request.add_ignored_group_pairs(a);
+    scene.request.add_ignored_group_pairs(b);
+  }
+  *scene.request.mutable_wanted() = description.wanted;
+  scene.request.set_tolerance(description.tolerance);
+  if (!description.pairs.has_value()) return scene;
+  scene.pairs.emplace();
+  for (const auto& [a, b] : *description.pairs) {
+    for (const uint32_t one : pieces[static_cast<size_t>(a)]) {
+      for (const uint32_t other : pieces[static_cast<size_t>(b)]) {
+        if (scene.pairs->size() >= 2 * kMostPairs) {
+          return absl::InvalidArgumentError(
+              absl::StrCat(name, ": more than ", kMostPairs, " pairs of pieces are named"));
+        }
+        scene.pairs->insert(scene.pairs->end(), {one, other});
+      }
+    }
+  }
+  return scene;
+}
+
+}  // namespace hulld

@@ -1,0 +1,196 @@
+"""Client of hulld, a server that keeps 3D convex hulls by ID and tells exactly whether they
+collide.
+
+    import hulld
+
+    with hulld.local() as client:                       # or hulld.Client("HOST:PORT")
+        client.append_points("box", points, create=True)  # n x 3
+        answer = client.check_collision("box", ("box", pose), separation=True)
+        print(answer.relation.name, answer.separation)
+
+README.md beside the package shows each task.
+"""
+
+from hulld.aio.appender import AsyncAppender
+from hulld.aio.client import AsyncClient
+from hulld.aio.collision_stream import AsyncCollisionStream
+from hulld.aio.watches import AsyncCollisionWatch, AsyncHullWatch
+from hulld.answers.collisions import (
+    Analysis,
+    Answers,
+    Axis,
+    AxisKind,
+    Batch,
+    BatchPart,
+    Certificate,
+    Collision,
+    CollisionChanges,
+    CollisionEvent,
+    CollisionEventKind,
+    Feature,
+    HullSize,
+    HullVersion,
+    Method,
+    Problem,
+    Relation,
+    Rung,
+    Scene,
+    ScenePart,
+    SceneTotals,
+    Separation,
+    StreamAnswer,
+    VertexPair,
+    Witness,
+)
+from hulld.answers.hulls import (
+    Audit,
+    CreatedHull,
+    Durability,
+    Header,
+    Hull,
+    HullChanges,
+    HullEvent,
+    HullEventKind,
+    HullInfo,
+    HullMesh,
+    MeshFacets,
+    MeshHeader,
+    MeshPart,
+    MeshVertices,
+    PointCounts,
+    ReplacedHull,
+)
+from hulld.answers.status import Limits, ServerStatus
+from hulld.appender import Appender
+from hulld.backup import Backup
+from hulld.calls.append_state import Appended, Opened
+from hulld.client import Client
+from hulld.collision_stream import CollisionStream
+from hulld.connection import DEFAULT_SERVER, Tls, read_token_file
+from hulld.errors import (
+    AbortedError,
+    AlreadyExistsError,
+    CancelledError,
+    DataLossError,
+    DeadlineExceededError,
+    FailedPreconditionError,
+    HulldError,
+    InternalError,
+    InvalidArgumentError,
+    NotFoundError,
+    PermissionDeniedError,
+    ResourceExhaustedError,
+    UnauthenticatedError,
+    UnavailableError,
+    UnimplementedError,
+)
+from hulld.geometry.placements import (
+    Placement,
+    PlacementLike,
+    Placements,
+    PlacementsLike,
+    all_pairs,
+)
+from hulld.geometry.points import PointsLike, as_points
+from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesLike, pack_poses
+from hulld.local_server import Local, LocalServer, local
+from hulld.programs import find_program
+from hulld.retry import RetryPolicy
+from hulld.watches import CollisionWatch, HullWatch
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "DEFAULT_SERVER",
+    "ORTHOGONALITY_TOLERANCE",
+    "AbortedError",
+    "AlreadyExistsError",
+    "Analysis",
+    "Answers",
+    "Appended",
+    "Appender",
+    "AsyncAppender",
+    "AsyncClient",
+    "AsyncCollisionStream",
+    "AsyncCollisionWatch",
+    "AsyncHullWatch",
+    "Audit",
+    "Axis",
+    "AxisKind",
+    "Backup",
+    "Batch",
+    "BatchPart",
+    "CancelledError",
+    "Certificate",
+    "Client",
+    "Collision",
+    "CollisionChanges",
+    "CollisionEvent",
+    "CollisionEventKind",
+    "CollisionStream",
+    "CollisionWatch",
+    "CreatedHull",
+    "DataLossError",
+    "DeadlineExceededError",
+    "Durability",
+    "FailedPreconditionError",
+    "Feature",
+    "Header",
+    "Hull",
+    "HullChanges",
+    "HullEvent",
+    "HullEventKind",
+    "HullInfo",
+    "HullMesh",
+    "HullSize",
+    "HullVersion",
+    "HullWatch",
+    "HulldError",
+    "InternalError",
+    "InvalidArgumentError",
+    "Limits",
+    "Local",
+    "LocalServer",
+    "MeshFacets",
+    "MeshHeader",
+    "MeshPart",
+    "MeshVertices",
+    "Method",
+    "NotFoundError",
+    "Opened",
+    "PermissionDeniedError",
+    "Placement",
+    "PlacementLike",
+    "Placements",
+    "PlacementsLike",
+    "PointCounts",
+    "PointsLike",
+    "Pose",
+    "PoseLike",
+    "PosesLike",
+    "Problem",
+    "Relation",
+    "ReplacedHull",
+    "ResourceExhaustedError",
+    "RetryPolicy",
+    "Rung",
+    "Scene",
+    "ScenePart",
+    "SceneTotals",
+    "Separation",
+    "ServerStatus",
+    "StreamAnswer",
+    "Tls",
+    "UnauthenticatedError",
+    "UnavailableError",
+    "UnimplementedError",
+    "VertexPair",
+    "Witness",
+    "__version__",
+    "all_pairs",
+    "as_points",
+    "find_program",
+    "local",
+    "pack_poses",
+    "read_token_file",
+]

@@ -1,0 +1,2 @@
+"""What the server answers, as plain values: frozen, with numpy arrays where there are many numbers.
+"""

@@ -1,0 +1,101 @@
+"""Puts the messages of a batch, a scene or a step of a stream together, whole columns at a time."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hulld.answers.collision_messages import new_frame
+from hulld.answers.collisions import Batch, Scene, StreamAnswer
+from hulld.calls.wanted import Wanted
+
+
+class BatchAssembly:
+    """The messages of one BatchCheckCollisions."""
+
+    def __init__(self, pairs: npt.NDArray[np.uint32], wanted: Wanted) -> None:
+        self._pairs = pairs
+        self._frame = new_frame(wanted)
+
+    def add(self, data: bytes) -> None:
+        """ValueError: it does not follow the message before."""
+        before = self._frame.columns.rows
+        self._frame.read_batch(data)
+        if self._frame.columns.rows > before and self._frame.numbers.get(4, 0) != before:
+            raise ValueError("the batch's answers do not follow each other")
+
+    def finish(self) -> Batch:
+        """ValueError: something is missing."""
+        frame = self._frame
+        if frame.header is None or frame.columns.rows != len(self._pairs):
+            raise ValueError(
+                f"the batch ended with {frame.columns.rows} answers for {len(self._pairs)} pairs"
+            )
+        return Batch(
+            self._pairs,
+            frame.columns.finish(),
+            frame.known_hulls(),
+            frame.placement_problems,
+            frame.header,
+        )
+
+
+class SceneAssembly:
+    """The messages of one FindCollisions."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self._frame = new_frame(wanted)
+
+    def add(self, data: bytes) -> None:
+        self._frame.read_scene(data)
+
+    def finish(self) -> Scene:
+        """ValueError: something is missing."""
+        frame = self._frame
+        pairs = frame.indices()
+        if frame.header is None or frame.totals is None or pairs.size != 2 * frame.columns.rows:
+            raise ValueError("the scene ended early, or its pairs and answers disagree")
+        return Scene(
+            pairs.reshape(-1, 2),
+            frame.columns.finish(),
+            frame.known_hulls(),
+            frame.placement_problems,
+            frame.totals,
+            frame.header,
+        )
+
+
+class StepAssembly:
+    """The messages that answer one message of StreamCollisions."""
+
+    def __init__(self, update: int, pairs: npt.NDArray[np.uint32], wanted: Wanted) -> None:
+        self._update = update
+        self._pairs = pairs
+        self._frame = new_frame(wanted)
+
+    def add(self, data: bytes) -> bool:
+        """Whether this was the last. ValueError: it answers another message."""
+        update, last = self._frame.read_stream(data)
+        if update != self._update:
+            raise ValueError(f"the server answered message {update}, not {self._update}")
+        return last
+
+    def finish(self) -> StreamAnswer:
+        """ValueError: something is missing."""
+        frame = self._frame
+        rows = frame.indices()
+        if (
+            frame.header is None
+            or rows.size != frame.columns.rows
+            or (rows.size and int(rows.max()) >= len(self._pairs))
+        ):
+            raise ValueError("the answer's pairs and columns disagree")
+        return StreamAnswer(
+            self._update,
+            rows,
+            self._pairs[rows],
+            frame.columns.finish(),
+            frame.known_hulls(),
+            frame.placement_problems,
+            frame.header,
+        )

@@ -1,0 +1,415 @@
+"""Answers about pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hulld.answers.hulls import Header
+from hulld.geometry.placements import Placement, Placements
+from hulld.notebook import Viewer
+
+
+class Relation(IntEnum):
+    """How two hulls lie: exactly, for the doubles given."""
+
+    #: No answer; a problem tells why.
+    UNSPECIFIED = 0
+    #: No common point.
+    SEPARATED = 1
+    #: A common point, but an arbitrarily small translation separates them.
+    TOUCHING = 2
+    #: No small translation separates them.
+    OVERLAPPING = 3
+    #: With a tolerance only: |separation| <= tolerance; neither colliding nor not.
+    WITHIN_TOLERANCE = 4
+
+
+class Method(IntEnum):
+    """CERTIFIED_SEARCH is the default."""
+
+    UNSPECIFIED = 0
+    CERTIFIED_SEARCH = 1
+    #: Every vertex projected on every candidate axis; its time grows with the cube of the size.
+    TEXTBOOK_SAT = 2
+
+
+class Rung(IntEnum):
+    """What decided an answer."""
+
+    UNSPECIFIED = 0
+    BOUNDS = 1
+    #: What decided the previous question of the pair, in a stream.
+    CACHED = 2
+    #: Floating point with a proven error bound.
+    FLOATING_POINT = 4
+    EXACT = 5
+
+
+class AxisKind(IntEnum):
+    """Where an axis comes from."""
+
+    UNSPECIFIED = 0
+    FACET_A = 1
+    FACET_B = 2
+    EDGE_EDGE = 3
+    #: A direction that only pairs of flat hulls need.
+    FLAT = 4
+    #: A support direction found by search.
+    GENERAL = 5
+
+
+@dataclass(frozen=True)
+class HullVersion:
+    """The hull that an answer was computed from."""
+
+    hull_id: str
+    create_revision: int
+    revision: int
+    store_id: str
+
+
+@dataclass(frozen=True)
+class Separation:
+    """|value - true separation| <= bound, and the sign of the value agrees with the relation; in
+    the caller's length unit.
+
+    value: the distance when positive; minus the penetration depth when negative; 0 exactly when
+    TOUCHING; infinite when a hull is empty. bound: infinite where a double cannot hold the value.
+    """
+
+    value: float
+    bound: float
+
+
+@dataclass(frozen=True)
+class Witness:
+    """Two points, x y z in the world frame, that attain the separation; each within `error` of
+    doing so."""
+
+    point_a: npt.NDArray[np.float64]
+    point_b: npt.NDArray[np.float64]
+    error: float
+
+
+@dataclass(frozen=True)
+class Feature:
+    """The points of one hull that lie farthest along an axis.
+
+    vertex_indices: into the canonical snapshot. vertices: the same vertices, n x 3, in the hull's
+    own frame. facet_index: the facet, when the feature is a whole facet.
+    """
+
+    vertex_indices: npt.NDArray[np.uint32]
+    vertices: npt.NDArray[np.float64]
+    facet_index: int | None
+
+
+@dataclass(frozen=True)
+class Axis:
+    """direction: x y z in the world frame, from A towards B, of unit length up to rounding."""
+
+    direction: npt.NDArray[np.float64]
+    kind: AxisKind
+    feature_a: Feature
+    feature_b: Feature
+
+
+@dataclass(frozen=True)
+class VertexPair:
+    """A vertex of A and a vertex of B: indices into the canonical snapshots, and x y z, each in the
+    frame of its own hull."""
+
+    index_a: int
+    index_b: int
+    vertex_a: npt.NDArray[np.float64]
+    vertex_b: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What proves the relation from vertices and poses alone.
+
+    direction: x y z in the world frame, from A towards B, exact as given; integers (of any size)
+    where doubles do not suffice; None when OVERLAPPING. SEPARATED: max n.A < min n.B. TOUCHING: max
+    n.A <= min n.B, and the differences of at most four pairs hold 0 in their convex hull.
+    OVERLAPPING: those of at most six pairs hold 0 strictly inside.
+    """
+
+    direction: tuple[float, float, float] | tuple[int, int, int] | None
+    pairs: Sequence[VertexPair]
+
+
+@dataclass(frozen=True)
+class HullSize:
+    """Sizes of a hull."""
+
+    vertices: int
+    edges: int
+    facets: int
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """How much work an answer took. time: seconds, without the network. axes_total: TEXTBOOK_SAT
+    only, else 0."""
+
+    time: float
+    size_a: HullSize
+    size_b: HullSize
+    axes_tested: int
+    axes_total: int
+    stage: AxisKind
+    axis_index: int | None
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Why a placement, or a pair, has no answer. code and reason: as in HulldError."""
+
+    code: str
+    message: str
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Collision:
+    """The answer about one pair.
+
+    relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness:
+    where they were wanted and there is one, else None. within_clearance: whether separation <=
+    clearance; None where no clearance was wanted. hull_a, hull_b: the revisions that the answer is
+    about.
+    """
+
+    relation: Relation
+    rung: Rung
+    hull_a: HullVersion
+    hull_b: HullVersion
+    axis: Axis | None
+    analysis: Analysis | None
+    certificate: Certificate | None
+    separation: Separation | None
+    witness: Witness | None
+    within_clearance: bool | None
+    header: Header
+    _question: tuple[Placement, Placement] | None = field(default=None, repr=False, compare=False)
+    _viewer: Viewer | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def colliding(self) -> bool:
+        """TOUCHING or OVERLAPPING."""
+        return self.relation in (Relation.TOUCHING, Relation.OVERLAPPING)
+
+    def __bool__(self) -> bool:
+        raise TypeError(
+            "an answer is neither true nor false; ask it for .colliding, .relation or "
+            ".within_clearance"
+        )
+
+    def _repr_html_(self) -> str:
+        """The viewer's page of both hulls as they are now, where hullctl is found; a table in any
+        case. For notebooks."""
+        separation, witness = self.separation, self.witness
+        rows = [
+            ("relation", self.relation.name),
+            ("decided by", self.rung.name),
+            ("A", f"{self.hull_a.hull_id} (revision {self.hull_a.revision})"),
+            ("B", f"{self.hull_b.hull_id} (revision {self.hull_b.revision})"),
+            ("separation", separation and f"{separation.value!r} within {separation.bound!r}"),
+            ("point of A", witness and witness.point_a),
+            ("point of B", witness and witness.point_b),
+            ("within clearance", self.within_clearance),
+            ("axis", self.axis and self.axis.direction),
+        ]
+        viewer = self._viewer or Viewer.absent("this answer did not come from a server")
+        return viewer.html(rows, Placements.of(self._question or ()), [(0, 1)])
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Answers of several pairs, a row for each; m rows.
+
+    relations, rungs: m values of Relation and Rung, as uint8; compare them, as in relations ==
+    Relation.TOUCHING. Where they were wanted: separations, separation_bounds (m), witness_points (m
+    x 2 x 3: the point of A, then that of B, world frame), witness_errors (m), NaN in rows that have
+    none; within_clearance (m, bool); axes, analyses, certificates, None in rows that have none.
+    What was not wanted is None. problems: by row, why it has no answer although both its placements
+    could.
+    """
+
+    relations: npt.NDArray[np.uint8]
+    rungs: npt.NDArray[np.uint8]
+    separations: npt.NDArray[np.float64] | None
+    separation_bounds: npt.NDArray[np.float64] | None
+    witness_points: npt.NDArray[np.float64] | None
+    witness_errors: npt.NDArray[np.float64] | None
+    within_clearance: npt.NDArray[np.bool_] | None
+    axes: Sequence[Axis | None] | None
+    analyses: Sequence[Analysis | None] | None
+    certificates: Sequence[Certificate | None] | None
+    problems: Mapping[int, Problem]
+
+    def __len__(self) -> int:
+        return len(self.relations)
+
+    @property
+    def colliding(self) -> npt.NDArray[np.bool_]:
+        """m: TOUCHING or OVERLAPPING."""
+        found: npt.NDArray[np.bool_] = (self.relations == Relation.TOUCHING) | (
+            self.relations == Relation.OVERLAPPING
+        )
+        return found
+
+    def __bool__(self) -> bool:
+        raise TypeError(
+            "answers are neither true nor false; ask them for .colliding.any() or .relations"
+        )
+
+
+@dataclass(frozen=True)
+class BatchPart:
+    """Answers to the pairs from `first_pair` on. The first parts also hold header, hulls and
+    placement_problems, as in Batch."""
+
+    first_pair: int
+    answers: Answers
+    header: Header | None
+    hulls: Sequence[HullVersion | None]
+    placement_problems: Mapping[int, Problem]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """The answers to all pairs of a batch.
+
+    pairs: m x 2, as asked. answers: row i answers pairs[i]. hulls: by ID, the revision that the
+    answers are about; IDs without a hull are missing. placement_problems: by index of the
+    placement, why no pair with it has an answer.
+    """
+
+    pairs: npt.NDArray[np.uint32]
+    answers: Answers
+    hulls: Mapping[str, HullVersion]
+    placement_problems: Mapping[int, Problem]
+    header: Header
+
+    def problem(self, row: int) -> Problem | None:
+        """Why pairs[row] has no answer; None where it has one."""
+        if row in self.answers.problems:
+            return self.answers.problems[row]
+        for placement in self.pairs[row]:
+            if int(placement) in self.placement_problems:
+                return self.placement_problems[int(placement)]
+        return None
+
+
+@dataclass(frozen=True)
+class SceneTotals:
+    """Counts of pairs: asked about; whose boxes meet; found, by relation; without an answer."""
+
+    pairs: int
+    candidates: int
+    separated: int
+    touching: int
+    overlapping: int
+    within_tolerance: int
+    failed: int
+
+
+@dataclass(frozen=True)
+class ScenePart:
+    """Pairs that were found, k x 2, the lower index first, ascending, and their answers. The first
+    parts hold no pairs but header, hulls and placement_problems, as in Scene; the last one holds
+    the totals."""
+
+    pairs: npt.NDArray[np.uint32]
+    answers: Answers
+    header: Header | None
+    hulls: Sequence[HullVersion | None]
+    placement_problems: Mapping[int, Problem]
+    totals: SceneTotals | None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All pairs of a scene that collide, or are within the clearance or tolerance: k x 2 pairs, the
+    lower index first, ascending. The rest as in Batch."""
+
+    pairs: npt.NDArray[np.uint32]
+    answers: Answers
+    hulls: Mapping[str, HullVersion]
+    placement_problems: Mapping[int, Problem]
+    totals: SceneTotals
+    header: Header
+
+
+@dataclass(frozen=True)
+class StreamAnswer:
+    """The answer to one message of a collision stream.
+
+    update: the message, 0 being the one that opened the stream. rows: which pairs are answered, as
+    positions in the pairs of the stream, ascending; row i of `answers` is about pairs[rows[i]].
+    pairs: the same as k x 2 indices of placements. hulls, placement_problems: as in Batch, where
+    the hulls were resolved for this message; empty otherwise.
+    """
+
+    update: int
+    rows: npt.NDArray[np.uint32]
+    pairs: npt.NDArray[np.uint32]
+    answers: Answers
+    hulls: Mapping[str, HullVersion]
+    placement_problems: Mapping[int, Problem]
+    header: Header
+
+
+class CollisionEventKind(IntEnum):
+    """How a pair is other than it was told of last."""
+
+    UNSPECIFIED = 0
+    #: It overlaps, and did not before.
+    ENTER = 1
+    #: It touches, and did not before.
+    TOUCH = 2
+    #: It is separated, and touched or overlapped before.
+    EXIT = 3
+    #: It is separated but within the clearance, and was farther apart before.
+    NEAR = 4
+    #: It is farther apart than the clearance, and was within it before.
+    FAR = 5
+    #: It has no answer any more: a placement has a problem.
+    LOST = 6
+
+
+@dataclass(frozen=True)
+class CollisionEvent:
+    """placements: the pair, as indices. revisions: of the hulls that this is about; 0 when LOST."""
+
+    kind: CollisionEventKind
+    placements: tuple[int, int]
+    relation: Relation
+    revisions: tuple[int, int]
+    within_clearance: bool | None
+
+
+@dataclass(frozen=True)
+class CollisionChanges:
+    """One message of a watch of collisions.
+
+    header: once synced, every change of a watched hull up to this revision is taken into account.
+    update: the last update that these events take into account, 0 being the opening. synced: all
+    pairs have been told of as they are with that update's poses. hulls: those that are new to the
+    watch, or changed. placement_problems: those that begin.
+    """
+
+    header: Header
+    update: int
+    synced: bool
+    hulls: Sequence[HullVersion]
+    placement_problems: Mapping[int, Problem]
+    events: Sequence[CollisionEvent]

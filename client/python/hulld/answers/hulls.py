@@ -1,0 +1,410 @@
+"""Answers about hulls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hulld.notebook import Viewer
+from hulld.v1 import hull_pb2
+from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
+
+
+@dataclass(frozen=True)
+class Header:
+    """The store, and its revision that a reply was answered from. Revisions of different stores
+    mean nothing to each other."""
+
+    store_id: str
+    revision: int
+
+
+@dataclass(frozen=True)
+class PointCounts:
+    """What became of points: received = outside + duplicate + inside."""
+
+    received: int = 0
+    #: Became vertices, and still were at the end of their chunk.
+    outside: int = 0
+    #: Equal to a vertex of the hull as it was after their chunk, beyond the first.
+    duplicate: int = 0
+    #: Inside the hull, or on its boundary without being a vertex.
+    inside: int = 0
+
+    def __add__(self, other: PointCounts) -> PointCounts:
+        return PointCounts(
+            self.received + other.received,
+            self.outside + other.outside,
+            self.duplicate + other.duplicate,
+            self.inside + other.inside,
+        )
+
+
+@dataclass(frozen=True)
+class HullInfo:
+    """A hull without its geometry.
+
+    dimension: -1 (empty), 0 (point), 1 (segment), 2 (polygon) or 3. revision: of the last change of
+    its vertices. create_revision: tells incarnations of one ID apart. damaged: what the store keeps
+    of it is damaged; calls that need it raise DataLossError, other fields may be missing, and
+    delete_hull removes it.
+    """
+
+    hull_id: str
+    create_revision: int
+    revision: int
+    dimension: int
+    vertex_count: int
+    counts: PointCounts
+    damaged: bool = False
+
+
+class Durability(IntEnum):
+    """What an acknowledgement means."""
+
+    UNSPECIFIED = 0
+    #: Held in memory: lost when the server ends.
+    MEMORY = 1
+    #: Written, and synced to disk soon.
+    RELAXED = 2
+    #: Synced to disk before it was acknowledged.
+    SYNC = 3
+
+
+@dataclass(frozen=True)
+class CreatedHull:
+    """created: False where if_absent met an existing hull."""
+
+    hull: HullInfo
+    created: bool
+    header: Header
+
+
+@dataclass(frozen=True)
+class ReplacedHull:
+    """created: there was no hull before."""
+
+    hull: HullInfo
+    created: bool
+    durability: Durability
+    header: Header
+
+
+@dataclass(frozen=True)
+class Audit:
+    """A check by means independent of the builder; finding: what is wrong, when not ok."""
+
+    ok: bool
+    finding: str
+
+
+@dataclass(frozen=True)
+class Hull:
+    """Sizes, counts and box of a hull.
+
+    edge_count, facet_count: None where they were not asked for. box: 2 x 3, the lowest and the
+    highest corner, in the caller's length unit; None when the hull is empty. audit: None where it
+    was not asked for.
+    """
+
+    info: HullInfo
+    edge_count: int | None
+    facet_count: int | None
+    box: npt.NDArray[np.float64] | None
+    audit: Audit | None
+    header: Header
+    _viewer: Viewer | None = field(default=None, repr=False, compare=False)
+
+    def _repr_html_(self) -> str:
+        """The viewer's page of the hull as it is now, where hullctl is found; a table in any case.
+        For notebooks."""
+        rows = [
+            ("hull", self.info.hull_id),
+            ("dimension", self.info.dimension),
+            ("vertices", self.info.vertex_count),
+            ("edges", self.edge_count),
+            ("facets", self.facet_count),
+            (
+                "points",
+                f"{self.info.counts.received} received, {self.info.counts.outside} outside, "
+                f"{self.info.counts.duplicate} duplicate, {self.info.counts.inside} inside",
+            ),
+            ("box", None if self.box is None else f"{self.box[0]} to {self.box[1]}"),
+            ("revision", self.info.revision),
+            ("audit", self.audit and (self.audit.finding or "ok")),
+        ]
+        viewer = self._viewer or Viewer.absent("this hull was not read from a server")
+        return viewer.html(rows, [self.info.hull_id])
+
+
+@dataclass(frozen=True)
+class HullMesh:
+    """The canonical snapshot of a hull, or a simplification of it, all of one revision.
+
+    vertices: n x 3, the caller's length unit, in canonical order; the doubles that were sent.
+    facet_sizes: vertices of each facet. facet_indices: indices of vertices, facet after facet,
+    counter-clockwise seen from outside. A hull of dimension 2 has one facet, seen from both sides;
+    one of lower dimension has none. error: the Hausdorff distance between mesh and hull is at most
+    this (proven); None where the mesh is the hull itself.
+    """
+
+    info: HullInfo
+    vertices: npt.NDArray[np.float64]
+    facet_sizes: npt.NDArray[np.uint32]
+    facet_indices: npt.NDArray[np.uint32]
+    error: float | None
+    header: Header
+    _viewer: Viewer | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def facets(self) -> list[npt.NDArray[np.uint32]]:
+        """The indices of each facet's vertices."""
+        return (
+            np.split(self.facet_indices, np.cumsum(self.facet_sizes)[:-1])
+            if self.facet_sizes.size
+            else []
+        )
+
+    @property
+    def triangles(self) -> npt.NDArray[np.int64]:
+        """m x 3: each facet as a fan around its first vertex, for libraries that take triangles
+        only."""
+        sizes = self.facet_sizes.astype(np.int64)
+        starts = np.cumsum(sizes) - sizes
+        fans = np.maximum(sizes - 2, 0)
+        first = np.repeat(starts, fans)
+        step = np.arange(int(fans.sum())) - np.repeat(np.cumsum(fans) - fans, fans)
+        corners = np.stack([first, first + step + 1, first + step + 2], axis=1)
+        triangles: npt.NDArray[np.int64] = self.facet_indices.astype(np.int64)[corners]
+        return triangles
+
+    def _repr_html_(self) -> str:
+        """As Hull's."""
+        rows = [
+            ("hull", self.info.hull_id),
+            ("vertices", len(self.vertices)),
+            ("facets", len(self.facet_sizes)),
+            ("within", self.error),
+            ("revision", self.info.revision),
+        ]
+        viewer = self._viewer or Viewer.absent("this mesh was not read from a server")
+        return viewer.html(rows, [self.info.hull_id])
+
+
+@dataclass(frozen=True)
+class MeshHeader:
+    """The first part of a mesh: the sizes of what follows. The rest as in HullMesh."""
+
+    info: HullInfo
+    vertex_count: int
+    facet_count: int
+    error: float | None
+    header: Header
+
+
+@dataclass(frozen=True)
+class MeshVertices:
+    """n x 3, in canonical order, after those of the parts before."""
+
+    vertices: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeshFacets:
+    """Facets after those of the parts before, as in HullMesh."""
+
+    sizes: npt.NDArray[np.uint32]
+    indices: npt.NDArray[np.uint32]
+
+
+MeshPart = MeshHeader | MeshVertices | MeshFacets
+
+
+class HullEventKind(IntEnum):
+    """What happened to a hull since the header before."""
+
+    UNSPECIFIED = 0
+    #: There is this hull. The only kind besides DELETED until `synced`.
+    PRESENT = 1
+    CREATED = 2
+    #: Its vertices changed; it is the same incarnation.
+    CHANGED = 3
+    #: It is a new incarnation: it was replaced, or deleted and created again.
+    REPLACED = 4
+    DELETED = 5
+
+
+@dataclass(frozen=True)
+class HullEvent:
+    """hull: as of its revision; DELETED: only hull_id, and in revision that of the deletion. box:
+    as in Hull."""
+
+    kind: HullEventKind
+    hull: HullInfo
+    box: npt.NDArray[np.float64] | None
+
+
+@dataclass(frozen=True)
+class HullChanges:
+    """One message of a watch of hulls.
+
+    header: every change up to this revision is in this message or one before it, unless a later one
+    superseded it; a watch resumes from here. events: each hull at most once. synced: what was there
+    has been told; what follows are changes as they are committed. anew: forget all that was told
+    before; the watch tells everything from the start.
+    """
+
+    header: Header
+    events: Sequence[HullEvent]
+    synced: bool
+    anew: bool
+
+
+# --- From the contract's messages ---
+
+
+def enum_or_zero(kind: Any, value: int) -> Any:
+    """A value of a later contract reads as UNSPECIFIED."""
+    try:
+        return kind(value)
+    except ValueError:
+        return kind(0)
+
+
+def header_of(message: Any) -> Header:
+    return Header(message.store_id, message.revision)
+
+
+def counts_of(message: Any) -> PointCounts:
+    return PointCounts(message.received, message.outside, message.duplicate, message.inside)
+
+
+def info_of(message: Any) -> HullInfo:
+    return HullInfo(
+        message.hull_id,
+        message.create_revision,
+        message.revision,
+        message.dimension,
+        message.vertex_count,
+        counts_of(message.counts),
+        message.damaged,
+    )
+
+
+def _box_of(message: Any) -> npt.NDArray[np.float64] | None:
+    if not message.HasField("box_min"):
+        return None
+    low, high = message.box_min, message.box_max
+    return np.array([[low.x, low.y, low.z], [high.x, high.y, high.z]])
+
+
+def decode_created(data: bytes) -> CreatedHull:
+    message = hull_pb2.CreateHullResponse.FromString(data)
+    return CreatedHull(info_of(message.hull), message.created, header_of(message.header))
+
+
+def decode_replaced(data: bytes) -> ReplacedHull:
+    message = hull_pb2.ReplaceHullResponse.FromString(data)
+    return ReplacedHull(
+        info_of(message.hull),
+        message.created,
+        enum_or_zero(Durability, message.durability),
+        header_of(message.header),
+    )
+
+
+def decode_hull(data: bytes, with_facets: bool, viewer: Viewer | None) -> Hull:
+    message = hull_pb2.GetHullResponse.FromString(data)
+    audit = Audit(message.audit.ok, message.audit.finding) if message.HasField("audit") else None
+    return Hull(
+        info_of(message.hull),
+        message.edge_count if with_facets else None,
+        message.facet_count if with_facets else None,
+        _box_of(message),
+        audit,
+        header_of(message.header),
+        viewer,
+    )
+
+
+def decode_changes(data: bytes) -> HullChanges:
+    message = hull_pb2.WatchHullsResponse.FromString(data)
+    events = tuple(
+        HullEvent(enum_or_zero(HullEventKind, event.kind), info_of(event.hull), _box_of(event))
+        for event in message.events
+    )
+    return HullChanges(header_of(message.header), events, message.synced, message.anew)
+
+
+_MESH_HEADER, _MESH_VERTICES, _MESH_FACETS = 1, 2, 3
+
+
+def decode_mesh_part(data: bytes) -> MeshPart:
+    """Raises ValueError where the message is of no known kind."""
+    for number, _, value in read_fields(data):
+        if number == _MESH_HEADER and isinstance(value, memoryview):
+            message = hull_pb2.MeshHeader.FromString(bytes(value))
+            return MeshHeader(
+                info_of(message.hull),
+                message.vertex_count,
+                message.facet_count,
+                message.error if message.HasField("error") else None,
+                header_of(message.header),
+            )
+        if number == _MESH_VERTICES and isinstance(value, memoryview):
+            columns = [
+                packed_doubles(part)
+                for field_number, _, part in read_fields(value)
+                if field_number == 1
+            ]
+            return MeshVertices(np.concatenate(columns or [np.empty(0)]).reshape(-1, 3))
+        if number == _MESH_FACETS and isinstance(value, memoryview):
+            found: dict[int, list[Unsigned]] = {1: [], 2: []}
+            for field_number, _, part in read_fields(value):
+                if field_number in found:
+                    found[field_number].append(packed_varints(part))
+            empty = np.empty(0, np.uint32)
+            sizes, indices = (
+                np.concatenate([empty, *(part.astype(np.uint32) for part in found[n])])
+                for n in (1, 2)
+            )
+            return MeshFacets(sizes, indices)
+    raise ValueError("the mesh stream holds a message of an unknown kind")
+
+
+class MeshAssembly:
+    """Puts the parts of a mesh together, and checks that they fit: drawing relies on it."""
+
+    def __init__(self) -> None:
+        self._header: MeshHeader | None = None
+        self._vertices: list[npt.NDArray[np.float64]] = []
+        self._facets: list[MeshFacets] = []
+
+    def add(self, part: MeshPart) -> None:
+        if isinstance(part, MeshHeader):
+            self._header = part
+        elif isinstance(part, MeshVertices):
+            self._vertices.append(part.vertices)
+        else:
+            self._facets.append(part)
+
+    def finish(self, viewer: Viewer | None) -> HullMesh:
+        """Raises ValueError where the parts contradict each other."""
+        if self._header is None:
+            raise ValueError("the mesh stream ended without a header")
+        head = self._header
+        vertices = np.concatenate([np.empty((0, 3)), *self._vertices])
+        sizes = np.concatenate([np.empty(0, np.uint32), *(part.sizes for part in self._facets)])
+        indices = np.concatenate([np.empty(0, np.uint32), *(part.indices for part in self._facets)])
+        if len(vertices) != head.vertex_count or len(sizes) != head.facet_count:
+            raise ValueError("the mesh stream ended early, or its header miscounts")
+        if int(sizes.sum(dtype=np.uint64)) != len(indices):
+            raise ValueError("the mesh stream's facet sizes and indices disagree")
+        if indices.size and int(indices.max()) >= len(vertices):
+            raise ValueError("the mesh stream names a vertex that it does not hold")
+        return HullMesh(head.info, vertices, sizes, indices, head.error, head.header, viewer)

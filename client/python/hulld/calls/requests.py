@@ -1,0 +1,305 @@
+"""One function per call of the contract: its request, how its answer is read, and whether it is
+safe to repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+import numpy.typing as npt
+import numpy as np
+
+from hulld.answers import collision_messages, hulls, status
+from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
+from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo, MeshPart
+from hulld.answers.status import ServerStatus
+from hulld.calls.wanted import Wanted
+from hulld.geometry.placements import PlacementLike, Placements, as_placement
+from hulld.geometry.poses import pack_pose
+from hulld.notebook import Viewer
+from hulld.v1 import collision_pb2, geometry_pb2, hull_pb2, maintenance_pb2, status_pb2
+from hulld.wire import MessageWriter
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Call(Generic[T]):
+    """method: gRPC's path. decode: raises ValueError where the answer is malformed."""
+
+    method: str
+    request: bytes
+    decode: Callable[[bytes], T]
+    safe_to_repeat: bool
+
+
+def method_path(service: str, name: str) -> str:
+    """gRPC's path of a call of the contract, as in "/hulld.v1.HullService/GetHull". KeyError: there
+    is none."""
+    for module in (hull_pb2, collision_pb2, status_pb2, maintenance_pb2):
+        found = module.DESCRIPTOR.services_by_name.get(service)
+        if found is not None:
+            return f"/{found.full_name}/{found.methods_by_name[name].name}"
+    raise KeyError(service)
+
+
+APPEND_POINTS = method_path("HullService", "AppendPoints")
+REPLACE_HULL = method_path("HullService", "ReplaceHull")
+STREAM_COLLISIONS = method_path("CollisionService", "StreamCollisions")
+WATCH_COLLISIONS = method_path("CollisionService", "WatchCollisions")
+CHECK_HEALTH = "/grpc.health.v1.Health/Check"
+
+
+def is_serving(answer: bytes) -> bool:
+    """Whether a HealthCheckResponse of grpc.health.v1 says SERVING: field 1 is 1."""
+    return answer == b"\x08\x01"
+
+
+def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
+    request = hull_pb2.CreateHullRequest(hull_id=hull_id, if_absent=if_absent)
+    return Call(
+        method_path("HullService", "CreateHull"),
+        request.SerializeToString(),
+        hulls.decode_created,
+        if_absent,
+    )
+
+
+def get_hull(hull_id: str, audit: bool, facets: bool, viewer: Viewer) -> Call[Hull]:
+    request = hull_pb2.GetHullRequest(hull_id=hull_id, audit=audit, without_facets=not facets)
+    return Call(
+        method_path("HullService", "GetHull"),
+        request.SerializeToString(),
+        lambda data: hulls.decode_hull(data, facets, viewer),
+        True,
+    )
+
+
+def get_hull_mesh(
+    hull_id: str,
+    side: Literal["inside", "outside"] | None,
+    max_vertices: int | None,
+    max_error: float | None,
+) -> Call[MeshPart]:
+    request = hull_pb2.GetHullMeshRequest(hull_id=hull_id)
+    if side is None and (max_vertices is not None or max_error is not None):
+        raise ValueError(
+            'say on which side of the hull the simpler one lies: side="inside" or side="outside"'
+        )
+    if side is not None:
+        if side not in ("inside", "outside"):
+            raise ValueError(f'side is {side!r}; it is "inside" or "outside"')
+        request.simplification.side = (
+            hull_pb2.SIMPLIFICATION_SIDE_INSIDE
+            if side == "inside"
+            else hull_pb2.SIMPLIFICATION_SIDE_OUTSIDE
+        )
+        request.simplification.max_vertices = max_vertices or 0
+        request.simplification.max_error = max_error or 0.0
+    return Call(
+        method_path("HullService", "GetHullMesh"),
+        request.SerializeToString(),
+        hulls.decode_mesh_part,
+        True,
+    )
+
+
+@dataclass(frozen=True)
+class HullPage:
+    """One page of a list; next_page: empty on the last."""
+
+    hulls: Sequence[HullInfo]
+    next_page: str
+
+
+def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
+    def decode(data: bytes) -> HullPage:
+        message = hull_pb2.ListHullsResponse.FromString(data)
+        if message.next_page_token and message.next_page_token == page_token:
+            raise ValueError("the server answered a page that continues with itself")
+        return HullPage([hulls.info_of(hull) for hull in message.hulls], message.next_page_token)
+
+    request = hull_pb2.ListHullsRequest(prefix=prefix, page_size=page_size, page_token=page_token)
+    return Call(method_path("HullService", "ListHulls"), request.SerializeToString(), decode, True)
+
+
+def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
+    def decode(data: bytes) -> Header:
+        return hulls.header_of(hull_pb2.DeleteHullResponse.FromString(data).header)
+
+    request = hull_pb2.DeleteHullRequest(hull_id=hull_id, if_revision=if_revision)
+    # A repeated delete could remove a hull that someone has created anew.
+    return Call(
+        method_path("HullService", "DeleteHull"), request.SerializeToString(), decode, False
+    )
+
+
+def watch_hulls(prefix: str, hull_id: str | None, after: Header | None) -> Call[HullChanges]:
+    request = hull_pb2.WatchHullsRequest(
+        prefix=prefix,
+        hull_id=hull_id or "",
+        after_revision=after.revision if after else 0,
+        store_id=after.store_id if after else "",
+    )
+    return Call(
+        method_path("HullService", "WatchHulls"),
+        request.SerializeToString(),
+        hulls.decode_changes,
+        True,
+    )
+
+
+def get_status() -> Call[ServerStatus]:
+    return Call(method_path("StatusService", "GetStatus"), b"", status.decode_status, True)
+
+
+def save_backup() -> Call[bytes]:
+    return Call(method_path("MaintenanceService", "SaveBackup"), b"", bytes, False)
+
+
+def check_collision(
+    a: PlacementLike,
+    b: PlacementLike,
+    wanted: Wanted,
+    tolerance: float,
+    method: Method,
+    viewer: Viewer,
+) -> Call[Collision]:
+    question = (as_placement(a), as_placement(b))
+    request = collision_pb2.CheckCollisionRequest(
+        method=collision_pb2.Method.Name(int(method)), tolerance=tolerance, wanted=wanted.message()
+    )
+    for placement, target in zip(question, (request.a, request.b)):
+        target.hull_id = placement.id
+        if placement.pose is not None:
+            w, x, y, z, tx, ty, tz = (float(number) for number in pack_pose(placement.pose))
+            target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
+            target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
+    return Call(
+        method_path("CollisionService", "CheckCollision"),
+        request.SerializeToString(),
+        lambda data: collision_messages.decode_collision(data, question, viewer),
+        True,
+    )
+
+
+def check_collisions(
+    placements: Placements,
+    pairs: npt.NDArray[np.uint32],
+    wanted: Wanted,
+    tolerance: float,
+    method: Method,
+) -> Call[BatchPart]:
+    fixed = collision_pb2.BatchCheckCollisionsRequest(
+        method=collision_pb2.Method.Name(int(method)), wanted=wanted.message(), tolerance=tolerance
+    )
+    request = (
+        MessageWriter()
+        .raw(fixed.SerializeToString())
+        .uint32s(2, pairs)
+        .message(6, placements.packed())
+    )
+    return Call(
+        method_path("CollisionService", "BatchCheckCollisions"),
+        request.finish(),
+        lambda data: collision_messages.decode_batch_part(data, wanted),
+        True,
+    )
+
+
+@dataclass(frozen=True)
+class SceneFilter:
+    """As the keyword arguments of Client.find_collisions."""
+
+    groups: npt.ArrayLike | None
+    ignore_same_group: bool
+    ignored_group_pairs: npt.ArrayLike | None
+    movers: int | None
+
+    def put(self, message: Any) -> None:
+        """Into a message with the fields of the same names."""
+        if self.groups is not None:
+            message.groups.extend(np.asarray(self.groups).reshape(-1).tolist())
+        message.ignore_same_group = self.ignore_same_group
+        if self.ignored_group_pairs is not None:
+            message.ignored_group_pairs.extend(
+                np.asarray(self.ignored_group_pairs).reshape(-1).tolist()
+            )
+        if self.movers is not None:
+            message.movers = self.movers
+
+
+def find_collisions(
+    placements: Placements, scene: SceneFilter, wanted: Wanted, tolerance: float
+) -> Call[ScenePart]:
+    fixed = collision_pb2.FindCollisionsRequest(wanted=wanted.message(), tolerance=tolerance)
+    scene.put(fixed)
+    request = MessageWriter().raw(fixed.SerializeToString()).message(8, placements.packed())
+    return Call(
+        method_path("CollisionService", "FindCollisions"),
+        request.finish(),
+        lambda data: collision_messages.decode_scene_part(data, wanted),
+        True,
+    )
+
+
+def open_stream(
+    placements: Placements,
+    pairs: npt.NDArray[np.uint32],
+    wanted: Wanted,
+    tolerance: float,
+    only_changes: bool,
+) -> bytes:
+    """The first message of StreamCollisions."""
+    fixed = collision_pb2.CollisionStreamOpen(
+        wanted=wanted.message(), tolerance=tolerance, only_changes=only_changes
+    )
+    opening = (
+        MessageWriter()
+        .raw(fixed.SerializeToString())
+        .uint32s(2, pairs)
+        .message(6, placements.packed())
+    )
+    return MessageWriter().message(1, opening).finish()
+
+
+def update_stream(
+    placements: npt.NDArray[np.uint32], poses: npt.NDArray[np.float64], refresh_hulls: bool
+) -> bytes:
+    """A later message of StreamCollisions, or, without refresh_hulls, of WatchCollisions."""
+    update = MessageWriter().uint32s(1, placements).doubles(2, poses)
+    if refresh_hulls:
+        update.raw(b"\x18\x01")  # field 3, true
+    return MessageWriter().message(2, update).finish()
+
+
+def open_watch(
+    placements: Placements,
+    pairs: npt.NDArray[np.uint32] | None,
+    scene: SceneFilter,
+    clearance: float | None,
+) -> bytes:
+    """The first message of WatchCollisions."""
+    fixed = collision_pb2.CollisionWatchOpen(clearance=clearance)
+    scene.put(fixed)
+    opening = MessageWriter().raw(fixed.SerializeToString()).message(2, placements.packed())
+    if pairs is not None:
+        opening.uint32s(3, pairs)
+    return MessageWriter().message(1, opening).finish()
+
+
+def open_replacement(hull_id: str, create: bool, if_revision: int | None) -> bytes:
+    """The first message of ReplaceHull."""
+    return bytes(
+        hull_pb2.ReplaceHullRequest(
+            open=hull_pb2.ReplaceOpen(
+                hull_id=hull_id, create_if_absent=create, if_revision=if_revision
+            )
+        ).SerializeToString()
+    )
+
+
+def replacement_points(block: MessageWriter) -> bytes:
+    """A later message of ReplaceHull; an empty block says that nothing is missing."""
+    return MessageWriter().message(2, block).finish()

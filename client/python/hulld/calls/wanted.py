@@ -1,0 +1,32 @@
+"""What a question needs beyond the relation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from hulld.v1 import collision_pb2
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """As the keyword arguments of Client.check_collision."""
+
+    axis: bool = False
+    analysis: bool = False
+    certificate: bool = False
+    separation: bool = False
+    max_error: float | None = None
+    witness: bool = False
+    clearance: float | None = None
+
+    def message(self) -> Any:
+        return collision_pb2.Wanted(
+            axis=self.axis,
+            analysis=self.analysis,
+            certificate=self.certificate,
+            separation=self.separation,
+            max_error=self.max_error,
+            witness=self.witness,
+            clearance=self.clearance,
+        )

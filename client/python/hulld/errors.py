@@ -1,0 +1,242 @@
+"""How calls fail: one class per gRPC status, with what the server says for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from google.protobuf.message import DecodeError
+
+from hulld.rpc import error_details_pb2
+
+D = TypeVar("D")
+T = TypeVar("T")
+
+_DETAILS = "grpc-status-details-bin"
+_REQUEST_ID = "x-request-id"
+_RETRY = "grpc-retry-pushback-ms"
+_ERROR_INFO = "google.rpc.ErrorInfo"
+
+
+class HulldError(Exception):
+    """A call failed. Read the class or `code`, `reason` and `metadata`; the text is for people and
+    may change.
+
+    code: gRPC's status, as in "NOT_FOUND". message: what to fix. reason: why, by the name that
+    proto/hulld/v1/error.proto gives, as in "HULL_NOT_FOUND"; None where the server gave none, as
+    for errors of gRPC itself. metadata: what goes with the reason, as in {"hull_id": "arm"}.
+    request_id: under which the server's log knows the call, or None. retry_after: the seconds to
+    wait before the same call is made again; None where the server does not say that it may be.
+    """
+
+    code = "UNKNOWN"
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        code: str | None = None,
+        reason: str | None = None,
+        metadata: Mapping[str, str] | None = None,
+        request_id: str | None = None,
+        retry_after: float | None = None,
+    ) -> None:
+        super().__init__(message)
+        if code is not None:
+            self.code = code
+        self.message = message
+        self.reason = reason
+        self.metadata: Mapping[str, str] = MappingProxyType(dict(metadata or {}))
+        self.request_id = request_id
+        self.retry_after = retry_after
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = {
+            "code": self.code,
+            "reason": self.reason,
+            "metadata": dict(self.metadata),
+            "request_id": self.request_id,
+            "retry_after": self.retry_after,
+        }
+        return _restore, (type(self), self.message, state)
+
+    def __str__(self) -> str:
+        details = [self.reason] if self.reason else []
+        if self.request_id:
+            details.append(f"request {self.request_id}")
+        return f"{self.code}: {self.message}" + (f" ({', '.join(details)})" if details else "")
+
+
+def _restore(kind: type[HulldError], message: str, state: dict[str, Any]) -> HulldError:
+    return kind(message, **state)
+
+
+class CancelledError(HulldError):
+    """The call was ended on this side."""
+
+    code = "CANCELLED"
+
+
+class InvalidArgumentError(HulldError, ValueError):
+    """The request is wrong; the message names the field."""
+
+    code = "INVALID_ARGUMENT"
+
+
+class DeadlineExceededError(HulldError):
+    """No answer came in time."""
+
+    code = "DEADLINE_EXCEEDED"
+
+
+class NotFoundError(HulldError, LookupError):
+    """There is no such hull."""
+
+    code = "NOT_FOUND"
+
+
+class AlreadyExistsError(HulldError):
+    """There is such a hull."""
+
+    code = "ALREADY_EXISTS"
+
+
+class PermissionDeniedError(HulldError):
+    """The token's role or prefix does not allow it."""
+
+    code = "PERMISSION_DENIED"
+
+
+class ResourceExhaustedError(HulldError):
+    """More than a limit allows; metadata["flag"] names it. With retry_after: others use it up at
+    the moment."""
+
+    code = "RESOURCE_EXHAUSTED"
+
+
+class FailedPreconditionError(HulldError):
+    """The hull was deleted or replaced while a stream was open, a chunk is missing, or the store
+    keeps nothing to save."""
+
+    code = "FAILED_PRECONDITION"
+
+
+class AbortedError(HulldError):
+    """The hull is not at the revision that the request expects; metadata["current_revision"] is the
+    one that it is at."""
+
+    code = "ABORTED"
+
+
+class UnimplementedError(HulldError):
+    """The server does not know the call."""
+
+    code = "UNIMPLEMENTED"
+
+
+class InternalError(HulldError):
+    """The server, or what came from it, contradicts itself."""
+
+    code = "INTERNAL"
+
+
+class UnavailableError(HulldError):
+    """The server cannot be reached, is draining, or cannot write its store."""
+
+    code = "UNAVAILABLE"
+
+
+class DataLossError(HulldError):
+    """What the store keeps of the hull is damaged."""
+
+    code = "DATA_LOSS"
+
+
+class UnauthenticatedError(HulldError):
+    """The call has no token, or one that the server does not know."""
+
+    code = "UNAUTHENTICATED"
+
+
+_CLASSES: dict[str, type[HulldError]] = {
+    kind.code: kind
+    for kind in (
+        CancelledError,
+        InvalidArgumentError,
+        DeadlineExceededError,
+        NotFoundError,
+        AlreadyExistsError,
+        PermissionDeniedError,
+        ResourceExhaustedError,
+        FailedPreconditionError,
+        AbortedError,
+        UnimplementedError,
+        InternalError,
+        UnavailableError,
+        DataLossError,
+        UnauthenticatedError,
+    )
+}
+
+
+def error_class(code: str) -> type[HulldError]:
+    """The class for a status, as in "NOT_FOUND"."""
+    return _CLASSES.get(code, HulldError)
+
+
+def read_answer(read: Callable[[D], T], data: D) -> T:
+    """What the server sent, read. InternalError: it is malformed, or contradicts itself."""
+    try:
+        return read(data)
+    except HulldError:
+        raise
+    except (ValueError, DecodeError) as error:
+        raise InternalError(f"the server's answer cannot be read: {error}") from error
+
+
+def from_status(code: str, message: str, trailing: Iterable[tuple[str, Any]] | None) -> HulldError:
+    """The error of a call that ended with this status and these trailing metadata."""
+    metadata = {key: value for key, value in trailing or ()}
+    reason, info = _error_info(metadata.get(_DETAILS))
+    request_id = metadata.get(_REQUEST_ID)
+    return error_class(code)(
+        message,
+        code=code,
+        reason=reason,
+        metadata=info,
+        request_id=None if request_id is None else str(request_id),
+        retry_after=_retry_after(metadata.get(_RETRY)),
+    )
+
+
+def from_rpc_error(error: Any) -> HulldError:
+    """The same for gRPC's exception, of its synchronous or its asynchronous interface."""
+    return from_status(error.code().name, error.details() or "", error.trailing_metadata())
+
+
+def _error_info(details: Any) -> tuple[str | None, dict[str, str]]:
+    if not isinstance(details, bytes):
+        return None, {}
+    status = error_details_pb2.Status()
+    info = error_details_pb2.ErrorInfo()
+    try:
+        status.ParseFromString(details)
+        for detail in status.details:
+            if detail.type_url.endswith("/" + _ERROR_INFO):
+                info.ParseFromString(detail.value)
+    except DecodeError:
+        # What is malformed tells nothing; the status stands without it.
+        return None, {}
+    if info.domain != "hulld":
+        return None, {}
+    return info.reason, dict(info.metadata)
+
+
+def _retry_after(hint: Any) -> float | None:
+    try:
+        milliseconds = int(hint)
+    except (TypeError, ValueError):
+        return None
+    # A negative number asks not to.
+    return milliseconds / 1000 if milliseconds >= 0 else None

@@ -1,0 +1,1 @@
+"""Points and poses: numpy in, numpy out."""

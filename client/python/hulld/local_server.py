@@ -1,0 +1,224 @@
+"""A server for a script or a test, which ends with it."""
+
+from __future__ import annotations
+
+import asyncio
+import collections
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import threading
+import weakref
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any
+
+from hulld.aio.client import AsyncClient
+from hulld.client import Client
+from hulld.connection import PathLike
+from hulld.programs import find_program
+
+_LISTENING = re.compile(r"listening on (\S+)")
+#: Kept of what the server logs.
+_LINES = 200
+_START_SECONDS = 60.0
+_STOP_SECONDS = 10.0
+# Its input is a pipe from us: it ends when we end, however that happens, and takes the server
+# along, and its folder, $0.
+_KEEPER = """
+"$@" 3<&- </dev/null & child=$!
+trap 'kill "$child" 2>/dev/null' TERM
+{ read -r _ <&3; kill "$child" 2>/dev/null; } & reader=$!
+wait "$child"; code=$?
+[ "$code" -gt 128 ] && { wait "$child"; code=$?; }
+kill "$reader" 2>/dev/null
+rm -f "$0/socket"; rmdir "$0" 2>/dev/null
+exit "$code"
+"""
+
+
+class LocalServer:
+    """A hulld process on a socket of its own, in a directory that no other user can enter. It runs
+    from `start` to `stop`, and ends with this process in any case. A context manager.
+
+    data_dir: keeps the hulls on disk there; None: in memory, until it ends. options: more flags of
+    hulld, as in ["--max-hulls", "10"]. binary: the program; None: HULLD_BINARY, else the PATH, else
+    a build in the checkout around the working directory. FileNotFoundError: there is none.
+    """
+
+    def __init__(
+        self,
+        *,
+        data_dir: PathLike | None = None,
+        options: Sequence[str] = (),
+        binary: PathLike | None = None,
+    ) -> None:
+        self._program = str(find_program("hulld") if binary is None else binary)
+        self._data_dir = data_dir
+        self._options = list(options)
+        self._process: subprocess.Popen[str] | None = None
+        self._reader: threading.Thread | None = None
+        self._listening = threading.Event()
+        self._log: collections.deque[str] = collections.deque(maxlen=_LINES)
+        self._address = ""
+        self._remove: Callable[[], Any] = lambda: None
+
+    @property
+    def address(self) -> str:
+        """For Client, hullctl and any other client on this machine. Requires that it runs."""
+        if not self._address:
+            raise RuntimeError(
+                "the server does not run; call start(), or use it as a context manager"
+            )
+        return self._address
+
+    @property
+    def log(self) -> list[str]:
+        """The last lines that it logged."""
+        return list(self._log)
+
+    def start(self) -> LocalServer:
+        """Returns once it listens. RuntimeError: it ended instead; tells what it said."""
+        if self._process is not None:
+            return self
+        folder = tempfile.mkdtemp(prefix="hulld-")
+        self._remove = weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        store = (
+            ["--store", "memory"]
+            if self._data_dir is None
+            else ["--store", "rocksdb", "--data-dir", os.fspath(self._data_dir)]
+        )
+        command = [
+            self._program,
+            "--listen",
+            f"unix:{folder}/socket",
+            "--drain-timeout",
+            "1",
+            *store,
+            *self._options,
+        ]
+        # Settings of the caller's own server are not meant for this one.
+        environment = {
+            name: value for name, value in os.environ.items() if not name.startswith("HULLD_")
+        }
+        # A session of its own: Ctrl-C in a terminal is for the script, which then ends the server.
+        self._process = subprocess.Popen(
+            ["sh", "-c", "exec 3<&0; " + _KEEPER, folder, *command],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=environment,
+            start_new_session=True,
+        )
+        self._reader = threading.Thread(
+            target=self._read, args=(self._process,), name="hulld-log", daemon=True
+        )
+        self._reader.start()
+        if not self._listening.wait(_START_SECONDS) or not self._address:
+            self.stop()
+            raise RuntimeError(
+                "hulld did not start: " + ("\n".join(self._log) or "it said nothing")
+            )
+        return self
+
+    def _read(self, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        for line in process.stdout:
+            self._log.append(line.rstrip("\n"))
+            if not self._address and (found := _LISTENING.search(line)):
+                self._address = found.group(1)
+                self._listening.set()
+        self._listening.set()
+
+    def stop(self) -> None:
+        """Ends it, and returns when it has ended."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        assert process.stdin is not None and process.stdout is not None and self._reader is not None
+        # Both, as a copy of this process may hold the pipe, too.
+        process.stdin.close()
+        process.terminate()
+        try:
+            process.wait(_STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, 9)
+            process.wait()
+        self._reader.join()
+        process.stdout.close()
+        self._address = ""
+        self._listening.clear()
+        self._remove()
+
+    def __enter__(self) -> LocalServer:
+        return self.start()
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+
+class Local:
+    """What local() returns: `with` gives a Client, `async with` an AsyncClient."""
+
+    def __init__(self, server: LocalServer, client: dict[str, Any]) -> None:
+        self._server = server
+        self._options = client
+        self._client: Client | None = None
+        self._async_client: AsyncClient | None = None
+
+    def __enter__(self) -> Client:
+        self._client = Client(self._server.start().address, **self._options)
+        return self._client
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._client is not None:
+            self._client.close()
+        self._server.stop()
+
+    async def __aenter__(self) -> AsyncClient:
+        await asyncio.to_thread(self._server.start)
+        self._async_client = AsyncClient(self._server.address, **self._options)
+        return self._async_client
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._async_client is not None:
+            await self._async_client.close()
+        await asyncio.to_thread(self._server.stop)
+
+
+def local(
+    *,
+    data_dir: PathLike | None = None,
+    options: Sequence[str] = (),
+    binary: PathLike | None = None,
+    **client: Any,
+) -> Local:
+    """A server of one's own, for a script or a test, and a client of it:
+
+        with hulld.local() as client:
+            ...
+
+    The arguments are those of LocalServer; further ones are for the client, such as timeout. The
+    server ends with the context, and its hulls with it unless data_dir keeps them. `async with`
+    gives an AsyncClient.
+    """
+    return Local(LocalServer(data_dir=data_dir, options=options, binary=binary), client)

@@ -1,0 +1,50 @@
+"""Finds hulld and hullctl."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shutil
+from collections.abc import Iterator
+
+
+def find_program(name: str) -> pathlib.Path:
+    """Where the program is: HULLD_BINARY (for hulld) or HULLCTL_BINARY, the directory of
+    HULLD_BINARY, the PATH, or the newest build in the checkout of hulld that the working directory
+    or this package lies in.
+
+    Raises FileNotFoundError, which tells where was looked.
+    """
+    variable = f"{name.upper()}_BINARY"
+    named = os.environ.get(variable)
+    if named:
+        if os.access(named, os.X_OK) and os.path.isfile(named):
+            return pathlib.Path(named)
+        raise FileNotFoundError(f"{variable} is {named}, which is no program")
+    beside = pathlib.Path(os.environ.get("HULLD_BINARY", "")).parent / name
+    if "HULLD_BINARY" in os.environ and os.access(beside, os.X_OK):
+        return beside
+    found = shutil.which(name)
+    if found:
+        return pathlib.Path(found)
+    builds = [
+        build
+        for checkout in _checkouts()
+        for build in checkout.glob(f"build/*/bin/{name}")
+        if os.access(build, os.X_OK)
+    ]
+    if builds:
+        return max(builds, key=lambda path: path.stat().st_mtime)
+    raise FileNotFoundError(
+        f"there is no {name}: {variable} is not set, the PATH lacks it, and there is no build of "
+        f"it in a checkout around the working directory; build hulld, or set {variable}"
+    )
+
+
+def _checkouts() -> Iterator[pathlib.Path]:
+    """The trees of hulld's sources above the working directory and above this file."""
+    for start in (pathlib.Path.cwd(), pathlib.Path(__file__).resolve().parent):
+        for folder in (start, *start.parents):
+            if (folder / "proto/hulld/v1/hull.proto").is_file():
+                yield folder
+                break

@@ -1,0 +1,204 @@
+"""Writes and reads the fields of a protobuf message whose arrays are numpy's.
+
+python-protobuf takes and gives arrays number by number, some 50 ns each. A packed field is the
+array's own bytes behind a tag and a length, so this module puts numpy's buffer there, and finds it
+there again. Small messages stay protobuf's; their bytes can be put into a message that is written
+here, and the other way round.
+
+Source: Protocol Buffers, "Encoding". A test compares both directions with protobuf's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+VARINT, FIXED64, LENGTH, FIXED32 = 0, 1, 2, 5
+
+Value = Union[int, memoryview]
+Unsigned = npt.NDArray[np.unsignedinteger[Any]]
+
+
+class WireError(ValueError):
+    """The bytes are not a protobuf message."""
+
+
+def encode_varint(value: int) -> bytes:
+    """0 <= value < 2^64, in groups of seven bits, the lowest first."""
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def encode_varints(values: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint8]:
+    """The varints of all values, one behind the other: canonical, as protobuf writes them. Cost:
+    some ns each."""
+    flat = np.ascontiguousarray(values, np.uint32).reshape(-1)
+    size = max(1, -(-int(flat.max(initial=0)).bit_length() // 7))
+    if size == 1:
+        return flat.astype(np.uint8)
+    # All groups of all numbers; then those that a number does not need are left out.
+    groups = np.empty((flat.size, size), np.uint8)
+    kept = np.ones((flat.size, size), np.bool_)
+    for group in range(size):
+        groups[:, group] = (flat >> np.uint32(7 * group)) & np.uint32(0x7F)
+        if group > 0:
+            kept[:, group] = flat >= np.uint32(1 << 7 * group)
+            groups[:, group - 1] |= kept[:, group].view(np.uint8) << np.uint8(7)
+    needed: npt.NDArray[np.uint8] = groups[kept]
+    return needed
+
+
+class MessageWriter:
+    """A message put together from its fields, in the order of the calls. Empty arrays are left out,
+    as proto3 does."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes | memoryview] = []
+        self.size = 0
+
+    def _put(self, part: bytes | memoryview) -> None:
+        self._parts.append(part)
+        self.size += len(part)
+
+    def raw(self, serialized: bytes) -> MessageWriter:
+        """Fields that are encoded already, as by SerializeToString."""
+        self._put(serialized)
+        return self
+
+    def _packed(self, number: int, data: npt.NDArray[Any]) -> MessageWriter:
+        if data.size:
+            flat = data.reshape(-1).view(np.uint8)
+            self._put(encode_varint(number << 3 | LENGTH) + encode_varint(flat.size))
+            self._put(flat.data)
+        return self
+
+    def doubles(self, number: int, values: npt.ArrayLike) -> MessageWriter:
+        """A packed `repeated double`. The bytes are those of the array: no double is changed."""
+        return self._packed(number, np.ascontiguousarray(values, "<f8"))
+
+    def floats(self, number: int, values: npt.ArrayLike) -> MessageWriter:
+        """A packed `repeated float`."""
+        return self._packed(number, np.ascontiguousarray(values, "<f4"))
+
+    def uint32s(self, number: int, values: npt.NDArray[np.uint32]) -> MessageWriter:
+        """A packed `repeated uint32`."""
+        return self._packed(number, encode_varints(values))
+
+    def strings(self, number: int, values: list[str]) -> MessageWriter:
+        """A `repeated string`."""
+        for value in values:
+            data = value.encode()
+            self._put(encode_varint(number << 3 | LENGTH) + encode_varint(len(data)) + data)
+        return self
+
+    def message(self, number: int, message: MessageWriter | bytes) -> MessageWriter:
+        """A message as a field."""
+        parts = message._parts if isinstance(message, MessageWriter) else [message]
+        size = message.size if isinstance(message, MessageWriter) else len(message)
+        self._put(encode_varint(number << 3 | LENGTH) + encode_varint(size))
+        for part in parts:
+            self._put(part)
+        return self
+
+    def finish(self) -> bytes:
+        """The message. Copies each array once."""
+        return b"".join(self._parts)
+
+
+def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
+    value = shift = 0
+    while shift < 70 and at < len(data):
+        byte = data[at]
+        at += 1
+        value |= (byte & 0x7F) << shift
+        if byte < 0x80:
+            return value & 0xFFFFFFFFFFFFFFFF, at
+        shift += 7
+    raise WireError("a varint does not end")
+
+
+def read_fields(data: bytes | memoryview) -> Iterator[tuple[int, int, Value]]:
+    """Number, wire type and value of each field, in order. What has a length comes as a view of
+    `data`.
+
+    Raises WireError where the bytes are cut off or no message.
+    """
+    view = memoryview(data)
+    at = 0
+    while at < len(view):
+        key, at = _read_varint(view, at)
+        number, wire_type = key >> 3, key & 7
+        if wire_type == VARINT:
+            value, at = _read_varint(view, at)
+            yield number, wire_type, value
+            continue
+        if wire_type == LENGTH:
+            size, at = _read_varint(view, at)
+        elif wire_type == FIXED64:
+            size = 8
+        elif wire_type == FIXED32:
+            size = 4
+        else:
+            raise WireError(
+                f"field {number} has the wire type {wire_type}, which proto3 does not use"
+            )
+        if number == 0:
+            raise WireError("a field has the number 0")
+        if at + size > len(view):
+            raise WireError(
+                f"field {number} is cut off: {size} bytes were announced, {len(view) - at} are "
+                "there"
+            )
+        yield number, wire_type, view[at : at + size]
+        at += size
+
+
+def packed_doubles(value: Value) -> npt.NDArray[np.float64]:
+    """What a `repeated double` field holds, packed or a single entry: a view, not a copy."""
+    if isinstance(value, int) or len(value) % 8:
+        raise WireError("a field of doubles does not hold doubles")
+    return np.frombuffer(value, "<f8")
+
+
+def packed_floats(value: Value) -> npt.NDArray[np.float32]:
+    """The same for a `repeated float`."""
+    if isinstance(value, int) or len(value) % 4:
+        raise WireError("a field of floats does not hold floats")
+    return np.frombuffer(value, "<f4")
+
+
+def packed_varints(value: Value) -> Unsigned:
+    """What a field of repeated integers, enums or bools holds, packed or a single entry: as uint8,
+    and without a copy, where all are below 128, else as uint64. Cost: some ns each."""
+    if isinstance(value, int):
+        return np.array([value], np.uint64)
+    data = np.frombuffer(value, np.uint8)
+    last = data < 0x80
+    if last.all():
+        return data
+    if not last[-1]:
+        raise WireError("the last varint of a field does not end")
+    ends = np.flatnonzero(last)
+    starts = np.empty_like(ends)
+    starts[0] = 0
+    starts[1:] = ends[:-1] + 1
+    sizes = ends - starts + 1
+    longest = int(sizes.max())
+    if longest > 10:
+        raise WireError("a varint is longer than ten bytes")
+    # Byte by byte of all numbers at once: most are short, so the passes soon concern few.
+    out: npt.NDArray[np.uint64] = (data[starts] & np.uint8(0x7F)).astype(np.uint64)
+    which = np.arange(out.size)
+    for byte in range(1, longest):
+        which = which[sizes[which] > byte]
+        out[which] |= (data[starts[which] + byte] & np.uint8(0x7F)).astype(np.uint64) << np.uint64(
+            7 * byte
+        )
+    return out

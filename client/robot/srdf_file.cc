@@ -1,0 +1,141 @@
+#include "client/robot/srdf_file.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "client/formats/byte_source.h"
+#include "client/formats/text_number.h"
+#include "client/robot/xml_document.h"
+
+namespace hulld {
+namespace {
+
+absl::StatusOr<int> LinkOf(const XmlDocument& document, const TiXmlElement& element,
+                           const char* attribute, const Robot& robot) {
+  const std::string name = AttributeOf(element, attribute);
+  const int link = robot.FindLink(name);
+  if (link >= 0) return link;
+  return document.ErrorAt(
+      element, name.empty()
+                   ? absl::StrCat("<", element.ValueStr(), "> lacks ", attribute, "=\"...\"")
+                   : absl::StrCat("<", element.ValueStr(), "> names the link ", Quoted(name),
+                                  ", which the robot ", Quoted(robot.name), " has not"));
+}
+
+absl::StatusOr<LinkPair> PairOf(const XmlDocument& document, const TiXmlElement& element,
+                                const Robot& robot) {
+  const auto a = LinkOf(document, element, "link1", robot);
+  if (!a.ok()) return a.status();
+  const auto b = LinkOf(document, element, "link2", robot);
+  if (!b.ok()) return b.status();
+  return MakeLinkPair(*a, *b);
+}
+
+std::string Escaped(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+LinkPair MakeLinkPair(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
+
+absl::StatusOr<std::set<LinkPair>> ParseDisabledPairs(const std::string& text,
+                                                      const std::string& name, const Robot& robot) {
+  const auto document = ParseXml(text, name, "robot");
+  if (!document.ok()) return document.status();
+  const TiXmlElement& root = *(*document)->tree.RootElement();
+  std::set<LinkPair> pairs;
+  for (const TiXmlElement* element : ChildrenOf(root, "disable_default_collisions")) {
+    const auto link = LinkOf(**document, *element, "link", robot);
+    if (!link.ok()) return link.status();
+    for (int other = 0; other < static_cast<int>(robot.links.size()); ++other) {
+      if (other != *link) pairs.insert(MakeLinkPair(*link, other));
+    }
+  }
+  for (const TiXmlElement* element : ChildrenOf(root, "enable_collisions")) {
+    const auto pair = PairOf(**document, *element, robot);
+    if (!pair.ok()) return pair.status();
+    pairs.erase(*pair);
+  }
+  for (const TiXmlElement* element : ChildrenOf(root, "disable_collisions")) {
+    const auto pair = PairOf(**document, *element, robot);
+    if (!pair.ok()) return pair.status();
+    pairs.insert(*pair);
+  }
+  return pairs;
+}
+
+absl::StatusOr<std::set<LinkPair>> ReadDisabledPairs(const std::string& path, const Robot& robot) {
+  const auto text = ReadText(path);
+  if (!text.ok()) return text.status();
+  return ParseDisabledPairs(*text, path == "-" ? "standard input" : path, robot);
+}
+
+std::set<LinkPair> AdjacentPairs(const Robot& robot) {
+  // Two links with shapes are neighbours when the way between them passes none: so each is a
+  // neighbour of the nearest one with shapes above it, and all that hang from the same bare links
+  // are neighbours, too.
+  std::set<LinkPair> pairs;
+  const int count = static_cast<int>(robot.links.size());
+  // The topmost link of the bare ones that a link hangs from, or the nearest with shapes.
+  std::vector<int> group(robot.links.size(), 0);
+  std::vector<std::vector<int>> members(robot.links.size());
+  for (int i = 0; i < count; ++i) {
+    const auto at = static_cast<size_t>(i);
+    const int joint = robot.links[at].parent_joint;
+    const bool bare = robot.links[at].shapes.empty();
+    if (joint < 0) {
+      group[at] = i;
+      if (!bare) members[at].push_back(i);
+      continue;
+    }
+    const auto parent = static_cast<size_t>(robot.joints[static_cast<size_t>(joint)].parent);
+    const bool parent_bare = robot.links[parent].shapes.empty();
+    // Where bare links hang from one with shapes, each branch of them is a group of its own.
+    const int key = parent_bare ? group[parent] : i;
+    group[at] = bare ? key : i;
+    if (!parent_bare) members[static_cast<size_t>(key)].push_back(static_cast<int>(parent));
+    if (!bare) members[static_cast<size_t>(key)].push_back(i);
+  }
+  for (const std::vector<int>& near : members) {
+    for (const int a : near) {
+      for (const int b : near) {
+        if (a < b) pairs.insert({a, b});
+      }
+    }
+  }
+  return pairs;
+}
+
+void WriteSrdf(const Robot& robot, const std::vector<DisabledPair>& pairs,
+               const std::string& comment, std::ostream& out) {
+  out << "<?xml version=\"1.0\"?>\n<!-- " << comment << " -->\n<robot name=\""
+      << Escaped(robot.name) << "\">\n";
+  for (const DisabledPair& pair : pairs) {
+    out << "  <disable_collisions link1=\""
+        << Escaped(robot.links[static_cast<size_t>(pair.links.first)].name) << "\" link2=\""
+        << Escaped(robot.links[static_cast<size_t>(pair.links.second)].name) << "\" reason=\""
+        << pair.reason << "\"/>\n";
+  }
+  out << "</robot>\n";
+}
+
+}  // namespace hulld

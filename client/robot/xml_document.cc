@@ -1,0 +1,247 @@
+#include "client/robot/xml_document.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/str_cat.h>
+
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "client/formats/byte_source.h"
+#include "client/formats/text_number.h"
+
+namespace hulld {
+namespace {
+
+bool IsSpace(char c) { return absl::ascii_isspace(static_cast<unsigned char>(c)); }
+bool EndsName(char c) { return IsSpace(c) || c == '>' || c == '/' || c == '=' || c == '<'; }
+
+// Walks the tags of a text, so that what TinyXML gets is well-formed: TinyXML itself closes what is
+// open without a word, and recurses as deep as tags are nested.
+class TagWalk {
+ public:
+  TagWalk(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+
+  absl::Status Run() {
+    if (text_.find('\0') != std::string_view::npos) return Error("a byte 0 is no text");
+    while (at_ < text_.size()) {
+      absl::Status step = text_[at_] == '<' ? TakeMarkup() : TakeText();
+      if (!step.ok()) return step;
+    }
+    if (!open_.empty()) {
+      return Error(absl::StrCat("the file ends before </", open_.back().name, ">, which closes <",
+                                open_.back().name, "> of line ", open_.back().line));
+    }
+    return roots_ == 1 ? absl::OkStatus() : Error("there is no element in it");
+  }
+
+ private:
+  struct Open {
+    std::string name;
+    uint64_t line;
+  };
+
+  absl::Status Error(const std::string& message) const {
+    return absl::InvalidArgumentError(absl::StrCat(name_, ":", line_, ": ", message));
+  }
+
+  bool StartsWith(std::string_view start) const { return text_.substr(at_, start.size()) == start; }
+
+  void Advance(size_t count) {
+    for (; count > 0; --count) line_ += text_[at_++] == '\n' ? 1 : 0;
+  }
+
+  void SkipSpace() {
+    while (at_ < text_.size() && IsSpace(text_[at_])) Advance(1);
+  }
+
+  // Passes over everything to the end of `end`.
+  absl::Status SkipPast(std::string_view end, const char* what) {
+    const size_t found = text_.find(end, at_);
+    if (found == std::string_view::npos) return Error(absl::StrCat(what, " is not closed"));
+    Advance(found + end.size() - at_);
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeText() {
+    if (open_.empty() && !IsSpace(text_[at_])) {
+      return Error("text outside of all elements; is this an XML file?");
+    }
+    Advance(1);
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeMarkup() {
+    if (StartsWith("<!--")) {
+      Advance(4);
+      return SkipPast("-->", "a comment");
+    }
+    if (StartsWith("<![CDATA[")) {
+      return open_.empty() ? Error("text outside of all elements") : SkipPast("]]>", "<![CDATA[");
+    }
+    if (StartsWith("<?")) return SkipPast("?>", "<?");
+    if (StartsWith("<!")) return Error("document types are not read; remove <!DOCTYPE ...>");
+    return StartsWith("</") ? TakeEnd() : TakeStart();
+  }
+
+  std::string TakeName() {
+    const size_t begin = at_;
+    while (at_ < text_.size() && !EndsName(text_[at_])) ++at_;
+    return std::string(text_.substr(begin, at_ - begin));
+  }
+
+  absl::Status TakeEnd() {
+    Advance(2);
+    const std::string name = TakeName();
+    SkipSpace();
+    if (at_ >= text_.size() || text_[at_] != '>') return Error("a tag </... is not closed by >");
+    if (open_.empty()) return Error(absl::StrCat("</", name, "> closes nothing"));
+    if (name != open_.back().name) {
+      return Error(absl::StrCat("</", name, "> where <", open_.back().name, "> of line ",
+                                open_.back().line, " is to be closed"));
+    }
+    Advance(1);
+    open_.pop_back();
+    return absl::OkStatus();
+  }
+
+  absl::Status TakeStart() {
+    Advance(1);
+    const uint64_t line = line_;
+    const std::string name = TakeName();
+    const bool starts_well =
+        !name.empty() && (absl::ascii_isalpha(static_cast<unsigned char>(name[0])) ||
+                          name[0] == '_' || static_cast<unsigned char>(name[0]) >= 0x80);
+    if (!starts_well) return Error("a name must follow <; text has &lt; for it");
+    if (name.rfind("xacro:", 0) == 0) {
+      return Error(absl::StrCat("<", name, "> is a macro; expand the file with 'xacro' first"));
+    }
+    if (open_.empty() && ++roots_ > 1) return Error("a second element beside the first");
+    for (;;) {
+      SkipSpace();
+      if (at_ >= text_.size()) return Error(absl::StrCat("the tag <", name, " is not closed by >"));
+      if (text_[at_] == '>') {
+        if (open_.size() >= kMostXmlDepth) {
+          return Error(absl::StrCat("elements are nested deeper than ", kMostXmlDepth));
+        }
+        open_.push_back({name, line});
+        Advance(1);
+        return absl::OkStatus();
+      }
+      if (StartsWith("/>")) {
+        Advance(2);
+        return absl::OkStatus();
+      }
+      if (absl::Status attribute = TakeAttribute(name); !attribute.ok()) return attribute;
+    }
+  }
+
+  absl::Status TakeAttribute(const std::string& element) {
+    const std::string name = TakeName();
+    SkipSpace();
+    if (name.empty() || at_ >= text_.size() || text_[at_] != '=') {
+      return Error(absl::StrCat("in <", element, ">, ", Quoted(name),
+                                " is no attribute; attributes are NAME=\"VALUE\""));
+    }
+    Advance(1);
+    SkipSpace();
+    const char quote = at_ < text_.size() ? text_[at_] : ' ';
+    if (quote != '"' && quote != '\'') {
+      return Error(absl::StrCat("the value of ", name, " in <", element, "> needs quotes"));
+    }
+    Advance(1);
+    const size_t end = text_.find(quote, at_);
+    const std::string_view value = text_.substr(at_, end - at_);
+    if (end == std::string_view::npos || value.find('<') != std::string_view::npos) {
+      return Error(absl::StrCat("the value of ", name, " in <", element, "> is not closed"));
+    }
+    Advance(value.size() + 1);
+    return absl::OkStatus();
+  }
+
+  const std::string_view text_;
+  const std::string& name_;
+  size_t at_ = 0;
+  uint64_t line_ = 1;
+  int roots_ = 0;
+  std::vector<Open> open_;
+};
+
+}  // namespace
+
+absl::Status XmlDocument::ErrorAt(const TiXmlElement& element, const std::string& message) const {
+  return absl::InvalidArgumentError(absl::StrCat(name, ":", element.Row(), ": ", message));
+}
+
+absl::StatusOr<std::unique_ptr<XmlDocument>> ParseXml(const std::string& text,
+                                                      const std::string& name,
+                                                      const std::string& root) {
+  if (absl::Status walked = TagWalk(text, name).Run(); !walked.ok()) return walked;
+  auto document = std::make_unique<XmlDocument>();
+  document->name = name;
+  document->tree.Parse(text.c_str(), nullptr, TIXML_ENCODING_UTF8);
+  if (document->tree.Error()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        name, ":", document->tree.ErrorRow(), ": not read as XML: ", document->tree.ErrorDesc()));
+  }
+  const TiXmlElement* const element = document->tree.RootElement();
+  if (element == nullptr) {
+    return absl::InvalidArgumentError(absl::StrCat(name, ": there is no element in it"));
+  }
+  if (element->ValueStr() != root) {
+    return document->ErrorAt(*element, absl::StrCat("the outermost element is <",
+                                                    element->ValueStr(), ">, not <", root, ">"));
+  }
+  return document;
+}
+
+absl::StatusOr<std::unique_ptr<XmlDocument>> ReadXml(const std::string& path,
+                                                     const std::string& root) {
+  const auto text = ReadText(path);
+  if (!text.ok()) return text.status();
+  return ParseXml(*text, path == "-" ? "standard input" : path, root);
+}
+
+std::vector<const TiXmlElement*> ChildrenOf(const TiXmlElement& parent, const char* name) {
+  std::vector<const TiXmlElement*> children;
+  for (const TiXmlElement* child = parent.FirstChildElement(name); child != nullptr;
+       child = child->NextSiblingElement(name)) {
+    children.push_back(child);
+  }
+  return children;
+}
+
+std::string AttributeOf(const TiXmlElement& element, const char* name) {
+  const char* const value = element.Attribute(name);
+  return value == nullptr ? "" : value;
+}
+
+absl::StatusOr<std::vector<double>> NumbersOf(const XmlDocument& document,
+                                              const TiXmlElement& element, const char* attribute,
+                                              size_t count) {
+  const std::string text = AttributeOf(element, attribute);
+  const auto error = [&](const std::string& problem) {
+    return document.ErrorAt(element, absl::StrCat("<", element.ValueStr(), "> ", problem));
+  };
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  for (std::string_view token; !(token = NextToken(&rest)).empty();) {
+    double number = 0;
+    const NumberText kind = ParseDouble(token, &number);
+    if (kind != NumberText::kNumber) {
+      return error(absl::StrCat(attribute, ": ", NumberProblem(kind, token)));
+    }
+    if (!std::isfinite(number)) {
+      return error(absl::StrCat(attribute, ": ", Quoted(token), " is not a finite number"));
+    }
+    numbers.push_back(number);
+  }
+  if (numbers.size() == count) return numbers;
+  if (element.Attribute(attribute) == nullptr) {
+    return error(absl::StrCat("lacks ", attribute, "=\"...\""));
+  }
+  return error(absl::StrCat(attribute, " takes ", count, count == 1 ? " number" : " numbers",
+                            ", here are ", numbers.size()));
+}
+
+}  // namespace hulld

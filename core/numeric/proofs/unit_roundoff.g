@@ -1,0 +1,10 @@
+# Rounding itself. A result in [1, 2) errs by at most u; by hand, a power of two moves the
+# exponent alone, so any normal result errs by at most u of itself. A smaller one errs by at most
+# 2^-1075. All other scripts assume the first of these alone, for any sizes (README.md).
+
+y = float<ieee_64, ne>(x);
+tiny_y = float<ieee_64, ne>(tiny);
+
+{ x in [1, 2] /\ |tiny| <= 1b-1022 -> |y - x| <= kUnitRoundoff /\ |tiny_y - tiny| <= 1b-1075 }
+
+# Refused: kUnitRoundoff * 0.999

@@ -1,0 +1,101 @@
+#ifndef HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
+#define HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "server/registry/registry_types.h"
+
+namespace hulld::server {
+
+// The last changes of what readers are given of hulls, in their order, each as a hash of the hull's
+// ID. Not thread-safe.
+class RecentChanges {
+ public:
+  // Half a megabyte.
+  static constexpr uint64_t kMost = 1 << 16;
+
+  static uint64_t HashOf(std::string_view id) { return std::hash<std::string_view>()(id); }
+
+  RecentChanges() : hashes_(kMost) {}
+  void Note(std::string_view id) { hashes_[end_++ % kMost] = HashOf(id); }
+  // After the last change.
+  uint64_t end() const { return end_; }
+  // Whether all changes from this one on are known.
+  bool Knows(uint64_t change) const { return end_ - change <= kMost; }
+  uint64_t at(uint64_t change) const { return hashes_[change % kMost]; }
+
+ private:
+  std::vector<uint64_t> hashes_;
+  uint64_t end_ = 0;
+};
+
+// What a reader knows of the hulls that it asks for: each once, however often it is named, and
+// which of them must be looked up because they changed since. Who asks again and again keeps it
+// (Registry::Resolve). Not thread-safe.
+class KnownHulls {
+ public:
+  KnownHulls() = default;
+
+  // Begins with these IDs, of which nothing is known, so that all must be looked up; does nothing
+  // when it has begun. They stay the same. Cost: O(n log n).
+  void Begin(std::span<const std::string> ids);
+
+  // Hulls by index: each ID once.
+  size_t size() const { return hulls_.size(); }
+
+ private:
+  friend class Registry;
+
+  struct Known {
+    // Where the ID is among those asked for.
+    uint32_t first = 0;
+    bool is_due = false;
+    bool is_prepared = false;
+    // About what it holds of the hull.
+    uint64_t bytes = 0;
+    absl::StatusOr<HullView> view = absl::UnknownError("not looked up");
+  };
+
+ public:
+  // About what it holds of each ID, in bytes, the ID and the hull apart.
+  static constexpr size_t kBytesEach =
+      sizeof(Known) + 2 * sizeof(uint32_t) + sizeof(std::pair<uint64_t, uint32_t>);
+
+ private:
+  // Every hull must be looked up.
+  void ForgetAll();
+  // Those that a change with this hash may have been of must be looked up. Cost: O(log n).
+  void NoteChange(uint64_t hash);
+  void MakeDue(uint32_t hull);
+  // Looks again for what could not be read, and begins to prepare anew.
+  void BeginLookup();
+  // About what is held of all hulls.
+  uint64_t HullBytes() const;
+  // In the order asked for.
+  std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids) const;
+
+  bool has_begun_ = false;
+  std::vector<Known> hulls_;
+  // The hull of each ID asked for.
+  std::vector<uint32_t> hull_of_;
+  // By the hash of their IDs.
+  std::vector<std::pair<uint64_t, uint32_t>> by_hash_;
+  // Those that must be looked up; the last one comes first.
+  std::vector<uint32_t> due_;
+  // Changes before this one were taken into account; none at first.
+  std::optional<uint64_t> next_change_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_

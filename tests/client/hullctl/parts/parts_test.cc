@@ -1,0 +1,87 @@
+// hullctl append --split, how much larger hulls are, and cover, against the real server.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/formats/point_reading.h"
+#include "tests/client/hullctl/hullctl_on_server.h"
+
+namespace hulld {
+namespace {
+
+using testing::HasSubstr;
+
+// A box as OBJ, its vertices counted on from `first`.
+std::string Box(const std::string& name, double x, double y, double dx, double dy, int first) {
+  std::string text = "o " + name + "\n";
+  for (int corner = 0; corner < 8; ++corner) {
+    text += "v " + std::to_string(x + (corner % 2 == 0 ? 0 : dx)) + " " +
+            std::to_string(y + (corner / 2 % 2 == 0 ? 0 : dy)) + " " + (corner < 4 ? "0" : "1") +
+            "\n";
+  }
+  const int faces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
+                           {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  for (const auto& face : faces) {
+    text += "f";
+    for (const int corner : face) text += " " + std::to_string(corner + first);
+    text += "\n";
+  }
+  return text;
+}
+
+class HullctlParts : public HullctlOnServer {
+ protected:
+  // An L of two boxes: volume 4 + 3 in a hull of 11.5.
+  HullctlParts() : bracket_("l.obj", Box("foot", 0, 0, 4, 1, 1) + Box("back", 0, 1, 1, 3, 9)) {}
+
+  const TempFile bracket_;
+};
+
+TEST_F(HullctlParts, AppendSaysHowMuchLargerTheHullIs) {
+  Ran ran = Ask({"append", "l", bracket_.path(), "--create"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("volume     1.643 times that of the mesh\n"));
+  EXPECT_THAT(ran.err, HasSubstr("warning: the hull l has 1.643 times the volume of its mesh"));
+  // Points of elsewhere are in it now, too.
+  ran = Ask({"append", "l", bracket_.path()});
+  EXPECT_THAT(ran.out, testing::Not(HasSubstr("volume")));
+  const TempFile open("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
+  EXPECT_THAT(Ask({"append", "o", open.path(), "--create"}).out,
+              HasSubstr("not compared: the mesh is not closed"));
+  const TempFile points("p.xyz", "0 0 0\n");
+  EXPECT_THAT(Ask({"append", "p", points.path(), "--create"}).out,
+              testing::Not(HasSubstr("volume")));
+}
+
+TEST_F(HullctlParts, SplitMakesAHullOfEachPart) {
+  Ran ran = Ask({"append", "l", bracket_.path(), "--split", "names", "--create"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("l/foot"));
+  EXPECT_THAT(ran.out, HasSubstr("1 times that of the mesh"));
+  EXPECT_EQ(ran.err, "");
+  EXPECT_EQ(Ask({"list", "--output", "name"}).out, "l/back\nl/foot\n");
+  // The boxes share corners, so they hang together.
+  ran = Ask(
+      {"append", "k", bracket_.path(), "--split", "components", "--create", "--output", "name"});
+  EXPECT_EQ(ran.out, "k/component-1\n");
+  EXPECT_EQ(Ask({"append", "n", bracket_.path(), "--split", "names"}).code, 1);
+  EXPECT_EQ(Ask({"append", "n", bracket_.path(), "--split", "names", "--writer", "w"}).code, 2);
+}
+
+TEST_F(HullctlParts, CoverTellsWhatSticksOut) {
+  ASSERT_EQ(Ask({"append", "l", bracket_.path(), "--split", "names", "--create"}).code, 0);
+  Ran ran = Ask({"cover", "l/foot", "l/back", bracket_.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out, "ENCLOSED: each of the 24 triangles is in the hulls together (exact)\n");
+  EXPECT_EQ(Ask({"cover", "l/", bracket_.path()}).out, ran.out);
+  ran = Ask({"cover", "l/foot", bracket_.path(), "--limit", "1"});
+  EXPECT_THAT(ran.out, HasSubstr("OUTSIDE: 10 of 24 triangles stick out (exact), by 3, with an "));
+  EXPECT_THAT(ran.out, HasSubstr("triangle 12\tby 3\tat 0 4 1\n# 9 more; raise --limit"));
+  ran = Ask({"cover", "l/foot", bracket_.path(), "--output", "name"});
+  EXPECT_EQ(ran.out, "OUTSIDE\n");
+  EXPECT_THAT(AskJson({"cover", "l/", bracket_.path()}).out, HasSubstr("\"enclosed\":true"));
+  EXPECT_EQ(Ask({"cover", "l/foot"}).code, 2);
+  EXPECT_EQ(Ask({"cover", "nowhere", bracket_.path()}).code, 1);
+}
+
+}  // namespace
+}  // namespace hulld

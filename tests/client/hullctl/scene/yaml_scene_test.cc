@@ -1,0 +1,173 @@
+#include "client/hullctl/scene/yaml_scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/client/formats/point_reading.h"
+
+namespace hulld {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr char kCell[] = R"(# a cell
+prefix: cell/
+scale: mm
+hulls:
+  table: {box: [2, 1, 0.5]}
+  wedge: {points: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}
+  part: {file: part.xyz, scale: cm}
+bodies:
+  corner:
+    - {hull: wedge, at: [1, 0, 0]}
+    - {hull: wedge}
+    - {id: spider, at: {xyz: [0, 0, 1], quaternion: [1, 0, 0, 1]}}
+place:
+  floor: {hull: table, at: [0, 0, -0.25], group: building}
+  wall: {hull: table, group: building}
+  left: {body: corner, at: [10, 0, 0]}
+  right: {body: corner, at: {xyz: [20, 0, 0], rpy: [0, 0, 3]}}
+ignore: [[left, building], [right, floor]]
+ask: {separation: true, clearance: 0.01, tolerance: 0}
+)";
+
+SceneDescription Parse(const std::string& text) {
+  const auto scene = ParseYamlScene(text, "folder/cell.yaml");
+  EXPECT_TRUE(scene.ok()) << scene.status();
+  return *scene;
+}
+
+std::string ErrorOf(const std::string& text) {
+  const auto scene = ParseYamlScene(text, "cell.yaml");
+  EXPECT_TRUE(absl::IsInvalidArgument(scene.status())) << text;
+  return std::string(scene.status().message().data(), scene.status().message().size());
+}
+
+// The names of the pairs that are asked about.
+std::vector<std::string> PairsIn(const std::string& text) {
+  const auto scene = ToScene(Parse(text), "cell.yaml");
+  EXPECT_TRUE(scene.ok()) << scene.status();
+  const auto pairs = PairsOf(*scene, "cell.yaml");
+  EXPECT_TRUE(pairs.ok()) << pairs.status();
+  std::vector<std::string> names;
+  for (size_t i = 0; i < pairs->size(); i += 2) {
+    names.push_back(scene->NameOf((*pairs)[i]) + " " + scene->NameOf((*pairs)[i + 1]));
+  }
+  return names;
+}
+
+TEST(YamlScene, DefinitionsAreRead) {
+  const SceneDescription scene = Parse(kCell);
+  ASSERT_EQ(scene.hulls.size(), 3u);
+  EXPECT_EQ(scene.hulls[0].hull_id, "cell/table");
+  EXPECT_THAT(std::vector<double>(scene.hulls[0].xyz.begin(), scene.hulls[0].xyz.begin() + 3),
+              ElementsAre(-1, -0.5, -0.25));
+  EXPECT_EQ(scene.hulls[2].file, "folder/part.xyz");
+  EXPECT_EQ(scene.hulls[2].scale.Apply(7), 7.0 / 100);
+  EXPECT_EQ(scene.hulls[2].where, "folder/cell.yaml:7:9");
+  ASSERT_EQ(scene.bodies.size(), 1u);
+  EXPECT_EQ(scene.bodies[0].pieces[0].name, "wedge");
+  EXPECT_EQ(scene.bodies[0].pieces[1].name, "wedge-2");
+  EXPECT_EQ(scene.bodies[0].pieces[2].hull_id, "spider");
+  EXPECT_TRUE(scene.wanted.separation());
+  EXPECT_EQ(scene.wanted.clearance(), 0.01);
+}
+
+TEST(YamlScene, BodiesBecomeTheirPieces) {
+  const auto scene = ToScene(Parse(kCell), "cell.yaml");
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_THAT(scene->names,
+              ElementsAre("floor", "wall", "left/wedge", "left/wedge-2", "left/spider",
+                          "right/wedge", "right/wedge-2", "right/spider"));
+  EXPECT_EQ(scene->PlacementOf(2).pose().translation().x(), 11);
+  EXPECT_EQ(scene->PlacementOf(2).hull_id(), "cell/wedge");
+  EXPECT_EQ(scene->PlacementOf(4).pose().rotation().z(), 1);
+  EXPECT_EQ(scene->PlacementOf(4).pose().translation().z(), 1);
+}
+
+TEST(YamlScene, GroupsPiecesAndIgnoredPairsAreNotAsked) {
+  const std::string head = "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n";
+  EXPECT_THAT(PairsIn(head + "place: {a: {hull: h}, b: {body: b}}"),
+              ElementsAre("a b/h", "a b/h-2"));
+  EXPECT_THAT(PairsIn(head + "place: {a: {hull: h, group: g}, b: {hull: h, group: g}, "
+                             "c: {hull: h}}"),
+              ElementsAre("a c", "b c"));
+  // One of a group is singled out, and still is of the group.
+  EXPECT_THAT(PairsIn(head + "place: {a: {hull: h, group: g}, b: {hull: h, group: g}, "
+                             "c: {hull: h}}\nignore: [[a, c]]"),
+              ElementsAre("b c"));
+  EXPECT_THAT(PairsIn(head + "place: {a: {hull: h, group: g}, b: {hull: h}, c: {hull: h}}\n"
+                             "ignore: [[g, c]]"),
+              ElementsAre("a b", "b c"));
+  EXPECT_THAT(PairsIn(kCell).size(), 3u + 9u);
+}
+
+TEST(YamlScene, PairsAndMoversAreTaken) {
+  const std::string head =
+      "hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}, {hull: h}]}\n"
+      "place: {a: {hull: h}, b: {body: b}, c: {hull: h}}\n";
+  EXPECT_THAT(PairsIn(head + "ask: {pairs: [[c, b], [a, c]]}"),
+              ElementsAre("c b/h", "c b/h-2", "a c"));
+  EXPECT_THAT(PairsIn(head + "ask: {movers: [c]}"), ElementsAre("c a", "c b/h", "c b/h-2"));
+}
+
+TEST(YamlScene, AliasesStandForTheirAnchors) {
+  EXPECT_THAT(PairsIn("hulls: {h: {box: &size [1, 1, 1]}, i: {box: *size}}\n"
+                      "place: {a: {hull: h, at: &pose [1, 2, 3]}, b: {hull: i, at: *pose}}"),
+              ElementsAre("a b"));
+}
+
+TEST(YamlScene, ErrorsNameLineColumnAndKey) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"hulls: {h: {box: [1, 1]}}", "cell.yaml:1:18: box takes 3 numbers, here are 2"},
+      {"hulls:\n  h: {fil: a.stl}",
+       "cell.yaml:2:7: hull \"h\" has no key \"fil\"; did you mean \"file\"?"},
+      {"hulls:\n  h: {file: a.stl, box: [1, 1, 1]}", "cell.yaml:2:6: hull \"h\" takes one of"},
+      {"hulls: {h: {points: [[0, 0, x]]}}", "cell.yaml:1:29: a point: \"x\" is not a number"},
+      {"hulls: {h: {points: [[0, 0, .inf]]}}", "\".inf\" is not a number"},
+      {"scale: inch", "cell.yaml:1:8: scale: \"inch\" is no unit"},
+      {"scale: 0", "is no unit and no number other than 0"},
+      {"places: {}", "cell.yaml:1:1: the scene has no key \"places\"; did you mean \"place\"?"},
+      {"hulls: {h: {box: [1, 1, 1]}}\nplace: {a: {hull: j}}",
+       "cell.yaml:2:19: hull \"j\" is not among hulls"},
+      {"hulls: {bracket: {box: [1, 1, 1]}}\nplace: {a: {hull: braket}}",
+       "did you mean \"bracket\"?"},
+      {"place: {a: {body: b}}", "cell.yaml:1:19: body \"b\" is not among bodies"},
+      {"place: {a: {id: x, at: [0, 0]}}", "cell.yaml:1:24: at takes 3 or 7 numbers, here are 2"},
+      {"place: {a: {id: x, at: {rpy: [0, 0, 0], quaternion: [1, 0, 0, 0]}}}", "not both"},
+      {"place: {a: {id: x, at: [0, 0, 0, 0, 0, 0, 0]}}", "is no rotation"},
+      {"place: {a: {id: x}, a: {id: y}}", "cell.yaml:1:21: place has the key \"a\" twice"},
+      {"place: {a: {id: x}}\nignore: [[a, b]]", "cell.yaml:2:14: ignore: \"b\" is no placement"},
+      {"place: {a: {id: x}}\nignore: [[a]]", "cell.yaml:2:10: ignore takes two names each"},
+      {"place: {a: {id: x}}\nask: {pairs: [[a, a]], movers: [a]}", "do not go together"},
+      {"ask: {separation: yes}", "cell.yaml:1:19: separation is true or false"},
+      {"ask: {clearance: -1}", "clearance must be at least 0"},
+      {"hulls: {h: {box: [1, 1, 1]}}\nbodies: {h: [{hull: h}]}", "share their names"},
+      {"a: [", "cell.yaml:"},
+      {"--- {}\n--- {}", "a second document"},
+      {"[1, 2]", "the scene is no mapping"},
+      {"&a [*a]", "the scene is no mapping"},
+  };
+  for (const auto& [text, error] : cases) {
+    EXPECT_THAT(ErrorOf(text), StartsWith("cell.yaml:")) << text;
+    EXPECT_THAT(ErrorOf(text), HasSubstr(error)) << text;
+  }
+  EXPECT_THAT(ErrorOf(std::string(100000, '[')), HasSubstr("not read as YAML"));
+}
+
+TEST(YamlScene, TheOneReaderTakesIt) {
+  const TempFile file("cell.yaml",
+                      "# comment\n\nplace:\n  a: {id: x}\n  b: {id: x, at: [1, 0, 0]}\n");
+  const auto source = ByteSource::Open(file.path());
+  const auto scene = ReadScene(source->get());
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_THAT(scene->names, ElementsAre("a", "b"));
+  const TempFile bad("cell.yaml", "# comment\n\nplace:\n  a: {idd: x}\n");
+  const auto bad_source = ByteSource::Open(bad.path());
+  EXPECT_THAT(ReadScene(bad_source->get()).status().ToString(), HasSubstr("cell.yaml:4:7: "));
+}
+
+}  // namespace
+}  // namespace hulld

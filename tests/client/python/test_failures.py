@@ -1,0 +1,316 @@
+"""What fails is tried again where that is safe, and told where it is not."""
+
+from __future__ import annotations
+
+import pickle
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import grpc
+import numpy as np
+import pytest
+
+import hulld
+from fake_hulld import FakeHulld, refuse
+from hulld.calls.requests import watch_hulls
+from hulld.errors import from_status
+from hulld.retry import may_retry
+from hulld.v1 import hull_pb2
+
+QUICK = hulld.RetryPolicy(initial_backoff=0.001, max_backoff=0.002)
+
+
+@pytest.fixture
+def fake() -> Iterator[FakeHulld]:
+    with FakeHulld() as server:
+        yield server
+
+
+@pytest.fixture
+def caller(connect: Callable[..., Any], fake: FakeHulld) -> Any:
+    """A client of the fake server, of either kind."""
+    return connect(fake.address, retry=QUICK, timeout=20)
+
+
+def unavailable(context: Any) -> None:
+    refuse(context, grpc.StatusCode.UNAVAILABLE, "the server ends soon", reason="DRAINING")
+
+
+def busy(context: Any) -> None:
+    refuse(
+        context,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        "too many calls",
+        reason="OVERLOADED",
+        metadata={"flag": "max-calls", "limit": "1"},
+        pushback="1",
+    )
+
+
+def full(context: Any) -> None:
+    refuse(
+        context,
+        grpc.StatusCode.RESOURCE_EXHAUSTED,
+        "too many hulls",
+        reason="LIMIT_EXCEEDED",
+        metadata={"flag": "max-hulls"},
+    )
+
+
+# --- Single calls ---
+
+
+def test_a_call_that_is_safe_to_repeat_is_repeated(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [unavailable, busy, unavailable]
+    assert caller.get_status().version == "fake"
+    assert len(fake.calls) == 4
+
+
+def test_attempts_are_counted(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [unavailable] * 9
+    with pytest.raises(hulld.UnavailableError) as caught:
+        caller.get_status()
+    assert len(fake.calls) == QUICK.max_attempts and caught.value.reason == "DRAINING"
+
+
+def test_what_may_not_be_repeated_is_not(caller: Any, fake: FakeHulld) -> None:
+    for call in (lambda: caller.delete_hull("a"), lambda: caller.create_hull("a")):
+        fake.calls.clear()
+        fake.script = [unavailable]
+        with pytest.raises(hulld.UnavailableError):
+            call()
+        assert len(fake.calls) == 1
+    fake.calls.clear()
+    fake.script = [unavailable]
+    assert caller.create_hull("a", if_absent=True).created and len(fake.calls) == 2
+
+
+def test_a_limit_without_a_hint_is_final(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [full]
+    with pytest.raises(hulld.ResourceExhaustedError) as caught:
+        caller.get_status()
+    error = caught.value
+    assert len(fake.calls) == 1 and error.metadata == {"flag": "max-hulls"}
+    assert error.retry_after is None and error.request_id == "fake-1"
+    assert str(error) == "RESOURCE_EXHAUSTED: too many hulls (LIMIT_EXCEEDED, request fake-1)"
+
+
+def test_a_hint_beyond_the_deadline_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+    client = connect(fake.address, timeout=5)
+    fake.script = [
+        lambda context: refuse(
+            context,
+            grpc.StatusCode.RESOURCE_EXHAUSTED,
+            "busy",
+            reason="OVERLOADED",
+            pushback="3600000",
+        )
+    ]
+    with pytest.raises(hulld.ResourceExhaustedError) as caught:
+        client.get_status()
+    assert caught.value.retry_after == 3600 and len(fake.calls) == 1
+
+
+def test_no_server_is_unavailable(connect: Any, tmp_path: Any) -> None:
+    client = connect(f"unix:{tmp_path}/nobody", retry=QUICK, timeout=5)
+    with pytest.raises(hulld.UnavailableError) as caught:
+        client.get_status()
+    assert caught.value.reason is None and caught.value.request_id is None
+
+
+def test_a_mesh_that_breaks_off_is_read_anew(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [lambda context: None, unavailable]
+    assert caller.get_hull_mesh("a").vertices.tolist() == [[0, 0, 0], [1, 1, 1]]
+    assert len(fake.calls) == 2
+
+
+def test_parts_that_were_given_out_are_not_repeated(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [lambda context: None, unavailable]
+    parts = caller.iter_hull_mesh("a")
+    assert isinstance(next(parts), hulld.MeshHeader)
+    with pytest.raises(hulld.UnavailableError):
+        list(parts)
+    assert len(fake.calls) == 1
+
+
+def test_the_token_goes_with_every_call(connect: Any, fake: FakeHulld) -> None:
+    client = connect(fake.address, token="secret", retry=QUICK)
+    client.get_status()
+    list(client.iter_hull_mesh("a"))
+    client.append_points("a", np.zeros((1, 3)), create=True)
+    assert [m.get("authorization") for m in fake.metadata] == ["Bearer secret"] * 3
+    assert "secret" not in repr(client)
+
+
+# --- Appends ---
+
+
+def test_a_lost_connection_applies_each_chunk_once(caller: Any, fake: FakeHulld) -> None:
+    lost: list[int] = []
+
+    def lose(at: list[int]) -> Callable[[int, Any], None]:
+        def fail(sequence: int, context: Any) -> None:
+            if sequence in at and sequence not in lost:
+                lost.append(sequence)
+                unavailable(context)
+
+        return fail
+
+    # Some are lost before they are applied, some afterwards with their acknowledgement.
+    fake.before, fake.after = lose([3, 8]), lose([5, 12])
+    points = np.arange(3 * 200, dtype=float).reshape(-1, 3)
+    done = caller.append_points("a", points, create=True, chunk_bytes=24 * 10)
+    assert sorted(lost) == [3, 5, 8, 12]
+    assert fake.chunks == {sequence: 10 for sequence in range(1, 21)}
+    assert done.points_acknowledged == 200 and done.chunks == 20
+    # What was sent behind a lost chunk may be taken, too, before the stream ends.
+    assert done.reconnects == len(fake.calls) - 1 > 0
+    assert done.counts.received + 10 * done.chunks_recovered == 200
+
+
+@pytest.mark.parametrize("change", ["store_id", "create_revision", "missing"])
+def test_another_hull_is_not_appended_to(caller: Any, fake: FakeHulld, change: str) -> None:
+    def replace(sequence: int, context: Any) -> None:
+        if sequence == 2:
+            setattr(
+                fake, change, {"store_id": "other", "create_revision": 2, "missing": True}[change]
+            )
+            unavailable(context)
+
+    fake.before = replace
+    with caller.open_append("a", create=True) as appender:
+        appender.append(np.zeros((1, 3)))
+        with pytest.raises(hulld.FailedPreconditionError, match="append everything again"):
+            appender.append(np.zeros((2, 3)))
+            appender.finish()
+        with pytest.raises(hulld.FailedPreconditionError):
+            appender.append(np.zeros((1, 3)))
+
+
+def test_an_append_gives_up_where_nothing_moves_on(caller: Any, fake: FakeHulld) -> None:
+    fake.before = lambda sequence, context: unavailable(context)
+    with pytest.raises(hulld.UnavailableError):
+        caller.append_points("a", np.zeros((1, 3)), create=True)
+    assert len(fake.calls) == QUICK.max_attempts and fake.chunks == {}
+
+
+def test_an_append_that_is_refused_is_not_repeated(caller: Any, fake: FakeHulld) -> None:
+    fake.before = lambda sequence, context: full(context)
+    with pytest.raises(hulld.ResourceExhaustedError):
+        caller.append_points("a", np.zeros((1, 3)), create=True)
+    assert len(fake.calls) == 1
+
+
+def test_an_opening_is_tried_again(caller: Any, fake: FakeHulld) -> None:
+    fake.script = [unavailable, busy]
+    assert caller.append_points("a", np.zeros((4, 3)), create=True).points_acknowledged == 4
+    assert len(fake.calls) == 3
+
+
+def test_a_server_that_says_nothing_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+    import threading
+
+    release = threading.Event()
+    fake.before = lambda sequence, context: release.wait(60) and None
+    client = connect(fake.address, timeout=0.2, retry=QUICK)
+    try:
+        with pytest.raises(hulld.DeadlineExceededError, match="acknowledged no chunk for 0.2 s"):
+            client.append_points("a", np.zeros((1, 3)), create=True)
+    finally:
+        release.set()
+
+
+def test_a_writer_numbers_on(caller: Any, fake: FakeHulld) -> None:
+    fake.chunks = {1: 5, 2: 5}
+    caller.append_points("a", np.zeros((7, 3)), writer_id="lab")
+    assert fake.chunks == {1: 5, 2: 5, 3: 7}
+
+
+# --- Watches ---
+
+
+def test_a_watch_goes_on_where_it_was(caller: Any, fake: FakeHulld) -> None:
+    with caller.watch_hulls() as watch:
+        seen = [next(watch).header.revision for _ in range(3)]
+    assert seen == [10, 20, 30]
+    assert fake.calls[:3] == ["WatchHulls after 0", "WatchHulls after 10", "WatchHulls after 20"]
+
+
+class LostAfterAnHour(grpc.RpcError):
+    """How a quiet watch ends."""
+
+    def code(self) -> grpc.StatusCode:
+        return grpc.StatusCode.UNAVAILABLE
+
+    def details(self) -> str:
+        return "the connection is lost"
+
+    def trailing_metadata(self) -> None:
+        return None
+
+
+def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    passing = types.SimpleNamespace(monotonic=lambda: clock[0], sleep=lambda seconds: None)
+    monkeypatch.setattr("hulld.watches.time", passing)
+    revisions = iter((10, 20, 30))
+
+    class Quiet:
+        """Tells one message, and an hour later that the connection is lost."""
+
+        def __init__(self, call: Any) -> None:
+            self.told = False
+
+        def __next__(self) -> bytes:
+            if self.told:
+                clock[0] += 3600
+                raise LostAfterAnHour
+            self.told = True
+            message = hull_pb2.WatchHullsResponse(synced=True)
+            message.header.revision = next(revisions)
+            return bytes(message.SerializeToString())
+
+        def cancel(self) -> None:
+            pass
+
+    watch = hulld.HullWatch(Quiet, lambda after: watch_hulls("", None, after), None, QUICK, 20)
+    assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
+
+
+# --- Errors ---
+
+
+def test_an_error_has_the_class_of_its_status() -> None:
+    for code in grpc.StatusCode:
+        error = from_status(code.name, "why", None)
+        assert error.code == code.name and isinstance(error, hulld.HulldError)
+    assert isinstance(from_status("NOT_FOUND", "", None), LookupError)
+    assert isinstance(from_status("INVALID_ARGUMENT", "", None), ValueError)
+
+
+def test_details_of_others_and_malformed_ones_are_left_out() -> None:
+    assert from_status("UNAVAILABLE", "", [("grpc-status-details-bin", b"\xff\xff")]).reason is None
+    for hint, seconds in (("1500", 1.5), ("-1", None), ("soon", None)):
+        error = from_status("RESOURCE_EXHAUSTED", "", [("grpc-retry-pushback-ms", hint)])
+        assert error.retry_after == seconds and may_retry(error) == (seconds is not None)
+
+
+def test_errors_travel_between_processes() -> None:
+    error = hulld.NotFoundError(
+        "no", reason="HULL_NOT_FOUND", metadata={"hull_id": "a"}, request_id="7"
+    )
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is hulld.NotFoundError and str(again) == str(error)
+    assert again.metadata == {"hull_id": "a"}
+
+
+def test_waits_double_and_keep_to_what_the_server_asks() -> None:
+    policy = hulld.RetryPolicy(max_attempts=9, initial_backoff=0.1, max_backoff=0.5)
+    error = hulld.UnavailableError("")
+    waits = [policy.wait_after(n, error, None) for n in range(1, 6)]
+    assert waits == [0.1, 0.2, 0.4, 0.5, 0.5]
+    assert policy.wait_after(9, error, None) is None
+    assert policy.wait_after(1, error, 0.05) is None
+    assert policy.wait_after(1, hulld.ResourceExhaustedError("", retry_after=2), 9) == 2
+    assert policy.wait_after(1, hulld.AbortedError(""), None) is None

@@ -1,0 +1,54 @@
+"""What a notebook shows: the viewer's page, or a table that says why there is none."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from typing import Any
+
+import pytest
+
+import hulld
+from conftest import CUBE
+from hulld.notebook import Viewer, scene_json
+
+
+def test_a_collision_shows_both_hulls_and_its_numbers(either: Any, name: str) -> None:
+    either.append_points(name, CUBE, create=True)
+    shown = either.check_collision(name, (name, (2, 0, 0)), separation=True)._repr_html_()
+    page = html.unescape(re.findall(r'srcdoc="([^"]*)"', shown)[0])
+    assert page.startswith("<!") and page.count(name) >= 2 and "SEPARATED" in shown
+    assert "sandbox='allow-scripts'" in shown
+    for view in (either.get_hull(name), either.get_hull_mesh(name)):
+        assert "<iframe" in view._repr_html_() and name in view._repr_html_()
+
+
+def test_without_hullctl_a_table_says_so(
+    either: Any, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    either.append_points(name, CUBE, create=True)
+    monkeypatch.setenv("HULLCTL_BINARY", "/nowhere/hullctl")
+    shown = either.get_hull(name)._repr_html_()
+    assert "<table>" in shown and "<iframe" not in shown and "HULLCTL_BINARY" in shown
+
+
+def test_a_hull_that_is_gone_is_no_error(either: Any, name: str) -> None:
+    either.append_points(name, CUBE, create=True)
+    answer = either.check_collision(name, name)
+    either.delete_hull(name)
+    assert "No picture" in answer._repr_html_() and "OVERLAPPING" in answer._repr_html_()
+
+
+def test_names_are_text_and_no_markup() -> None:
+    shown = Viewer.absent("<b>why</b>").html([("<i>", "<script>"), ("none", None)], ["a"])
+    assert "<script>" not in shown and "<i>" not in shown and "<b>" not in shown
+    assert "&lt;script&gt;" in shown and "none" not in shown
+
+
+def test_a_scene_reads_back_as_the_same_doubles() -> None:
+    numbers = [0.1, 1 / 3, 5e-324, -0.0, 1e308, 2 / 3, 1.0]
+    scene = json.loads(scene_json(hulld.Placements("a", [numbers]), [(0, 0)]))
+    pose = scene["placements"][0]["pose"]
+    read = [pose["rotation"][k] for k in "wxyz"] + [pose["translation"][k] for k in "xyz"]
+    assert [x.hex() for x in read] == [x.hex() for x in numbers] and scene["pairs"] == [0, 0]

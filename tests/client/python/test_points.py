@@ -1,0 +1,58 @@
+"""What counts as points, and what an array of them may not hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hulld
+
+
+def test_doubles_and_floats_keep_their_memory() -> None:
+    for kind in (np.float64, np.float32):
+        points = np.ones((4, 3), kind)
+        assert np.shares_memory(hulld.as_points(points), points)
+
+
+def test_lists_single_points_and_no_points_are_taken() -> None:
+    assert hulld.as_points([[1, 2, 3]]).dtype == np.float64
+    assert hulld.as_points((1, 2, 3)).shape == (1, 3)
+    assert hulld.as_points([]).shape == (0, 3)
+    assert hulld.as_points(np.empty((0, 3))).shape == (0, 3)
+
+
+@pytest.mark.parametrize("shape", [(4,), (3, 2), (2, 3, 3), (0, 2)])
+def test_another_shape_is_named(shape: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match=r"\(n, 3\)"):
+        hulld.as_points(np.zeros(shape))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_coordinate_that_is_not_finite_is_named(bad: float) -> None:
+    points = np.zeros((20, 3))
+    points[17, 1] = bad
+    with pytest.raises(ValueError, match=r"points\[17\]\.y is "):
+        hulld.as_points(points)
+
+
+def test_integers_pass_where_a_double_holds_them() -> None:
+    exact = np.array([[2**53, -(2**60), 2**62]])
+    assert hulld.as_points(exact).tolist() == [[2.0**53, -(2.0**60), 2.0**62]]
+    assert hulld.as_points(np.array([[1, 2, 3]], np.int8)).tolist() == [[1, 2, 3]]
+    for bad in (2**53 + 1, 2**63 - 1, -(2**53) - 1):
+        with pytest.raises(ValueError, match=rf"points\[0\]\[2\] is {bad}"):
+            hulld.as_points(np.array([[0, 0, bad]]))
+    with pytest.raises(ValueError, match="no double holds exactly"):
+        hulld.as_points(np.array([[0, 0, 2**64 - 1]], np.uint64))
+
+
+def test_long_doubles_are_not_rounded_silently() -> None:
+    with pytest.raises(ValueError, match="no double holds exactly"):
+        hulld.as_points(np.array([[0, 0, 1]], np.longdouble) / 3)
+    assert hulld.as_points(np.array([[0, 0, 0.5]], np.longdouble)).tolist() == [[0, 0, 0.5]]
+
+
+def test_what_are_no_numbers_is_refused() -> None:
+    for bad in (np.array([["a", "b", "c"]]), np.zeros((1, 3), complex)):
+        with pytest.raises(TypeError, match="not numbers"):
+            hulld.as_points(bad)

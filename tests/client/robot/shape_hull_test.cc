@@ -1,0 +1,90 @@
+#include "client/robot/shape_hull.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/client/formats/point_reading.h"
+
+namespace hulld {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+CollisionShape Round(ShapeKind kind, double radius, double length) {
+  CollisionShape shape;
+  shape.kind = kind;
+  shape.radius = radius;
+  shape.length = length;
+  return shape;
+}
+
+// The farthest that the points reach along a direction.
+double Support(const ShapeHull& hull, double x, double y, double z) {
+  double most = -HUGE_VAL;
+  for (size_t i = 0; i < hull.xyz.size(); i += 3) {
+    most = std::max(most, x * hull.xyz[i] + y * hull.xyz[i + 1] + z * hull.xyz[i + 2]);
+  }
+  return most;
+}
+
+// A convex set holds another when it reaches at least as far in each direction.
+void ExpectEncloses(const CollisionShape& shape) {
+  const ShapeHull hull = PrimitiveHull(shape);
+  double most = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const double z = 2 * (i + 0.5) / 20000 - 1;
+    const double angle = 2.399963229728653 * i;
+    const double r = std::sqrt(1 - z * z);
+    double reach = shape.radius;
+    if (shape.kind == ShapeKind::kCylinder) reach = shape.radius * r;
+    if (shape.kind != ShapeKind::kSphere) reach += std::abs(z) * shape.length / 2;
+    const double support = Support(hull, r * std::cos(angle), r * std::sin(angle), z);
+    // The directions themselves are rounded, and so is their product with the points.
+    ASSERT_GE(support, reach * (1 - 0x1p-50)) << i;
+    most = std::max(most, support - reach);
+  }
+  EXPECT_LE(most, hull.excess * (1 + 0x1p-40) + shape.length * 0x1p-40);
+  EXPECT_GT(most, hull.excess / 2);
+}
+
+TEST(ShapeHull, BoxIsExact) {
+  CollisionShape box;
+  box.kind = ShapeKind::kBox;
+  box.size = {0.1, 2, 3};
+  const ShapeHull hull = PrimitiveHull(box);
+  EXPECT_EQ(hull.excess, 0);
+  EXPECT_EQ(hull.xyz.size(), 24u);
+  EXPECT_EQ(Support(hull, 1, 0, 0), 0.05);
+  EXPECT_EQ(Support(hull, 0, 0, -1), 1.5);
+}
+
+TEST(ShapeHull, RoundShapesAreEnclosedWithinTheirExcess) {
+  for (const double radius : {1.0, 1e-3, 0.3}) {
+    ExpectEncloses(Round(ShapeKind::kSphere, radius, 0));
+    ExpectEncloses(Round(ShapeKind::kCylinder, radius, 0.7));
+    ExpectEncloses(Round(ShapeKind::kCapsule, radius, 0.7));
+  }
+  EXPECT_LT(PrimitiveHull(Round(ShapeKind::kCylinder, 1, 1)).excess, 0.005);
+  EXPECT_LT(PrimitiveHull(Round(ShapeKind::kSphere, 1, 1)).excess, 0.025);
+}
+
+TEST(ShapeHull, MeshIsScaled) {
+  const TempFile file("a.obj", "v 1 2 3\nv 4 5 6\n");
+  CollisionShape mesh;
+  mesh.scale = {1, -2, 0.5};
+  const auto hull = MeshHull(mesh, file.path());
+  ASSERT_TRUE(hull.ok()) << hull.status();
+  EXPECT_THAT(hull->xyz, ElementsAre(1, -4, 1.5, 4, -10, 3));
+  mesh.scale = {1e308, 1, 1};
+  EXPECT_THAT(MeshHull(mesh, file.path()).status().ToString(), HasSubstr("beyond the largest"));
+  const TempFile empty("b.obj", "# nothing\n");
+  EXPECT_THAT(MeshHull(mesh, empty.path()).status().ToString(), HasSubstr("holds no vertex"));
+  EXPECT_THAT(MeshHull(mesh, "a.dae").status().ToString(), HasSubstr("convert it"));
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,108 @@
+#include "client/robot/urdf_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+
+#include "tests/client/robot/urdf_text.h"
+
+namespace hulld {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string ErrorOf(const std::string& urdf) {
+  const auto robot = ParseUrdf(urdf, "arm.urdf");
+  EXPECT_TRUE(absl::IsInvalidArgument(robot.status())) << robot.status() << "\n" << urdf;
+  return std::string(robot.status().message().data(), robot.status().message().size());
+}
+
+// The arm with one thing changed.
+std::string Changed(const std::string& from, const std::string& to) {
+  std::string urdf = kArmUrdf;
+  const size_t at = urdf.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return urdf.replace(at, from.size(), to);
+}
+
+TEST(UrdfFile, LinksJointsAndShapesAreRead) {
+  const auto robot = ParseUrdf(kArmUrdf, "arm.urdf");
+  ASSERT_TRUE(robot.ok()) << robot.status();
+  EXPECT_EQ(robot->name, "arm");
+  ASSERT_EQ(robot->links.size(), 6u);
+  EXPECT_EQ(robot->links[0].name, "base");
+  EXPECT_EQ(robot->links[0].parent_joint, -1);
+  const RobotLink& upper = robot->links[static_cast<size_t>(robot->FindLink("upper"))];
+  ASSERT_EQ(upper.shapes.size(), 2u);
+  EXPECT_EQ(upper.shapes[0].kind, ShapeKind::kCylinder);
+  EXPECT_EQ(upper.shapes[0].radius, 0.25);
+  EXPECT_EQ(upper.shapes[0].length, 3);
+  EXPECT_EQ(upper.shapes[0].X_LS, (RigidPose{1, 0, 0, 0, 0, 0, 2}));
+  EXPECT_EQ(upper.shapes[1].kind, ShapeKind::kSphere);
+  const RobotLink& lower = robot->links[static_cast<size_t>(robot->FindLink("lower"))];
+  ASSERT_EQ(lower.shapes.size(), 1u);
+  EXPECT_EQ(lower.shapes[0].kind, ShapeKind::kCapsule);
+  EXPECT_EQ(lower.shapes[0].length, 1.5);
+  const RobotJoint& follow = robot->joints[static_cast<size_t>(robot->FindJoint("follow"))];
+  EXPECT_EQ(follow.mimics, robot->FindJoint("shoulder"));
+  EXPECT_EQ(follow.multiplier, -2);
+  EXPECT_EQ(follow.offset, 1);
+  // The finger's limits lack effort and velocity, which collisions do not need.
+  const RobotJoint& slide = robot->joints[static_cast<size_t>(robot->FindJoint("slide"))];
+  EXPECT_EQ(*slide.limits, (std::array<double, 2>{0.5, 1}));
+  EXPECT_EQ(robot->FreeJoints().size(), 3u);
+}
+
+TEST(UrdfFile, ErrorsNameLineAndElement) {
+  const std::pair<std::string, std::string> none = {"", ""};
+  const struct {
+    std::pair<std::string, std::string> change;
+    const char* error;
+  } cases[] = {
+      {{"size=\"2 2 1\"", "size=\"2 2\""}, "arm.urdf:5: <box> size takes 3 numbers, here are 2"},
+      {{"size=\"2 2 1\"", "size=\"2 two 1\""}, "arm.urdf:5: <box> size: \"two\" is not a number"},
+      {{"size=\"2 2 1\"", "size=\"2 0 1\""}, "arm.urdf:5: <box> size must be above 0"},
+      {{"size=\"2 2 1\"", ""}, "arm.urdf:5: <box> lacks size=\"...\""},
+      {{"<box size=\"2 2 1\"/>", "<cone/>"}, "arm.urdf:5: <geometry> holds \"cone\""},
+      {{"<link name=\"upper\">", "<link>"}, "arm.urdf:12: <link> lacks name"},
+      {{"<link name=\"upper\">", "<link name=\"base\">"},
+       "arm.urdf:12: link \"base\" is there already, in line 3"},
+      {{"<child link=\"upper\"/>", "<child link=\"uper\"/>"},
+       "arm.urdf:8: joint \"shoulder\" has a child that there is not: \"uper\""},
+      {{"type=\"revolute\"", "type=\"planar\""},
+       "arm.urdf:7: joint \"shoulder\" has type \"planar\""},
+      {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\""}, "arm.urdf:9: <axis> xyz must not be 0 0 0"},
+      {{"lower=\"-2\"", "lower=\"nan\""}, "arm.urdf:10: <limit> lower: \"nan\" is not a finite"},
+      {{"mimic joint=\"shoulder\"", "mimic joint=\"follow\""}, "mimics itself in the end"},
+      {{"<parent link=\"base\"/>", "<parent link=\"lower\"/>"}, "is in a circle of joints"},
+      {{"</link>\n  <joint name=\"elbow\"", "</lnk>\n  <joint name=\"elbow\""},
+       "arm.urdf:19: </lnk> where <link> of line 12 is to be closed"},
+      {{"</robot>", ""}, "the file ends before </robot>"},
+      {{"<link name=\"flange\"/>", "<xacro:flange/>"}, "expand the file with 'xacro' first"},
+      {{"<?xml version=\"1.0\"?>", "<!DOCTYPE robot>"}, "arm.urdf:1: document types are not read"},
+      {{"<robot name=\"arm\">", "<robot>"}, "arm.urdf:2: <robot> lacks name"},
+      {{"size=\"2 2 1\"", "size=\"2 2 1"}, "is not closed"},
+  };
+  for (const auto& [change, error] : cases) {
+    const std::string message = ErrorOf(Changed(change.first, change.second));
+    EXPECT_THAT(message, StartsWith("arm.urdf:"));
+    EXPECT_THAT(message, HasSubstr(error));
+  }
+  EXPECT_THAT(ErrorOf(""), HasSubstr("there is no element in it"));
+  EXPECT_THAT(ErrorOf("<sdf/>"), HasSubstr("the outermost element is <sdf>, not <robot>"));
+  EXPECT_THAT(ErrorOf(std::string("<robot name=\"\0\"/>", 17)), HasSubstr("a byte 0"));
+  std::string deep;
+  for (int i = 0; i < 100000; ++i) deep += "<a>";
+  EXPECT_THAT(ErrorOf(deep), HasSubstr("nested deeper"));
+}
+
+TEST(UrdfFile, SecondRootIsNamed) {
+  EXPECT_THAT(ErrorOf("<robot name=\"r\">\n<link name=\"a\"/>\n<link name=\"b\"/>\n</robot>"),
+              HasSubstr("arm.urdf:3: link \"b\" hangs on no joint, like \"a\""));
+}
+
+}  // namespace
+}  // namespace hulld

@@ -1,0 +1,13 @@
+// Prints the bounds and the ranges of core/numeric as they are compiled, a name and a hexadecimal
+// double a line, for the proofs about them.
+
+#include <cstdio>
+
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+
+int main() {
+#define HULLD_CONSTANT(name) std::printf("%s %a\n", #name, hulld::name);
+#include "constants.inc"
+  return 0;
+}

@@ -1,0 +1,146 @@
+// A token that is taken back takes its open calls with it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <string>
+
+#include "tests/server/harness/captured_log.h"
+#include "tests/server/harness/test_certificates.h"
+#include "tests/server/harness/test_server.h"
+#include "tests/server/harness/test_tokens.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class Revocation : public ServerTest {
+ protected:
+  void SetUp() override {
+    path_ = testing::TempDir() + "/hulld_revocation_test_" + std::to_string(getpid());
+    kept_ = TokenLine("kept", "admin", "*", "kept secret");
+    WriteSecret(path_, kept_ + TokenLine("gone", "admin", "*", "gone secret"));
+    Config config = TestConfig();
+    config.tokens_file = path_;
+    Restart(config);
+    grpc::ClientContext context;
+    Be(context, "kept secret");
+    const auto append = hulls_->AppendPoints(&context);
+    v1::AppendPointsResponse reply;
+    ASSERT_TRUE(append->Write(OpenMessage("cube", "w", true)) && append->Read(&reply));
+    ASSERT_TRUE(append->Write(ChunkMessage(1, Cube())) && append->Read(&reply));
+    append->WritesDone();
+    ASSERT_TRUE(append->Finish().ok());
+  }
+  ~Revocation() override { std::filesystem::remove(path_); }
+
+  // The deadline ends what a server leaves open; no other test waits for it.
+  static void Be(grpc::ClientContext& context, const std::string& token) {
+    Authorize(context, token);
+    context.set_deadline(std::chrono::system_clock::now() + std::chrono::minutes(1));
+  }
+
+  void ReplaceTokens(const std::string& lines) {
+    WriteSecret(path_, lines);
+    server_->ReloadFiles();
+  }
+
+  static void ExpectRevoked(const grpc::Status& status) {
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED) << status.error_message();
+    EXPECT_THAT(status.error_message(), HasSubstr("no longer valid"));
+  }
+
+  std::string path_;
+  std::string kept_;
+};
+
+TEST_F(Revocation, EndsIdleStreamsOfEveryKindAndThoseOfNobodyElse) {
+  v1::AppendPointsResponse appended;
+  v1::WatchHullsResponse change;
+  v1::StreamCollisionsResponse answer;
+  v1::StreamCollisionsRequest open;
+  *open.mutable_open()->add_placements() = PlacementOf("cube");
+  *open.mutable_open()->add_placements() = PlacementOf("cube", 9);
+  open.mutable_open()->add_pairs(0);
+  open.mutable_open()->add_pairs(1);
+
+  grpc::ClientContext append_context;
+  Be(append_context, "gone secret");
+  const auto append = hulls_->AppendPoints(&append_context);
+  ASSERT_TRUE(append->Write(OpenMessage("cube", "g")) && append->Read(&appended));
+  grpc::ClientContext watch_context;
+  Be(watch_context, "gone secret");
+  const auto watch = hulls_->WatchHulls(&watch_context, {});
+  ASSERT_TRUE(watch->Read(&change));
+  grpc::ClientContext poses_context;
+  Be(poses_context, "gone secret");
+  const auto poses = collisions_->StreamCollisions(&poses_context);
+  ASSERT_TRUE(poses->Write(open) && poses->Read(&answer));
+  grpc::ClientContext kept_context;
+  Be(kept_context, "kept secret");
+  const auto kept = collisions_->StreamCollisions(&kept_context);
+  ASSERT_TRUE(kept->Write(open) && kept->Read(&answer));
+
+  const CapturedLog log;
+  ReplaceTokens(kept_);
+  while (append->Read(&appended)) {
+  }
+  ExpectRevoked(append->Finish());
+  while (watch->Read(&change)) {
+  }
+  ExpectRevoked(watch->Finish());
+  while (poses->Read(&answer)) {
+  }
+  ExpectRevoked(poses->Finish());
+
+  v1::StreamCollisionsRequest update;
+  update.mutable_update()->add_placements(1);
+  for (const double number : {1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0}) {
+    update.mutable_update()->add_poses(number);
+  }
+  ASSERT_TRUE(kept->Write(update) && kept->Read(&answer));
+  kept->WritesDone();
+  EXPECT_TRUE(kept->Finish().ok());
+  server_.reset();
+  EXPECT_THAT(log.text(), HasSubstr("info 3 calls ended, as their tokens are no longer valid"));
+}
+
+TEST_F(Revocation, EndsWhatIsBeingComputed) {
+  // 5e9 pairs: hours.
+  v1::FindCollisionsRequest request;
+  for (int i = 0; i < 100'000; ++i) *request.add_placements() = PlacementOf("cube");
+  grpc::ClientContext context;
+  Be(context, "gone secret");
+  const auto scene = collisions_->FindCollisions(&context, request);
+  v1::FindCollisionsResponse part;
+  ASSERT_TRUE(scene->Read(&part));
+  ReplaceTokens(kept_);
+  while (scene->Read(&part)) {
+  }
+  ExpectRevoked(scene->Finish());
+  EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+}
+
+// The name stays; the token, or what it may do, is another.
+TEST_F(Revocation, CountsAsOneWhenTheTokenOrItsRightsChange) {
+  const std::string narrower = TokenLine("gone", "read-only", "cell-1/", "gone secret");
+  for (const std::string& line : {TokenLine("gone", "admin", "*", "next secret"), narrower}) {
+    ReplaceTokens(kept_ + TokenLine("gone", "admin", "*", "gone secret"));
+    grpc::ClientContext context;
+    Be(context, "gone secret");
+    const auto watch = hulls_->WatchHulls(&context, {});
+    v1::WatchHullsResponse change;
+    ASSERT_TRUE(watch->Read(&change));
+    ReplaceTokens(kept_ + line);
+    while (watch->Read(&change)) {
+    }
+    ExpectRevoked(watch->Finish());
+  }
+}
+
+}  // namespace
+}  // namespace hulld::server

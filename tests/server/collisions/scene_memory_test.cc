@@ -1,0 +1,121 @@
+// What a scene holds while it runs, and how it is counted, whatever collides.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class SceneMemory : public ServerTest {
+ protected:
+  // The sum of all series of this name.
+  double Metric(const std::string& name) const {
+    double sum = 0;
+    for (const prometheus::MetricFamily& family : server_->metrics().Collect()) {
+      if (family.name != name) continue;
+      for (const prometheus::ClientMetric& metric : family.metric) {
+        sum += metric.counter.value + metric.gauge.value;
+      }
+    }
+    return sum;
+  }
+
+  // One cube so many times at one pose: every pair overlaps.
+  static v1::FindCollisionsRequest Heap(int placements) {
+    v1::FindCollisionsRequest request;
+    v1::PackedPlacements& packed = *request.mutable_packed_placements();
+    packed.add_hull_ids("cube");
+    for (int i = 0; i < placements; ++i) {
+      packed.add_hulls(0);
+      for (const double number : {1, 0, 0, 0, 0, 0, 0}) packed.add_poses(number);
+    }
+    return request;
+  }
+};
+
+// 2e10 pairs overlap and nobody takes an answer. What is held is the placements, the tree of their
+// boxes, and the answers that gRPC has not taken: some MiB, counted against --memory-limit.
+TEST_F(SceneMemory, OfASceneThatNobodyReadsIsCountedAndBounded) {
+  constexpr int kPlacements = 200'000;
+  // Placed hulls, their boxes twice, the tree.
+  constexpr double kLeast = kPlacements * 300.0;
+  constexpr double kMost = kPlacements * 700.0 + (16 << 20);
+  Put("cube", Cube());
+  const double before = Metric("hulld_cache_bytes");
+  v1::FindCollisionsRequest request = Heap(kPlacements);
+  request.mutable_wanted()->set_certificate(true);
+  grpc::ClientContext context;
+  const auto unread = collisions_->FindCollisions(&context, request);
+  // Each is bounded by the time limit of the test alone.
+  while (Metric("hulld_pairs_total") == 0) std::this_thread::yield();
+  EXPECT_GT(Metric("hulld_cache_bytes") - before, kLeast);
+  // Beside it a scene that is read runs to its end; both take turns.
+  grpc::ClientContext read_context;
+  const auto read = collisions_->FindCollisions(&read_context, Heap(1500));
+  v1::FindCollisionsResponse part;
+  while (read->Read(&part)) EXPECT_LT(Metric("hulld_cache_bytes") - before, kMost);
+  ASSERT_TRUE(read->Finish().ok());
+  EXPECT_EQ(part.totals().overlapping(), 1500u * 1499 / 2);
+  // Of 2e10.
+  EXPECT_LT(Metric("hulld_pairs_total"), 2e6);
+  context.TryCancel();
+  while (unread->Read(&part)) {
+  }
+  EXPECT_EQ(unread->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  EXPECT_LE(Metric("hulld_cache_bytes"), before + (1 << 20));
+}
+
+TEST_F(SceneMemory, BeyondTheMemoryLimitIsRefused) {
+  Config config = TestConfig();
+  config.limits.memory_limit = 4 << 20;
+  Restart(config);
+  Put("cube", Cube());
+  const auto find = [this](int placements) {
+    grpc::ClientContext context;
+    const auto reader = collisions_->FindCollisions(&context, Heap(placements));
+    v1::FindCollisionsResponse part;
+    while (reader->Read(&part)) {
+      // A scene that is let in would take long.
+      if (placements > 100 && part.pairs_size() > 0) context.TryCancel();
+    }
+    return reader->Finish();
+  };
+  EXPECT_TRUE(find(100).ok());
+  const grpc::Status refused = find(20'000);
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("(--memory-limit)"));
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+  EXPECT_TRUE(find(100).ok());
+}
+
+// The placements of a batch are as many.
+TEST_F(SceneMemory, OfABatchCountsAgainstTheSameLimit) {
+  Config config = TestConfig();
+  config.limits.memory_limit = 4 << 20;
+  Restart(config);
+  Put("cube", Cube());
+  v1::BatchCheckCollisionsRequest request;
+  *request.mutable_packed_placements() = Heap(20'000).packed_placements();
+  request.add_pairs(0);
+  request.add_pairs(1);
+  grpc::ClientContext context;
+  const auto reader = collisions_->BatchCheckCollisions(&context, request);
+  v1::BatchCheckCollisionsResponse part;
+  while (reader->Read(&part)) {
+  }
+  const grpc::Status refused = reader->Finish();
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("(--memory-limit)"));
+}
+
+}  // namespace
+}  // namespace hulld::server
