@@ -26,6 +26,7 @@
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
 #include "server/registry/registry_types.h"
+#include "server/registry/table/hull_table.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -209,9 +210,7 @@ class Registry {
   enum class Verdict;
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  HullPointer Find(const std::string& id) const;
-  HullPointer FindVisible(const std::string& id) const;
-  HullPointer Insert(const StoredHull& stored, const HullState& state);
+  HullPointer FindVisible(const std::string& id);
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   absl::Status CheckHullCount() const;
   // The last revision that a change was given becomes visible.
@@ -304,7 +303,7 @@ class Registry {
   uint64_t assigned_revision_ = 0;
   uint64_t vertex_count_ = 0;
   uint64_t last_watch_ = 0;
-  std::map<std::string, HullPointer> hulls_;
+  HullTable hulls_;
   // No ID is in both.
   std::map<std::string, RegisteredBody> bodies_;
   // As many as bodies_ holds.

@@ -97,7 +97,7 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer<OpenResult>(later, request->done, status);
   };
-  const HullPointer hull = Find(request->hull_id);
+  const HullPointer hull = hulls_.Find(request->hull_id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
