@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import pickle
+import threading
 import types
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -209,14 +211,32 @@ def test_an_opening_is_tried_again(caller: Any, fake: FakeHulld) -> None:
 
 
 def test_a_server_that_says_nothing_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
-    import threading
-
     release = threading.Event()
     fake.before = lambda sequence, context: release.wait(60) and None
     client = connect(fake.address, timeout=0.2, retry=QUICK)
     try:
         with pytest.raises(hulld.DeadlineExceededError, match="acknowledged no chunk for 0.2 s"):
             client.append_points("a", np.zeros((1, 3)), create=True)
+    finally:
+        release.set()
+
+
+def test_a_task_that_is_cancelled_while_it_writes_ends(fake: FakeHulld) -> None:
+    release = threading.Event()
+    fake.before = lambda sequence, context: release.wait(60) and None
+
+    async def cancel_a_write() -> None:
+        async with hulld.AsyncClient(fake.address, retry=QUICK) as client:
+            appender = client.open_append("a", create=True)
+            writing = asyncio.create_task(appender.append(np.zeros((1 << 18, 3))))
+            while appender.totals.chunks < 2:
+                await asyncio.sleep(0)
+            writing.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await writing
+
+    try:
+        asyncio.run(cancel_a_write())
     finally:
         release.set()
 
