@@ -221,6 +221,25 @@ def test_a_server_that_says_nothing_is_not_waited_for(connect: Any, fake: FakeHu
         release.set()
 
 
+def test_a_server_that_reads_no_further_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+    release = threading.Event()
+    gave_up: list[int] = []
+
+    # More chunks are on their way behind the first than there is room for.
+    def read_no_further(sequence: int, context: Any) -> None:
+        if not release.wait(20):
+            gave_up.append(sequence)
+
+    fake.before = read_no_further
+    client = connect(fake.address, timeout=0.2, retry=QUICK)
+    try:
+        with pytest.raises(hulld.DeadlineExceededError, match="no chunk for 0.2 s"):
+            client.append_points("a", np.zeros((1 << 18, 3)), create=True)
+        assert not gave_up
+    finally:
+        release.set()
+
+
 def test_a_task_that_is_cancelled_while_it_writes_ends(fake: FakeHulld) -> None:
     release = threading.Event()
     fake.before = lambda sequence, context: release.wait(60) and None
