@@ -15,7 +15,8 @@ import pytest
 
 import hulld
 from fake_hulld import FakeHulld, refuse
-from hulld.calls.requests import watch_hulls
+from hulld.calls.requests import SceneFilter, watch_hulls
+from hulld.calls.told_pairs import WatchedPlacements
 from hulld.errors import from_status
 from hulld.retry import may_retry
 from hulld.v1 import hull_pb2
@@ -315,6 +316,31 @@ def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch
 
     watch = hulld.HullWatch(Quiet, lambda after: watch_hulls("", None, after), None, QUICK, 20)
     assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
+
+
+def test_a_watch_that_cannot_read_an_answer_ends_its_call() -> None:
+    cancelled = threading.Event()
+
+    class Garbled:
+        """Goes on telling what is no message, until it is cancelled."""
+
+        def __init__(self, requests: Any, metadata: Any) -> None:
+            pass
+
+        def __iter__(self) -> Iterator[bytes]:
+            while not cancelled.is_set():
+                yield b"\xff"
+
+        def cancel(self) -> None:
+            cancelled.set()
+
+    watched = WatchedPlacements(
+        hulld.Placements.of(["a", "b"]), None, SceneFilter(None, False, None, None), None
+    )
+    watch = hulld.CollisionWatch(Garbled, (), watched, QUICK, 20)
+    with pytest.raises(hulld.InternalError, match="cannot be read"):
+        next(watch)
+    assert cancelled.is_set()
 
 
 # --- Errors ---
