@@ -56,7 +56,7 @@ const QueryHull& QueryHullOf(const absl::StatusOr<HullView>& hull, bool canonica
 }
 
 // About what an error takes beside the pointer to it: its message, its reason, and what they are
-// kept in.
+// kept in, which is a guess.
 size_t ErrorBytes(const absl::Status& status) {
   constexpr size_t kReasonBytes = 384;
   return status.ok() ? 0 : kReasonBytes + status.message().size();
