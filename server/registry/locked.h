@@ -51,9 +51,11 @@ class FairMutex {
 
   // Requires that it is held.
   HoldStatistics Statistics() const {
-    const bool is_recent = MinuteOf(Clock::now()) <= minute_ + 1;
-    return {is_recent ? std::max(longest_, longest_before_) : std::chrono::nanoseconds(0),
-            std::max(most_lookups_, lookups_)};
+    const int64_t age = MinuteOf(Clock::now()) - minute_;
+    const auto longest = age == 0   ? std::max(longest_, longest_before_)
+                         : age == 1 ? longest_
+                                    : std::chrono::nanoseconds(0);
+    return {longest, std::max(most_lookups_, lookups_)};
   }
 
  private:
