@@ -30,6 +30,9 @@ class Limits:
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
+    #: Of a client, which is a token or, without tokens, an address.
+    max_calls_per_client: int
+    max_batches_per_client: int
 
 
 @dataclass(frozen=True)
