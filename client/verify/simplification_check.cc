@@ -213,6 +213,7 @@ class AskedHull {
   std::vector<Triangle> triangles_;
   std::array<size_t, 2> apexes_ = {0, 0};
   bool is_flat_ = false;
+  // Refers to unit_ and triangles_, whose elements stay where they are when this is moved.
   std::optional<TriangleTree> tree_;
 };
 

@@ -1,6 +1,6 @@
-// The same bits on every path and every processor: hashes of snapshots and of answers over questions
-// from fixed seeds. Nothing here is computed by the mathematical library, whose sines may differ in
-// the last bit from one processor to the next.
+// The same bits on every path and every processor: hashes of snapshots and of answers over
+// questions from fixed seeds. Nothing here is computed by the mathematical library, whose sines may
+// differ in the last bit from one processor to the next.
 
 #include <gtest/gtest.h>
 

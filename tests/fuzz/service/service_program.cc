@@ -140,11 +140,15 @@ void ServiceProgram::Settle() {
   if (!service_.server_->WaitIdle(kPatience)) Note("a call outlives its client");
 }
 
-void ServiceProgram::SeeHeader(const v1::ResponseHeader& header) {
+void ServiceProgram::SeeStore(const v1::ResponseHeader& header) {
   if (service_.store_id_.empty()) service_.store_id_ = header.store_id();
   if (header.store_id() != service_.store_id_ || header.store_id().empty()) {
     Note("a reply names another store");
   }
+}
+
+void ServiceProgram::SeeHeader(const v1::ResponseHeader& header) {
+  SeeStore(header);
   if (header.revision() < service_.revision_) {
     Note(absl::StrCat("the revision fell from ", service_.revision_, " to ", header.revision()));
   }
@@ -655,7 +659,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   const auto read_until = [&](const auto& is_told) {
     while (finding_.empty() && !is_told()) {
       if (!reader->Read(&response)) return false;
-      SeeHeader(response.header());
+      SeeStore(response.header());
       Note(check->Received(response));
     }
     return finding_.empty();
@@ -665,21 +669,25 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   if (told && then_change) {
     const auto before = hulls_;
     watch_ = &context;
-    in_.OneOf(2) ? CreateHull() : in_.OneOf(3) ? DeleteHull() : AppendPoints();
+    if (in_.OneOf(2)) {
+      CreateHull();
+    } else if (in_.OneOf(3)) {
+      DeleteHull();
+    } else {
+      AppendPoints();
+    }
     // Otherwise a call was given up, and this one with it.
     told = std::exchange(watch_, nullptr) != nullptr && doubtful_.empty() && !all_doubtful_;
     for (const std::string& changed : told ? ChangedSince(before) : std::vector<std::string>()) {
       if (!check->Watches(changed)) continue;
       Reach("WatchHulls change");
-      const int times = check->TimesTold(changed);
       const auto seen = [&] {
         const auto now = hulls_.find(changed);
         const auto known = check->hulls().find(changed);
         if (now == hulls_.end()) return known == check->hulls().end();
         return known != check->hulls().end() && known->second.revision() == now->second.revision();
       };
-      told = read_until([&] { return seen(); });
-      if (told && check->TimesTold(changed) < times) Note("a change is not told of");
+      told = told && read_until(seen);
     }
     if (told) CompareWatched(*check);
   }
@@ -734,10 +742,14 @@ v1::WatchCollisionsRequest ServiceProgram::NextWatchMessage(bool first, size_t p
     FillMessage(in_, hints, &request);
   } else if (first) {
     FillMessage(in_, hints, request.mutable_open());
-    // A scene, mostly, as pairs go with no groups.
+    // Pairs go with no groups.
     v1::CollisionWatchOpen* const open = request.mutable_open();
-    if (!in_.OneOf(8))
-      in_.OneOf(3) ? (open->clear_groups(), open->clear_movers()) : open->clear_pairs();
+    if (in_.OneOf(3)) {
+      open->clear_groups();
+      open->clear_movers();
+    } else if (!in_.OneOf(8)) {
+      open->clear_pairs();
+    }
   } else {
     FillMessage(in_, hints, request.mutable_update());
   }
@@ -761,7 +773,7 @@ void ServiceProgram::WatchCollisions() {
   }
   v1::WatchCollisionsResponse response;
   const auto receive = [&] {
-    SeeHeader(response.header());
+    SeeStore(response.header());
     if (is_followed) Note(check.Received(response));
   };
   for (size_t i = 0; i < messages; ++i) {

@@ -68,6 +68,8 @@ class ServiceProgram {
   bool Ended(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
   // A call that its client gives up may still change something: waits until all calls have ended.
   void Settle();
+  // Of a watch: its revision is that of what was told.
+  void SeeStore(const v1::ResponseHeader& header);
   void SeeHeader(const v1::ResponseHeader& header);
   void SeeHull(const v1::HullInfo& hull);
   // A hull that a reply tells of is the one that was acknowledged.

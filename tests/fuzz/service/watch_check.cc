@@ -35,11 +35,6 @@ bool HullWatchCheck::Watches(const std::string& hull_id) const {
   return absl::StartsWith(hull_id, request_.prefix());
 }
 
-int HullWatchCheck::TimesTold(const std::string& hull_id) const {
-  const auto told = times_told_.find(hull_id);
-  return told == times_told_.end() ? 0 : told->second;
-}
-
 std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   if (response.anew()) {
     if (request_.after_revision() == 0) return "a watch from the start starts anew";
@@ -72,7 +67,6 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
 std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
   const v1::HullInfo& hull = event.hull();
   if (!Watches(hull.hull_id())) return "it is not watched";
-  ++times_told_[hull.hull_id()];
   const bool is_resumed = request_.after_revision() > 0 && !is_anew_;
   const bool was_known = hulls_.count(hull.hull_id()) > 0;
   if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {

@@ -26,8 +26,6 @@ class HullWatchCheck {
   const std::map<std::string, v1::HullInfo>& hulls() const { return hulls_; }
   bool is_synced() const { return is_synced_; }
   bool is_anew() const { return is_anew_; }
-  // How often an event named a hull.
-  int TimesTold(const std::string& hull_id) const;
   const v1::ResponseHeader& header() const { return header_; }
 
  private:
@@ -35,7 +33,6 @@ class HullWatchCheck {
 
   const v1::WatchHullsRequest request_;
   std::map<std::string, v1::HullInfo> hulls_;
-  std::map<std::string, int> times_told_;
   v1::ResponseHeader header_;
   bool is_synced_ = false;
   bool is_anew_ = false;
