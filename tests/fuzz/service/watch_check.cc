@@ -81,7 +81,6 @@ std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
   const bool changes =
       event.kind() == v1::HULL_EVENT_KIND_CHANGED || event.kind() == v1::HULL_EVENT_KIND_REPLACED;
   if (changes && !is_resumed && !was_known) return "it changes, and was never told of";
-  if (hull.revision() > header_.revision()) return "it is of a revision that is to come";
   hulls_[hull.hull_id()] = hull;
   if (event.has_box_min() != (hull.vertex_count() > 0) ||
       event.has_box_max() != event.has_box_min()) {

@@ -137,8 +137,8 @@ TEST_F(Revocation, EndsWhatIsBeingComputed) {
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 
-// A stream that waits for its client to read cannot tell it why.
-TEST_F(Revocation, CutsOffWhoDoesNotRead) {
+// A stream that waits for its client to read cannot tell it why, but ends.
+TEST_F(Revocation, EndsTheCallOfWhoDoesNotRead) {
   v1::FindCollisionsRequest request;
   for (int i = 0; i < 20'000; ++i) *request.add_placements() = PlacementOf("cube");
   request.mutable_wanted()->set_witness(true);

@@ -123,13 +123,18 @@ TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
   std::vector<size_t> built;
   std::vector<std::future<void>> ends;
   for (size_t i = 0; i < sessions.size(); ++i) {
+    const auto building = std::make_shared<std::promise<void>>();
     const auto ended = std::make_shared<std::promise<void>>();
+    ends.push_back(building->get_future());
     ends.push_back(ended->get_future());
     registry.Append(
         sessions[i], {1, {{1, 2, 3}}, std::nullopt}, {},
-        [&, i] {
-          const std::lock_guard lock(mutex);
-          built.push_back(i);
+        [&, i, building] {
+          {
+            const std::lock_guard lock(mutex);
+            built.push_back(i);
+          }
+          building->set_value();
         },
         [ended](const absl::StatusOr<ChunkResult>&) { ended->set_value(); });
   }
