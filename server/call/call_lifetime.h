@@ -40,16 +40,17 @@ class CallLifetime {
   void Cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   // The token of the call is no longer valid.
   void Revoke() {
-    revoked_.store(true, std::memory_order_relaxed);
+    revoked_.store(true);
     Cancel();
   }
+  bool is_revoked() const { return revoked_.load(); }
 
   bool ShouldStop() const { return cancelled_.load(std::memory_order_relaxed) || Expired(); }
 
   // Why the call stopped. Requires ShouldStop(); unchecked, as EndMessage may have lifted the limit
   // since.
   absl::Status StopStatus() const {
-    if (revoked_.load(std::memory_order_relaxed)) {
+    if (is_revoked()) {
       return WithReason(absl::UnauthenticatedError(kRevoked), v1::ERROR_REASON_TOKEN_UNKNOWN);
     }
     if (Clock::now() >= deadline_) {

@@ -365,7 +365,7 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   if (hull->chunks.empty()) return;
   if (hull->state.gone() || hull->state.damaged()) {
     // Replies come on other threads than the one that asks.
-    writers_.Submit([this, hull] { RefuseChunks(hull); });
+    writers_.Submit([this, hull] { RefuseChunks(hull); }, hull->chunks.front().session.client);
     return;
   }
   if (!hull->state.can_schedule() || !hull->exclusive.empty()) return;
@@ -374,7 +374,7 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   // What such a chunk finds must be committed.
   if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
   hull->state.Schedule();
-  writers_.Submit([this, hull] { RunNextChunk(hull); });
+  writers_.Submit([this, hull] { RunNextChunk(hull); }, next.session.client);
 }
 
 void Registry::NoteChange(const RegisteredHull& hull) {

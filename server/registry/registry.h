@@ -171,9 +171,10 @@ class Registry {
   // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
   // thread, with the reason when the hull is deleted or replaced before the session is closed.
   // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
-  // RESOURCE_EXHAUSTED: --max-writers-per-hull.
+  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: who takes turns with others for a thread.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
-                  std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done);
+                  std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
+                  ClientId client = kNoClient);
 
   void CloseAppend(const AppendSession& session);
 
@@ -246,6 +247,7 @@ class Registry {
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
 
+  void RunOpen(const std::shared_ptr<OpenRequest>& request);
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
   void OpenSession(Locked& locked, const HullPointer& hull,
                    const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
