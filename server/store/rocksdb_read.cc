@@ -96,6 +96,21 @@ absl::Status RocksDbStore::ForEachHull(const StoredHullVisitor& visit) {
                    });
 }
 
+absl::Status RocksDbStore::ForEachBody(const StoredBodyVisitor& visit) {
+  return ScanRange(std::string(1, kBodyPrefix), std::string(1, kBodyPrefix + 1),
+                   [&](std::string_view key, std::string_view sealed) {
+                     const std::string body_id(key.substr(1));
+                     const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
+                     absl::StatusOr<StoredBody> body =
+                         value.ok() ? DecodeStoredBody(body_id, *value) : value.status();
+                     if (!body.ok()) {
+                       body = DamagedBody(body_id, std::string(body.status().message()));
+                     }
+                     visit(body_id, std::move(body));
+                     return absl::OkStatus();
+                   });
+}
+
 absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {
   std::vector<Vector> vertices;
   vertices.reserve(hull.layout.base_vertices + hull.layout.delta_vertices);

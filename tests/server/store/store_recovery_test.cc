@@ -216,8 +216,8 @@ TEST_F(StoreRecovery, ANewerFormatIsRefused) {
   hulls_ = nullptr;
   const auto store = OpenStore();
   EXPECT_EQ(store.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(store.status().message()), HasSubstr("was written in format 2"));
-  EXPECT_THAT(std::string(store.status().message()), HasSubstr("knows format 1"));
+  EXPECT_THAT(std::string(store.status().message()), HasSubstr("was written in format 3"));
+  EXPECT_THAT(std::string(store.status().message()), HasSubstr("knows format 2"));
 }
 
 TEST_F(StoreRecovery, WritersPerHullAreLimited) {
