@@ -3,15 +3,13 @@
 
 #include <absl/status/status.h>
 
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "server/process/metrics.h"
+#include "server/process/synchronization.h"
 #include "server/registry/locked.h"
 #include "server/store/store.h"
 
@@ -81,13 +79,13 @@ class Committer {
   FairMutex& order_;
   StoreMetrics* metrics_ = nullptr;
 
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   // The rest is guarded by mutex_.
-  std::condition_variable ready_;
+  ConditionVariable ready_;
   std::vector<Pending> queue_;
   CommitStatistics statistics_;
   bool ending_ = false;
-  std::thread thread_;
+  Thread thread_;
 };
 
 }  // namespace hulld::server

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "server/process/synchronization.h"
 
 namespace hulld::server {
 
@@ -60,7 +61,7 @@ class FairMutex {
 
  private:
   friend class Locked;
-  using Clock = std::chrono::steady_clock;
+  using Clock = SteadyClock;
 
   static int64_t MinuteOf(Clock::time_point time) {
     return std::chrono::floor<std::chrono::minutes>(time.time_since_epoch()).count();
@@ -80,8 +81,8 @@ class FairMutex {
     most_lookups_ = std::max(most_lookups_, lookups_);
   }
 
-  std::mutex entry_;
-  std::mutex mutex_;
+  Mutex entry_;
+  Mutex mutex_;
   // Written by who holds entry_.
   std::atomic<bool> is_wanted_ = false;
   // The rest is guarded by mutex_.
