@@ -67,6 +67,31 @@ absl::Status CheckConsistent(const HullMesh& mesh) {
   return absl::OkStatus();
 }
 
+// Follows the pages of a list; `items` are those of a page.
+template <typename Request, typename Response, typename Items, typename ListPage>
+absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit, const Items& items,
+                                 const ListPage& list_page) {
+  constexpr uint64_t kLargestPage = 1000;
+  Response all;
+  Request request;
+  request.set_prefix(prefix);
+  const auto count = [&] { return static_cast<uint64_t>(items(all)->size()); };
+  do {
+    const uint64_t missing = limit == 0 ? kLargestPage : limit - count();
+    request.set_page_size(static_cast<uint32_t>(std::min(missing, kLargestPage)));
+    absl::StatusOr<Response> page = list_page(request);
+    if (!page.ok()) return page.status();
+    *all.mutable_header() = page->header();
+    items(all)->MergeFrom(*items(*page));
+    if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
+      return absl::InternalError("the server answered a page that continues with itself");
+    }
+    all.set_next_page_token(page->next_page_token());
+    request.set_page_token(page->next_page_token());
+  } while (!request.page_token().empty() && (limit == 0 || count() < limit));
+  return all;
+}
+
 // HealthCheckResponse.status, field 1 of grpc.health.v1; Debian has no generated code for it.
 enum HealthStatus { kUnknown = 0, kServing = 1 };
 
@@ -89,6 +114,7 @@ Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
       channel_(std::move(channel)),
       hulls_(v1::HullService::NewStub(channel_)),
       collisions_(v1::CollisionService::NewStub(channel_)),
+      bodies_(v1::BodyService::NewStub(channel_)),
       status_(v1::StatusService::NewStub(channel_)),
       maintenance_(v1::MaintenanceService::NewStub(channel_)) {}
 
@@ -225,25 +251,39 @@ absl::StatusOr<v1::ListHullsResponse> Client::ListHulls(const v1::ListHullsReque
 
 absl::StatusOr<v1::ListHullsResponse> Client::ListAllHulls(const std::string& prefix,
                                                            uint64_t limit) const {
-  constexpr uint64_t kLargestPage = 1000;
-  v1::ListHullsResponse all;
-  v1::ListHullsRequest request;
-  request.set_prefix(prefix);
-  do {
-    const uint64_t missing = limit == 0 ? kLargestPage : limit - all.hulls_size();
-    request.set_page_size(static_cast<uint32_t>(std::min(missing, kLargestPage)));
-    absl::StatusOr<v1::ListHullsResponse> page = ListHulls(request);
-    if (!page.ok()) return page.status();
-    *all.mutable_header() = page->header();
-    all.mutable_hulls()->MergeFrom(page->hulls());
-    if (!page->next_page_token().empty() && page->next_page_token() == request.page_token()) {
-      return absl::InternalError("the server answered a page that continues with itself");
-    }
-    all.set_next_page_token(page->next_page_token());
-    request.set_page_token(page->next_page_token());
-  } while (!request.page_token().empty() &&
-           (limit == 0 || static_cast<uint64_t>(all.hulls_size()) < limit));
-  return all;
+  return ListAll<v1::ListHullsRequest, v1::ListHullsResponse>(
+      prefix, limit, [](v1::ListHullsResponse& page) { return page.mutable_hulls(); },
+      [this](const v1::ListHullsRequest& request) { return ListHulls(request); });
+}
+
+absl::StatusOr<v1::PutBodyResponse> Client::PutBody(const v1::PutBodyRequest& request) const {
+  return Call(bodies_.get(), &v1::BodyService::Stub::PutBody, request, !request.has_if_revision());
+}
+
+absl::StatusOr<v1::GetBodyResponse> Client::GetBody(const std::string& body_id) const {
+  v1::GetBodyRequest request;
+  request.set_body_id(body_id);
+  return Call(bodies_.get(), &v1::BodyService::Stub::GetBody, request, true);
+}
+
+absl::StatusOr<v1::ListBodiesResponse> Client::ListBodies(
+    const v1::ListBodiesRequest& request) const {
+  return Call(bodies_.get(), &v1::BodyService::Stub::ListBodies, request, true);
+}
+
+absl::StatusOr<v1::ListBodiesResponse> Client::ListAllBodies(const std::string& prefix,
+                                                             uint64_t limit) const {
+  return ListAll<v1::ListBodiesRequest, v1::ListBodiesResponse>(
+      prefix, limit, [](v1::ListBodiesResponse& page) { return page.mutable_bodies(); },
+      [this](const v1::ListBodiesRequest& request) { return ListBodies(request); });
+}
+
+absl::StatusOr<v1::DeleteBodyResponse> Client::DeleteBody(
+    const std::string& body_id, std::optional<uint64_t> if_revision) const {
+  v1::DeleteBodyRequest request;
+  request.set_body_id(body_id);
+  if (if_revision) request.set_if_revision(*if_revision);
+  return Call(bodies_.get(), &v1::BodyService::Stub::DeleteBody, request, false);
 }
 
 absl::StatusOr<v1::DeleteHullResponse> Client::DeleteHull(

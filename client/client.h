@@ -19,6 +19,7 @@
 #include "client/connection_security.h"
 #include "client/watch/collision_watch.h"
 #include "client/watch/hull_watch.h"
+#include "hulld/v1/body.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/maintenance.grpc.pb.h"
@@ -56,10 +57,11 @@ struct HullMesh {
 // A connection to hulld. Connects when first used; any thread may call it.
 //
 // Errors carry the server's code and message. UNAVAILABLE and DEADLINE_EXCEEDED mean that no answer
-// came. Calls that are safe to repeat (all but DeleteHull, and CreateHull without if_absent) are
-// retried as options.retry says after UNAVAILABLE, and after RESOURCE_EXHAUSTED when the server
-// says when to retry. ReasonOf and MetadataOf (grpc_status.h) tell why hulld refused a call.
-// ValidateSecurity tells beforehand whether options.security can work.
+// came. Calls that are safe to repeat (all but DeleteHull, DeleteBody, PutBody with if_revision,
+// and CreateHull without if_absent) are retried as options.retry says after UNAVAILABLE, and after
+// RESOURCE_EXHAUSTED when the server says when to retry. ReasonOf and MetadataOf (grpc_status.h)
+// tell why hulld refused a call. ValidateSecurity tells beforehand whether options.security can
+// work.
 class Client {
  public:
   explicit Client(ClientOptions options = {});
@@ -107,6 +109,19 @@ class Client {
 
   // Never retried: a repeated delete could remove a hull that someone has created anew.
   absl::StatusOr<v1::DeleteHullResponse> DeleteHull(const std::string& hull_id,
+                                                    std::optional<uint64_t> if_revision = {}) const;
+
+  // Creates a body, or replaces its pieces. Retried only where if_revision is absent: putting the
+  // same again does no harm.
+  absl::StatusOr<v1::PutBodyResponse> PutBody(const v1::PutBodyRequest& request) const;
+  absl::StatusOr<v1::GetBodyResponse> GetBody(const std::string& body_id) const;
+  // One page.
+  absl::StatusOr<v1::ListBodiesResponse> ListBodies(const v1::ListBodiesRequest& request) const;
+  // As ListAllHulls.
+  absl::StatusOr<v1::ListBodiesResponse> ListAllBodies(const std::string& prefix,
+                                                       uint64_t limit = 0) const;
+  // Never retried, as DeleteHull.
+  absl::StatusOr<v1::DeleteBodyResponse> DeleteBody(const std::string& body_id,
                                                     std::optional<uint64_t> if_revision = {}) const;
 
   // Tells of hulls as they come, change and go. The timeout bounds the search for a server that was
@@ -162,6 +177,7 @@ class Client {
   std::shared_ptr<grpc::Channel> channel_;
   std::shared_ptr<v1::HullService::Stub> hulls_;
   std::shared_ptr<v1::CollisionService::Stub> collisions_;
+  std::unique_ptr<v1::BodyService::Stub> bodies_;
   std::unique_ptr<v1::StatusService::Stub> status_;
   std::unique_ptr<v1::MaintenanceService::Stub> maintenance_;
 };

@@ -24,8 +24,9 @@ namespace hulld::server {
 namespace {
 
 constexpr const char* kServices[] = {
-    v1::HullService::service_full_name(), v1::CollisionService::service_full_name(),
-    v1::StatusService::service_full_name(), v1::MaintenanceService::service_full_name()};
+    v1::HullService::service_full_name(), v1::BodyService::service_full_name(),
+    v1::CollisionService::service_full_name(), v1::StatusService::service_full_name(),
+    v1::MaintenanceService::service_full_name()};
 
 // With those of gRPC's own protocols.
 std::vector<std::string> AllServices() {
@@ -76,6 +77,7 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
       executor_(pool_.threads(), metrics_.AddPool("executor")),
       hull_service_(registry_, admission_, writers_, readers_, long_readers_),
+      body_service_(registry_, admission_, readers_),
       collision_service_(registry_, admission_, readers_, long_readers_, pool_, executor_),
       status_service_(registry_, admission_),
       maintenance_service_(*store_, registry_, admission_, long_readers_),
@@ -125,6 +127,8 @@ void Server::AddSizesToMetrics() {
   });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
                     [this] { return static_cast<double>(registry_.Sizes().hull_count); });
+  metrics_.AddGauge("hulld_bodies", "Bodies in the store.",
+                    [this] { return static_cast<double>(registry_.Sizes().body_count); });
   metrics_.AddGauge("hulld_registry_lock_hold_max_seconds",
                     "Longest hold of the registry's lock within the last one to two minutes.",
                     [this] {
@@ -158,6 +162,7 @@ absl::Status Server::Listen(const Config& config) {
   builder.AddListeningPort(config.listen, guard_->credentials(), &port);
   SetTransport(config, builder);
   builder.RegisterService(&hull_service_);
+  builder.RegisterService(&body_service_);
   builder.RegisterService(&collision_service_);
   builder.RegisterService(&status_service_);
   builder.RegisterService(&maintenance_service_);

@@ -14,6 +14,7 @@
 #include "server/admin/maintenance_service.h"
 #include "server/admin/reflection_service.h"
 #include "server/admin/status_service.h"
+#include "server/bodies/body_service.h"
 #include "server/call/admission.h"
 #include "server/collisions/collision_service.h"
 #include "server/hulls/hull_service.h"
@@ -88,6 +89,7 @@ class Server {
   TaskPool pool_;
   Executor executor_;
   HullService hull_service_;
+  BodyService body_service_;
   CollisionService collision_service_;
   StatusService status_service_;
   MaintenanceService maintenance_service_;

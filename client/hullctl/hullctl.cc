@@ -74,6 +74,7 @@ void AddCommands(Command program, Invocation* invocation) {
   AddAppendCommand(program, invocation);
   AddReplaceCommand(program, invocation);
   AddDeleteCommand(program, invocation);
+  AddBodyCommand(program, invocation);
   program.BeginGroup("Look at hulls");
   AddListCommand(program, invocation);
   AddGetCommand(program, invocation);

@@ -48,10 +48,28 @@ inline constexpr double kSubsetDistanceErrorFactor = 32 * kUnitRoundoff;
 
 // Entries of the rotation matrix R(q)/|q|^2, computed from q of which the largest component is
 // within [kQuaternionMin, kQuaternionMax], or brought into [1/2, 1) by a power of two: each
-// numerator is a sum of at most 4 products (error at most 7 u |q|^2), the squared norm has relative
-// error at most 4 u, its reciprocal one rounding more, their product one: |error| <= 13 u + 50 u^2
-// < 16 u, as no entry exceeds 1. Proven.
+// numerator is a sum of at most 4 products (error at most 3 u |q|^2), the squared norm has relative
+// error at most 3 u, its reciprocal one rounding more, their product one: |error| <= 8 u + 50 u^2,
+// as no entry exceeds 1. Where q is itself a product of two quaternions, each component rounded
+// once (pose_product.h), a numerator changes by 2 u |q|^2 and the squared norm by 2 u of itself, 4
+// u of an entry: 12 u + 100 u^2 < 16 u in all. Proven.
 inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
+
+// The translation of a product of two poses, R(q) t_P / |q|^2 + t_B in double-double arithmetic
+// (double_double.h): the numerators of the entries are sums of four exact products, within 9 u^2
+// |q|^2, the squared norm within 9 u^2 of itself, their quotient within 15 u^2: entries, at most 1,
+// err by 33 u^2. Products with t_P err by 5 u^2 more, two sums of them, at most 3 |t_P|, by 3 u^2
+// each: 132 u^2 |t_P|; the last sum by 3 u^2 (3 |t_P| + |t_B|). Below 145 u^2 (|t_P| + |t_B|); 256
+// u^2 leaves slack for higher powers of u. Times |t_P| + |t_B|, |.| the largest component. Proven.
+inline constexpr double kProductTranslationError = 256 * kUnitRoundoff * kUnitRoundoff;
+
+// The difference of two translations of which at least one is that of a product of poses: the
+// differences of what is rounded is exact as a sum of two doubles, those of what the rounding left
+// err by u of 2 u (|t_A| + |t_B|) at most, sums by u of themselves: beyond the errors of the
+// translations, at most 8 u^2 (|t_A| + |t_B|) and u of the result. Where all but the last is below
+// u S, the difference errs by 2 u S instead of the u |t| below, for which the slack of each bound
+// has room. Proven.
+inline constexpr double kProductOffsetError = 8 * kUnitRoundoff * kUnitRoundoff;
 
 // A Minkowski vertex w = R_A a - R_B b - (t_B - t_A): each rotated component errs by at most 3 * 16
 // u M (matrix) and 3 u * 3 M (products and sums), that is 57 u M; the difference of translations by
@@ -177,6 +195,17 @@ inline constexpr double kReachErrorFactor = 640 * kUnitRoundoff;
 // err by sqrt(3) * 128 u S, the length by 56 u S, products and sums by 4 u * 7 S, the difference by
 // 7 u S: 313 u S. Times S. Proven.
 inline constexpr double kTriangleDistanceErrorFactor = 384 * kUnitRoundoff;
+
+// The gap between two boxes along an axis of one of them, each box in the frame of its own body
+// (box_gap.h); M the largest absolute coordinate of a body's boxes, t the translation between the
+// bodies, S = M_X + M_Y + |t|. Entries of the product of two computed rotations err by 2 sqrt(3) *
+// 16 u and their own rounding, 3 u: 59 u. The translation, turned into the frame of X, errs by 57 u
+// |t| as above and 3 u |t| of the difference; a centre by 3 * 59 u M, 9 u M of turning it and 2 u M
+// of its own. The step between the centres, at most 5 S, so errs by 200 u S and its sums by 12 u S.
+// Turned into the frame of Y: 3 * 212 u S, 3 * 59 u * 5 S and 9 u * 5 S: below 1600 u S. Half
+// widths err as centres do. In all below 2000 u S, also for the corners of a box that holds a
+// turned one. Times S, for S between kFilterMinSize and kFilterMaxSize. Proven.
+inline constexpr double kBoxGapErrorFactor = 4096 * kUnitRoundoff;
 
 // The sign of det[p, q, r], p . ((q - p) x (r - p)), for computed Minkowski vertices in a unit with
 // S < 2: a vertex errs by 256 u per component and is at most 2 sqrt(3), an edge by 520 u and is at

@@ -84,6 +84,16 @@ inline constexpr bool IsFilterDirection(double largest_component) {
 inline constexpr double kQuaternionMin = 0x1p-100;
 inline constexpr double kQuaternionMax = 0x1p100;
 
+// Composing poses in double-double arithmetic (pose_product.h). Translations up to the first,
+// added, are split without overflow. Components of a quaternion below the second, the largest being
+// in [1/2, 1), are left out: entries change by less than 2^-127, far below the slack of
+// kProductTranslationError. So are components of translations below a quarter of the third, which
+// the bound includes. Then entries that are not zero are above 2^-400, and no product that counts
+// underflows. Proven.
+inline constexpr double kProductMaxTranslation = 0x1p400;
+inline constexpr double kProductLeastComponent = 0x1p-130;
+inline constexpr double kProductUnderflow = 0x1p-600;
+
 // The bound of a gap along a textbook axis is itself accurate above this, far above the underflow
 // threshold. Proven.
 inline constexpr double kGapMinBound = 0x1p-900;

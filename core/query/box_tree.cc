@@ -16,6 +16,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
+Box Box::Empty() { return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)}; }
+
 Box GrownBy(const Box& box, double clearance) {
   if (clearance == 0) return box;
   // Rounded up, one unit in the last place being the most that the sums err.
@@ -31,9 +33,7 @@ Box GrownBy(const Box& box, double clearance) {
 }
 
 Box BoundingBox(const PlacedHull& placed) {
-  if (placed.empty()) {
-    return {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};
-  }
+  if (placed.empty()) return Box::Empty();
   const Vector& t = placed.X_WH().t;
   const double size = placed.query_hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
   if (!IsFilterSize(size)) {
@@ -64,7 +64,7 @@ BoxTree::BoxTree(std::span<const Box> boxes, const std::function<bool()>& should
 // Halves the boxes along the axis in which their centres spread widest.
 uint32_t BoxTree::Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll) {
   const auto node = static_cast<uint32_t>(nodes_.size());
-  Box bounds = {Vector::Constant(kInfinity), Vector::Constant(-kInfinity)};
+  Box bounds = Box::Empty();
   Box centers = bounds;
   // Twice the centre; 0 for a box that is all of space.
   const auto center = [&](uint32_t index) {

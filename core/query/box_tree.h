@@ -1,6 +1,7 @@
 #ifndef HULLD_CORE_QUERY_BOX_TREE_H_
 #define HULLD_CORE_QUERY_BOX_TREE_H_
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -18,6 +19,8 @@ struct Box {
   Vector low;
   Vector high;
 
+  static Box Empty();
+  bool IsEmpty() const { return (low.array() > high.array()).any(); }
   bool Meets(const Box& other) const {
     return (low.array() <= other.high.array()).all() && (other.low.array() <= high.array()).all();
   }
@@ -56,15 +59,24 @@ class BoxTree {
   bool AppendMeeting(const Box& box, uint32_t first, uint64_t nodes, Cursor& cursor,
                      std::vector<uint32_t>& found) const;
 
+  // For searches of two trees at once. Nodes are known by number; that of the root is 0.
+  bool empty() const { return nodes_.empty(); }
+  const Box& box(uint32_t node) const { return nodes_[node].box; }
+  bool is_leaf(uint32_t node) const { return nodes_[node].second == 0; }
+  // Requires that the node is no leaf.
+  std::array<uint32_t, 2> children(uint32_t node) const { return {node + 1, nodes_[node].second}; }
+  // The boxes of a leaf, at most kLeafBoxes, and their indices.
+  std::span<const Box> boxes(uint32_t leaf) const { return Part(boxes_, leaf); }
+  std::span<const uint32_t> indices(uint32_t leaf) const { return Part(indices_, leaf); }
+  // A choice, not tuned.
+  static constexpr uint32_t kLeafBoxes = 8;
+
   size_t MemoryBytes() const {
     return nodes_.capacity() * sizeof(Node) + indices_.capacity() * sizeof(uint32_t) +
            boxes_.capacity() * sizeof(Box);
   }
 
  private:
-  // Boxes in a leaf. A choice, not tuned.
-  static constexpr uint32_t kLeafBoxes = 8;
-
   // An inner node's children are the node after it and `second`; a leaf's boxes are those from
   // `begin` to `end`.
   struct Node {
@@ -76,6 +88,12 @@ class BoxTree {
   };
 
   uint32_t Build(std::span<const Box> boxes, uint32_t begin, uint32_t end, StopPoll& poll);
+
+  template <typename T>
+  std::span<const T> Part(const std::vector<T>& all, uint32_t leaf) const {
+    const Node& node = nodes_[leaf];
+    return std::span(all).subspan(node.begin, node.end - node.begin);
+  }
 
   std::vector<Node> nodes_;
   // In the order of the leaves.

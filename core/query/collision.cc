@@ -33,13 +33,23 @@ std::weak_ordering Compare(std::span<const double> a, std::span<const double> b)
 
 std::span<const double> Coordinates(const Vector& v) { return {v.data(), 3}; }
 
+std::weak_ordering Compare(const Pose& a, const Pose& b) {
+  if (const auto order = Compare(Coordinates(a.t), Coordinates(b.t)); order != 0) return order;
+  return Compare(a.q, b.q);
+}
+
+// Which of two products of poses comes first; what is none comes before what is one.
+std::weak_ordering Compare(const PoseProduct* a, const PoseProduct* b) {
+  if (a == nullptr || b == nullptr) return (a != nullptr) <=> (b != nullptr);
+  if (const auto order = Compare(a->X_WB(), b->X_WB()); order != 0) return order;
+  return Compare(a->X_BP(), b->X_BP());
+}
+
 // A total order of placed hulls by their content, so that a pair is answered the same way whichever
 // of the two comes first.
 [[gnu::noinline]] std::weak_ordering Compare(const PlacedHull& a, const PlacedHull& b) {
-  if (const auto order = Compare(Coordinates(a.X_WH().t), Coordinates(b.X_WH().t)); order != 0) {
-    return order;
-  }
-  if (const auto order = Compare(a.X_WH().q, b.X_WH().q); order != 0) return order;
+  if (const auto order = Compare(a.X_WH(), b.X_WH()); order != 0) return order;
+  if (const auto order = Compare(a.product(), b.product()); order != 0) return order;
   const QueryHull& hull_a = a.query_hull();
   const QueryHull& hull_b = b.query_hull();
   if (const auto order = hull_a.point_count() <=> hull_b.point_count(); order != 0) return order;

@@ -148,14 +148,15 @@ SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOpti
 
 bool SceneSearch::BuildTree() {
   const std::function<bool()>& should_stop = options_->query.should_stop;
-  const auto count = static_cast<int64_t>(placements_.size());
-  boxes_.resize(placements_.size());
+  const auto count = static_cast<uint32_t>(placements_.size());
+  boxes_.resize(count);
 #pragma omp parallel num_threads(std::max(1, options_->threads))
   {
     StopPoll poll(should_stop);
 #pragma omp for schedule(static)
-    for (int64_t i = 0; i < count; ++i) {
-      if (!poll.Step()) boxes_[i] = BoundingBox(placements_[i]);
+    for (uint32_t i = 0; i < count; ++i) {
+      if (poll.Step()) continue;
+      boxes_[i] = IsBody(i) ? BoundingBox(options_->bodies[i]) : BoundingBox(placements_[i]);
     }
   }
   if (StopPoll(should_stop, 1).Poll()) return false;
@@ -170,6 +171,7 @@ absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placem
                                                    " groups for ", placements.size(),
                                                    " placements; give one each, or none"));
   }
+  HULLD_CHECK(options.bodies.empty() || options.bodies.size() == placements.size());
   SceneSearch scene(placements, options);
   if (!scene.BuildTree()) return absl::CancelledError("stopped in a scene");
   return scene;
@@ -206,12 +208,23 @@ bool SceneSearch::IsFound(const Answer& answer) const {
   return answer.relation != Relation::kSeparated;
 }
 
-absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b) const {
-  absl::StatusOr<Answer> answer = CheckCollision(placements_[a], placements_[b], first_look_);
+absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
+                                            std::optional<PiecePair>* pieces) const {
+  if (!IsBody(a) && !IsBody(b)) return CheckCollision(placements_[a], placements_[b], options);
+  absl::StatusOr<BodyAnswer> answer =
+      CheckBodies(options_->bodies[a], options_->bodies[b], options);
+  if (!answer.ok()) return answer.status();
+  if (pieces != nullptr) *pieces = answer->pieces;
+  return std::move(answer->answer);
+}
+
+absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b,
+                                        std::optional<PiecePair>* pieces) const {
+  absl::StatusOr<Answer> answer = AskWith(a, b, first_look_, pieces);
   if (!options_->query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
   QueryOptions options = options_->query;
   options.threads = 1;
-  return CheckCollision(placements_[a], placements_[b], options);
+  return AskWith(a, b, options, pieces);
 }
 
 void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {

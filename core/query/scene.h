@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "core/query/batch.h"
+#include "core/query/body/body_search.h"
+#include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/answer.h"
@@ -36,6 +38,8 @@ struct SceneOptions {
   std::span<const uint32_t> groups;
   // Pairs of groups that are never asked about.
   std::span<const GroupPair> ignored_groups;
+  // Empty, or each placement as a body: those that are no hulls are asked about in this form.
+  std::span<const PlacedBody> bodies;
   // One against many: only pairs with at least one of the first so many placements.
   std::optional<uint32_t> movers;
   // OpenMP threads.
@@ -62,9 +66,9 @@ struct SceneTotals {
 // once.
 class SceneSearch {
  public:
-  // Both must outlive this. Cost: O(n log n); boxes are computed on options.threads.
-  // INVALID_ARGUMENT: `groups` is neither empty nor one for each placement. CANCELLED: should_stop
-  // said so.
+  // Both must outlive this; bodies, if there are any, are one for each placement. Cost: O(n log n);
+  // boxes are computed on options.threads. INVALID_ARGUMENT: `groups` is neither empty nor one for
+  // each placement. CANCELLED: should_stop said so.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
 
@@ -73,9 +77,12 @@ class SceneSearch {
   // Placements that have candidates of their own: all, or the movers.
   uint32_t size() const { return size_; }
 
-  // The answer of a candidate, and what else is wanted of it if it is found. CANCELLED: should_stop
-  // said so.
-  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b) const;
+  // The answer of a candidate, and what else is wanted of it if it is found. pieces: where not
+  // null, becomes the pair that decided of a candidate with a body (BodyAnswer::pieces). CANCELLED:
+  // should_stop said so. INVALID_ARGUMENT: a candidate with a body, and what ValidateBodyOptions
+  // refuses.
+  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b,
+                             std::optional<PiecePair>* pieces = nullptr) const;
   // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.
   bool IsFound(const Answer& answer) const;
 
@@ -92,6 +99,11 @@ class SceneSearch {
   // False: should_stop said so, and what was built is to be dropped.
   bool BuildTree();
   bool IsIgnored(uint32_t a, uint32_t b) const;
+  bool IsBody(uint32_t placement) const {
+    return !options_->bodies.empty() && !options_->bodies[placement].body().is_hull();
+  }
+  absl::StatusOr<Answer> AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
+                                 std::optional<PiecePair>* pieces) const;
   uint64_t CountPairs() const;
 
   std::span<const PlacedHull> placements_;

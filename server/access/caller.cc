@@ -50,11 +50,15 @@ Permission PermissionFor(Rpc rpc) {
     case Rpc::kGetStatus:
     case Rpc::kWatchHulls:
     case Rpc::kWatchCollisions:
+    case Rpc::kGetBody:
+    case Rpc::kListBodies:
       return Permission::kRead;
     case Rpc::kCreateHull:
     case Rpc::kAppendPoints:
     case Rpc::kDeleteHull:
     case Rpc::kReplaceHull:
+    case Rpc::kPutBody:
+    case Rpc::kDeleteBody:
       return Permission::kWrite;
     case Rpc::kSaveBackup:
       return Permission::kAdmin;

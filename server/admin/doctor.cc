@@ -21,6 +21,7 @@ constexpr int kExitDamaged = 1;
 constexpr int kExitUsage = 2;
 
 struct Finding {
+  // Or a body's.
   std::string hull_id;
   std::string what;
 };
@@ -30,6 +31,7 @@ struct Report {
   uint64_t revision = 0;
   uint64_t hulls = 0;
   uint64_t vertices = 0;
+  uint64_t bodies = 0;
   std::vector<Finding> findings;
   // Not of a hull: what kept the hulls from being read.
   std::string failure;
@@ -65,7 +67,15 @@ Report ExamineAll(RocksDbStore& store) {
     if (stored.ok()) report.vertices += stored->record.vertex_count;
     if (!status.ok()) report.findings.push_back({id, std::string(status.message())});
   }
-  if (!read.ok()) report.failure = std::string(read.message());
+  const absl::Status bodies_read =
+      store.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
+        ++report.bodies;
+        if (stored.ok()) return;
+        report.findings.push_back({id, std::string(stored.status().message())});
+      });
+  for (const absl::Status& status : {read, bodies_read}) {
+    if (!status.ok()) report.failure = std::string(status.message());
+  }
   return report;
 }
 
@@ -79,12 +89,13 @@ void PrintJson(const Report& report) {
                     ",\"finding\":", JsonText(finding.what), "}");
   }
   std::printf(
-      "{\"storeId\":%s,\"revision\":\"%llu\",\"hulls\":\"%llu\",\"vertices\":\"%llu\",\"damaged\":["
-      "%s]"
-      ",\"failure\":%s}\n",
+      "{\"storeId\":%s,\"revision\":\"%llu\",\"hulls\":\"%llu\",\"vertices\":\"%llu\",\"bodies\":"
+      "\"%llu\","
+      "\"damaged\":[%s],\"failure\":%s}\n",
       JsonText(report.store_id).c_str(), static_cast<unsigned long long>(report.revision),
       static_cast<unsigned long long>(report.hulls),
-      static_cast<unsigned long long>(report.vertices), findings.c_str(),
+      static_cast<unsigned long long>(report.vertices),
+      static_cast<unsigned long long>(report.bodies), findings.c_str(),
       JsonText(report.failure).c_str());
 }
 
@@ -93,10 +104,12 @@ void PrintText(const Report& report) {
     std::printf("DAMAGED  %s\n         %s\n", finding.hull_id.c_str(), finding.what.c_str());
   }
   if (!report.failure.empty()) std::printf("FAILED   %s\n", report.failure.c_str());
-  std::printf("store %s at revision %llu: %llu hulls with %llu vertices, %zu damaged\n",
+  const std::string bodies = report.bodies == 0 ? "" : absl::StrCat(", ", report.bodies, " bodies");
+  std::printf("store %s at revision %llu: %llu hulls with %llu vertices%s, %zu damaged\n",
               report.store_id.c_str(), static_cast<unsigned long long>(report.revision),
               static_cast<unsigned long long>(report.hulls),
-              static_cast<unsigned long long>(report.vertices), report.findings.size());
+              static_cast<unsigned long long>(report.vertices), bodies.c_str(),
+              report.findings.size());
 }
 
 absl::Status CutLog(RocksDbOptions options) {
@@ -108,7 +121,7 @@ absl::Status CutLog(RocksDbOptions options) {
 }  // namespace
 
 int RunDoctor(const std::vector<std::string>& arguments) {
-  CLI::App app("Audits every hull of a store that no hulld has open.", "hulld doctor");
+  CLI::App app("Audits every hull and body of a store that no hulld has open.", "hulld doctor");
   RocksDbOptions options;
   options.read_only = true;
   bool json = false;

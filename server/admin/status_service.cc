@@ -32,6 +32,7 @@ void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) 
   if (caller.sees_all()) {
     response->set_hull_count(sizes.hull_count);
     response->set_vertex_count(sizes.vertex_count);
+    response->set_body_count(sizes.body_count);
   }
   const Limits& limits = registry_.limits();
   v1::Limits* message = response->mutable_limits();
@@ -41,6 +42,7 @@ void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) 
   message->set_max_pairs_per_batch(limits.max_pairs_per_batch);
   message->set_max_textbook_axes(limits.max_textbook_axes);
   message->set_max_writers_per_hull(limits.max_writers_per_hull);
+  message->set_max_pieces_per_body(limits.max_pieces_per_body);
   message->set_memory_limit_bytes(limits.memory_limit);
   message->set_max_message_bytes(limits.max_message_bytes);
   message->set_max_points_per_hull(limits.max_points_per_hull);

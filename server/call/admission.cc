@@ -29,6 +29,10 @@ CallKind KindOf(Rpc rpc) {
     case Rpc::kDeleteHull:
     case Rpc::kCheckCollision:
     case Rpc::kGetStatus:
+    case Rpc::kPutBody:
+    case Rpc::kGetBody:
+    case Rpc::kListBodies:
+    case Rpc::kDeleteBody:
       return CallKind::kUnary;
     case Rpc::kBatchCheckCollisions:
     case Rpc::kFindCollisions:

@@ -121,12 +121,12 @@ void Call::Log(LogLevel level, const std::string& message, LogFields fields) con
   LogEvent(level, message, all);
 }
 
-void Call::LogChange(const std::string& message, const std::string& hull_id, uint64_t revision,
+void Call::LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                      const LogFields& fields) const {
   LogFields all;
   if (!caller_.name.empty()) all.push_back({"token", caller_.name});
   all.push_back({"peer", peer_});
-  all.push_back({"hull", hull_id});
+  all.push_back(changed);
   all.push_back({"revision", revision});
   all.insert(all.end(), fields.begin(), fields.end());
   Log(LogLevel::kInfo, message, std::move(all));

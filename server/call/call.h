@@ -76,8 +76,9 @@ class Call {
 
   // Logs one line about this call, with the trace that it is part of.
   void Log(LogLevel level, const std::string& message, LogFields fields = {}) const;
-  // Logs a change of a hull, and who made it: the token's name and the peer.
-  void LogChange(const std::string& message, const std::string& hull_id, uint64_t revision,
+  // Logs a change of a hull or a body, as {"hull", ID}, and who made it: the token's name and the
+  // peer.
+  void LogChange(const std::string& message, const LogField& changed, uint64_t revision,
                  const LogFields& fields = {}) const;
 
   // What the reactor is to finish with.

@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
 
@@ -97,6 +98,7 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
 }
 
 bool BatchStream::IsForTeam(const PlacedPair& pair) const {
+  if (table_.is_body(pair.a) || table_.is_body(pair.b)) return false;
   return IsTextbookForTeam(options_, table_.placed()[pair.a], table_.placed()[pair.b]);
 }
 
@@ -139,44 +141,47 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
 absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts) {
   const PlacedPair pair = PairAt(piece.next);
   if (!IsAnswerable(pair)) {
-    columns->AddUnanswered();
+    columns->Add(
+        [&](v1::AnswerColumns* to) { return AddUnansweredPair(table_, request().wanted(), to); });
     ++piece.next;
     return absl::OkStatus();
   }
-  return Add(CheckCollision(table_.placed()[pair.a], table_.placed()[pair.b], options_), piece,
-             columns, counts);
+  return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
 }
 
 absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point end,
                                            BatchColumns* columns, RungCounts* counts) {
   const PlacedPair pair = PairAt(piece.next);
-  if (!IsAnswerable(pair)) return Answer(piece, columns, counts);
+  const bool is_for_hulls = !table_.is_body(pair.a) && !table_.is_body(pair.b);
+  if (!IsAnswerable(pair) || !is_for_hulls) return Answer(piece, columns, counts);
   if (!piece.check.has_value()) {
     absl::StatusOr<TextbookCheck> begun =
         TextbookCheck::Begin(table_.placed()[pair.a], table_.placed()[pair.b],
                              IsForTeam(pair) ? team_options_ : options_);
-    if (!begun.ok()) return Add(begun.status(), piece, columns, counts);
+    if (!begun.ok()) return Add({begun.status(), std::nullopt}, piece, columns, counts);
     piece.check = *std::move(begun);
   }
   const absl::StatusOr<bool> done = piece.check->Advance(end);
   if (!done.ok()) return done.status();
   if (!*done) return absl::OkStatus();
-  absl::StatusOr<hulld::Answer> answer = piece.check->Finish();
+  PlacedAnswer answer = {piece.check->Finish(), std::nullopt};
   piece.check.reset();
   return Add(std::move(answer), piece, columns, counts);
 }
 
-absl::Status BatchStream::Add(absl::StatusOr<hulld::Answer> answer, PairsPiece& piece,
-                              BatchColumns* columns, RungCounts* counts) {
-  if (absl::IsCancelled(answer.status())) return answer.status();
-  if (answer.ok()) {
-    counts->Add(answer->rung);
+absl::Status BatchStream::Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
+                              RungCounts* counts) {
+  if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
+  if (answer.answer.ok()) {
+    counts->Add(answer.answer->rung);
   } else {
-    answer = NameQueryLimit(answer.status(), options_);
-    call().CountLimit(answer.status());
+    answer.answer = NameQueryLimit(answer.answer.status(), options_);
+    call().CountLimit(answer.answer.status());
   }
   const PlacedPair pair = PairAt(piece.next++);
-  columns->Add(answer, table_.placed()[pair.a], table_.placed()[pair.b]);
+  columns->Add([&](v1::AnswerColumns* to) {
+    return AddPlacedAnswer(table_, pair.a, pair.b, answer, request().wanted(), to);
+  });
   return absl::OkStatus();
 }
 

@@ -13,6 +13,7 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/placement_table.h"
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
@@ -64,7 +65,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
                                 RungCounts* counts);
-  absl::Status Add(absl::StatusOr<hulld::Answer> answer, PairsPiece& piece, BatchColumns* columns,
+  absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
                    RungCounts* counts);
 
   // The size of the team, and the turns of this call on it.

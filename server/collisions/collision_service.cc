@@ -11,14 +11,17 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/query/body/body_search.h"
 #include "core/query/collision.h"
 #include "server/call/unary_call.h"
 #include "server/collisions/batch_stream.h"
+#include "server/collisions/body_question.h"
 #include "server/collisions/collision_stream.h"
 #include "server/collisions/collision_watch.h"
 #include "server/collisions/query_settings.h"
 #include "server/collisions/scene_stream.h"
 #include "server/contract/status_map.h"
+#include "server/registry/bodies/body_resolution.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 
@@ -42,13 +45,66 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
   return {request.a().hull_id(), request.b().hull_id()};
 }
 
-// Whether nothing is left to make before these hulls can be queried.
-bool AreReady(const Resolved& resolved, const QueryOptions& options) {
-  if (!options.WantsCanonical()) return true;
-  for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
-    if (hull.ok() && !hull->served->has_canonical_query_hull()) return false;
+// The first reason why there is no answer.
+absl::Status FirstProblem(const absl::StatusOr<Resolved>& resolved) {
+  if (!resolved.ok()) return resolved.status();
+  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
+    if (!hull.ok()) return hull.status();
   }
-  return true;
+  return absl::OkStatus();
+}
+
+// What stands for a hull where no pair of pieces decided.
+const QueryHull& NoHull() {
+  static const Hull nothing;
+  static const QueryHull no_hull(nothing);
+  return no_hull;
+}
+
+void EncodeVersions(const Store& store, uint64_t revision, const HullView& a, const HullView& b,
+                    v1::CheckCollisionResponse* response) {
+  EncodeHeader(store, revision, response->mutable_header());
+  EncodeVersion(store.id(), a.record, response->mutable_hull_a());
+  EncodeVersion(store.id(), b.record, response->mutable_hull_b());
+}
+
+// a, b: the hulls that decided. They are canonical where the answer names vertices.
+absl::Status EncodeAnswer(const Answer& answer, const QueryHull& a, const QueryHull& b,
+                          const v1::Wanted& wanted, v1::CheckCollisionResponse* response) {
+  response->set_relation(EncodeRelation(answer.relation));
+  response->set_rung(EncodeRung(answer.rung));
+  if (answer.analysis) {
+    EncodeAnalysis(*answer.analysis, a.hull(), b.hull(), response->mutable_analysis());
+  }
+  if (answer.certificate) {
+    EncodeCertificate(*answer.certificate, a.hull(), b.hull(), response->mutable_certificate());
+  }
+  if (answer.separation) EncodeSeparation(*answer.separation, response->mutable_separation());
+  if (answer.witness) EncodeWitness(*answer.witness, response->mutable_witness());
+  if (answer.within_clearance) response->set_within_clearance(*answer.within_clearance);
+  if (!wanted.axis() || !answer.axis.has_value()) return absl::OkStatus();
+  return EncodeAxis(*answer.axis, a.hull(), b.hull(), response->mutable_axis());
+}
+
+void EncodePiece(const std::string& store_id, const BodyQuestion::Side& side, uint32_t piece,
+                 v1::DecidingPiece* message) {
+  message->set_index(piece);
+  EncodeVersion(store_id, side.view().body->hull_of(piece).record, message->mutable_hull());
+}
+
+const QueryHull& HullOfPiece(const BodyQuestion::Side& side, uint32_t piece) {
+  return *side.placed().body().pieces()[piece].hull;
+}
+
+absl::Status EncodeBodyAnswer(const std::string& store_id, const BodyAnswer& answer,
+                              const BodyQuestion::Side& a, const BodyQuestion::Side& b,
+                              const v1::Wanted& wanted, v1::CheckCollisionResponse* response) {
+  if (!answer.pieces) return EncodeAnswer(answer.answer, NoHull(), NoHull(), wanted, response);
+  const PiecePair pieces = *answer.pieces;
+  if (a.is_body()) EncodePiece(store_id, a, pieces.a, response->mutable_piece_a());
+  if (b.is_body()) EncodePiece(store_id, b, pieces.b, response->mutable_piece_b());
+  return EncodeAnswer(answer.answer, HullOfPiece(a, pieces.a), HullOfPiece(b, pieces.b), wanted,
+                      response);
 }
 
 }  // namespace
@@ -59,10 +115,9 @@ struct CollisionService::PairQuery {
   static absl::StatusOr<PairQuery> Read(const Limits& limits, const Call& call,
                                         const v1::CheckCollisionRequest& request);
 
-  // Takes the hulls that were found for it, and gives the response their versions. May make what
-  // queries need of them.
-  absl::Status Place(Registry& registry, absl::StatusOr<Resolved> resolved,
-                     v1::CheckCollisionResponse* response);
+  // Takes the hulls that were found for it, of which none is a body, and gives the response their
+  // versions.
+  void Place(const Registry& registry, Resolved resolved, v1::CheckCollisionResponse* response);
 
   // Requires that Place succeeded.
   bool IsQuick() const {
@@ -105,30 +160,16 @@ absl::StatusOr<CollisionService::PairQuery> CollisionService::PairQuery::Read(
   return query;
 }
 
-absl::Status CollisionService::PairQuery::Place(Registry& registry,
-                                                absl::StatusOr<Resolved> resolved,
-                                                v1::CheckCollisionResponse* response) {
-  if (!resolved.ok()) return resolved.status();
-  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
-    if (!hull.ok()) return hull.status();
-  }
-  views = std::move(resolved->hulls);
+void CollisionService::PairQuery::Place(const Registry& registry, Resolved resolved,
+                                        v1::CheckCollisionResponse* response) {
+  views = std::move(resolved.hulls);
   const bool canonical = options.WantsCanonical();
-  if (canonical) {
-    for (const absl::StatusOr<HullView>& view : views) {
-      const auto made = registry.Canonical(*view, options.should_stop);
-      if (!made.ok()) return made.status();
-    }
-  }
   const auto query_hull = [canonical](const HullView& view) -> const QueryHull& {
     return canonical ? view.served->canonical_query_hull() : view.served->query_hull();
   };
   a = PlacedHull(query_hull(*views[0]), X_WA);
   b = PlacedHull(query_hull(*views[1]), X_WB);
-  EncodeHeader(registry.store(), resolved->store_revision, response->mutable_header());
-  EncodeVersion(registry.store().id(), views[0]->record, response->mutable_hull_a());
-  EncodeVersion(registry.store().id(), views[1]->record, response->mutable_hull_b());
-  return absl::OkStatus();
+  EncodeVersions(registry.store(), resolved.store_revision, *views[0], *views[1], response);
 }
 
 struct CollisionService::TextbookQuery {
@@ -147,19 +188,7 @@ absl::Status CollisionService::PairQuery::Encode(const absl::StatusOr<Answer>& a
   RungCounts counts;
   counts.Add(answer->rung);
   metrics.CountPairs(counts);
-  response->set_relation(EncodeRelation(answer->relation));
-  response->set_rung(EncodeRung(answer->rung));
-  if (answer->analysis) {
-    EncodeAnalysis(*answer->analysis, a->hull(), b->hull(), response->mutable_analysis());
-  }
-  if (answer->certificate) {
-    EncodeCertificate(*answer->certificate, a->hull(), b->hull(), response->mutable_certificate());
-  }
-  if (answer->separation) EncodeSeparation(*answer->separation, response->mutable_separation());
-  if (answer->witness) EncodeWitness(*answer->witness, response->mutable_witness());
-  if (answer->within_clearance) response->set_within_clearance(*answer->within_clearance);
-  if (!wanted.axis() || !answer->axis.has_value()) return absl::OkStatus();
-  return EncodeAxis(*answer->axis, a->hull(), b->hull(), response->mutable_axis());
+  return EncodeAnswer(*answer, a->query_hull(), b->query_hull(), wanted, response);
 }
 
 grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerContext* context,
@@ -174,23 +203,48 @@ void CollisionService::Check(CheckCall* call) {
   const v1::CheckCollisionRequest& request = call->request();
   absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), request);
   if (!query.ok()) return call->End(query.status());
-  std::optional<Resolved> ready = registry_.TryResolve(HullIds(request));
-  if (ready.has_value() && AreReady(*ready, query->options)) {
-    const absl::Status placed = query->Place(registry_, *std::move(ready), &call->response());
-    if (!placed.ok()) return call->End(placed);
-    return Compute(*std::move(query), call);
-  }
-  // Waits for the store, or for canonical snapshots to be made.
+  PlacedLookup lookup;
+  lookup.canonical = query->options.WantsCanonical();
+  lookup.prefix = call->call().caller().prefix;
+  std::optional<Resolved> ready = TryResolvePlaced(registry_, HullIds(request), lookup);
+  if (ready.has_value()) return AnswerPair(*std::move(query), *std::move(ready), call);
+  // Waits for the store, or for canonical snapshots or boxes of pieces to be made.
   const ClientId client = call->call().client();
   readers_.Submit(
-      [this, call, query = *std::move(query)]() mutable {
-        const absl::Status placed = query.Place(
-            registry_, registry_.Resolve(HullIds(call->request()), query.options.should_stop),
-            &call->response());
-        if (!placed.ok()) return call->End(placed);
-        Compute(std::move(query), call);
+      [this, call, lookup, query = *std::move(query)]() mutable {
+        AnswerPair(
+            std::move(query),
+            ResolvePlaced(registry_, HullIds(call->request()), lookup, query.options.should_stop),
+            call);
       },
       client);
+}
+
+void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved,
+                                  CheckCall* call) {
+  if (absl::Status problem = FirstProblem(resolved); !problem.ok()) return call->End(problem);
+  const bool has_body = resolved->hulls[0]->body != nullptr || resolved->hulls[1]->body != nullptr;
+  if (has_body) return AnswerBodies(query, *std::move(resolved), call);
+  query.Place(registry_, *std::move(resolved), &call->response());
+  Compute(std::move(query), call);
+}
+
+void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call) {
+  if (absl::Status s = ValidateForBodies(query.options); !s.ok()) return call->End(s);
+  EncodeVersions(registry_.store(), resolved.store_revision, *resolved.hulls[0], *resolved.hulls[1],
+                 &call->response());
+  BodyQuestion::Start(pool_, *std::move(resolved.hulls[0]), query.X_WA,
+                      *std::move(resolved.hulls[1]), query.X_WB, query.options,
+                      call->call().client(),
+                      [this, call](const absl::StatusOr<BodyAnswer>& answer,
+                                   const BodyQuestion::Side& a, const BodyQuestion::Side& b) {
+                        if (!answer.ok()) return call->End(answer.status());
+                        RungCounts counts;
+                        counts.Add(answer->answer.rung);
+                        call->call().metrics().CountPairs(counts);
+                        call->End(EncodeBodyAnswer(registry_.store().id(), *answer, a, b,
+                                                   call->request().wanted(), &call->response()));
+                      });
 }
 
 void CollisionService::Compute(PairQuery query, CheckCall* call) {

@@ -57,6 +57,8 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
+  void AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call);
+  void AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call);
   // Answers the query on the thread that suits it.
   void Compute(PairQuery query, CheckCall* call);
   // The next piece of a query for the textbook, which lasts as long as its hulls are large: others

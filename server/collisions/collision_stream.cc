@@ -6,6 +6,7 @@
 #include <chrono>
 #include <utility>
 
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
 #include "server/wire/answer_columns.h"
@@ -70,6 +71,7 @@ bool CollisionStream::IsQuick() const {
       if (++pairs > kMostQuickPairs) return false;
       const PairState& pair = pairs_[pairs_of_[k]];
       for (const uint32_t part : {pair.a, pair.b}) {
+        if (table_.is_body(part)) return false;
         if (!IsQuickToRelate(table_.placed()[part].query_hull())) return false;
       }
     }
@@ -178,6 +180,9 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
 
 absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
   if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
+  if (table_.has_bodies()) {
+    if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
+  }
   for (size_t i = 0; i < table_.size(); ++i) {
     if (table_.hull_changed(i)) AskAboutPairsOf(i);
     if (!table_.query_hull_changed(i)) continue;
@@ -203,18 +208,15 @@ void CollisionStream::AskAboutPairsOf(size_t placement) {
   }
 }
 
-absl::StatusOr<Answer> CollisionStream::AnswerPair(PairState& pair) const {
-  return CheckCollision(table_.placed()[pair.a], table_.placed()[pair.b], options_, &pair.cache);
-}
-
 void CollisionStream::AddAnswer(uint32_t index) {
   PairState& pair = pairs_[index];
   const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
-  absl::StatusOr<Answer> answer;
-  if (answerable) answer = AnswerPair(pair);
-  if (answerable && answer.ok()) rungs_.Add(answer->rung);
+  PlacedAnswer answer;
+  if (answerable) answer = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
+  const bool is_answered = answerable && answer.answer.ok();
+  if (is_answered) rungs_.Add(answer.answer->rung);
   const v1::Relation relation =
-      answerable && answer.ok() ? EncodeRelation(answer->relation) : v1::RELATION_UNSPECIFIED;
+      is_answered ? EncodeRelation(answer.answer->relation) : v1::RELATION_UNSPECIFIED;
   const bool changed = relation != pair.relation;
   pair.relation = relation;
   if (only_changes_ && messages_ > 0 && !changed) return;
@@ -222,11 +224,10 @@ void CollisionStream::AddAnswer(uint32_t index) {
   reply().add_pairs(index);
   reply_bytes_ += kIndexBytes;
   if (!answerable) {
-    reply_bytes_ += AddUnanswered(wanted_, columns);
+    reply_bytes_ += AddUnansweredPair(table_, wanted_, columns);
     return;
   }
-  reply_bytes_ +=
-      server::AddAnswer(answer, table_.placed()[pair.a], table_.placed()[pair.b], wanted_, columns);
+  reply_bytes_ += AddPlacedAnswer(table_, pair.a, pair.b, answer, wanted_, columns);
 }
 
 void CollisionStream::SendPart(bool last) {

@@ -68,7 +68,6 @@ class CollisionStream
   absl::Status Refresh(const ReadPlan& plan);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
-  absl::StatusOr<Answer> AnswerPair(PairState& pair) const;
   void AddAnswer(uint32_t index);
   void AnswerSlice();
   void SendPart(bool last);

@@ -156,6 +156,7 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
   if (!valid.ok()) return valid;
   options_ = *std::move(options);
   table_ = *std::move(table);
+  table_.TakeHullsAlone();
   pairs_ = WatchedPairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
   if (absl::Status s = WatchHulls(); !s.ok()) return s;

@@ -6,6 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
@@ -26,33 +27,32 @@ const QueryHull& NoHull() {
   return no_hull;
 }
 
+// Stands in for the body of such placements.
+const QueryBody& NoBody() {
+  static const QueryBody no_body(NoHull());
+  return no_body;
+}
+
+bool IsSame(const HullView& a, const HullView& b) {
+  if (a.record.revision != b.record.revision ||
+      a.record.create_revision != b.record.create_revision) {
+    return false;
+  }
+  if (a.body == nullptr || b.body == nullptr) return a.body == b.body;
+  return std::ranges::equal(
+      a.body->hulls, b.body->hulls,
+      [](const HullView& hull_a, const HullView& hull_b) { return IsSame(hull_a, hull_b); });
+}
+
 bool IsSame(const absl::StatusOr<HullView>& a, const absl::StatusOr<HullView>& b) {
   if (!a.ok() || !b.ok()) return a.ok() == b.ok();
-  return a->record.revision == b->record.revision &&
-         a->record.create_revision == b->record.create_revision;
+  return IsSame(*a, *b);
 }
 
 // What is asked of a hull, or stands in for it.
 const QueryHull& QueryHullOf(const absl::StatusOr<HullView>& hull, bool canonical) {
-  if (!hull.ok()) return NoHull();
+  if (!hull.ok() || hull->body != nullptr) return NoHull();
   return canonical ? hull->served->canonical_query_hull() : hull->served->query_hull();
-}
-
-// Hulls that queries with these options can be asked of. CANCELLED: options.should_stop said so.
-absl::StatusOr<Resolved> ResolveFor(Registry& registry, std::span<const std::string> ids,
-                                    KnownHulls& known, const QueryOptions& options,
-                                    const ReadPlan& plan) {
-  const bool canonical = options.WantsCanonical();
-  absl::StatusOr<Resolved> resolved =
-      registry.Refresh(ids, known, options.should_stop, canonical ? ReadPlan() : plan);
-  if (!resolved.ok() || !canonical) return resolved;
-  for (absl::StatusOr<HullView>& hull : resolved->hulls) {
-    if (!hull.ok()) continue;
-    const absl::Status made = registry.Canonical(*hull, options.should_stop).status();
-    if (absl::IsCancelled(made)) return made;
-    if (!made.ok()) hull = made;
-  }
-  return resolved;
 }
 
 absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
@@ -102,7 +102,7 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
 }
 
 PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller& caller)
-    : is_packed_(true) {
+    : is_packed_(true), prefix_(caller.prefix) {
   std::vector<absl::Status> malformed(packed.hull_ids_size());
   named_.resize(malformed.size());
   for (size_t k = 0; k < named_.size(); ++k) {
@@ -130,7 +130,8 @@ PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller&
 }
 
 PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-                               const Caller& caller) {
+                               const Caller& caller)
+    : prefix_(caller.prefix) {
   std::unordered_map<std::string, size_t> index_of;
   entries_.resize(placements.size());
   for (size_t i = 0; i < entries_.size(); ++i) {
@@ -161,12 +162,25 @@ size_t PlacementTable::MemoryBytes() const {
          ids_.size() *
              (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
-         entries_.size() * sizeof(uint32_t) + of_ids;
+         entries_.size() * sizeof(uint32_t) + of_ids + BodyBytes();
+}
+
+// Known once they are resolved.
+size_t PlacementTable::BodyBytes() const {
+  size_t bytes = bodies_.capacity() * sizeof(PlacedBody) + known_.BodyBytes();
+  for (const auto& body : bodies_of_hulls_) {
+    if (body != nullptr) bytes += sizeof(QueryBody) + body->boxes().MemoryBytes();
+  }
+  return bytes;
+}
+
+PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPlan& plan) const {
+  return {options.WantsCanonical(), prefix_, takes_bodies_, plan};
 }
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
                                      const ReadPlan& plan) {
-  KnownHulls known;
+  KnownPlaced known;
   return ResolveFrom(registry, known, options, plan);
 }
 
@@ -175,9 +189,10 @@ absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& opt
   return ResolveFrom(registry, known_, options, plan);
 }
 
-absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownHulls& known,
+absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
                                          const QueryOptions& options, const ReadPlan& plan) {
-  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids_, known, options, plan);
+  absl::StatusOr<Resolved> resolved =
+      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
   Take(registry, *std::move(resolved), options.WantsCanonical());
   return absl::OkStatus();
@@ -188,8 +203,9 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
-  KnownHulls known;
-  absl::StatusOr<Resolved> resolved = ResolveFor(registry, ids, known, options, {});
+  HULLD_CHECK(!takes_bodies_);
+  absl::StatusOr<Resolved> resolved =
+      ResolvePlaced(registry, ids, LookupFor(options, {}), options.should_stop);
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
@@ -208,13 +224,9 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
 
 bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
                                 const ReadPlan& plan) {
-  const bool canonical = options.WantsCanonical();
-  std::optional<Resolved> resolved = registry.TryResolve(ids_, canonical ? ReadPlan() : plan);
+  std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, LookupFor(options, plan));
   if (!resolved.has_value()) return false;
-  for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
-    if (canonical && hull.ok() && !hull->served->has_canonical_query_hull()) return false;
-  }
-  Take(registry, *std::move(resolved), canonical);
+  Take(registry, *std::move(resolved), options.WantsCanonical());
   return true;
 }
 
@@ -240,7 +252,34 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved, bool cano
   placed_.clear();
   placed_.reserve(entries_.size());
   for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
+  TakeBodies();
   if (by_hull_begin_.empty()) SortByHull();
+}
+
+// Where there are bodies, hulls are asked about as bodies of one piece.
+void PlacementTable::TakeBodies() {
+  bodies_.clear();
+  bodies_of_hulls_.clear();
+  query_bodies_.clear();
+  const bool has_any = std::ranges::any_of(
+      hulls_, [](const auto& hull) { return hull.ok() && hull->body != nullptr; });
+  if (!has_any) return;
+  bodies_of_hulls_.resize(ids_.size());
+  for (size_t k = 0; k < ids_.size(); ++k) {
+    if (hulls_[k].ok() && hulls_[k]->body != nullptr) {
+      query_bodies_.push_back(&hulls_[k]->body->query);
+      continue;
+    }
+    bodies_of_hulls_[k] = std::make_unique<const QueryBody>(*query_hulls_[k]);
+    query_bodies_.push_back(bodies_of_hulls_[k].get());
+  }
+  bodies_.reserve(entries_.size());
+  for (size_t i = 0; i < entries_.size(); ++i) bodies_.push_back(PlaceBody(i));
+}
+
+PlacedBody PlacementTable::PlaceBody(size_t i) const {
+  if (!is_answerable(i)) return PlacedBody(NoBody(), Pose());
+  return PlacedBody(*query_bodies_[*entries_[i].hull], entries_[i].pose);
 }
 
 void PlacementTable::SortByHull() {
@@ -282,6 +321,7 @@ void PlacementTable::Move(size_t i, const Pose& X_WH) {
   entry.pose = X_WH;
   entry.malformed = absl::OkStatus();
   placed_[i] = Place(i);
+  if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
 void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {

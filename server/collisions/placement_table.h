@@ -7,18 +7,20 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/query/body/placed_body.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/pose.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
-#include "server/registry/known_hulls.h"
+#include "server/registry/bodies/body_resolution.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
@@ -37,11 +39,15 @@ class PlacementTable {
       const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
-  // Resolves every hull once, all at one revision of the store, for queries that answer with
-  // `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
+  // Bodies are no hulls for this table: placements that name one have a problem.
+  void TakeHullsAlone() { takes_bodies_ = false; }
+
+  // Resolves every hull and body once, all at one revision of the store, for queries that answer
+  // with `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  // The same for who does so again and again: only hulls that changed since are looked up.
+  // The same for a caller that does so again and again: only hulls that changed since are looked
+  // up.
   absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
   // The same as Resolve, but false, at once, where it would have to wait or to make something.
@@ -52,17 +58,30 @@ class PlacementTable {
   size_t hull_count() const { return ids_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
+  // Of a body, an empty hull stands in.
   std::span<const PlacedHull> placed() const { return placed_; }
+  // Whether a placement is a body; then bodies() holds every placement, hulls too. Otherwise it is
+  // empty.
+  bool has_bodies() const { return !bodies_.empty(); }
+  std::span<const PlacedBody> bodies() const { return bodies_; }
+  bool is_body(size_t i) const { return has_bodies() && !bodies_[i].body().is_hull(); }
+  // A hull, or the hull of a piece, for what it is made of alone: its pose means nothing.
+  PlacedHull HullOfPiece(size_t i, uint32_t piece) const {
+    const auto pieces = bodies_[i].body().pieces();
+    return piece < pieces.size() ? PlacedHull(*pieces[piece].hull, Pose()) : placed_[i];
+  }
   bool is_answerable(size_t i) const { return problem(i).ok(); }
   // Why not, else OK. Requires that the hulls were resolved.
   const absl::Status& problem(size_t i) const;
-  // Whether the last Resolve gave this placement another hull, or took it, or gave it one.
+  // Whether the last Resolve gave this placement another hull, or took it, or gave it one; of a
+  // body, also another hull of a piece.
   bool hull_changed(size_t i) const;
   // Whether it gave it another QueryHull, perhaps of the same hull: what was found before must not
   // name that one's points.
   bool query_hull_changed(size_t i) const;
 
-  // The same as Resolve for a few of hull_ids(), by index; the others stay as they are.
+  // The same as Resolve for a few of hull_ids(), by index; the others stay as they are. Requires a
+  // table of hulls alone.
   absl::Status ResolveSome(Registry& registry, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
@@ -107,9 +126,13 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
-  absl::Status ResolveFrom(Registry& registry, KnownHulls& known, const QueryOptions& options,
+  absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
+  PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
   void Take(const Registry& registry, Resolved resolved, bool canonical);
+  void TakeBodies();
+  size_t BodyBytes() const;
+  PlacedBody PlaceBody(size_t i) const;
   void SortByHull();
   PlacedHull Place(size_t i) const;
 
@@ -122,7 +145,7 @@ class PlacementTable {
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
   // For Refresh.
-  KnownHulls known_;
+  KnownPlaced known_;
   // What is asked of each: its own, or NoHull's.
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;
@@ -134,6 +157,15 @@ class PlacementTable {
   std::string store_id_;
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
+
+  bool takes_bodies_ = true;
+  // The caller's.
+  std::string prefix_;
+  // Where any of hulls_ is a body: of each what is asked; parallel to ids_. Those of hulls are
+  // kept here.
+  std::vector<const QueryBody*> query_bodies_;
+  std::vector<std::unique_ptr<const QueryBody>> bodies_of_hulls_;
+  std::vector<PlacedBody> bodies_;
 };
 
 // Placements that move, each with its new pose.

@@ -2,6 +2,7 @@
 
 #include <absl/strings/str_cat.h>
 
+#include "core/query/body/body_search.h"
 #include "server/contract/limit_error.h"
 #include "server/wire/decode.h"
 
@@ -43,6 +44,10 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
   options.max_textbook_axes = limits.max_textbook_axes;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
   return options;
+}
+
+absl::Status ValidateForBodies(const QueryOptions& options) {
+  return ValidateBodyOptions(options, kFieldNames);
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {

@@ -17,6 +17,9 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);
 
+// OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone.
+absl::Status ValidateForBodies(const QueryOptions& options);
+
 // Whether the relation of this hull and another such takes no longer than moving the bytes of the
 // question and of the answer does, so that one of gRPC's threads may find it.
 bool IsQuickToRelate(const QueryHull& hull);

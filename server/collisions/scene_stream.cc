@@ -96,6 +96,7 @@ absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
 }
 
 absl::Status SceneStream::Prepare() {
+  options_.bodies = table_.bodies();
   absl::StatusOr<SceneSearch> search = SceneSearch::Make(table_.placed(), options_);
   if (!search.ok()) return search.status();
   search_ = *std::move(search);
@@ -135,11 +136,12 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
       ++piece.next;
       continue;
     }
-    const absl::StatusOr<Answer> answer = search_->Ask(a, *b);
-    if (absl::IsCancelled(answer.status())) return answer.status();
+    PlacedAnswer answer;
+    answer.answer = search_->Ask(a, *b, &answer.pieces);
+    if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
     piece.totals.set_candidates(piece.totals.candidates() + 1);
-    if (answer.ok()) piece.rungs.Add(answer->rung);
-    if (answer.ok() && !search_->IsFound(*answer)) continue;
+    if (answer.answer.ok()) piece.rungs.Add(answer.answer->rung);
+    if (answer.answer.ok() && !search_->IsFound(*answer.answer)) continue;
     reply_bytes += AddFound(a, *b, answer, piece, &reply);
     if (reply_bytes < FullMessageBytes(request().wanted())) continue;
     piece.Add(std::exchange(reply, {}));
@@ -150,13 +152,13 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   return absl::OkStatus();
 }
 
-size_t SceneStream::AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer,
-                             ScenePiece& piece, v1::FindCollisionsResponse* reply) {
+size_t SceneStream::AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece,
+                             v1::FindCollisionsResponse* reply) {
   const int position = reply->pairs_size() / 2;
   reply->add_pairs(a);
   reply->add_pairs(b);
-  const size_t bytes = AddAnswer(answer, table_.placed()[a], table_.placed()[b], request().wanted(),
-                                 reply->mutable_columns());
+  const size_t bytes =
+      AddPlacedAnswer(table_, a, b, answer, request().wanted(), reply->mutable_columns());
   Count(reply->columns().relations(position), &piece.totals);
   return kPairBytes + bytes;
 }

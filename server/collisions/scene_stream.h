@@ -12,6 +12,7 @@
 #include "core/query/scene.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
@@ -59,7 +60,7 @@ class SceneStream
   void OnAllDelivered() override;
 
   // Without the mutex.
-  size_t AddFound(uint32_t a, uint32_t b, const absl::StatusOr<Answer>& answer, ScenePiece& piece,
+  size_t AddFound(uint32_t a, uint32_t b, const PlacedAnswer& answer, ScenePiece& piece,
                   v1::FindCollisionsResponse* reply);
 
   // Written before the first piece.

@@ -36,6 +36,14 @@ const char* RpcName(Rpc rpc) {
       return "WatchHulls";
     case Rpc::kWatchCollisions:
       return "WatchCollisions";
+    case Rpc::kPutBody:
+      return "PutBody";
+    case Rpc::kGetBody:
+      return "GetBody";
+    case Rpc::kListBodies:
+      return "ListBodies";
+    case Rpc::kDeleteBody:
+      return "DeleteBody";
     case Rpc::kServerReflectionInfo:
       return "ServerReflectionInfo";
   }

@@ -22,6 +22,10 @@ enum class Rpc {
   kSaveBackup,
   kWatchHulls,
   kWatchCollisions,
+  kPutBody,
+  kGetBody,
+  kListBodies,
+  kDeleteBody,
   // Of gRPC's own protocol.
   kServerReflectionInfo,
 };

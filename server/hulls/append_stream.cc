@@ -57,7 +57,7 @@ void AppendStream::OnDone() {
 void AppendStream::LogApplied() {
   if (applied_chunks_ == 0) return;
   call().LogChange(
-      "points appended", hull_id_, last_revision_,
+      "points appended", {"hull", hull_id_}, last_revision_,
       {{"writer", writer_id_}, {"chunks", applied_chunks_}, {"points", applied_points_}});
 }
 
@@ -110,7 +110,7 @@ void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   session_ = opened->session;
   hull_id_ = opened->hull.hull_id;
   if (session_->created_hull) {
-    call().LogChange("hull created", opened->hull.hull_id, opened->hull.revision);
+    call().LogChange("hull created", {"hull", opened->hull.hull_id}, opened->hull.revision);
   }
   if (end().has_value()) return;
   v1::AppendPointsResponse opened_reply;

@@ -85,20 +85,20 @@ void HullService::Create(CreateCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return call->End(s);
   }
-  registry_.Create(request.hull_id(), request.if_absent(),
-                   [this, call](const absl::StatusOr<CreateResult>& created) {
-                     if (!created.ok()) return call->End(created.status());
-                     const HullRecord& hull = created->hull;
-                     if (created->created) {
-                       call->call().LogChange("hull created", hull.hull_id, hull.revision);
-                     }
-                     v1::CreateHullResponse& response = call->response();
-                     EncodeHeader(registry_.store(), created->store_revision,
-                                  response.mutable_header());
-                     EncodeRecord(hull, response.mutable_hull());
-                     response.set_created(created->created);
-                     call->End(absl::OkStatus());
-                   });
+  registry_.Create(
+      request.hull_id(), request.if_absent(),
+      [this, call](const absl::StatusOr<CreateResult>& created) {
+        if (!created.ok()) return call->End(created.status());
+        const HullRecord& hull = created->hull;
+        if (created->created) {
+          call->call().LogChange("hull created", {"hull", hull.hull_id}, hull.revision);
+        }
+        v1::CreateHullResponse& response = call->response();
+        EncodeHeader(registry_.store(), created->store_revision, response.mutable_header());
+        EncodeRecord(hull, response.mutable_hull());
+        response.set_created(created->created);
+        call->End(absl::OkStatus());
+      });
 }
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,
@@ -155,13 +155,13 @@ void HullService::Delete(DeleteCall* call) {
   }
   const auto if_revision =
       request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
-  registry_.Delete(request.hull_id(), if_revision,
-                   [this, call](const absl::StatusOr<uint64_t>& revision) {
-                     if (!revision.ok()) return call->End(revision.status());
-                     call->call().LogChange("hull deleted", call->request().hull_id(), *revision);
-                     EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
-                     call->End(absl::OkStatus());
-                   });
+  registry_.Delete(
+      request.hull_id(), if_revision, [this, call](const absl::StatusOr<uint64_t>& revision) {
+        if (!revision.ok()) return call->End(revision.status());
+        call->call().LogChange("hull deleted", {"hull", call->request().hull_id()}, *revision);
+        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
+        call->End(absl::OkStatus());
+      });
 }
 
 }  // namespace hulld::server

@@ -107,8 +107,8 @@ void ReplaceStream::Commit() {
     // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());
-    call().LogChange(result->created ? "hull created" : "hull replaced", result->hull.hull_id,
-                     result->hull.revision);
+    call().LogChange(result->created ? "hull created" : "hull replaced",
+                     {"hull", result->hull.hull_id}, result->hull.revision);
     call().metrics().CountPoints(result->hull.counts);
     v1::ReplaceHullResponse response;
     EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());

@@ -63,6 +63,11 @@ ChangeFeed::~ChangeFeed() {
   thread_.join();
 }
 
+void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
+  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
+  revision_ = revision;
+}
+
 void ChangeFeed::Begin(uint64_t revision) { revision_ = deletions_begin_ = revision; }
 
 void ChangeFeed::NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {

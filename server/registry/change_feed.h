@@ -114,6 +114,8 @@ class ChangeFeed {
   void Close(const std::shared_ptr<ChangeWatch>& watch);
 
   static const WatchTarget& TargetOf(const ChangeWatch& watch);
+  // What is not watched was given this revision: watches that wait are told that it moved on.
+  void NoteOther(const Locked& locked, uint64_t revision);
   // Whether all that went after this revision is remembered.
   bool Remembers(uint64_t revision) const { return revision >= deletions_begin_; }
   // Moves a watch back to where everything is told, and says so.

@@ -78,7 +78,8 @@ absl::Status Registry::Load() {
   if (cache_.damaged > 0) {
     spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
   }
-  return status;
+  if (!status.ok()) return status;
+  return LoadBodies();
 }
 
 Registry::HullPointer Registry::Find(const std::string& id) const {
@@ -113,9 +114,10 @@ void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Statu
 }
 
 absl::Status Registry::CheckHullCount() const {
-  if (hulls_.size() < limits_.max_hulls) return absl::OkStatus();
-  return LimitExceeded(absl::StrCat("the store holds ", hulls_.size(), " hulls"), limits_.max_hulls,
-                       "max-hulls");
+  if (hulls_.size() + bodies_.size() < limits_.max_hulls) return absl::OkStatus();
+  std::string held = absl::StrCat("the store holds ", hulls_.size(), " hulls");
+  if (!bodies_.empty()) absl::StrAppend(&held, " and ", bodies_.size(), " bodies");
+  return LimitExceeded(held, limits_.max_hulls, "max-hulls");
 }
 
 void Registry::Publish(uint64_t revision) {
@@ -158,6 +160,7 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
 // There must be no such hull, which Insert checks.
 void Registry::CreateNew(Locked& locked, const std::string& id,
                          const std::function<void(Locked&, absl::StatusOr<HullPointer>)>& done) {
+  if (bodies_.contains(id)) return done(locked, BodyExists(id));
   if (absl::Status s = CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
   change.revision = ++assigned_revision_;
@@ -188,7 +191,7 @@ void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
   const HullPointer hull = Find(id);
-  if (hull == nullptr) return Answer<uint64_t>(locked, done, HullNotFound(id));
+  if (hull == nullptr) return Answer<uint64_t>(locked, done, NoSuchHull(id));
   if (!hull->state.quiet()) {
     hull->exclusive.push_back(
         [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
@@ -260,7 +263,8 @@ absl::Status Registry::CheckReplacement(const RegisteredHull* former,
         v1::ERROR_REASON_REVISION_MISMATCH,
         {{"hull_id", id}, {"if_revision", *if_revision}, {"current_revision", uint64_t{0}}});
   }
-  if (!replacement.create_if_absent) return HullNotFound(id);
+  if (!replacement.create_if_absent) return NoSuchHull(id);
+  if (bodies_.contains(id)) return BodyExists(id);
   return CheckHullCount();
 }
 
@@ -420,7 +424,7 @@ HoldStatistics Registry::Holds() const {
 
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(mutex_);
-  return {revision_, hulls_.size() - creating_, vertex_count_};
+  return {revision_, hulls_.size() - creating_, vertex_count_, bodies_.size()};
 }
 
 CacheStatistics Registry::Cache() const {

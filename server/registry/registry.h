@@ -3,6 +3,8 @@
 
 #include <absl/status/statusor.h>
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -16,6 +18,7 @@
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
+#include "server/registry/bodies/body.h"
 #include "server/registry/change_feed.h"
 #include "server/registry/committer.h"
 #include "server/registry/hull_state.h"
@@ -30,9 +33,10 @@ namespace hulld::server {
 
 struct PendingChunk;
 
-// Keeps hulls by ID: for each its record, and, while it is in use or memory allows, a builder and
-// its points as a LiveHull, of which readers are given versions. What is not in memory is read back
-// from the store at first use.
+// Keeps hulls by ID, and bodies, whose IDs are of the same namespace: of a body all that is known,
+// which is its pieces (registry_bodies.cc). Keeps for each hull its record, and, while it is in use
+// or memory allows, a builder and its points as a LiveHull, of which readers are given versions.
+// What is not in memory is read back from the store at first use.
 //
 // The registry owns IDs, revisions and the rules of change: what may follow what, and what readers
 // see. HullState says what a hull can be in, the Committer brings changes to the store, and the
@@ -104,6 +108,22 @@ class Registry {
   // NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
   // --max-hulls, or the disk is full; UNAVAILABLE: as above.
   void Replace(Replacement replacement, Reply<ReplaceResult> done);
+
+  // Puts a body in the place of another or of none, at once for all readers; its revisions are
+  // given here. Replies as above. Requires valid IDs and poses (unchecked), and pieces, at most
+  // --max-pieces-per-body. The hulls of the pieces need not exist.
+  // ALREADY_EXISTS: a hull has the ID; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
+  // --max-hulls, --memory-limit, or the disk is full; UNAVAILABLE: as above.
+  void PutBody(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done);
+  // Removes a body. Replies with the store's revision, as above.
+  // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
+  void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  // As List.
+  BodyPage ListBodies(const std::string& prefix, const std::string& after, size_t page_size) const;
+  // Cost: O(log n) each; others pass after each kMostLookupsPerHold.
+  FoundBodies FindBodies(std::span<const std::string> ids) const;
+  // Whether there may be a body. Takes no lock.
+  bool has_bodies() const { return body_count_.load(std::memory_order_relaxed) > 0; }
 
   // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
   HullPage List(const std::string& prefix, const std::string& after, size_t page_size) const;
@@ -213,6 +233,17 @@ class Registry {
                                                   const HullPointer& hull,
                                                   const absl::Status& status);
 
+  absl::Status NoSuchHull(const std::string& id) const;
+  absl::Status LoadBodies();
+  void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
+                     std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
+  absl::Status CheckBody(Locked& locked, const std::string& id,
+                         std::optional<uint64_t> if_revision);
+  void DeleteBodyLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
+                        const Reply<uint64_t>& done);
+  void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
+  void ForgetBody(const std::string& id);
+
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
 
@@ -274,6 +305,10 @@ class Registry {
   uint64_t vertex_count_ = 0;
   uint64_t last_watch_ = 0;
   std::map<std::string, HullPointer> hulls_;
+  // No ID is in both.
+  std::map<std::string, RegisteredBody> bodies_;
+  // As many as bodies_ holds.
+  std::atomic<size_t> body_count_ = 0;
   // Those of hulls_ whose creation is not committed yet.
   uint64_t creating_ = 0;
   // For readers that look up hulls in slices, or again.

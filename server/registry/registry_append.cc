@@ -99,7 +99,7 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   };
   const HullPointer hull = Find(request->hull_id);
   if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(locked, HullNotFound(request->hull_id));
+    if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
     return CreateNew(
         locked, request->hull_id,

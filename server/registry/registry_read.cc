@@ -88,7 +88,7 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls&
   while (true) {
     const HullPointer hull = FindVisible(id);
     if (hull == nullptr) {
-      known.view = HullNotFound(id);
+      known.view = NoSuchHull(id);
       return absl::OkStatus();
     }
     if (hull->state.damaged()) {

@@ -14,15 +14,21 @@
 #include "core/numeric/vector.h"
 #include "core/query/placed/live_hull.h"
 #include "server/registry/served_hull.h"
+#include "server/store/body_record.h"
 #include "server/store/hull_record.h"
 
 // What the registry is asked and what it answers.
 namespace hulld::server {
 
-// A hull as one reader sees it: what is served belongs to the record's revision.
+struct ServedBody;
+
+// A hull as one reader sees it: what is served belongs to the record's revision. Or a body where
+// those are asked for (ResolvePlaced): then `record` holds its ID and revisions alone, and `served`
+// is null.
 struct HullView {
   HullRecord record;
   std::shared_ptr<const ServedHull> served;
+  std::shared_ptr<const ServedBody> body = nullptr;
 };
 
 // What a reader is about to do with the hulls that it asks for.
@@ -80,10 +86,36 @@ struct HullPage {
   bool more = false;
 };
 
+// A body of one revision, known to many readers.
+class Body;
+
+struct PutBodyResult {
+  uint64_t store_revision = 0;
+  BodyRecord body;
+  uint64_t piece_count = 0;
+  // Whether there was none before.
+  bool created = false;
+};
+
+struct BodyPage {
+  uint64_t store_revision = 0;
+  // Those that are damaged, too.
+  std::vector<std::shared_ptr<const Body>> bodies;
+  bool more = false;
+};
+
+// Bodies by ID, in the order asked for; null where there is none. Up to
+// Registry::kMostLookupsPerHold of them were all current at the revision.
+struct FoundBodies {
+  uint64_t store_revision = 0;
+  std::vector<std::shared_ptr<const Body>> bodies;
+};
+
 struct RegistrySizes {
   uint64_t store_revision = 0;
   uint64_t hull_count = 0;
   uint64_t vertex_count = 0;
+  uint64_t body_count = 0;
 };
 
 // What the registry holds of hulls in memory, and how that served so far.

@@ -15,6 +15,8 @@ namespace hulld::server {
 namespace {
 
 constexpr uint64_t kMaxVertexIndex = std::numeric_limits<uint32_t>::max();
+// Answers hold the index of a piece as a signed one.
+constexpr uint64_t kMaxPieceIndex = std::numeric_limits<int32_t>::max();
 constexpr uint64_t kMaxGrpcMessageBytes = std::numeric_limits<int32_t>::max();
 
 std::string EnvironmentName(std::string flag) {
@@ -189,13 +191,17 @@ class Parser {
              "Points in one message of AppendPoints", kAny);
     AddLimit("max-vertices-per-hull", limits.max_vertices_per_hull, "Vertices of one hull",
              kMaxVertexIndex);
-    AddLimit("max-hulls", limits.max_hulls, "Hulls in the store", kAny);
+    AddLimit("max-hulls", limits.max_hulls, "Hulls and bodies in the store", kAny);
     AddLimit("max-pairs-per-batch", limits.max_pairs_per_batch, "Pairs in one BatchCheckCollisions",
              kAny);
     AddLimit("max-textbook-axes", limits.max_textbook_axes,
              "Candidate axes of one pair under TEXTBOOK_SAT", kAny);
     AddLimit("max-writers-per-hull", limits.max_writers_per_hull,
              "Writers whose sequences are kept for one hull", kAny);
+    AddLimit("max-pieces-per-body", limits.max_pieces_per_body,
+             "Pieces of one body; their answer beyond 10000 may exceed the 4 MiB that gRPC's "
+             "clients take unless told otherwise",
+             kMaxPieceIndex);
     AddLimit(
         "memory-limit", limits.memory_limit,
         "Bytes of memory that hulls, points on their way to them, replacements under way and the "

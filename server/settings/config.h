@@ -32,6 +32,8 @@ struct Limits {
   uint64_t max_placements = 200'000;
   uint64_t max_textbook_axes = 10'000'000;
   uint64_t max_writers_per_hull = 100'000;
+  // GetBody's answer, at the longest IDs, stays under the 4 MiB that every gRPC client takes.
+  uint64_t max_pieces_per_body = 10'000;
   // Bytes that hulls in memory may hold, replacements under way too, points that wait to be built
   // or stored, and the placements, pairs and answers of batches, scenes and streams; beside
   // messages of calls and the store's own buffers. 0: half of what the machine or the control group

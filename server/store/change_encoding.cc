@@ -45,14 +45,28 @@ void PutBase(rocksdb::WriteBatch& batch, const Change& change) {
   }
 }
 
+// The first body makes the store one that an older hulld does not open: it would give the body's ID
+// to a hull.
+void EncodeBody(rocksdb::WriteBatch& batch, const StoredBody& body, bool deleted) {
+  const std::string key = BodyKey(body.record.body_id);
+  if (deleted) {
+    batch.Delete(key);
+    return;
+  }
+  PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
+  PutSealed(batch, key, EncodeStoredBody(body));
+}
+
 }  // namespace
 
 bool EndsUnknown(const Change& change) {
+  if (change.body != nullptr) return false;
   if (change.deleted) return change.hull.record.create_revision == 0;
   return change.replaced.has_value() && change.replaced->record.create_revision == 0;
 }
 
 void EncodeChange(rocksdb::WriteBatch& batch, const Change& change) {
+  if (change.body != nullptr) return EncodeBody(batch, *change.body, change.deleted);
   const HullRecord& record = change.hull.record;
   const std::string hull_key = HullKey(record.hull_id);
   if (change.replaced.has_value()) {

@@ -19,6 +19,7 @@ class MemoryStore : public Store {
   bool keeps_hulls() const override { return false; }
   uint64_t revision() const override { return 0; }
   absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
+  absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
     return KeepsNothing();
   }

@@ -183,7 +183,7 @@ absl::Status RocksDbStore::ReadMeta() {
 absl::Status RocksDbStore::InitializeMeta() {
   id_ = RandomId();
   rocksdb::WriteBatch batch;
-  PutSealed(batch, kFormatKey, EncodeNumber(kStoreFormat));
+  PutSealed(batch, kFormatKey, EncodeNumber(kFormatWithoutBodies));
   PutSealed(batch, kStoreIdKey, id_);
   PutSealed(batch, kRevisionKey, EncodeNumber(0));
   return WriteMeta(&batch);

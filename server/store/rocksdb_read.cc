@@ -90,6 +90,15 @@ absl::Status RocksDbStore::ForEachHull(const StoredHullVisitor& visit) {
                    });
 }
 
+absl::Status RocksDbStore::ForEachBody(const StoredBodyVisitor& visit) {
+  return ScanRange(std::string(1, kBodyPrefix), std::string(1, kBodyPrefix + 1),
+                   [&](std::string_view key, std::string_view sealed) {
+                     const std::string body_id(key.substr(1));
+                     visit(body_id, UnsealStoredBody(body_id, sealed));
+                     return absl::OkStatus();
+                   });
+}
+
 absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {
   VertexAssembly assembly(hull);
   absl::Status status = LoadBase(hull, &assembly);

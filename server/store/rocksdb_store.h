@@ -63,6 +63,7 @@ class RocksDbStore : public Store {
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
+  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;

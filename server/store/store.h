@@ -6,12 +6,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/hull/hull.h"
+#include "server/store/body_record.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
@@ -37,7 +39,7 @@ enum class VertexChange {
   kReplaced,
 };
 
-// One hull, created, changed or deleted.
+// One hull, or one body, created, changed or deleted.
 struct Change {
   // The hull after the change; what is deleted if it is.
   StoredHull hull;
@@ -52,11 +54,17 @@ struct Change {
   std::optional<WriterSequence> writer;
   // The incarnation that this one takes the place of, if there is one.
   std::optional<StoredHull> replaced;
+  // The body after the change, or what is deleted if it is. Then all but `revision` and `deleted`
+  // is unused.
+  std::shared_ptr<const StoredBody> body;
 };
 
 // A hull that a store holds: its ID, and the rest, or DATA_LOSS naming the hull when what is kept
 // of it is damaged.
 using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<StoredHull>)>;
+
+// The same for bodies.
+using StoredBodyVisitor = std::function<void(const std::string&, absl::StatusOr<StoredBody>)>;
 
 // Operations that failed so far, each counted once, by what the system refused.
 struct StoreFailures {
@@ -96,6 +104,8 @@ class Store {
 
   // Every hull, in byte order of the IDs.
   virtual absl::Status ForEachHull(const StoredHullVisitor& visit) = 0;
+  // Every body, likewise.
+  virtual absl::Status ForEachBody(const StoredBodyVisitor& visit) = 0;
   // Points whose hull `hull` is. DATA_LOSS naming the hull: something is missing or damaged.
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
   // The writer's last committed sequence; 0 when there is none.

@@ -66,4 +66,11 @@ absl::Status DamagedHull(const std::string& hull_id, const std::string& finding)
       v1::ERROR_REASON_HULL_DAMAGED, {{"hull_id", hull_id}});
 }
 
+absl::Status DamagedBody(const std::string& body_id, const std::string& finding) {
+  return WithReason(
+      absl::DataLossError(absl::StrCat("body \"", body_id, "\" is damaged in the store (", finding,
+                                       "); put it anew or delete it, or restore a backup")),
+      v1::ERROR_REASON_BODY_DAMAGED, {{"body_id", body_id}});
+}
+
 }  // namespace hulld::server

@@ -25,6 +25,7 @@ absl::Status CannotBeRead(const std::string& data_dir);
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only);
 // DATA_LOSS: what is kept of this hull is damaged. finding: what is wrong with it.
 absl::Status DamagedHull(const std::string& hull_id, const std::string& finding);
+absl::Status DamagedBody(const std::string& body_id, const std::string& finding);
 
 }  // namespace hulld::server
 

@@ -51,6 +51,10 @@ std::string HullKey(std::string_view hull_id) {
   return std::string(1, kHullPrefix).append(hull_id);
 }
 
+std::string BodyKey(std::string_view body_id) {
+  return std::string(1, kBodyPrefix).append(body_id);
+}
+
 std::string IncarnationKey(char prefix, uint64_t incarnation) {
   return std::string(1, prefix).append(BigEndian(incarnation));
 }

@@ -14,8 +14,9 @@
 
 namespace hulld::server {
 
-// Keys and values of the durable store, format version 1. Numbers in keys are big endian, so that
-// byte order is theirs; numbers in values are little endian.
+// Keys and values of the durable store, format version 2. A store takes that version with its first
+// body; until then it is of version 1, so that a hulld which knows no bodies can open it. Numbers
+// in keys are big endian, so that byte order is theirs; numbers in values are little endian.
 //
 //   m/format, m/store_id, m/revision     of the store
 //   m/relaxed                            while --durability=relaxed has it open; without a value
@@ -23,11 +24,14 @@ namespace hulld::server {
 //   w<incarnation><writer ID>            the writer's last committed sequence
 //   b<incarnation><revision><part>       vertices of a base, in parts
 //   d<incarnation><revision>             vertices of a delta
+//   p<body ID>                           a StoredBody, from format version 2 on
 //
 // An incarnation is a create_revision. Every value ends in the CRC-32 of key and value, so that a
 // value that was damaged, or that belongs to another key, is recognized where it is used.
 
-inline constexpr uint64_t kStoreFormat = 1;
+// The latest, and that of a store that never had a body.
+inline constexpr uint64_t kStoreFormat = 2;
+inline constexpr uint64_t kFormatWithoutBodies = 1;
 inline constexpr char kFormatKey[] = "m/format";
 inline constexpr char kStoreIdKey[] = "m/store_id";
 inline constexpr char kRevisionKey[] = "m/revision";
@@ -36,10 +40,12 @@ inline constexpr char kHullPrefix = 'h';
 inline constexpr char kWriterPrefix = 'w';
 inline constexpr char kBasePrefix = 'b';
 inline constexpr char kDeltaPrefix = 'd';
+inline constexpr char kBodyPrefix = 'p';
 // Vertices of one part of a base: 768 KiB.
 inline constexpr size_t kBasePartVertices = 32768;
 
 std::string HullKey(std::string_view hull_id);
+std::string BodyKey(std::string_view body_id);
 // Where an incarnation's keys of one kind start; they end before those of incarnation + 1.
 std::string IncarnationKey(char prefix, uint64_t incarnation);
 // The incarnation in any of the keys below.

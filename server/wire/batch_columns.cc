@@ -21,17 +21,6 @@ v1::AnswerColumns* BatchColumns::ColumnsForNext() {
   return messages_.back().mutable_columns();
 }
 
-void BatchColumns::AddUnanswered() {
-  bytes_ += server::AddUnanswered(wanted_, ColumnsForNext());
-  ++next_pair_;
-}
-
-void BatchColumns::Add(const absl::StatusOr<Answer>& answer, const PlacedHull& a,
-                       const PlacedHull& b) {
-  bytes_ += AddAnswer(answer, a, b, wanted_, ColumnsForNext());
-  ++next_pair_;
-}
-
 std::vector<v1::BatchCheckCollisionsResponse> BatchColumns::Take() { return std::move(messages_); }
 
 }  // namespace hulld::server

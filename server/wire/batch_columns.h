@@ -1,14 +1,10 @@
 #ifndef HULLD_SERVER_WIRE_BATCH_COLUMNS_H_
 #define HULLD_SERVER_WIRE_BATCH_COLUMNS_H_
 
-#include <absl/status/statusor.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "core/query/collision.h"
-#include "core/query/placed/placed_hull.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld::server {
@@ -20,10 +16,12 @@ class BatchColumns {
   BatchColumns(v1::BatchCheckCollisionsResponse head, const v1::Wanted& wanted,
                uint64_t first_pair);
 
-  // The answer for the next pair, of hulls a and b, or why there is none (AddAnswer).
-  void Add(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b);
-  // The next pair has no answer; its placements give the cause.
-  void AddUnanswered();
+  // The next pair: `add_row` adds its row to the columns and returns its size, as AddAnswer does.
+  template <typename AddRow>
+  void Add(AddRow add_row) {
+    bytes_ += add_row(ColumnsForNext());
+    ++next_pair_;
+  }
 
   std::vector<v1::BatchCheckCollisionsResponse> Take();
 

@@ -39,8 +39,12 @@ std::string Explain(const absl::Status& status, const std::string& server,
     case absl::StatusCode::kUnauthenticated:
       return WithHint(message, "give it with --token-file or $HULLD_TOKEN");
     case absl::StatusCode::kNotFound:
-      return WithHint(message, "see 'hullctl list'");
+      return WithHint(message, reason == v1::ERROR_REASON_BODY_NOT_FOUND ? "see 'hullctl body list'"
+                                                                         : "see 'hullctl list'");
     case absl::StatusCode::kAlreadyExists:
+      if (reason == v1::ERROR_REASON_BODY_EXISTS) {
+        return WithHint(message, "see 'hullctl body delete'");
+      }
       return WithHint(message, "accept it with --if-absent, or see 'hullctl delete'");
     case absl::StatusCode::kAborted:
       return WithHint(message, "see its revision with 'hullctl get'");

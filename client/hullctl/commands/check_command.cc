@@ -23,6 +23,16 @@ std::string VersionText(const v1::HullVersion& hull) {
   return hull.hull_id() + "  (revision " + std::to_string(hull.revision()) + ")";
 }
 
+std::string PieceText(const v1::DecidingPiece& piece) {
+  return std::to_string(piece.index()) + ": " + VersionText(piece.hull());
+}
+
+// Of bodies, the pieces that decided.
+void AddPieces(const v1::CheckCollisionResponse& response, Table* table) {
+  if (response.has_piece_a()) table->Row({"piece of A", PieceText(response.piece_a())});
+  if (response.has_piece_b()) table->Row({"piece of B", PieceText(response.piece_b())});
+}
+
 std::string FeatureText(const v1::Feature& feature) {
   constexpr int kShown = 8;
   std::string text = feature.vertex_indices_size() == 1 ? "vertex" : "vertices";
@@ -81,6 +91,7 @@ void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
       .Row({"A", VersionText(response.hull_a())})
       .Row({"B", VersionText(response.hull_b())})
       .Row({"decided by", RungText(response.rung())});
+  AddPieces(response, &table);
   AddMeasures(request, response, &table);
   if (request.wanted().axis()) AddAxis(response, &table);
   if (request.wanted().certificate()) {
@@ -166,11 +177,11 @@ void AddPoseOption(Command command, const std::string& name, v1::Placement* plac
 void AddCheckCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CheckArguments>();
   v1::CheckCollisionRequest* const request = &arguments->request;
-  Command command = program.AddCommand("check", "Ask whether two hulls collide");
-  command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull")
+  Command command = program.AddCommand("check", "Ask whether two hulls or bodies collide");
+  command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull or a body")
       .Required()
       .Completes(ValueKind::kHull);
-  command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull")
+  command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull or a body")
       .Required()
       .Completes(ValueKind::kHull);
   AddPoseOption(command, "--pose-a", request->mutable_a());
@@ -188,7 +199,9 @@ void AddCheckCommand(Command program, Invocation* invocation) {
           "Write question and answer, with its certificate, for 'hullctl verify'; - is standard "
           "output, in place of the answer")
       .ValueName("FILE");
-  command.SetDetails("Lengths are in the unit of the points.");
+  command.SetDetails(
+      "Lengths are in the unit of the points. Of a body ('hullctl body --help') the answer names\n"
+      "the pieces that decided; certificates and --textbook are for hulls alone.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",

@@ -22,6 +22,7 @@ void AddMoreLimits(const v1::Limits& limits, Table* table) {
       .Row({"max waiting calls", std::to_string(limits.max_waiting_calls())})
       .Row({"max streams per client", std::to_string(limits.max_streams_per_client())})
       .Row({"max concurrent batches", std::to_string(limits.max_concurrent_batches())})
+      .Row({"max pieces per body", std::to_string(limits.max_pieces_per_body())})
       .Row({"max writers per hull", std::to_string(limits.max_writers_per_hull())})
       .Row({"memory limit bytes", std::to_string(limits.memory_limit_bytes())});
   if (limits.has_max_request_time()) {
@@ -45,7 +46,11 @@ void Print(const Invocation& run, const v1::GetStatusResponse& status, const std
       .Row({"max hulls", std::to_string(limits.max_hulls())})
       .Row({"max pairs per batch", std::to_string(limits.max_pairs_per_batch())})
       .Row({"max textbook axes", std::to_string(limits.max_textbook_axes())});
-  if (run.wide()) AddMoreLimits(limits, &table);
+  if (run.wide()) {
+    const bool known = status.has_body_count();
+    table.Row({"bodies", known ? std::to_string(status.body_count()) : "-"});
+    AddMoreLimits(limits, &table);
+  }
   table.Print(run.out);
 }
 

@@ -32,7 +32,7 @@ bool AreParallel(const v1::AnswerColumns& columns, size_t count) {
          columns.separations_size() == columns.separation_bounds_size() &&
          fits(columns.witness_xyz_size(), kWitnessNumbers) &&
          columns.witness_xyz_size() == kWitnessNumbers * columns.witness_errors_size() &&
-         fits(columns.within_clearance_size());
+         fits(columns.within_clearance_size()) && fits(columns.pieces_size(), 2);
 }
 
 AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
@@ -55,6 +55,7 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
     row.witness->set_error(columns.witness_errors(i));
   }
   if (columns.within_clearance_size() > 0) row.within_clearance = columns.within_clearance(i);
+  if (columns.pieces_size() > 0) row.pieces = {columns.pieces(2 * i), columns.pieces(2 * i + 1)};
   return row;
 }
 
@@ -66,6 +67,11 @@ std::string RowText(const AnswerRow& row, const Painter& paint) {
     cells.push_back(DirectionText(row.witness->point_b()));
   }
   if (row.within_clearance) cells.emplace_back(*row.within_clearance ? "within" : "beyond");
+  if (row.pieces) {
+    const auto name = [](int32_t piece) { return piece < 0 ? "-" : std::to_string(piece); };
+    cells.push_back(
+        absl::StrCat("pieces ", name(row.pieces->first), " ", name(row.pieces->second)));
+  }
   if (row.axis != nullptr) {
     const bool found = row.axis->kind() != v1::AXIS_KIND_UNSPECIFIED;
     cells.push_back(found ? absl::StrCat(AxisKindText(row.axis->kind()), " ",
@@ -88,6 +94,9 @@ void AddRow(const AnswerRow& row, JsonObject* object) {
   if (row.witness) object->AddJson("witness", MessageJson(*row.witness));
   if (row.within_clearance) {
     object->AddJson("withinClearance", *row.within_clearance ? "true" : "false");
+  }
+  if (row.pieces) {
+    object->AddJson("pieces", absl::StrCat("[", row.pieces->first, ",", row.pieces->second, "]"));
   }
   if (row.axis != nullptr) object->AddJson("axis", MessageJson(*row.axis));
   if (row.certificate != nullptr) object->AddJson("certificate", MessageJson(*row.certificate));

@@ -2,8 +2,10 @@
 #define HULLD_CLIENT_HULLCTL_PRINTING_ANSWER_ROW_H_
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/painter.h"
@@ -21,6 +23,8 @@ struct AnswerRow {
   std::optional<v1::Separation> separation;
   std::optional<v1::Witness> witness;
   std::optional<bool> within_clearance;
+  // The pieces of bodies that decided, -1 where none did; absent without bodies.
+  std::optional<std::pair<int32_t, int32_t>> pieces;
 };
 
 // Whether each column is empty or holds `count` entries.

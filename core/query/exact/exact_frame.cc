@@ -14,6 +14,8 @@ namespace {
 
 // Four squares of them, and sums of products as large, stay below 2^123.
 constexpr int kMostQuaternionBits = 60;
+// So do products of two norms of so many bits together, and sums of three such.
+constexpr int kMostNormBits = 120;
 
 int BitWidth(Int128 magnitude) {
   const auto high = static_cast<uint64_t>(magnitude >> 64);
@@ -89,11 +91,38 @@ bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) 
   return true;
 }
 
+bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation) {
+  if (placed.product() == nullptr) return FindSmallRotation(placed.X_WH().q, rotation);
+  SmallRotation outer, inner;
+  if (!FindSmallRotation(placed.product()->X_WB().q, outer)) return false;
+  if (!FindSmallRotation(placed.product()->X_BP().q, inner)) return false;
+  // Rows are as long as the norm: each of the three products below is at most that of the norms.
+  if (BitWidth(outer.norm) + BitWidth(inner.norm) > kMostNormBits) return false;
+  rotation.norm = outer.norm * inner.norm;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      rotation.rows[i][j] = outer.rows[i][0] * inner.rows[0][j] +
+                            outer.rows[i][1] * inner.rows[1][j] +
+                            outer.rows[i][2] * inner.rows[2][j];
+    }
+  }
+  return true;
+}
+
+std::array<const Pose*, 2> PosesOf(const PlacedHull& placed) {
+  const PoseProduct* const product = placed.product();
+  if (product == nullptr) return {&placed.X_WH(), &placed.X_WH()};
+  return {&product->X_WB(), &product->X_BP()};
+}
+
+int TranslationExponent(const PlacedHull& placed, int otherwise) {
+  for (const Pose* pose : PosesOf(placed)) otherwise = LowestBitExponent(pose->t, otherwise);
+  return otherwise;
+}
+
 bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame) {
-  const Pose& X_WA = pair.a().X_WH();
-  const Pose& X_WB = pair.b().X_WH();
-  if (!FindSmallRotation(X_WA.q, frame.a.rotation)) return false;
-  if (!FindSmallRotation(X_WB.q, frame.b.rotation)) return false;
+  if (!FindSmallRotation(pair.a(), frame.a.rotation)) return false;
+  if (!FindSmallRotation(pair.b(), frame.b.rotation)) return false;
   const Int128 norm_a = frame.a.rotation.norm;
   const Int128 norm_b = frame.b.rotation.norm;
   const bool same_norm = norm_a == norm_b;
@@ -104,11 +133,17 @@ bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame) {
   frame.b.exponent = pair.b().query_hull().exponent();
   frame.exponent =
       std::min({frame.a.exponent, frame.b.exponent,
-                LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents))});
+                TranslationExponent(pair.a(), TranslationExponent(pair.b(), kAboveAllExponents))});
   int translation_bits = 0;
-  for (int i = 0; i < 3; ++i) {
-    for (const double t : {X_WA.t[i], X_WB.t[i]}) {
-      if (t != 0) translation_bits = std::max(translation_bits, ExponentAbove(t) - frame.exponent);
+  for (const PlacedHull* placed : {&pair.a(), &pair.b()}) {
+    // |R(q) t_P / |q|^2 + t_B| is at most 1 + sqrt(3) times the larger of the largest components.
+    const int of_sum = placed->product() == nullptr ? 0 : 2;
+    for (const Pose* pose : PosesOf(*placed)) {
+      for (int i = 0; i < 3; ++i) {
+        const double t = pose->t[i];
+        if (t == 0) continue;
+        translation_bits = std::max(translation_bits, ExponentAbove(t) - frame.exponent + of_sum);
+      }
     }
   }
   const auto add_side = [&](const PlacedHull& placed, SmallFrame::Side& side) {

@@ -47,6 +47,16 @@ inline constexpr int WordsFor(int bits) { return (bits + 9 + 63) / 64; }
 // zero.
 bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation);
 
+// The rotation of a placed hull. That of a piece of a body is the product of two, which is small
+// where its norm is below 2^120, as it is when one of them turns by no angle or by quarter turns.
+bool FindSmallRotation(const PlacedHull& placed, SmallRotation& rotation);
+
+// The poses that place a hull: its own, or both of a piece of a body.
+std::array<const Pose*, 2> PosesOf(const PlacedHull& placed);
+// The least exponent of the lowest bits of the translations that place it, or `otherwise` when that
+// is less.
+int TranslationExponent(const PlacedHull& placed, int otherwise);
+
 // False where a quaternion has no small rotation. Cost: about 50 ns.
 bool FindSmallFrame(const FloatPair& pair, SmallFrame& frame);
 

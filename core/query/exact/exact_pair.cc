@@ -50,19 +50,42 @@ IntegerRotation RotationOf(const std::array<double, 4>& q) {
           ww + xx + yy + zz};
 }
 
+IntegerRotation RotationOf(const PlacedHull& placed) {
+  if (placed.product() == nullptr) return RotationOf(placed.X_WH().q);
+  const IntegerRotation outer = RotationOf(placed.product()->X_WB().q);
+  const IntegerRotation inner = RotationOf(placed.product()->X_BP().q);
+  IntegerRotation product;
+  for (int i = 0; i < 3; ++i) {
+    product.rows[i] = outer.rows[i].x * inner.rows[0] + outer.rows[i].y * inner.rows[1] +
+                      outer.rows[i].z * inner.rows[2];
+  }
+  product.norm_squared = outer.norm_squared * inner.norm_squared;
+  return product;
+}
+
+// The norm of the rotation times the translation over 2^exponent: integers, as the translation of a
+// piece of a body, R(q_B) t_P / |q_B|^2 + t_B, has a divisor of that norm as its denominator.
+IntegerVector ScaledTranslation(const PlacedHull& placed, const Integer& norm, int exponent) {
+  const PoseProduct* const product = placed.product();
+  if (product == nullptr) return norm * ToInteger(placed.X_WH().t, exponent);
+  const IntegerRotation body = RotationOf(product->X_WB().q);
+  const IntegerVector t_P = ToInteger(product->X_BP().t, exponent);
+  const IntegerVector turned = {Dot(body.rows[0], t_P), Dot(body.rows[1], t_P),
+                                Dot(body.rows[2], t_P)};
+  return (norm / body.norm_squared) * turned + norm * ToInteger(product->X_WB().t, exponent);
+}
+
 }  // namespace
 
 ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
-  const Pose& X_WA = filter.a().X_WH();
-  const Pose& X_WB = filter.b().X_WH();
-  const IntegerRotation R_A = RotationOf(X_WA.q);
-  const IntegerRotation R_B = RotationOf(X_WB.q);
+  const IntegerRotation R_A = RotationOf(filter.a());
+  const IntegerRotation R_B = RotationOf(filter.b());
   a_ = {&filter.a().query_hull(), {}, {}, {}};
   b_ = {&filter.b().query_hull(), {}, {}, {}};
   const int exponent_a = a_.hull->exponent();
   const int exponent_b = b_.hull->exponent();
   const int shift_exponent =
-      LowestBitExponent(X_WA.t, LowestBitExponent(X_WB.t, kAboveAllExponents));
+      TranslationExponent(filter.a(), TranslationExponent(filter.b(), kAboveAllExponents));
   const int common = std::min({exponent_a, exponent_b, shift_exponent});
   // A common norm need not be multiplied in twice.
   const bool same_norm = R_A.norm_squared == R_B.norm_squared;
@@ -75,11 +98,11 @@ ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
   exponent_ = common;
   norm_ = factor_a * R_A.norm_squared;
   a_.shift = {0, 0, 0};
-  b_.shift = norm_ * (ToInteger(X_WB.t, common) - ToInteger(X_WA.t, common));
+  b_.shift = ScaledTranslation(filter.b(), norm_, common) - TranslationA();
 }
 
 IntegerVector ExactPair::TranslationA() const {
-  return norm_ * ToInteger(filter_->a().X_WH().t, exponent_);
+  return ScaledTranslation(filter_->a(), norm_, exponent_);
 }
 
 IntegerVector ExactPair::ToWorld(const Side& side, const IntegerVector& own) {

@@ -21,8 +21,9 @@ using ExactCorner = MinkowskiVertex<IntegerVector>;
 // With Q the quaternions' integers and N = |Q|^2, the world coordinates, shifted by -t_A and
 // multiplied by N_A N_B and a power of two, are integers: N_B R(Q_A) P_A for A, and N_A R(Q_B) P_B
 // + N_A N_B (T_B - T_A) for B; or by N_A alone where N_A = N_B. Degree 5 in the input; some 280
-// bits at a common exponent. The floating-point pair, where it is usable, narrows down which
-// vertices can be farthest, so that only these are multiplied out.
+// bits at a common exponent. For a piece of a body, whose pose is a product, R and N are the
+// products of two, and N T is an integer all the same: degree 9. The floating-point pair, where it
+// is usable, narrows down which vertices can be farthest, so that only these are multiplied out.
 class ExactPair {
  public:
   // Makes the pair for the hulls and poses of `filter`, which must outlive it.

@@ -47,6 +47,11 @@ class WidePair {
     const WideInteger<2> norm_b = WideOf(frame.b.rotation.norm);
     SetRows(frame, frame.a, norm_b, a_);
     SetRows(frame, frame.b, norm_a, b_);
+    for (int i = 0; i < 3; ++i) a_.shift[i] = 0;
+    if (filter.a().product() != nullptr || filter.b().product() != nullptr) [[unlikely]] {
+      ShiftByProducts(frame);
+      return;
+    }
     Number norm(norm_a);
     if (frame.a.times_other_norm) norm = LowProduct<kWords>(norm, norm_b);
     const Vector& t_A = filter.a().X_WH().t;
@@ -54,7 +59,6 @@ class WidePair {
     for (int i = 0; i < 3; ++i) {
       const Number step = WideIntegerOf<kWords>(t_B[i], frame.exponent) -
                           WideIntegerOf<kWords>(t_A[i], frame.exponent);
-      a_.shift[i] = 0;
       b_.shift[i] = LowProduct<kWords>(norm, step);
     }
   }
@@ -211,6 +215,52 @@ class WidePair {
         if (from.times_other_norm) entry = LowProduct<kWords>(entry, other_norm);
         side.rows[i][j] = shift == 0 ? entry : Shifted(entry, shift);
       }
+    }
+  }
+
+  static Coordinates WideCoordinates(const Vector& t, int exponent) {
+    return {WideIntegerOf<kWords>(t.x(), exponent), WideIntegerOf<kWords>(t.y(), exponent),
+            WideIntegerOf<kWords>(t.z(), exponent)};
+  }
+
+  // The norm of a hull's rotation times its translation over 2^exponent. With the rows and norm n_B
+  // of a body, and n_P of its piece: n_P (rows_B t_P + n_B t_B).
+  static Coordinates ScaledTranslation(const PlacedHull& placed, const SmallFrame::Side& side,
+                                       int exponent) {
+    Coordinates scaled;
+    const PoseProduct* const product = placed.product();
+    if (product == nullptr) {
+      const Coordinates t = WideCoordinates(placed.X_WH().t, exponent);
+      for (int i = 0; i < 3; ++i) {
+        scaled[i] = LowProduct<kWords>(WideOf(side.rotation.norm), t[i]);
+      }
+      return scaled;
+    }
+    SmallRotation body, piece;
+    HULLD_CHECK(FindSmallRotation(product->X_WB().q, body) &&
+                FindSmallRotation(product->X_BP().q, piece));
+    const Coordinates t_B = WideCoordinates(product->X_WB().t, exponent);
+    const Coordinates t_P = WideCoordinates(product->X_BP().t, exponent);
+    for (int i = 0; i < 3; ++i) {
+      const Number sum = LowProduct<kWords>(WideOf(body.rows[i][0]), t_P.x) +
+                         LowProduct<kWords>(WideOf(body.rows[i][1]), t_P.y) +
+                         LowProduct<kWords>(WideOf(body.rows[i][2]), t_P.z) +
+                         LowProduct<kWords>(WideOf(body.norm), t_B[i]);
+      scaled[i] = LowProduct<kWords>(WideOf(piece.norm), sum);
+    }
+    return scaled;
+  }
+
+  // b_.shift, where a pose is a product of two.
+  void ShiftByProducts(const SmallFrame& frame) {
+    Coordinates of_a = ScaledTranslation(filter_->a(), frame.a, frame.exponent);
+    Coordinates of_b = ScaledTranslation(filter_->b(), frame.b, frame.exponent);
+    for (int i = 0; i < 3; ++i) {
+      if (frame.a.times_other_norm) {
+        of_a[i] = LowProduct<kWords>(of_a[i], WideOf(frame.b.rotation.norm));
+        of_b[i] = LowProduct<kWords>(of_b[i], WideOf(frame.a.rotation.norm));
+      }
+      b_.shift[i] = of_b[i] - of_a[i];
     }
   }
 

@@ -3,7 +3,31 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/numeric/expansion.h"
+
 namespace hulld {
+
+void FloatPair::TakeProducts() {
+  Vector offset;
+  double error = 0;
+  double sizes = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double t_A = a_->X_WH().t[i];
+    const double t_B = b_->X_WH().t[i];
+    const double rest_a = a_->product() == nullptr ? 0 : a_->product()->translation_rest()[i];
+    const double rest_b = b_->product() == nullptr ? 0 : b_->product()->translation_rest()[i];
+    const SumWithError difference = TwoSum(t_B, -t_A);
+    offset[i] = difference.sum + (difference.error + (rest_b - rest_a));
+    sizes = std::max(sizes, std::abs(t_A) + std::abs(t_B));
+  }
+  for (const PlacedHull* placed : {a_, b_}) {
+    if (placed->product() != nullptr) error += placed->product()->translation_error();
+  }
+  offset_ = offset;
+  size_ = a_->query_hull().max_abs_coordinate() + b_->query_hull().max_abs_coordinate() +
+          LargestComponent(offset_);
+  usable_ = IsFilterSize(size_) && error + kProductOffsetError * sizes <= kUnitRoundoff * size_;
+}
 
 std::span<const uint32_t> FloatPair::CandidatesOf(const PlacedHull& placed,
                                                   const PlainVector& n_own, double error,

@@ -36,12 +36,16 @@ class FloatPair {
               LargestComponent(offset_)),
         usable_(IsFilterSize(size_)) {
     HULLD_DCHECK(!a.empty() && !b.empty());
+    if (a.product() != nullptr || b.product() != nullptr) [[unlikely]] {
+      TakeProducts();
+    }
   }
 
   const PlacedHull& a() const { return *a_; }
   const PlacedHull& b() const { return *b_; }
   // Whether the bounds below hold: false when the pair's size is beyond [kFilterMinSize,
-  // kFilterMaxSize].
+  // kFilterMaxSize], or when pieces of bodies are so far from the origins of these, or of the
+  // world, that rounding their poses is not small beside the pair.
   bool usable() const { return usable_; }
   // The size S of the pair that the bounds are relative to.
   double size() const { return size_; }
@@ -92,6 +96,8 @@ class FloatPair {
   Vector InnerDifference() const { return InnerPoint(*a_) - (InnerPoint(*b_) + Vector(offset_)); }
 
  private:
+  // Where a pose is a product: the offset with what its rounding lacks.
+  void TakeProducts();
   static Vector InnerPoint(const PlacedHull& placed);
   // How far the value of a candidate may be below the largest. Products of edges may be beyond the
   // range of directions: even then nothing overflows, and what underflows, 2^-1070, is far below

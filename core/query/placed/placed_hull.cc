@@ -51,6 +51,11 @@ PlacedHull::PlacedHull(const QueryHull& hull, const Pose& X_WH)
   HULLD_DCHECK(ValidatePose(X_WH).ok());
 }
 
+PlacedHull::PlacedHull(const QueryHull& hull, const PoseProduct& X_WH)
+    : PlacedHull(hull, X_WH.rounded()) {
+  product_ = &X_WH;
+}
+
 absl::StatusOr<PlacedHull> PlacedHull::Make(const QueryHull& hull, const Pose& X_WH) {
   // Both returns name this one variable, so that the hull is constructed in the caller's place.
   absl::StatusOr<PlacedHull> placed;

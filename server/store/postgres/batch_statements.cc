@@ -109,11 +109,16 @@ class Encoder {
     }
   }
 
+  void AddBody(const std::string& body_id, const Change& last) {
+    if (last.deleted) return no_bodies_.Add({body_id}, &drops_);
+    bodies_.Add({body_id, Seal(BodyKey(body_id), EncodeStoredBody(*last.body))}, &puts_);
+  }
+
   std::vector<Statement> Take() && {
-    for (RowsOfTable* table : {&no_hulls_, &no_writers_, &no_bases_, &no_deltas_}) {
+    for (RowsOfTable* table : {&no_hulls_, &no_bodies_, &no_writers_, &no_bases_, &no_deltas_}) {
       table->Flush(&drops_);
     }
-    for (RowsOfTable* table : {&hulls_, &writers_, &bases_, &deltas_}) table->Flush(&puts_);
+    for (RowsOfTable* table : {&hulls_, &bodies_, &writers_, &bases_, &deltas_}) table->Flush(&puts_);
     std::ranges::move(puts_, std::back_inserter(drops_));
     return std::move(drops_);
   }
@@ -135,10 +140,12 @@ class Encoder {
   std::vector<Statement> drops_;
   std::vector<Statement> puts_;
   RowsOfTable no_hulls_{"hulld_drop_hulls", {Element::kText}};
+  RowsOfTable no_bodies_{"hulld_drop_bodies", {Element::kText}};
   RowsOfTable no_writers_{"hulld_drop_writers", {Element::kText}};
   RowsOfTable no_bases_{"hulld_drop_bases", {Element::kText}};
   RowsOfTable no_deltas_{"hulld_drop_deltas", {Element::kText}};
   RowsOfTable hulls_{"hulld_put_hulls", {Element::kText, Element::kBytea}};
+  RowsOfTable bodies_{"hulld_put_bodies", {Element::kText, Element::kBytea}};
   RowsOfTable writers_{"hulld_put_writers",
                        {Element::kText, Element::kBigint, Element::kText, Element::kBytea}};
   RowsOfTable bases_{
@@ -153,12 +160,16 @@ class Encoder {
 std::string PrepareBatchStatements() {
   return R"(
     PREPARE hulld_drop_hulls(text[]) AS DELETE FROM hulld.hulls WHERE hull_id = ANY ($1);
+    PREPARE hulld_drop_bodies(text[]) AS DELETE FROM hulld.bodies WHERE body_id = ANY ($1);
     PREPARE hulld_drop_writers(text[]) AS DELETE FROM hulld.writers WHERE hull_id = ANY ($1);
     PREPARE hulld_drop_bases(text[]) AS DELETE FROM hulld.bases WHERE hull_id = ANY ($1);
     PREPARE hulld_drop_deltas(text[]) AS DELETE FROM hulld.deltas WHERE hull_id = ANY ($1);
     PREPARE hulld_put_hulls(text[], bytea[]) AS
       INSERT INTO hulld.hulls (hull_id, record) SELECT * FROM unnest($1, $2)
       ON CONFLICT (hull_id) DO UPDATE SET record = excluded.record;
+    PREPARE hulld_put_bodies(text[], bytea[]) AS
+      INSERT INTO hulld.bodies (body_id, body) SELECT * FROM unnest($1, $2)
+      ON CONFLICT (body_id) DO UPDATE SET body = excluded.body;
     PREPARE hulld_put_writers(text[], bigint[], text[], bytea[]) AS
       INSERT INTO hulld.writers (hull_id, incarnation, writer_id, sequence)
       SELECT * FROM unnest($1, $2, $3, $4)
@@ -173,10 +184,18 @@ std::string PrepareBatchStatements() {
 
 std::vector<Statement> StatementsOf(std::span<const Change* const> changes) {
   std::map<std::string, HullRows> hulls;
-  for (const Change* change : changes) hulls[change->hull.record.hull_id].Add(*change);
+  std::map<std::string, const Change*> bodies;
+  for (const Change* change : changes) {
+    if (change->body != nullptr) {
+      bodies[change->body->record.body_id] = change;
+    } else {
+      hulls[change->hull.record.hull_id].Add(*change);
+    }
+  }
   Encoder encoder;
   for (const auto& [hull_id, rows] : hulls) encoder.AddDrops(hull_id, rows);
   for (const auto& [hull_id, rows] : hulls) encoder.AddRows(hull_id, rows);
+  for (const auto& [body_id, last] : bodies) encoder.AddBody(body_id, *last);
   return std::move(encoder).Take();
 }
 

@@ -27,8 +27,8 @@ constexpr std::chrono::milliseconds kLongestTurnPause{250};
 // synchronous_commit = off, from the start of a server until it ends in order.
 //
 // hulld.epochs tells what each epoch began with. The other tables hold what store_keys.h lists, by
-// the ID of the hull first; an incarnation is a create_revision. record, sequence and vertices are
-// sealed values. Coordinates do not compress, hence EXTERNAL.
+// the ID of the hull or body first; an incarnation is a create_revision. record, body, sequence and
+// vertices are sealed values. Coordinates do not compress, hence EXTERNAL.
 //
 // Plain tables and statements, so that databases that speak PostgreSQL's protocol and spread rows
 // by key could take them.
@@ -53,6 +53,9 @@ constexpr char kTables[] = R"(
   CREATE TABLE hulld.hulls (
     hull_id text COLLATE "C" PRIMARY KEY,
     record bytea NOT NULL);
+  CREATE TABLE hulld.bodies (
+    body_id text COLLATE "C" PRIMARY KEY,
+    body bytea NOT NULL);
   CREATE TABLE hulld.writers (
     hull_id text COLLATE "C",
     incarnation bigint,
@@ -122,6 +125,8 @@ constexpr char kPrepareReads[] = R"(
     PREPARE hulld_owner AS SELECT owner FROM hulld.store;
     PREPARE hulld_hulls_after(text, integer) AS
       SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2;
+    PREPARE hulld_bodies_after(text, integer) AS
+      SELECT body_id, body FROM hulld.bodies WHERE body_id > $1 ORDER BY body_id LIMIT $2;
     PREPARE hulld_base(text, bigint, bigint) AS
       SELECT part, vertices FROM hulld.bases
       WHERE hull_id = $1 AND incarnation = $2 AND revision = $3 ORDER BY part;

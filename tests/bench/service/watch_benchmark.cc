@@ -169,7 +169,8 @@ class Watcher : public grpc::ClientReadReactor<v1::WatchHullsResponse> {
 
   void AwaitSynced() {
     std::unique_lock lock(mutex_);
-    ended_.wait(lock, [this] { return is_synced_; });
+    ended_.wait(lock, [this] { return is_synced_ || is_done_; });
+    if (!is_synced_) Require(status_, "WatchHulls");
   }
 
  private:
@@ -185,8 +186,9 @@ class Watcher : public grpc::ClientReadReactor<v1::WatchHullsResponse> {
     }
     StartRead(&message_);
   }
-  void OnDone(const grpc::Status&) override {
+  void OnDone(const grpc::Status& status) override {
     const std::lock_guard lock(mutex_);
+    status_ = status;
     is_done_ = true;
     ended_.notify_all();
   }
@@ -200,6 +202,7 @@ class Watcher : public grpc::ClientReadReactor<v1::WatchHullsResponse> {
   std::condition_variable ended_;
   bool is_synced_ = false;
   bool is_done_ = false;
+  grpc::Status status_;
 };
 
 void MeasureFloor(const std::string& address) {
@@ -301,8 +304,8 @@ void MeasureFlood(const ChildServer& server) {
 
 int Run(int argc, char** argv) {
   const ChildServer server({argc > 1 ? argv[1] : HULLD_PROGRAM, "--listen", "127.0.0.1:0",
-                            "--store", "memory", "--max-streams-per-client", "2000", "--log-level",
-                            "info"});
+                            "--store", "memory", "--max-streams-per-client", "2000",
+                            "--max-calls-per-client", "4000", "--log-level", "info"});
   std::printf("case,samples,p50_us,p99_us,changes_per_s,events_per_s,grown_mib\n");
   MeasureFloor(server.address());
   MeasureDelay(server.address(), "one watcher", 1, kAppends);

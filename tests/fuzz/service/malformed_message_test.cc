@@ -54,9 +54,10 @@ TEST_F(MalformedMessage, FirstOfAStreamIsRefused) {
 
 // These ended UNIMPLEMENTED, as gRPC parsed them.
 TEST_F(MalformedMessage, OfACallWithOneRequestIsRefused) {
-  for (const Rpc rpc : {Rpc::kCreateHull, Rpc::kGetHull, Rpc::kGetHullMesh, Rpc::kListHulls,
-                        Rpc::kDeleteHull, Rpc::kCheckCollision, Rpc::kBatchCheckCollisions,
-                        Rpc::kFindCollisions, Rpc::kGetStatus, Rpc::kSaveBackup}) {
+  for (const Rpc rpc :
+       {Rpc::kCreateHull, Rpc::kGetHull, Rpc::kGetHullMesh, Rpc::kListHulls, Rpc::kDeleteHull,
+        Rpc::kCheckCollision, Rpc::kBatchCheckCollisions, Rpc::kFindCollisions, Rpc::kGetStatus,
+        Rpc::kSaveBackup, Rpc::kPutBody, Rpc::kGetBody, Rpc::kListBodies, Rpc::kDeleteBody}) {
     const grpc::Status status = Send(rpc, {kCutShort});
     EXPECT_EQ(status.error_code(), grpc::INVALID_ARGUMENT) << server::RpcName(rpc);
     EXPECT_THAT(status.error_message(), HasSubstr("a message is malformed"));

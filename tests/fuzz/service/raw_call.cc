@@ -19,8 +19,9 @@ using google::protobuf::ServiceDescriptor;
 // Of the services that the program is linked with.
 const MethodDescriptor* FindMethod(server::Rpc rpc) {
   for (const char* service :
-       {"hulld.v1.HullService", "hulld.v1.CollisionService", "hulld.v1.StatusService",
-        "hulld.v1.MaintenanceService", "grpc.reflection.v1alpha.ServerReflection"}) {
+       {"hulld.v1.HullService", "hulld.v1.BodyService", "hulld.v1.CollisionService",
+        "hulld.v1.StatusService", "hulld.v1.MaintenanceService",
+        "grpc.reflection.v1alpha.ServerReflection"}) {
     const ServiceDescriptor* const found =
         DescriptorPool::generated_pool()->FindServiceByName(service);
     if (found == nullptr) continue;

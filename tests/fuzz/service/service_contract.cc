@@ -18,9 +18,10 @@ Codes CodesOf(Rpc rpc) {
     case Rpc::kCreateHull:
       return {grpc::INVALID_ARGUMENT, grpc::ALREADY_EXISTS};
     case Rpc::kAppendPoints:
-      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::FAILED_PRECONDITION, grpc::ABORTED};
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::FAILED_PRECONDITION, grpc::ABORTED,
+              grpc::ALREADY_EXISTS};
     case Rpc::kReplaceHull:
-      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED, grpc::ALREADY_EXISTS};
     case Rpc::kGetHull:
     case Rpc::kGetHullMesh:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
@@ -35,6 +36,14 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kCheckCollision:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
+    case Rpc::kPutBody:
+      return {grpc::INVALID_ARGUMENT, grpc::ALREADY_EXISTS, grpc::ABORTED};
+    case Rpc::kGetBody:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
+    case Rpc::kListBodies:
+      return {grpc::INVALID_ARGUMENT};
+    case Rpc::kDeleteBody:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kSaveBackup:
       return {grpc::FAILED_PRECONDITION};
     case Rpc::kServerReflectionInfo:

@@ -16,6 +16,7 @@
 #include <string>
 #include <string_view>
 
+#include "hulld/v1/body.pb.h"
 #include "server/access/caller.h"
 #include "tests/server/harness/test_certificates.h"
 #include "tests/server/harness/test_server.h"
@@ -49,6 +50,13 @@ template <typename Request>
 std::vector<std::string> WithHullId(const std::string& hull_id) {
   Request request;
   request.set_hull_id(hull_id);
+  return {request.SerializeAsString()};
+}
+
+template <typename Request>
+std::vector<std::string> WithBodyId(const std::string& body_id) {
+  Request request;
+  request.set_body_id(body_id);
   return {request.SerializeAsString()};
 }
 
@@ -149,6 +157,27 @@ const std::map<std::string, CallRule>& Rules() {
           return std::vector{open.SerializeAsString()};
         },
         CallRule::kInReply}},
+      {"hulld.v1.BodyService.PutBody",
+       {Permission::kWrite,
+        [](const std::string& body_id) {
+          v1::PutBodyRequest request;
+          request.set_body_id(body_id);
+          *request.add_pieces() = PlacementOf("cell-1/own");
+          return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kByStatus}},
+      {"hulld.v1.BodyService.GetBody",
+       {Permission::kRead, WithBodyId<v1::GetBodyRequest>, CallRule::kByStatus}},
+      {"hulld.v1.BodyService.ListBodies",
+       {Permission::kRead,
+        [](const std::string& body_id) {
+          v1::ListBodiesRequest request;
+          request.set_prefix(body_id);
+          return std::vector{request.SerializeAsString()};
+        },
+        CallRule::kByStatus}},
+      {"hulld.v1.BodyService.DeleteBody",
+       {Permission::kWrite, WithBodyId<v1::DeleteBodyRequest>, CallRule::kByStatus}},
       {"hulld.v1.StatusService.GetStatus",
        {Permission::kRead, [](const std::string&) { return std::vector{std::string()}; },
         CallRule::kNoHull}},
@@ -270,6 +299,35 @@ class Access : public ServerTest {
   std::string path_;
 };
 
+// A body is used by those who may use all of its pieces; others hear of no hull of another prefix.
+TEST_F(Access, APieceOutsideOfThePrefixIsRefusedUnnamed) {
+  v1::PutBodyRequest put;
+  put.set_body_id("cell-1/body");
+  *put.add_pieces() = PlacementOf("cell-1/own");
+  *put.add_pieces() = PlacementOf("cell-10/theirs", 3, 0, 0);
+  const auto run = [this](const std::string& method, const std::string& token,
+                          const google::protobuf::Message& request) {
+    return Run(method, {absl::StrCat("Bearer ", token)}, {request.SerializeAsString()}).status;
+  };
+  const std::string put_method = "/hulld.v1.BodyService/PutBody";
+  EXPECT_EQ(run(put_method, "cell's secret", put).error_code(),
+            grpc::StatusCode::PERMISSION_DENIED);
+  ASSERT_TRUE(run(put_method, "robot's secret", put).ok());
+  v1::GetBodyRequest get;
+  get.set_body_id("cell-1/body");
+  v1::CheckCollisionRequest check;
+  *check.mutable_a() = PlacementOf("cell-1/body");
+  *check.mutable_b() = PlacementOf("cell-1/own");
+  for (const auto& [method, request] : std::map<std::string, const google::protobuf::Message*>{
+           {"/hulld.v1.BodyService/GetBody", &get},
+           {"/hulld.v1.CollisionService/CheckCollision", &check}}) {
+    EXPECT_TRUE(run(method, "viewer's secret", *request).ok());
+    const grpc::Status status = run(method, "cell's secret", *request);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::PERMISSION_DENIED) << method;
+    EXPECT_THAT(status.error_message(), AllOf(HasSubstr("piece 1"), Not(HasSubstr("theirs"))));
+  }
+}
+
 TEST_F(Access, EveryCallOfTheServerHasARule) {
   const std::set<std::string> calls = KnownCalls();
   EXPECT_EQ(calls.size(), Rules().size());
@@ -324,7 +382,8 @@ TEST_F(Access, NoCallTellsWhetherAHullOfOthersExists) {
   for (const auto& [call, rule] : Rules()) {
     if (rule.refusal == CallRule::kNoHull) continue;
     for (const char* theirs : {"cell-10/theirs", "cell", "cell-1"}) {
-      if (call.ends_with("ListHulls") && std::string("cell-1/").starts_with(theirs)) continue;
+      const bool is_list = call.ends_with("ListHulls") || call.ends_with("ListBodies");
+      if (is_list && std::string("cell-1/").starts_with(theirs)) continue;
       const std::string none = absl::StrCat(std::string(theirs, std::strlen(theirs) - 1), "X");
       const Outcome there = Do(call, "cell's secret", theirs);
       Outcome absent = Do(call, "cell's secret", none);

@@ -98,6 +98,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
                                                        {"durability", "relaxed"},
                                                        {"memory-limit", "17"},
                                                        {"max-writers-per-hull", "18"},
+                                                       {"max-pieces-per-body", "19"},
                                                        {"tls-cert", "/c"},
                                                        {"tls-key", "/k"},
                                                        {"tls-client-ca", "/a"},
@@ -131,6 +132,7 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
     EXPECT_EQ(config.durability, "relaxed");
     EXPECT_EQ(config.limits.memory_limit, 17);
     EXPECT_EQ(config.limits.max_writers_per_hull, 18);
+    EXPECT_EQ(config.limits.max_pieces_per_body, 19);
     EXPECT_EQ(config.limits.max_message_bytes, 16);
     EXPECT_EQ(config.limits.max_points_per_hull, 27);
     EXPECT_EQ(config.limits.max_placements, 28);
@@ -245,6 +247,7 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--take-over",
                            "--memory-limit",
                            "--max-writers-per-hull",
+                           "--max-pieces-per-body",
                            "--max-points-per-hull",
                            "--max-placements",
                            "--max-calls",

@@ -1,0 +1,191 @@
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
+#include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/table.h"
+
+namespace hulld {
+namespace {
+
+struct BodyArguments {
+  std::string body_id;
+  std::vector<std::string> pieces;
+  std::string file;
+  std::string prefix;
+  uint64_t limit = 0;
+  bool if_exists = false;
+  std::optional<uint64_t> if_revision;
+};
+
+ExitCode Put(const Invocation& run, const BodyArguments& arguments) {
+  v1::PutBodyRequest request;
+  request.set_body_id(arguments.body_id);
+  if (arguments.if_revision) request.set_if_revision(*arguments.if_revision);
+  if (arguments.pieces.empty() == arguments.file.empty()) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "name the pieces, each HULL or HULL@POSE, or give --pieces FILE, but not both"));
+  }
+  for (const std::string& text : arguments.pieces) {
+    const absl::StatusOr<v1::Placement> piece = ParsePiece(text);
+    if (!piece.ok()) return run.FailUsage(piece.status());
+    *request.add_pieces() = *piece;
+  }
+  if (!arguments.file.empty()) {
+    const absl::Status read = ReadPieces(arguments.file, request.mutable_pieces());
+    if (!read.ok()) return run.FailUsage(read);
+  }
+  const auto response = run.MakeClient().PutBody(request);
+  if (!response.ok()) return run.Fail(response.status());
+  if (run.json()) {
+    run.out << MessageJson(*response) << "\n";
+  } else if (run.names()) {
+    run.out << response->body().body_id() << "\n";
+  } else {
+    run.out << response->body().body_id() << (response->created() ? " created" : " replaced")
+            << " at revision " << response->body().revision() << ", "
+            << response->body().piece_count()
+            << (response->body().piece_count() == 1 ? " piece" : " pieces") << "\n";
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode Get(const Invocation& run, const BodyArguments& arguments) {
+  const auto response = run.MakeClient().GetBody(arguments.body_id);
+  if (!response.ok()) return run.Fail(response.status());
+  if (run.json()) {
+    run.out << MessageJson(*response) << "\n";
+    return ExitCode::kDone;
+  }
+  if (run.names()) {
+    for (const v1::Placement& piece : response->pieces()) run.out << piece.hull_id() << "\n";
+    return ExitCode::kDone;
+  }
+  const v1::BodyInfo& body = response->body();
+  run.out << body.body_id() << " at revision " << body.revision() << ", created at "
+          << body.create_revision() << "\n";
+  Table table;
+  std::vector<std::string> head = {"PIECE", "HULL", "POSE"};
+  for (std::string& title : head) title = run.paint(Hue::kHeading, title);
+  table.Row(head);
+  for (int i = 0; i < response->pieces_size(); ++i) {
+    const v1::Placement& piece = response->pieces(i);
+    const std::string pose = PoseText(piece.pose());
+    table.Row({std::to_string(i), piece.hull_id(), pose.empty() ? "-" : pose});
+  }
+  table.Print(run.out);
+  return ExitCode::kDone;
+}
+
+ExitCode List(const Invocation& run, const BodyArguments& arguments) {
+  const auto response = run.MakeClient().ListAllBodies(arguments.prefix, arguments.limit);
+  if (!response.ok()) return run.Fail(response.status());
+  if (run.json()) {
+    run.out << MessageJson(*response) << "\n";
+  } else if (run.names()) {
+    for (const v1::BodyInfo& body : response->bodies()) run.out << body.body_id() << "\n";
+  } else {
+    Table table;
+    std::vector<std::string> head = {"BODY", "PIECES", "REVISION"};
+    for (std::string& title : head) title = run.paint(Hue::kHeading, title);
+    table.Row(head);
+    for (const v1::BodyInfo& body : response->bodies()) {
+      table.Row({body.body_id(), body.damaged() ? "damaged" : std::to_string(body.piece_count()),
+                 std::to_string(body.revision())});
+    }
+    table.Print(run.out);
+  }
+  if (!response->next_page_token().empty()) {
+    run.err << "hullctl: there are more bodies; raise --limit to see them\n";
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode Delete(const Invocation& run, const BodyArguments& arguments) {
+  const auto response = run.MakeClient().DeleteBody(arguments.body_id, arguments.if_revision);
+  if (absl::IsNotFound(response.status()) && arguments.if_exists) return ExitCode::kDone;
+  if (!response.ok()) return run.Fail(response.status());
+  if (run.json()) {
+    run.out << MessageJson(*response) << "\n";
+  } else if (run.names()) {
+    run.out << arguments.body_id << "\n";
+  } else {
+    run.out << arguments.body_id << " deleted at revision " << response->header().revision()
+            << "\n";
+  }
+  return ExitCode::kDone;
+}
+
+using Arguments = std::shared_ptr<BodyArguments>;
+using Act = ExitCode (*)(const Invocation& run, const BodyArguments& arguments);
+
+void OnGiven(Command command, Invocation* invocation, const Arguments& arguments, Act act) {
+  command.OnGiven([=] { invocation->action = [=] { return act(*invocation, *arguments); }; });
+}
+
+void AddName(Command command, const Arguments& arguments) {
+  command.AddText("ID", &arguments->body_id, "Name of the body").Required();
+}
+
+void AddIfRevision(Command command, const Arguments& arguments, const std::string& help) {
+  command.AddNumber("--if-revision", 0, kAnyNumber, help,
+                    [arguments](uint64_t number) { arguments->if_revision = number; });
+}
+
+void AddPut(Command body, Invocation* invocation, const Arguments& arguments) {
+  Command put = body.AddCommand("put", "Create a body, or replace all of its pieces");
+  AddName(put, arguments);
+  put.AddTexts(
+         "HULL[@POSE]", &arguments->pieces,
+         "The pieces: hulls, each at [w,x,y,z,]tx,ty,tz in the frame of the body (default: as "
+         "built)")
+      .Completes(ValueKind::kHull);
+  put.AddText("--pieces", &arguments->file,
+              "Instead: a JSON file of pieces, as 'body get --output json' writes it; - is "
+              "standard input")
+      .ValueName("FILE")
+      .Completes(ValueKind::kFile);
+  AddIfRevision(put, arguments, "Only if its revision is this one; 0: only if there is none");
+  put.SetExamples(
+      {{"", "hullctl body put bracket plate rib@0,0.05,0 rib@0,-0.05,0"},
+       {"Turned by a quarter about z", "hullctl body put bracket plate rib@1,0,0,1,0,0,0"},
+       {"A copy", "hullctl body get bracket --output json | hullctl body put copy --pieces -"}});
+  OnGiven(put, invocation, arguments, Put);
+}
+
+}  // namespace
+
+void AddBodyCommand(Command program, Invocation* invocation) {
+  Command body = program.AddCommand("body", "Keep bodies: several hulls at fixed poses as one");
+  body.RequireCommand();
+  const auto arguments = std::make_shared<BodyArguments>();
+  body.SetDetails(
+      "A body is a list of pieces, hulls at fixed poses, under one name. Bodies and hulls share\n"
+      "their names: 'check', 'batch', 'scene' and 'stream' take either. The relation of two "
+      "bodies\n"
+      "is the strongest over all pairs of pieces. A piece is its hull as it is when a question is\n"
+      "asked.");
+  AddPut(body, invocation, arguments);
+  Command get = body.AddCommand("get", "Show the pieces of a body");
+  AddName(get, arguments);
+  get.SetExamples({{"", "hullctl body get bracket"}});
+  OnGiven(get, invocation, arguments, Get);
+  Command list = body.AddCommand("list", "List the bodies");
+  list.AddText("PREFIX", &arguments->prefix, "Only names that start with it");
+  list.AddNumber("--limit", 1, 1000000000, "Stop after N bodies (default: all)",
+                 [arguments](uint64_t number) { arguments->limit = number; });
+  list.SetExamples({{"", "hullctl body list cell-3/"}});
+  OnGiven(list, invocation, arguments, List);
+  Command remove = body.AddCommand("delete", "Remove a body; its hulls stay");
+  AddName(remove, arguments);
+  remove.AddFlag("--if-exists", &arguments->if_exists, "Accept that it is not there");
+  AddIfRevision(remove, arguments, "Only if its revision is this one");
+  remove.SetExamples({{"", "hullctl body delete bracket"}});
+  OnGiven(remove, invocation, arguments, Delete);
+}
+
+}  // namespace hulld

@@ -1,0 +1,29 @@
+#ifndef HULLD_CLIENT_HULLCTL_BODY_BODY_PIECES_H_
+#define HULLD_CLIENT_HULLCTL_BODY_BODY_PIECES_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+#include <google/protobuf/repeated_field.h>
+
+#include <string>
+
+#include "hulld/v1/collision.pb.h"
+#include "hulld/v1/geometry.pb.h"
+
+namespace hulld {
+
+using Pieces = google::protobuf::RepeatedPtrField<v1::Placement>;
+
+// "HULL" or "HULL@POSE", the pose as ParsePose reads it.
+absl::StatusOr<v1::Placement> ParsePiece(const std::string& text);
+
+// Adds the pieces of a JSON file, which 'hullctl body get --output json' writes: {"pieces":[...]};
+// "-" is standard input. INVALID_ARGUMENT and NOT_FOUND name the file.
+absl::Status ReadPieces(const std::string& path, Pieces* pieces);
+
+// A pose as ParsePose reads it, in the fewest numbers; empty for the identity.
+std::string PoseText(const v1::Pose& pose);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_BODY_BODY_PIECES_H_

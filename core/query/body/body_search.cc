@@ -1,0 +1,284 @@
+#include "core/query/body/body_search.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <cmath>
+#include <compare>
+#include <utility>
+
+#include "core/base/check.h"
+#include "core/query/collision.h"
+
+namespace hulld {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+// Steps between two looks at whether to stop: a step takes a microsecond or less but for exact
+// pairs, which look themselves.
+constexpr int kStepsPerLook = 16;
+
+// The place of a relation among those of pairs.
+int Strength(Relation relation) {
+  switch (relation) {
+    case Relation::kSeparated:
+      return 0;
+    case Relation::kTouching:
+      return 1;
+    case Relation::kWithinTolerance:
+      return 2;
+    case Relation::kOverlapping:
+      return 3;
+  }
+  HULLD_UNREACHABLE();
+}
+
+template <typename Numbers>
+std::weak_ordering CompareNumbers(const Numbers& a, const Numbers& b, int count) {
+  for (int i = 0; i < count; ++i) {
+    if (a[i] < b[i]) return std::weak_ordering::less;
+    if (b[i] < a[i]) return std::weak_ordering::greater;
+  }
+  return std::weak_ordering::equivalent;
+}
+
+std::weak_ordering Compare(const Pose& a, const Pose& b) {
+  if (const auto order = CompareNumbers(a.t, b.t, 3); order != 0) return order;
+  return CompareNumbers(a.q, b.q, 4);
+}
+
+std::weak_ordering Compare(const BodyPiece& a, const BodyPiece& b) {
+  if (const auto order = Compare(a.X_BP, b.X_BP); order != 0) return order;
+  if (a.hull == b.hull) return std::weak_ordering::equivalent;
+  const uint32_t count = a.hull->point_count();
+  if (const auto order = count <=> b.hull->point_count(); order != 0) return order;
+  for (uint32_t i = 0; i < count; ++i) {
+    const auto order = CompareNumbers(a.hull->point(i), b.hull->point(i), 3);
+    if (order != 0) return order;
+  }
+  return std::weak_ordering::equivalent;
+}
+
+// A total order of placed bodies by their content. The poses tell mostly.
+bool IsInOrder(const PlacedBody& a, const PlacedBody& b) {
+  if (const auto order = Compare(a.X_WB(), b.X_WB()); order != 0) return order < 0;
+  const auto pieces_a = a.body().pieces();
+  const auto pieces_b = b.body().pieces();
+  if (pieces_a.size() != pieces_b.size()) return pieces_a.size() < pieces_b.size();
+  for (size_t i = 0; i < pieces_a.size(); ++i) {
+    if (const auto order = Compare(pieces_a[i], pieces_b[i]); order != 0) return order < 0;
+  }
+  return true;
+}
+
+QueryOptions ForEachPair(const QueryOptions& options) {
+  QueryOptions each = options;
+  each.want_axis = false;
+  each.want_analysis = false;
+  each.want_witness = false;
+  each.want_separation = options.WantsDetails();
+  each.threads = 1;
+  return each;
+}
+
+double Extent(const Box& box) { return (box.high - box.low).maxCoeff(); }
+
+}  // namespace
+
+absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames& names) {
+  if (options.method == Method::kTextbookSat) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(names.textbook, " is for pairs of hulls, not of bodies; leave it out"));
+  }
+  if (options.want_certificate) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(names.certificate, " is for pairs of hulls, not of bodies; leave it out"));
+  }
+  return ValidateOptions(options, names);
+}
+
+void BodySearch::PlacedLeaf::Enter(uint32_t leaf) {
+  if (node == leaf) return;
+  node = leaf;
+  for (auto& piece : pieces) piece.reset();
+}
+
+const PlacedHull& BodySearch::PlacedLeaf::At(const PlacedBody& body, uint32_t slot,
+                                             uint32_t piece) {
+  if (!pieces[slot]) pieces[slot].emplace(body, piece);
+  return pieces[slot]->placed();
+}
+
+BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOptions& options)
+    : a_(&a),
+      b_(&b),
+      x_(IsInOrder(a, b) ? &a : &b),
+      y_(x_ == &a ? &b : &a),
+      options_(&options),
+      each_(ForEachPair(options)),
+      wants_least_(options.WantsDetails()),
+      limit_(std::max(0.0, options.clearance.value_or(0))),
+      gap_(*x_, *y_),
+      poll_(options.should_stop, kStepsPerLook) {
+  HULLD_DCHECK(ValidateBodyOptions(options).ok());
+  if (!x_->body().tree().empty() && !y_->body().tree().empty()) Push(0, 0);
+}
+
+absl::StatusOr<bool> BodySearch::Advance(uint64_t steps) {
+  for (; steps > 0 && !ended_; --steps) {
+    if (poll_.Step()) return absl::CancelledError("stopped in a query of bodies");
+    if (!candidates_.empty()) {
+      const Candidate candidate = candidates_.back();
+      candidates_.pop_back();
+      if (candidate.gap > Limit()) continue;
+      if (absl::Status s = Ask(candidate); !s.ok()) return s;
+    } else if (!waiting_.empty()) {
+      const Nodes nodes = waiting_.back();
+      waiting_.pop_back();
+      if (nodes.gap <= Limit()) Descend(nodes);
+    } else {
+      ended_ = true;
+    }
+  }
+  return ended_;
+}
+
+double BodySearch::Gap(const Box& of_x, const Box& of_y) {
+  ++counts_.boxes;
+  return gap_.AtLeast(of_x, of_y);
+}
+
+void BodySearch::Push(uint32_t x, uint32_t y) {
+  const double gap = Gap(x_->body().tree().box(x), y_->body().tree().box(y));
+  // Infinite where a box is empty.
+  if (gap <= Limit() && gap < kInfinity) waiting_.push_back({x, y, gap});
+}
+
+// Replaces the larger of the two nodes by its children, the nearer one to be looked at first.
+void BodySearch::Descend(const Nodes& nodes) {
+  const BoxTree& tree_x = x_->body().tree();
+  const BoxTree& tree_y = y_->body().tree();
+  const bool is_leaf_x = tree_x.is_leaf(nodes.x);
+  const bool is_leaf_y = tree_y.is_leaf(nodes.y);
+  if (is_leaf_x && is_leaf_y) return EnterLeaves(nodes);
+  const bool splits_x =
+      !is_leaf_x && (is_leaf_y || Extent(tree_x.box(nodes.x)) >= Extent(tree_y.box(nodes.y)));
+  const size_t before = waiting_.size();
+  if (splits_x) {
+    for (const uint32_t child : tree_x.children(nodes.x)) Push(child, nodes.y);
+  } else {
+    for (const uint32_t child : tree_y.children(nodes.y)) Push(nodes.x, child);
+  }
+  if (waiting_.size() == before + 2 && waiting_[before].gap < waiting_[before + 1].gap) {
+    std::swap(waiting_[before], waiting_[before + 1]);
+  }
+}
+
+void BodySearch::EnterLeaves(const Nodes& nodes) {
+  const BoxTree& tree_x = x_->body().tree();
+  const BoxTree& tree_y = y_->body().tree();
+  leaf_x_.Enter(nodes.x);
+  leaf_y_.Enter(nodes.y);
+  const auto boxes_x = tree_x.boxes(nodes.x);
+  const auto boxes_y = tree_y.boxes(nodes.y);
+  for (uint32_t i = 0; i < boxes_x.size(); ++i) {
+    for (uint32_t j = 0; j < boxes_y.size(); ++j) {
+      const double gap = Gap(boxes_x[i], boxes_y[j]);
+      if (gap > Limit() || gap == kInfinity) continue;
+      candidates_.push_back({i, j, tree_x.indices(nodes.x)[i], tree_y.indices(nodes.y)[j], gap});
+    }
+  }
+  std::sort(candidates_.begin(), candidates_.end(), [](const Candidate& p, const Candidate& q) {
+    if (p.gap != q.gap) return p.gap > q.gap;
+    return std::pair(p.piece_x, p.piece_y) > std::pair(q.piece_x, q.piece_y);
+  });
+}
+
+absl::Status BodySearch::Ask(const Candidate& candidate) {
+  const PlacedHull& x = leaf_x_.At(*x_, candidate.slot_x, candidate.piece_x);
+  const PlacedHull& y = leaf_y_.At(*y_, candidate.slot_y, candidate.piece_y);
+  const bool swapped = x_ != a_;
+  ++counts_.pairs;
+  const absl::StatusOr<Answer> answer =
+      swapped ? CheckCollision(y, x, each_) : CheckCollision(x, y, each_);
+  if (!answer.ok()) return answer.status();
+  const PiecePair pieces = swapped ? PiecePair{candidate.piece_y, candidate.piece_x}
+                                   : PiecePair{candidate.piece_x, candidate.piece_y};
+  rung_ = std::max(rung_, answer->rung);
+  if (wants_least_) {
+    TakeUpSeparation(*answer, pieces);
+  } else {
+    TakeUp(*answer, pieces);
+  }
+  return absl::OkStatus();
+}
+
+void BodySearch::TakeUp(const Answer& answer, PiecePair pieces) {
+  const bool within = answer.within_clearance.value_or(false);
+  const bool is_stronger = Strength(answer.relation) > Strength(relation_);
+  // What is separated but within the clearance decides where nothing collides.
+  if (is_stronger || (within && !decided_)) decided_ = pieces;
+  if (is_stronger) relation_ = answer.relation;
+  within_clearance_ |= within;
+  const bool is_within_known = within_clearance_ || !options_->clearance.has_value();
+  ended_ = relation_ == Relation::kOverlapping && is_within_known;
+}
+
+void BodySearch::TakeUpSeparation(const Answer& answer, PiecePair pieces) {
+  HULLD_CHECK(answer.separation.has_value());
+  const Separation& separation = *answer.separation;
+  if (Strength(answer.relation) > Strength(relation_)) relation_ = answer.relation;
+  within_clearance_ |= answer.within_clearance.value_or(false);
+  least_low_ = std::min(least_low_, separation.value - separation.bound);
+  least_high_ = std::min(least_high_, separation.value + separation.bound);
+  if (decided_ && separation.value >= least_value_) return;
+  least_value_ = separation.value;
+  decided_ = pieces;
+}
+
+absl::StatusOr<BodyAnswer> BodySearch::Take() {
+  HULLD_CHECK(ended_);
+  if (wants_least_ && decided_) return TakeLeast();
+  BodyAnswer result;
+  result.answer.relation = relation_;
+  result.answer.rung = rung_;
+  result.pieces = decided_;
+  if (options_->clearance) result.answer.within_clearance = within_clearance_;
+  if (!wants_least_) return result;
+  // Nothing but empty hulls.
+  if (options_->want_separation) result.answer.separation = Separation{kInfinity, 0};
+  if (options_->want_analysis) result.answer.analysis = Analysis();
+  return result;
+}
+
+// The answer of the named pair, with what holds of the bodies.
+absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() {
+  const PlacedPiece a(*a_, decided_->a);
+  const PlacedPiece b(*b_, decided_->b);
+  absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), *options_);
+  if (!answer.ok()) return answer.status();
+  BodyAnswer result = {*std::move(answer), decided_};
+  // The signs of separations are exact, so that of the least one is the strongest relation.
+  HULLD_CHECK(result.answer.relation == relation_);
+  result.answer.rung = rung_;
+  if (options_->clearance) result.answer.within_clearance = within_clearance_;
+  if (!result.answer.separation || relation_ == Relation::kTouching) return result;
+  Separation& separation = *result.answer.separation;
+  // Another pair whose bounds reach lower may be the least one.
+  const double bound = std::max(separation.value - least_low_, least_high_ - separation.value);
+  if (bound > separation.bound) separation.bound = std::nextafter(bound, kInfinity);
+  return result;
+}
+
+absl::StatusOr<BodyAnswer> CheckBodies(const PlacedBody& a, const PlacedBody& b,
+                                       const QueryOptions& options, BodyCounts* counts) {
+  if (absl::Status s = ValidateBodyOptions(options); !s.ok()) return s;
+  BodySearch search(a, b, options);
+  const absl::StatusOr<bool> ended = search.Advance(std::numeric_limits<uint64_t>::max());
+  if (counts != nullptr) *counts = search.counts();
+  if (!ended.ok()) return ended.status();
+  return search.Take();
+}
+
+}  // namespace hulld

@@ -1,0 +1,68 @@
+#include "core/query/body/box_gap.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+
+namespace hulld {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// The rotation of a pose, as placed hulls compute it.
+Eigen::Matrix3d RotationOf(const Pose& pose) {
+  static const Hull nothing;
+  static const QueryHull no_hull(nothing);
+  return PlacedHull(no_hull, pose).R_WH();
+}
+
+}  // namespace
+
+BoxGap::BoxGap(const PlacedBody& x, const PlacedBody& y) {
+  const Eigen::Matrix3d R_WX = RotationOf(x.X_WB());
+  const Eigen::Matrix3d R_WY = RotationOf(y.X_WB());
+  const Vector offset = y.X_WB().t - x.X_WB().t;
+  const double size =
+      x.body().boxes().size() + y.body().boxes().size() + offset.cwiseAbs().maxCoeff();
+  usable_ = IsFilterSize(size);
+  error_ = kBoxGapErrorFactor * size;
+  R_XY_ = R_WX.transpose() * R_WY;
+  abs_R_XY_ = R_XY_.cwiseAbs();
+  p_XY_ = R_WX.transpose() * offset;
+}
+
+double BoxGap::AtLeast(const Box& of_x, const Box& of_y) const {
+  if (of_x.IsEmpty() || of_y.IsEmpty()) return kInfinity;
+  if (!usable_) return -kInfinity;
+  const Vector center_x = 0.5 * (of_x.low + of_x.high);
+  const Vector half_x = 0.5 * (of_x.high - of_x.low);
+  const Vector center_y = 0.5 * (of_y.low + of_y.high);
+  const Vector half_y = 0.5 * (of_y.high - of_y.low);
+  // From X's centre to Y's, in the frame of X.
+  const Vector step = R_XY_ * center_y + p_XY_ - center_x;
+  const Vector along_x = step.cwiseAbs() - half_x - abs_R_XY_ * half_y;
+  const Vector along_y =
+      (R_XY_.transpose() * step).cwiseAbs() - half_y - abs_R_XY_.transpose() * half_x;
+  return std::max(along_x.maxCoeff(), along_y.maxCoeff()) - error_;
+}
+
+Box BoundingBox(const PlacedBody& placed) {
+  if (placed.body().is_hull()) {
+    return BoundingBox(PlacedHull(*placed.body().pieces()[0].hull, placed.X_WB()));
+  }
+  const Box box = placed.body().boxes().all();
+  if (box.IsEmpty()) return Box::Empty();
+  const Vector& t = placed.X_WB().t;
+  const double size = placed.body().boxes().size() + t.cwiseAbs().maxCoeff();
+  if (!IsFilterSize(size)) return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
+  const Eigen::Matrix3d R = RotationOf(placed.X_WB());
+  const Vector center = R * (0.5 * (box.low + box.high)) + t;
+  const Vector error = Vector::Constant(kBoxGapErrorFactor * size);
+  const Vector half = R.cwiseAbs() * (0.5 * (box.high - box.low)) + error;
+  return {center - half, center + half};
+}
+
+}  // namespace hulld

@@ -1,0 +1,58 @@
+#ifndef HULLD_CORE_QUERY_BODY_PLACED_BODY_H_
+#define HULLD_CORE_QUERY_BODY_PLACED_BODY_H_
+
+#include <cstdint>
+#include <optional>
+
+#include "core/query/body/query_body.h"
+#include "core/query/box_tree.h"
+#include "core/query/placed/placed_hull.h"
+#include "core/query/terms/pose.h"
+#include "core/query/terms/pose_product.h"
+
+namespace hulld {
+
+// A body, or a hull beside bodies, at a pose. Pieces are placed when they are asked about.
+class PlacedBody {
+ public:
+  // `body` must outlive the result. Requires a valid pose (ValidatePose).
+  PlacedBody(const QueryBody& body, const Pose& X_WB) : body_(&body), X_WB_(X_WB) {}
+
+  const QueryBody& body() const { return *body_; }
+  const Pose& X_WB() const { return X_WB_; }
+
+ private:
+  const QueryBody* body_;
+  Pose X_WB_;
+};
+
+// One piece in the world. It stays where it is made, as what it places refers to its pose.
+class PlacedPiece {
+ public:
+  // Requires an index of a piece. The hull of the piece must outlive the result.
+  PlacedPiece(const PlacedBody& body, uint32_t index) {
+    const BodyPiece& piece = body.body().pieces()[index];
+    if (body.body().is_hull()) {
+      placed_.emplace(*piece.hull, body.X_WB());
+      return;
+    }
+    product_.emplace(body.X_WB(), piece.X_BP);
+    placed_.emplace(*piece.hull, *product_);
+  }
+  PlacedPiece(const PlacedPiece&) = delete;
+  PlacedPiece& operator=(const PlacedPiece&) = delete;
+
+  const PlacedHull& placed() const { return *placed_; }
+
+ private:
+  std::optional<PoseProduct> product_;
+  std::optional<PlacedHull> placed_;
+};
+
+// A box, world frame, that is certain to hold all pieces: larger than the least one where the body
+// is turned. All of space where doubles do not reach; empty where all pieces are.
+Box BoundingBox(const PlacedBody& placed);
+
+}  // namespace hulld
+
+#endif  // HULLD_CORE_QUERY_BODY_PLACED_BODY_H_

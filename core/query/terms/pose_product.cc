@@ -1,0 +1,112 @@
+#include "core/query/terms/pose_product.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/base/check.h"
+#include "core/numeric/double_double.h"
+#include "core/numeric/error_bounds.h"
+#include "core/numeric/exponent_limits.h"
+
+namespace hulld {
+namespace {
+
+using Quaternion = std::array<double, 4>;
+
+// Whether it turns by no angle.
+bool IsScalar(const Quaternion& q) { return q[1] == 0 && q[2] == 0 && q[3] == 0; }
+
+// The same rotation with the largest component in [1/2, 1). Components too small to matter are left
+// out (kProductLeastComponent).
+Quaternion Scaled(const Quaternion& q) {
+  double largest = 0;
+  for (const double component : q) largest = std::max(largest, std::abs(component));
+  int exponent = 0;
+  std::frexp(largest, &exponent);
+  Quaternion scaled;
+  for (int i = 0; i < 4; ++i) {
+    const double component = std::ldexp(q[i], -exponent);
+    scaled[i] = std::abs(component) < kProductLeastComponent ? 0 : component;
+  }
+  return scaled;
+}
+
+// Hamilton's product, each component rounded once but for terms of the size of u^2. Requires both
+// scaled.
+Quaternion Product(const Quaternion& p, const Quaternion& q) {
+  const auto sum = [](DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {
+    return ((a + b) + (c + d)).high;
+  };
+  const auto times = [&](int i, int j) { return ExactProduct(p[i], q[j]); };
+  return {sum(times(0, 0), -times(1, 1), -times(2, 2), -times(3, 3)),
+          sum(times(0, 1), times(1, 0), times(2, 3), -times(3, 2)),
+          sum(times(0, 2), -times(1, 3), times(2, 0), times(3, 1)),
+          sum(times(0, 3), times(1, 2), -times(2, 1), times(3, 0))};
+}
+
+// R(q) v / |q|^2 for a scaled q.
+std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
+  const auto times = [&](int i, int j) { return ExactProduct(q[i], q[j]); };
+  const auto twice = [](const DoubleDouble& x) { return DoubleDouble{2 * x.high, 2 * x.low}; };
+  const DoubleDouble ww = times(0, 0), xx = times(1, 1), yy = times(2, 2), zz = times(3, 3);
+  const DoubleDouble wx = times(0, 1), wy = times(0, 2), wz = times(0, 3);
+  const DoubleDouble xy = times(1, 2), xz = times(1, 3), yz = times(2, 3);
+  const DoubleDouble norm = (ww + xx) + (yy + zz);
+  const DoubleDouble rows[3][3] = {{(ww + xx) - (yy + zz), twice(xy - wz), twice(xz + wy)},
+                                   {twice(xy + wz), (ww + yy) - (xx + zz), twice(yz - wx)},
+                                   {twice(xz - wy), twice(yz + wx), (ww + zz) - (xx + yy)}};
+  const auto component = [&](int i) {
+    return DoubleDouble{std::abs(v[i]) < kProductUnderflow / 4 ? 0 : v[i], 0};
+  };
+  std::array<DoubleDouble, 3> result;
+  for (int i = 0; i < 3; ++i) {
+    result[i] = ((rows[i][0] / norm) * component(0) + (rows[i][1] / norm) * component(1)) +
+                (rows[i][2] / norm) * component(2);
+  }
+  return result;
+}
+
+}  // namespace
+
+PoseProduct::PoseProduct(const Pose& X_WB, const Pose& X_BP) : X_WB_(X_WB), X_BP_(X_BP) {
+  HULLD_DCHECK(IsValidPose(X_WB) && IsValidPose(X_BP));
+  const Vector& t_B = X_WB.t;
+  const Vector& t_P = X_BP.t;
+  const bool turns_nothing = IsScalar(X_WB.q);
+  if (turns_nothing || IsScalar(X_BP.q)) {
+    rounded_.q = turns_nothing ? X_BP.q : X_WB.q;
+  } else {
+    rounded_.q = Product(Scaled(X_WB.q), Scaled(X_BP.q));
+  }
+
+  const double size = t_B.cwiseAbs().maxCoeff() + t_P.cwiseAbs().maxCoeff();
+  if (!(size <= kProductMaxTranslation)) {
+    // Somewhere in range: nothing but exact arithmetic will use it.
+    rounded_.t = (t_B / 4 + t_P / 4).cwiseMin(kLargestDouble).cwiseMax(-kLargestDouble);
+    translation_error_ = std::numeric_limits<double>::infinity();
+    return;
+  }
+  if (t_P.isZero(0)) {
+    rounded_.t = t_B;
+    return;
+  }
+  if (turns_nothing) {
+    for (int i = 0; i < 3; ++i) {
+      const SumWithError sum = TwoSum(t_B[i], t_P[i]);
+      rounded_.t[i] = sum.sum;
+      translation_rest_[i] = sum.error;
+    }
+    return;
+  }
+  const std::array<DoubleDouble, 3> turned = Rotated(Scaled(X_WB.q), t_P);
+  for (int i = 0; i < 3; ++i) {
+    const DoubleDouble sum = turned[i] + DoubleDouble{t_B[i], 0};
+    rounded_.t[i] = sum.high;
+    translation_rest_[i] = sum.low;
+  }
+  translation_error_ = kProductTranslationError * size + kProductUnderflow;
+}
+
+}  // namespace hulld

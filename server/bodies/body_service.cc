@@ -1,0 +1,196 @@
+#include "server/bodies/body_service.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+
+#include "server/access/caller.h"
+#include "server/contract/limit_error.h"
+#include "server/contract/status_map.h"
+#include "server/registry/bodies/body.h"
+#include "server/registry/bodies/body_resolution.h"
+#include "server/settings/config.h"
+#include "server/wire/decode.h"
+#include "server/wire/encode.h"
+#include "server/wire/page_token.h"
+
+namespace hulld::server {
+namespace {
+
+absl::StatusOr<StoredBody> DecodeBody(const v1::PutBodyRequest& request, const Caller& caller,
+                                      uint64_t max_pieces) {
+  if (absl::Status s = CheckHullId(caller, request.body_id(), "body_id"); !s.ok()) return s;
+  if (request.pieces().empty()) {
+    return absl::InvalidArgumentError(
+        "pieces is empty; a body has at least one (DeleteBody removes a body)");
+  }
+  const auto count = static_cast<uint64_t>(request.pieces_size());
+  if (count > max_pieces) {
+    return LimitExceeded(absl::StrCat("the body holds ", count, " pieces"), max_pieces,
+                         "max-pieces-per-body");
+  }
+  StoredBody body;
+  body.record.body_id = request.body_id();
+  body.pieces.reserve(count);
+  std::unordered_map<std::string, uint32_t> index_of;
+  for (int i = 0; i < request.pieces_size(); ++i) {
+    const v1::Placement& piece = request.pieces(i);
+    const auto [known, is_new] =
+        index_of.try_emplace(piece.hull_id(), static_cast<uint32_t>(body.hull_ids.size()));
+    if (is_new) {
+      const absl::Status valid = CheckHullId(caller, piece.hull_id(), "hull_id");
+      if (!valid.ok()) return Prefixed(absl::StrCat("pieces[", i, "]."), valid);
+      if (piece.hull_id() == request.body_id()) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("pieces[", i, "].hull_id is the body itself; a piece is a hull"));
+      }
+      body.hull_ids.push_back(piece.hull_id());
+    }
+    const absl::StatusOr<Pose> pose = DecodePose(piece.pose());
+    if (!pose.ok()) return Prefixed(absl::StrCat("pieces[", i, "].pose."), pose.status());
+    body.pieces.push_back({known->second, *pose});
+  }
+  return body;
+}
+
+void EncodeBody(const Body& body, v1::BodyInfo* message) {
+  message->set_body_id(body.record().body_id);
+  message->set_create_revision(body.record().create_revision);
+  message->set_revision(body.record().revision);
+  message->set_piece_count(body.pieces().size());
+  message->set_damaged(!body.damage().ok());
+}
+
+void EncodePose(const Pose& pose, v1::Pose* message) {
+  v1::Quaternion* const q = message->mutable_rotation();
+  q->set_w(pose.q[0]);
+  q->set_x(pose.q[1]);
+  q->set_y(pose.q[2]);
+  q->set_z(pose.q[3]);
+  EncodeVector(pose.t, message->mutable_translation());
+}
+
+template <typename Request>
+std::optional<uint64_t> IfRevision(const Request& request) {
+  return request.has_if_revision() ? std::optional(request.if_revision()) : std::nullopt;
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* BodyService::PutBody(grpc::CallbackServerContext* context,
+                                               const grpc::ByteBuffer* request,
+                                               grpc::ByteBuffer* response) {
+  return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
+                        [this](PutCall* call) {
+                          readers_.Submit([this, call] { Put(call); }, call->call().client());
+                        });
+}
+
+grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* context,
+                                               const grpc::ByteBuffer* request,
+                                               grpc::ByteBuffer* response) {
+  return GetCall::Start(
+      *context, admission_, Rpc::kGetBody, {request, response}, [this](GetCall* call) {
+        call->EndOn(readers_,
+                    [this, call] { return Get(call->request(), call->call(), &call->response()); });
+      });
+}
+
+grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* context,
+                                                  const grpc::ByteBuffer* request,
+                                                  grpc::ByteBuffer* response) {
+  return ListCall::Start(*context, admission_, Rpc::kListBodies, {request, response},
+                         [this](ListCall* call) {
+                           call->End(List(call->request(), call->call(), &call->response()));
+                         });
+}
+
+grpc::ServerUnaryReactor* BodyService::DeleteBody(grpc::CallbackServerContext* context,
+                                                  const grpc::ByteBuffer* request,
+                                                  grpc::ByteBuffer* response) {
+  return DeleteCall::Start(*context, admission_, Rpc::kDeleteBody, {request, response},
+                           [this](DeleteCall* call) { Delete(call); });
+}
+
+void BodyService::Put(PutCall* call) {
+  if (call->call().ShouldStop()) return call->End(call->call().StopStatus());
+  absl::StatusOr<StoredBody> body =
+      DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
+  if (!body.ok()) return call->End(body.status());
+  registry_.PutBody(*std::move(body), IfRevision(call->request()),
+                    [this, call](const absl::StatusOr<PutBodyResult>& result) {
+                      if (!result.ok()) return call->End(result.status());
+                      const BodyRecord& record = result->body;
+                      call->call().LogChange(result->created ? "body created" : "body replaced",
+                                             {"body", record.body_id}, record.revision);
+                      v1::PutBodyResponse& response = call->response();
+                      EncodeHeader(registry_.store(), result->store_revision,
+                                   response.mutable_header());
+                      v1::BodyInfo* const info = response.mutable_body();
+                      info->set_body_id(record.body_id);
+                      info->set_create_revision(record.create_revision);
+                      info->set_revision(record.revision);
+                      info->set_piece_count(result->piece_count);
+                      response.set_created(result->created);
+                      response.set_durability(EncodeDurability(registry_.store().durability()));
+                      call->End(absl::OkStatus());
+                    });
+}
+
+absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,
+                              v1::GetBodyResponse* response) {
+  const std::string& id = request.body_id();
+  if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
+  const FoundBodies found = registry_.FindBodies(std::span(&id, 1));
+  const std::shared_ptr<const Body>& body = found.bodies.front();
+  if (body == nullptr) return BodyNotFound(id);
+  if (!body->damage().ok()) return body->damage();
+  if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
+  EncodeHeader(registry_.store(), found.store_revision, response->mutable_header());
+  EncodeBody(*body, response->mutable_body());
+  response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
+  for (const StoredPiece& piece : body->pieces()) {
+    v1::Placement* const placement = response->add_pieces();
+    placement->set_hull_id(body->hull_ids()[piece.hull]);
+    EncodePose(piece.X_BP, placement->mutable_pose());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call& call,
+                               v1::ListBodiesResponse* response) {
+  const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
+  if (!prefix.ok()) return prefix.status();
+  const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
+  if (!after.ok()) return after.status();
+  const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
+  const BodyPage page =
+      registry_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize));
+  EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
+  for (const std::shared_ptr<const Body>& body : page.bodies) {
+    EncodeBody(*body, response->add_bodies());
+  }
+  if (page.more) {
+    response->set_next_page_token(EncodePageToken(*prefix, page.bodies.back()->record().body_id));
+  }
+  return absl::OkStatus();
+}
+
+void BodyService::Delete(DeleteCall* call) {
+  const std::string& id = call->request().body_id();
+  if (absl::Status s = CheckHullId(call->call().caller(), id, "body_id"); !s.ok()) {
+    return call->End(s);
+  }
+  registry_.DeleteBody(
+      id, IfRevision(call->request()), [this, call](const absl::StatusOr<uint64_t>& revision) {
+        if (!revision.ok()) return call->End(revision.status());
+        call->call().LogChange("body deleted", {"body", call->request().body_id()}, *revision);
+        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
+        call->End(absl::OkStatus());
+      });
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,63 @@
+#ifndef HULLD_SERVER_BODIES_BODY_SERVICE_H_
+#define HULLD_SERVER_BODIES_BODY_SERVICE_H_
+
+#include <absl/status/status.h>
+#include <grpcpp/grpcpp.h>
+
+#include "hulld/v1/body.grpc.pb.h"
+#include "server/call/admission.h"
+#include "server/call/call.h"
+#include "server/call/unary_call.h"
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// The generated service; its methods take and give bytes (message_bytes.h).
+using BodyServiceOfBytes =
+    v1::BodyService::WithRawCallbackMethod_PutBody<v1::BodyService::WithRawCallbackMethod_GetBody<
+        v1::BodyService::WithRawCallbackMethod_ListBodies<
+            v1::BodyService::WithRawCallbackMethod_DeleteBody<v1::BodyService::Service>>>>;
+
+// hulld.v1.BodyService: the contract in body.proto over the registry. Calls that look into records
+// are answered where they arrive; those with pieces, of which there may be many, on `readers`.
+class BodyService : public BodyServiceOfBytes {
+ public:
+  BodyService(Registry& registry, Admission& admission, WorkerPool& readers)
+      : registry_(registry), admission_(admission), readers_(readers) {}
+
+  grpc::ServerUnaryReactor* PutBody(grpc::CallbackServerContext* context,
+                                    const grpc::ByteBuffer* request,
+                                    grpc::ByteBuffer* response) override;
+  grpc::ServerUnaryReactor* GetBody(grpc::CallbackServerContext* context,
+                                    const grpc::ByteBuffer* request,
+                                    grpc::ByteBuffer* response) override;
+  grpc::ServerUnaryReactor* ListBodies(grpc::CallbackServerContext* context,
+                                       const grpc::ByteBuffer* request,
+                                       grpc::ByteBuffer* response) override;
+  grpc::ServerUnaryReactor* DeleteBody(grpc::CallbackServerContext* context,
+                                       const grpc::ByteBuffer* request,
+                                       grpc::ByteBuffer* response) override;
+
+ private:
+  using PutCall = UnaryCall<v1::PutBodyRequest, v1::PutBodyResponse>;
+  using GetCall = UnaryCall<v1::GetBodyRequest, v1::GetBodyResponse>;
+  using ListCall = UnaryCall<v1::ListBodiesRequest, v1::ListBodiesResponse>;
+  using DeleteCall = UnaryCall<v1::DeleteBodyRequest, v1::DeleteBodyResponse>;
+
+  // Put and Delete end the call once the change is committed.
+  void Put(PutCall* call);
+  absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
+                   v1::GetBodyResponse* response);
+  absl::Status List(const v1::ListBodiesRequest& request, const Call& call,
+                    v1::ListBodiesResponse* response);
+  void Delete(DeleteCall* call);
+
+  Registry& registry_;
+  Admission& admission_;
+  WorkerPool& readers_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_BODIES_BODY_SERVICE_H_

@@ -1,0 +1,62 @@
+#ifndef HULLD_SERVER_COLLISIONS_BODY_QUESTION_H_
+#define HULLD_SERVER_COLLISIONS_BODY_QUESTION_H_
+
+#include <absl/status/statusor.h>
+
+#include <functional>
+#include <memory>
+
+#include "core/query/body/body_search.h"
+#include "core/query/body/placed_body.h"
+#include "core/query/terms/query_options.h"
+#include "server/process/fair_queue.h"
+#include "server/process/task_pool.h"
+#include "server/registry/bodies/body_resolution.h"
+
+namespace hulld::server {
+
+// One question about a pair of which at least one is a body. It is answered in slices, of which
+// only the first goes ahead of batches. Owns itself until it is answered.
+class BodyQuestion : public std::enable_shared_from_this<BodyQuestion> {
+ public:
+  // A hull, in the form of a body of one piece, or a body, at a pose.
+  class Side {
+   public:
+    // canonical: as the hulls were looked up.
+    Side(HullView view, const Pose& X_W, bool canonical);
+    Side(const Side&) = delete;
+    Side& operator=(const Side&) = delete;
+
+    const HullView& view() const { return view_; }
+    bool is_body() const { return view_.body != nullptr; }
+    const PlacedBody& placed() const { return placed_; }
+
+   private:
+    const HullView view_;
+    const std::unique_ptr<const QueryBody> own_;
+    const PlacedBody placed_;
+  };
+  using Done = std::function<void(absl::StatusOr<BodyAnswer>, const Side& a, const Side& b)>;
+
+  // client: who waits for it. `done` is called once, on a thread of the pool. Requires valid
+  // options for bodies (ValidateBodyOptions). CANCELLED: options.should_stop said so.
+  static void Start(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
+                    const QueryOptions& options, ClientId client, Done done);
+
+ private:
+  BodyQuestion(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
+               const QueryOptions& options, ClientId client, Done done);
+  void RunSlice();
+
+  const QueryOptions options_;
+  const ClientId client_;
+  const Side a_;
+  const Side b_;
+  BodySearch search_;
+  const Done done_;
+  TaskPool::Lane lane_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_BODY_QUESTION_H_

@@ -1,0 +1,40 @@
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_ANSWER_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_ANSWER_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "core/query/body/body_search.h"
+#include "core/query/terms/answer.h"
+#include "core/query/terms/pair_cache.h"
+#include "core/query/terms/query_options.h"
+#include "hulld/v1/collision.pb.h"
+#include "server/collisions/placement_table.h"
+
+namespace hulld::server {
+
+// The answer for two placements, or why there is none, and the pair of pieces that decided where
+// one is a body.
+struct PlacedAnswer {
+  absl::StatusOr<Answer> answer;
+  std::optional<PiecePair> pieces;
+};
+
+// Asks about a pair of placements. What is for hulls alone leaves a pair with a body without an
+// answer. cache: of a pair of hulls; may be null. Requires that both are answerable.
+PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const QueryOptions& options, PairCache* cache);
+
+// Adds the row of such an answer, as AddAnswer; and one without an answer.
+size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const PlacedAnswer& answer, const v1::Wanted& wanted,
+                       v1::AnswerColumns* columns);
+size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,
+                         v1::AnswerColumns* columns);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_ANSWER_H_

@@ -1,0 +1,39 @@
+#include "server/registry/bodies/body.h"
+
+#include <absl/strings/str_cat.h>
+
+#include "server/contract/error_info.h"
+
+namespace hulld::server {
+
+std::shared_ptr<const PieceBoxes> Body::BoxesOf(std::span<const BodyPiece> pieces,
+                                                std::vector<uint64_t> hull_revisions) const {
+  {
+    const std::lock_guard lock(mutex_);
+    if (boxes_ != nullptr && box_revisions_ == hull_revisions) return boxes_;
+  }
+  // Without the mutex: two readers may make the same.
+  auto boxes = std::make_shared<const PieceBoxes>(pieces);
+  const std::lock_guard lock(mutex_);
+  boxes_ = boxes;
+  box_revisions_ = std::move(hull_revisions);
+  box_charge_.Set(boxes_->MemoryBytes() + box_revisions_.capacity() * sizeof(uint64_t));
+  return boxes;
+}
+
+std::string QuotedBody(const std::string& id) { return absl::StrCat("body \"", id, "\""); }
+
+absl::Status BodyExists(const std::string& id) {
+  return WithReason(absl::AlreadyExistsError(absl::StrCat(
+                        "\"", id,
+                        "\" is a body, and hulls and bodies share their IDs; choose another ID, or "
+                        "delete the body first")),
+                    v1::ERROR_REASON_BODY_EXISTS, {{"body_id", id}});
+}
+
+absl::Status BodyNotFound(const std::string& id) {
+  return WithReason(absl::NotFoundError(absl::StrCat(QuotedBody(id), " not found")),
+                    v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}});
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,96 @@
+#ifndef HULLD_SERVER_REGISTRY_BODIES_BODY_RESOLUTION_H_
+#define HULLD_SERVER_REGISTRY_BODIES_BODY_RESOLUTION_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "core/query/body/query_body.h"
+#include "server/registry/bodies/body.h"
+#include "server/registry/known_hulls.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+
+// A body as one call sees it, with the hulls of its pieces, which it keeps; counted against
+// --memory-limit while it is there.
+struct ServedBody {
+  std::shared_ptr<const Body> body;
+  // In the order of Body::hull_ids().
+  std::vector<HullView> hulls;
+  QueryBody query;
+  MemoryCharge charge;
+
+  const HullView& hull_of(uint32_t piece) const { return hulls[body->pieces()[piece].hull]; }
+};
+
+// How hulls are looked up for questions.
+struct PlacedLookup {
+  // For answers that name vertices (QueryOptions::WantsCanonical).
+  bool canonical = false;
+  // What IDs must start with, those of pieces too; it is the caller's.
+  std::string prefix;
+  // Otherwise an ID of a body is that of no hull.
+  bool takes_bodies = true;
+  ReadPlan plan;
+};
+
+// What a reader that asks again and again for the same IDs keeps in between. Not thread-safe.
+class KnownPlaced {
+ public:
+  // What it holds of bodies, in bytes; of hulls, KnownHulls::kBytesEach for each ID.
+  size_t BodyBytes() const;
+
+ private:
+  friend absl::StatusOr<Resolved> RefreshPlaced(Registry&, std::span<const std::string>,
+                                                KnownPlaced&, const PlacedLookup&,
+                                                const std::function<bool()>&);
+
+  using Bodies = std::vector<std::shared_ptr<const Body>>;
+
+  // Takes the bodies among the IDs; where they are others than before, nothing is known of hulls.
+  void SetBodies(std::span<const std::string> ids, Bodies bodies);
+  bool has_bodies() const { return !bodies_.empty(); }
+  void AddHull(const std::string& id);
+
+  // Parallel to the IDs, null for those of hulls; empty when all are.
+  Bodies bodies_;
+  // Where there are bodies: the IDs of hulls, then those of pieces, each once.
+  std::vector<std::string> hull_ids_;
+  std::unordered_map<std::string, size_t> index_of_;
+  KnownHulls hulls_;
+};
+
+// Hulls and bodies by ID, all current at one revision of the store; a body has no answer where the
+// hull of a piece has none: NOT_FOUND (PIECE_NOT_FOUND), PERMISSION_DENIED or DATA_LOSS names body
+// and piece; RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies among
+// them it is Registry::Resolve. Boxes of pieces are made here, not on gRPC's threads. CANCELLED
+// when should_stop said so.
+absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
+                                       const PlacedLookup& lookup,
+                                       const std::function<bool()>& should_stop);
+
+// As ResolvePlaced, for a reader that asks for the same IDs again and again: `known` is kept in
+// between, and only hulls that changed since are looked up.
+absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
+                                       KnownPlaced& known, const PlacedLookup& lookup,
+                                       const std::function<bool()>& should_stop);
+
+// The same, but nullopt, at once, where it would have to read, to prepare or to make something, or
+// where there is a body among the IDs.
+std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
+                                         const PlacedLookup& lookup);
+
+// PERMISSION_DENIED, naming the piece, where the hull of one is outside of a caller's prefix.
+absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_BODIES_BODY_RESOLUTION_H_

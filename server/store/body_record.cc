@@ -1,0 +1,116 @@
+#include "server/store/body_record.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <bit>
+#include <cstring>
+
+namespace hulld::server {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "values are copied as they are");
+
+// What is kept, one after the other: numbers as they are, texts with their length before them.
+class Writer {
+ public:
+  template <typename Number>
+  void Add(Number number) {
+    bytes_.append(reinterpret_cast<const char*>(&number), sizeof(number));
+  }
+  void AddText(const std::string& text) {
+    Add<uint64_t>(text.size());
+    bytes_ += text;
+  }
+  std::string Take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+};
+
+// Whatever is missing is zero or empty; then ok() is false from there on.
+class Reader {
+ public:
+  explicit Reader(std::string_view bytes) : rest_(bytes) {}
+
+  template <typename Number>
+  Number Next() {
+    Number number{};
+    const std::string_view bytes = NextBytes(sizeof(number));
+    if (!bytes.empty()) std::memcpy(&number, bytes.data(), sizeof(number));
+    return number;
+  }
+  std::string NextText() { return std::string(NextBytes(Next<uint64_t>())); }
+  // A number of entries of at least so many bytes each; none when there is no room for them.
+  uint64_t NextCount(size_t least_bytes) {
+    const uint64_t count = Next<uint64_t>();
+    ok_ = ok_ && count <= rest_.size() / least_bytes;
+    return ok_ ? count : 0;
+  }
+  bool ok() const { return ok_; }
+  bool at_end() const { return rest_.empty(); }
+
+ private:
+  std::string_view NextBytes(uint64_t count) {
+    ok_ = ok_ && count <= rest_.size();
+    if (!ok_) return {};
+    const std::string_view bytes = rest_.substr(0, count);
+    rest_.remove_prefix(count);
+    return bytes;
+  }
+
+  std::string_view rest_;
+  bool ok_ = true;
+};
+
+constexpr size_t kPieceBytes = sizeof(uint32_t) + 7 * sizeof(double);
+
+}  // namespace
+
+size_t StoredBody::MemoryBytes() const {
+  size_t bytes = sizeof(*this) + pieces.capacity() * sizeof(StoredPiece);
+  for (const std::string& id : hull_ids) bytes += sizeof(id) + id.capacity();
+  return bytes;
+}
+
+std::string EncodeStoredBody(const StoredBody& body) {
+  Writer writer;
+  writer.Add(body.record.create_revision);
+  writer.Add(body.record.revision);
+  writer.Add<uint64_t>(body.hull_ids.size());
+  for (const std::string& id : body.hull_ids) writer.AddText(id);
+  writer.Add<uint64_t>(body.pieces.size());
+  for (const StoredPiece& piece : body.pieces) {
+    writer.Add(piece.hull);
+    for (const double component : piece.X_BP.q) writer.Add(component);
+    for (int i = 0; i < 3; ++i) writer.Add<double>(piece.X_BP.t[i]);
+  }
+  return writer.Take();
+}
+
+absl::StatusOr<StoredBody> DecodeStoredBody(std::string_view body_id, std::string_view value) {
+  Reader reader(value);
+  StoredBody body;
+  body.record.body_id = body_id;
+  body.record.create_revision = reader.Next<uint64_t>();
+  body.record.revision = reader.Next<uint64_t>();
+  const uint64_t hulls = reader.NextCount(sizeof(uint64_t));
+  for (uint64_t i = 0; i < hulls; ++i) body.hull_ids.push_back(reader.NextText());
+  const uint64_t pieces = reader.NextCount(kPieceBytes);
+  for (uint64_t i = 0; i < pieces && reader.ok(); ++i) {
+    StoredPiece& piece = body.pieces.emplace_back();
+    piece.hull = reader.Next<uint32_t>();
+    for (double& component : piece.X_BP.q) component = reader.Next<double>();
+    for (int k = 0; k < 3; ++k) piece.X_BP.t[k] = reader.Next<double>();
+    if (piece.hull >= hulls || !IsValidPose(piece.X_BP)) {
+      return absl::DataLossError(absl::StrCat("its piece ", i, " cannot be"));
+    }
+  }
+  if (!reader.ok() || !reader.at_end()) {
+    return absl::DataLossError(
+        absl::StrCat("a value of ", value.size(), " bytes, which cannot be"));
+  }
+  return body;
+}
+
+}  // namespace hulld::server
