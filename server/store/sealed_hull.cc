@@ -17,6 +17,13 @@ absl::StatusOr<StoredHull> UnsealStoredHull(const std::string& hull_id, std::str
   return hull;
 }
 
+absl::StatusOr<StoredBody> UnsealStoredBody(const std::string& body_id, std::string_view sealed) {
+  const absl::StatusOr<std::string_view> value = Unseal(BodyKey(body_id), sealed);
+  absl::StatusOr<StoredBody> body = value.ok() ? DecodeStoredBody(body_id, *value) : value.status();
+  if (!body.ok()) return DamagedBody(body_id, std::string(body.status().message()));
+  return body;
+}
+
 VertexAssembly::VertexAssembly(const StoredHull& hull) : hull_(hull) {
   vertices_.reserve(hull.layout.base_vertices + hull.layout.delta_vertices);
 }

@@ -9,14 +9,18 @@
 #include <string_view>
 #include <vector>
 
+#include "server/store/body_record.h"
 #include "server/store/hull_record.h"
 
-// What a store keeps of one hull, read back and checked. Every store that keeps hulls seals its
-// values as store_keys.h says, wherever it puts them.
+// What a store keeps of one hull or body, read back and checked. Every store that keeps hulls seals
+// its values as store_keys.h says, wherever it puts them.
 namespace hulld::server {
 
 // A hull's record. DATA_LOSS naming the hull: it is damaged.
 absl::StatusOr<StoredHull> UnsealStoredHull(const std::string& hull_id, std::string_view sealed);
+
+// The same for a body.
+absl::StatusOr<StoredBody> UnsealStoredBody(const std::string& body_id, std::string_view sealed);
 
 // Puts the vertices of a hull together: first the parts of its base in their order, then its
 // deltas.

@@ -118,7 +118,8 @@ class Encoder {
     for (RowsOfTable* table : {&no_hulls_, &no_bodies_, &no_writers_, &no_bases_, &no_deltas_}) {
       table->Flush(&drops_);
     }
-    for (RowsOfTable* table : {&hulls_, &bodies_, &writers_, &bases_, &deltas_}) table->Flush(&puts_);
+    for (RowsOfTable* table : {&hulls_, &bodies_, &writers_, &bases_, &deltas_})
+      table->Flush(&puts_);
     std::ranges::move(puts_, std::back_inserter(drops_));
     return std::move(drops_);
   }

@@ -12,8 +12,8 @@
 namespace hulld::server {
 namespace {
 
-// Records that are read at a time: some 100 bytes each.
-constexpr uint32_t kHullsPerPortion = 4096;
+// Rows that are read at a time: some 100 bytes each, but for bodies of many pieces.
+constexpr uint32_t kRowsPerPortion = 4096;
 
 }  // namespace
 
@@ -35,21 +35,33 @@ absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> sta
   return ended();
 }
 
-absl::Status PostgresStore::ForEachHull(const StoredHullVisitor& visit) {
+absl::Status PostgresStore::ForEachRow(
+    const char* statement, const std::function<void(const std::string&, std::string_view)>& visit) {
   std::string last;
   while (true) {
     std::vector<Statement> statements(1);
-    statements[0] = {.name = "hulld_hulls_after",
-                     .parameters = {last, EncodeInteger(kHullsPerPortion)}};
-    const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
-    if (!rows.ok()) return rows.status();
-    const Rows& hulls = rows->front();
-    for (int i = 0; i < hulls.count(); ++i) {
-      last = std::string(hulls.at(i, 0));
-      visit(last, UnsealStoredHull(last, hulls.at(i, 1)));
+    statements[0] = {.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}};
+    const absl::StatusOr<std::vector<Rows>> answers = Read(std::move(statements));
+    if (!answers.ok()) return answers.status();
+    const Rows& rows = answers->front();
+    for (int i = 0; i < rows.count(); ++i) {
+      last = std::string(rows.at(i, 0));
+      visit(last, rows.at(i, 1));
     }
-    if (static_cast<uint32_t>(hulls.count()) < kHullsPerPortion) return absl::OkStatus();
+    if (static_cast<uint32_t>(rows.count()) < kRowsPerPortion) return absl::OkStatus();
   }
+}
+
+absl::Status PostgresStore::ForEachHull(const StoredHullVisitor& visit) {
+  return ForEachRow("hulld_hulls_after", [&](const std::string& hull_id, std::string_view sealed) {
+    visit(hull_id, UnsealStoredHull(hull_id, sealed));
+  });
+}
+
+absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
+  return ForEachRow("hulld_bodies_after", [&](const std::string& body_id, std::string_view sealed) {
+    visit(body_id, UnsealStoredBody(body_id, sealed));
+  });
 }
 
 absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {

@@ -74,6 +74,7 @@ class PostgresStore : public Store {
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
+  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
@@ -127,6 +128,9 @@ class PostgresStore : public Store {
   absl::Status WriteFailed(const absl::Status& status);
   void EndRelaxedRun();
 
+  // Every row of a table, in byte order of the IDs: its ID and its sealed value.
+  absl::Status ForEachRow(const char* statement,
+                          const std::function<void(const std::string&, std::string_view)>& visit);
   // The answers to statements, asked while this was the active server.
   absl::StatusOr<std::vector<Rows>> Read(std::vector<Statement> statements);
 
