@@ -114,6 +114,8 @@ class KeptPostgres : public KeptStore {
     switch (key.front()) {
       case kHullPrefix:
         return {"hulls", "record", absl::StrCat(" WHERE hull_id = '", key.substr(1), "'")};
+      case kBodyPrefix:
+        return {"bodies", "body", absl::StrCat(" WHERE body_id = '", key.substr(1), "'")};
       case kWriterPrefix:
         return {"writers", "sequence",
                 absl::StrCat(incarnation, " AND writer_id = '", key.substr(9), "'")};

@@ -154,6 +154,43 @@ TEST_P(StoreRecovery, ReplacingWhatIsNotThereNeedsCreateIfAbsent) {
   EXPECT_EQ(Start().View("h")->record.vertex_count, 8);
 }
 
+TEST_P(StoreRecovery, BodiesComeBackAndAreDamagedByThemselves) {
+  KeptRegistry& first = Start();
+  ASSERT_TRUE(first.Put("cube", CubeCorners()).ok());
+  const auto put = [this](const std::string& id, double x) {
+    StoredBody body;
+    body.record.body_id = id;
+    body.hull_ids = {"cube"};
+    body.pieces.resize(2);
+    body.pieces[1].X_BP.t = Vector(x, 0, 0);
+    return KeptRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
+      hulls_->registry().PutBody(body, std::nullopt, std::move(done));
+    });
+  };
+  ASSERT_TRUE(put("changed", 1).ok());
+  ASSERT_TRUE(put("changed", 2).ok());
+  ASSERT_TRUE(put("damaged", 3).ok());
+  ASSERT_TRUE(put("gone", 4).ok());
+  ASSERT_TRUE(KeptRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
+                first.registry().DeleteBody("gone", std::nullopt, std::move(done));
+              }).ok());
+  std::string value = kept_->Get(BodyKey("damaged"));
+  value[value.size() / 2] ^= 4;
+  kept_->Put(BodyKey("damaged"), value);
+  Start();
+  EXPECT_EQ(CountKeys(kBodyPrefix), 2);
+  std::vector<std::string> seen;
+  const absl::Status read = hulls_->store().ForEachBody(
+      [&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
+        seen.push_back(id);
+        EXPECT_EQ(body.ok(), id == "changed") << body.status();
+        EXPECT_EQ(absl::IsDataLoss(body.status()), id == "damaged");
+        EXPECT_EQ(body.ok() ? body->pieces.at(1).X_BP.t.x() : 0, id == "changed" ? 2 : 0);
+      });
+  EXPECT_TRUE(read.ok()) << read;
+  EXPECT_THAT(seen, ::testing::ElementsAre("changed", "damaged"));
+}
+
 TEST_P(StoreRecovery, ASessionHearsThatItsHullWasReplaced) {
   KeptRegistry& hulls = Start();
   std::promise<absl::Status> gone;
