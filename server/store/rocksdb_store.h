@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "server/store/log_file_system.h"
+#include "server/store/sealed_hull.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -106,8 +107,8 @@ class RocksDbStore : public Store {
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
   absl::Status DropLostIncarnations();
-  absl::Status LoadBase(const StoredHull& hull, std::vector<Vector>* vertices);
-  absl::Status LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices);
+  absl::Status LoadBase(const StoredHull& hull, VertexAssembly* assembly);
+  absl::Status LoadDeltas(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status Probe();
   absl::Status Reopen();
   absl::Status SyncLog();

@@ -40,9 +40,9 @@ class Limits:
 class ServerStatus:
     """What runs, since when, and how much it holds.
 
-    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb" or "memory". hull_count,
-    vertex_count: None where the token is limited to a prefix, as it may not see the sizes of
-    others.
+    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb", "postgres" or "memory".
+    hull_count, vertex_count: None where the token is limited to a prefix, as it may not see the
+    sizes of others.
     """
 
     header: Header
