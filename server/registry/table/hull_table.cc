@@ -1,6 +1,7 @@
 #include "server/registry/table/hull_table.h"
 
 #include "core/base/check.h"
+#include "server/registry/registered_hull.h"
 
 namespace hulld::server {
 
@@ -22,6 +23,12 @@ HullRecord HullTable::RestingHull::RecordWith(const std::string& id) const {
   record.vertex_count = vertex_count;
   record.counts = counts;
   return record;
+}
+
+bool HullTable::Entry::visible() const { return awake_ == nullptr || awake_->state.visible(); }
+
+uint64_t HullTable::Entry::revision() const {
+  return awake_ == nullptr ? resting_.revision : awake_->committed.record.revision;
 }
 
 HullChange HullTable::Entry::Describe(const std::string& id) const {

@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
+#include "server/registry/hull_state.h"
 #include "server/registry/memory_budget.h"
-#include "server/registry/registered_hull.h"
 #include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 
@@ -52,11 +52,9 @@ class HullTable {
  public:
   class Entry {
    public:
-    bool visible() const { return awake_ == nullptr || awake_->state.visible(); }
+    bool visible() const;
     // The revision of the committed hull.
-    uint64_t revision() const {
-      return awake_ == nullptr ? resting_.revision : awake_->committed.record.revision;
-    }
+    uint64_t revision() const;
     // Null for a hull at rest.
     const HullPointer& awake() const { return awake_; }
     // The committed hull, as watches and lists are told of it. id: its own.

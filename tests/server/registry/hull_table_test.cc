@@ -4,7 +4,8 @@
 #include <malloc.h>
 
 #include <string>
-#include <vector>
+
+#include "server/registry/registered_hull.h"
 
 namespace hulld::server {
 namespace {
