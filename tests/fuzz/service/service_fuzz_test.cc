@@ -14,7 +14,7 @@ namespace hulld::fuzz {
 namespace {
 
 // The fuzzer's target without the fuzzer: as many programs on every run, from a fixed seed.
-constexpr int kPrograms = 500;
+constexpr int kPrograms = 800;
 
 std::vector<uint8_t> RandomProgram(Random& random) {
   std::vector<uint8_t> bytes(static_cast<size_t>(random.Between(1, 500)));

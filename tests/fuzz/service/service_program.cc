@@ -68,7 +68,7 @@ std::string ServiceProgram::Run() {
 }
 
 void ServiceProgram::Step() {
-  switch (in_.Below(23)) {
+  switch (in_.Below(24)) {
     case 0:
       return CreateHull();
     case 1:
@@ -102,9 +102,10 @@ void ServiceProgram::Step() {
     case 18:
       return in_.OneOf(4) ? SaveBackup() : ReplaceHull();
     case 19:
-      return WatchHulls();
     case 20:
+      return WatchHulls();
     case 21:
+    case 22:
       return WatchCollisions();
     default:
       return in_.OneOf(4) ? GetStatus() : AppendPoints();
@@ -667,7 +668,9 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     return finding_.empty();
   };
   bool told = read_until([&] { return check->is_synced(); });
-  if (told && (request.after_revision() == 0 || check->is_anew())) CompareWatched(*check);
+  // A watch that was resumed tells what changed.
+  const bool tells_all = request.after_revision() == 0 || check->is_anew();
+  if (told && tells_all) CompareWatched(*check);
   if (told && then_change) {
     const auto before = hulls_;
     watch_ = &context;
@@ -691,7 +694,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
       };
       told = told && read_until(seen);
     }
-    if (told) CompareWatched(*check);
+    if (told && tells_all) CompareWatched(*check);
   }
   manner.cancelled = true;
   context.TryCancel();
