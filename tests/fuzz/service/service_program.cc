@@ -658,10 +658,12 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   CallManner manner;
   Hurry(context, manner);
   const auto reader = service_.hulls_->WatchHulls(&context, request);
+  bool lasts = true;
   v1::WatchHullsResponse response;
   const auto read_until = [&](const auto& is_told) {
     while (finding_.empty() && !is_told()) {
-      if (!reader->Read(&response)) return false;
+      lasts = reader->Read(&response);
+      if (!lasts) return false;
       SeeStore(response.header());
       Note(check->Received(response));
     }
@@ -682,7 +684,8 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
       AppendPoints();
     }
     // Otherwise a call was given up, and this one with it.
-    told = std::exchange(watch_, nullptr) != nullptr && doubtful_.empty() && !all_doubtful_;
+    manner.cancelled = std::exchange(watch_, nullptr) == nullptr;
+    told = !manner.cancelled && doubtful_.empty() && !all_doubtful_;
     for (const std::string& changed : told ? ChangedSince(before) : std::vector<std::string>()) {
       if (!check->Watches(changed)) continue;
       Reach("WatchHulls change");
@@ -696,8 +699,9 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
     }
     if (told && tells_all) CompareWatched(*check);
   }
-  manner.cancelled = true;
-  context.TryCancel();
+  manner.cancelled = manner.cancelled || lasts;
+  // What has ended says why.
+  if (lasts) context.TryCancel();
   while (reader->Read(&response)) {
   }
   const grpc::Status status = reader->Finish();
