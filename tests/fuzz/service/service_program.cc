@@ -68,7 +68,7 @@ std::string ServiceProgram::Run() {
 }
 
 void ServiceProgram::Step() {
-  switch (in_.Below(23)) {
+  switch (in_.Below(24)) {
     case 0:
       return CreateHull();
     case 1:
@@ -102,9 +102,10 @@ void ServiceProgram::Step() {
     case 18:
       return in_.OneOf(4) ? SaveBackup() : ReplaceHull();
     case 19:
-      return WatchHulls();
     case 20:
+      return WatchHulls();
     case 21:
+    case 22:
       return WatchCollisions();
     default:
       return in_.OneOf(4) ? GetStatus() : AppendPoints();
@@ -657,17 +658,21 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   CallManner manner;
   Hurry(context, manner);
   const auto reader = service_.hulls_->WatchHulls(&context, request);
+  bool lasts = true;
   v1::WatchHullsResponse response;
   const auto read_until = [&](const auto& is_told) {
     while (finding_.empty() && !is_told()) {
-      if (!reader->Read(&response)) return false;
+      lasts = reader->Read(&response);
+      if (!lasts) return false;
       SeeStore(response.header());
       Note(check->Received(response));
     }
     return finding_.empty();
   };
   bool told = read_until([&] { return check->is_synced(); });
-  if (told && (request.after_revision() == 0 || check->is_anew())) CompareWatched(*check);
+  // A watch that was resumed tells what changed.
+  const bool tells_all = request.after_revision() == 0 || check->is_anew();
+  if (told && tells_all) CompareWatched(*check);
   if (told && then_change) {
     const auto before = hulls_;
     watch_ = &context;
@@ -679,7 +684,8 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
       AppendPoints();
     }
     // Otherwise a call was given up, and this one with it.
-    told = std::exchange(watch_, nullptr) != nullptr && doubtful_.empty() && !all_doubtful_;
+    manner.cancelled = std::exchange(watch_, nullptr) == nullptr;
+    told = !manner.cancelled && doubtful_.empty() && !all_doubtful_;
     for (const std::string& changed : told ? ChangedSince(before) : std::vector<std::string>()) {
       if (!check->Watches(changed)) continue;
       Reach("WatchHulls change");
@@ -691,10 +697,11 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
       };
       told = told && read_until(seen);
     }
-    if (told) CompareWatched(*check);
+    if (told && tells_all) CompareWatched(*check);
   }
-  manner.cancelled = true;
-  context.TryCancel();
+  manner.cancelled = manner.cancelled || lasts;
+  // What has ended says why.
+  if (lasts) context.TryCancel();
   while (reader->Read(&response)) {
   }
   const grpc::Status status = reader->Finish();

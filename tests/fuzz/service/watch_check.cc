@@ -50,14 +50,16 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   uint64_t last_revision = 0;
   for (const v1::HullEvent& event : response.events()) {
     const v1::HullInfo& hull = event.hull();
-    if (!is_synced_ && hull.hull_id() <= last_id) return "events are not in the order of IDs";
-    if (is_synced_ && hull.revision() < last_revision) {
+    // What went comes first, then what is there.
+    const bool is_there = !is_synced_ && event.kind() != v1::HULL_EVENT_KIND_DELETED;
+    if (is_there && hull.hull_id() <= last_id) return "events are not in the order of IDs";
+    if (!is_there && (hull.revision() < last_revision || !last_id.empty())) {
       return "events are not in the order of revisions";
     }
-    last_id = hull.hull_id();
-    last_revision = hull.revision();
+    if (is_there) last_id = hull.hull_id();
+    if (!is_there) last_revision = hull.revision();
     if (std::string finding = TakeEvent(event); !finding.empty()) {
-      return absl::StrCat("watched hull ", last_id, ": ", finding);
+      return absl::StrCat("watched hull ", hull.hull_id(), ": ", finding);
     }
   }
   is_synced_ = is_synced_ || response.synced();
