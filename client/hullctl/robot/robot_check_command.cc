@@ -1,10 +1,10 @@
 #include <absl/strings/str_cat.h>
 
-#include <array>
 #include <atomic>
 #include <deque>
 #include <memory>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 
 #include "client/formats/text_number.h"
@@ -106,7 +106,7 @@ class RobotCheck {
   std::vector<uint64_t> lines_;
   std::atomic<bool> stopped_ = false;
 
-  std::array<uint64_t, 5> counts_ = {};
+  std::unordered_map<int, uint64_t> counts_;
   uint64_t waypoints_ = 0;
   uint64_t failed_ = 0;
   uint64_t beyond_limits_ = 0;
@@ -313,7 +313,7 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
                       const std::string& problem) {
   // With --first, what the message of the first contact holds beyond it is passed over.
   if (arguments_.first && first_.has_value() && waypoint > first_->waypoint) return;
-  ++counts_[static_cast<size_t>(row.relation)];
+  ++counts_[row.relation];
   const bool collides =
       row.relation == v1::RELATION_TOUCHING || row.relation == v1::RELATION_OVERLAPPING;
   if (collides && !first_.has_value()) first_ = Contact{waypoint, pair, row.relation};
