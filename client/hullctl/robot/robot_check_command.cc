@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/query_options.h"
@@ -126,7 +127,7 @@ absl::Status RobotCheck::AddScene() {
   if (arguments_.scene.empty()) return absl::OkStatus();
   const auto source = ByteSource::Open(arguments_.scene);
   if (!source.ok()) return source.status();
-  const auto scene = ReadScene(source->get());
+  const auto scene = ReadScene(source->get(), BodyForm::kPieces);
   if (!scene.ok()) return scene.status();
   for (uint32_t i = 0; i < scene->size(); ++i) {
     cast_.names.push_back(scene->NameOf(i));
