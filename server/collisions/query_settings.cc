@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "core/query/body/body_search.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/wire/decode.h"
 
@@ -42,12 +43,17 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
         absl::StrCat("wanted.clearance is ", wanted.clearance(), "; it is a length of at least 0"));
   }
   options.max_textbook_axes = limits.max_textbook_axes;
+  options.max_piece_certificates = Config::kMaxPieceCertificates;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
   return options;
 }
 
 absl::Status ValidateForBodies(const QueryOptions& options) {
   return ValidateBodyOptions(options, kFieldNames);
+}
+
+absl::Status ValidateForBodiesAmongMany(const QueryOptions& options) {
+  return ValidateOptionsAmongMany(options, kFieldNames);
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {
@@ -77,6 +83,12 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   return AtLimit(status, options.max_textbook_axes, "max-textbook-axes");
+}
+
+absl::Status NameProofLimit(const absl::Status& status) {
+  if (status.code() != absl::StatusCode::kResourceExhausted) return status;
+  return WithReason(status, v1::ERROR_REASON_PROOF_TOO_LARGE,
+                    {{"limit", uint64_t{Config::kMaxPieceCertificates}}});
 }
 
 }  // namespace hulld::server
