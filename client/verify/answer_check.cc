@@ -2,18 +2,58 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "client/verify/certificate_check.h"
+#include "client/verify/piece_check.h"
 
 namespace hulld {
 namespace {
 
 constexpr int kAttempts = 5;
 
-bool IsSame(const v1::HullInfo& hull, const v1::HullVersion& version) {
-  return hull.create_revision() == version.create_revision() &&
-         hull.revision() == version.revision();
+constexpr char kOtherStore[] = "the server holds another store than the answer's";
+
+// Of a hull or a body.
+template <typename Info>
+bool IsSame(const Info& info, const v1::HullVersion& version) {
+  return info.create_revision() == version.create_revision() &&
+         info.revision() == version.revision();
+}
+
+std::string MovedText(const char* what, uint64_t revision, const v1::HullVersion& version) {
+  return absl::StrCat(what, " ", version.hull_id(), " is at revision ", revision,
+                      "; the answer is from revision ", version.revision());
+}
+
+// Why nothing can be checked; none for an answer that is about what was asked.
+std::optional<Verification> Precluded(v1::Relation relation, const v1::Placement& a,
+                                      const v1::HullVersion& of_a, const v1::Placement& b,
+                                      const v1::HullVersion& of_b) {
+  if (relation == v1::RELATION_UNSPECIFIED || relation == v1::RELATION_WITHIN_TOLERANCE) {
+    return Verification{Verdict::kCannotCheck,
+                        absl::StrCat(v1::Relation_Name(relation), " has no certificate")};
+  }
+  if (of_a.hull_id() == a.hull_id() && of_b.hull_id() == b.hull_id()) return std::nullopt;
+  return Verification{Verdict::kInvalid, "the answer is about other hulls than the request"};
+}
+
+Verification FromStatus(const absl::Status& checked) {
+  if (checked.ok()) return Verification{Verdict::kValid, ""};
+  return Verification{Verdict::kInvalid, std::string(checked.message())};
+}
+
+// Whether the pieces that the answer says decided are proven to be in its relation.
+bool IsDecidingPairProven(const v1::CheckCollisionResponse& response) {
+  if (response.relation() == v1::RELATION_SEPARATED) return true;
+  return std::any_of(response.piece_certificates().begin(), response.piece_certificates().end(),
+                     [&](const v1::PieceCertificate& of) {
+                       return of.relation() == response.relation() &&
+                              of.piece_a() == response.piece_a().index() &&
+                              of.piece_b() == response.piece_b().index();
+                     });
 }
 
 }  // namespace
@@ -34,27 +74,75 @@ absl::StatusOr<const HullMesh*> AnswerChecker::Fetch(const v1::HullVersion& vers
   }
   const v1::MeshHeader& header = known->second.header;
   if (header.header().store_id() != version.store_id()) {
-    *problem = {Verdict::kCannotCheck, "the server holds another store than the answer's"};
+    *problem = {Verdict::kCannotCheck, kOtherStore};
     return nullptr;
   }
   if (!IsSame(header.hull(), version)) {
-    *problem = {Verdict::kMoved,
-                absl::StrCat("hull ", id, " is at revision ", header.hull().revision(),
-                             "; the answer is from revision ", version.revision())};
+    *problem = {Verdict::kMoved, MovedText("hull", header.hull().revision(), version)};
     return nullptr;
   }
   return &known->second;
 }
 
-absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
-  if (answer.relation == v1::RELATION_UNSPECIFIED ||
-      answer.relation == v1::RELATION_WITHIN_TOLERANCE) {
-    return Verification{Verdict::kCannotCheck,
-                        absl::StrCat(v1::Relation_Name(answer.relation), " has no certificate")};
+absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::HullVersion& version,
+                                                                    Verification* problem) {
+  const std::string& id = version.hull_id();
+  auto known = bodies_.find(id);
+  if (known == bodies_.end() || known->second.body().revision() < version.revision()) {
+    absl::StatusOr<v1::GetBodyResponse> body = client_.GetBody(id);
+    if (absl::IsNotFound(body.status())) return nullptr;
+    if (!body.ok()) return body.status();
+    known = bodies_.insert_or_assign(id, *std::move(body)).first;
   }
-  if (answer.hull_a.hull_id() != answer.a.hull_id() ||
-      answer.hull_b.hull_id() != answer.b.hull_id()) {
-    return Verification{Verdict::kInvalid, "the answer is about other hulls than the request"};
+  const v1::GetBodyResponse& body = known->second;
+  if (body.header().store_id() != version.store_id()) {
+    *problem = {Verdict::kCannotCheck, kOtherStore};
+    return nullptr;
+  }
+  if (!IsSame(body.body(), version)) {
+    *problem = {Verdict::kMoved, MovedText("body", body.body().revision(), version)};
+    return nullptr;
+  }
+  return &body;
+}
+
+absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
+    const v1::Placement& placement, const v1::HullVersion& version, bool named,
+    const Versions& hulls, Verification* problem) {
+  const auto body = FetchBody(version, problem);
+  if (!body.ok()) return body.status();
+  std::vector<PlacedVertices> pieces;
+  if (!problem->reason.empty()) return pieces;
+  if (*body == nullptr) {
+    if (named) {
+      *problem = {Verdict::kMoved, absl::StrCat("body ", version.hull_id(), " was deleted")};
+      return pieces;
+    }
+    const auto mesh = Fetch(version, problem);
+    if (!mesh.ok()) return mesh.status();
+    if (*mesh != nullptr) pieces.push_back({(*mesh)->xyz, placement.pose()});
+    return pieces;
+  }
+  for (const v1::Placement& piece : (*body)->pieces()) {
+    const auto hull = hulls.find(piece.hull_id());
+    if (hull == hulls.end()) {
+      *problem = {Verdict::kInvalid,
+                  absl::StrCat("piece ", pieces.size(), " of body ", version.hull_id(), " is hull ",
+                               piece.hull_id(), ", of which the answer names no revision")};
+      return pieces;
+    }
+    const auto mesh = Fetch(*hull->second, problem);
+    if (!mesh.ok()) return mesh.status();
+    if (*mesh == nullptr) return pieces;
+    pieces.push_back({(*mesh)->xyz, placement.pose(), &piece.pose()});
+  }
+  return pieces;
+}
+
+absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
+  if (const auto precluded =
+          Precluded(answer.relation, answer.a, answer.hull_a, answer.b, answer.hull_b)) {
+    return *precluded;
   }
   Verification verification;
   const auto a = Fetch(answer.hull_a, &verification);
@@ -66,8 +154,43 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
   const absl::Status checked =
       CheckCertificate(answer.relation, answer.certificate, {(*a)->xyz, answer.a.pose()},
                        {(*b)->xyz, answer.b.pose()});
-  if (checked.ok()) return Verification{Verdict::kValid, ""};
-  return Verification{Verdict::kInvalid, std::string(checked.message())};
+  return FromStatus(checked);
+}
+
+absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionRequest& request,
+                                                  const v1::CheckCollisionResponse& response) {
+  if (!response.piece_hulls().empty()) return CheckBodies(request, response);
+  if (response.has_piece_a() || response.has_piece_b()) {
+    return Verification{Verdict::kCannotCheck, "the answer about bodies has no certificates"};
+  }
+  return Check({request.a(), request.b(), response.relation(), response.certificate(),
+                response.hull_a(), response.hull_b()});
+}
+
+absl::StatusOr<Verification> AnswerChecker::CheckBodies(
+    const v1::CheckCollisionRequest& request, const v1::CheckCollisionResponse& response) {
+  if (const auto precluded = Precluded(response.relation(), request.a(), response.hull_a(),
+                                       request.b(), response.hull_b())) {
+    return *precluded;
+  }
+  Versions hulls;
+  for (const v1::HullVersion& hull : response.piece_hulls()) hulls.emplace(hull.hull_id(), &hull);
+  Verification verification;
+  const auto a =
+      FetchPieces(request.a(), response.hull_a(), response.has_piece_a(), hulls, &verification);
+  if (!a.ok()) return a.status();
+  if (!verification.reason.empty()) return verification;
+  const auto b =
+      FetchPieces(request.b(), response.hull_b(), response.has_piece_b(), hulls, &verification);
+  if (!b.ok()) return b.status();
+  if (!verification.reason.empty()) return verification;
+  const absl::Status checked =
+      CheckPieceCertificates(response.relation(), response.piece_certificates(), *a, *b);
+  if (!checked.ok() || IsDecidingPairProven(response)) return FromStatus(checked);
+  return Verification{
+      Verdict::kInvalid,
+      absl::StrCat("the answer says that pieces ", response.piece_a().index(), " of A and ",
+                   response.piece_b().index(), " of B decided, but no certificate shows that")};
 }
 
 absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,
@@ -78,10 +201,7 @@ absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,
     absl::StatusOr<v1::CheckCollisionResponse> response = client.CheckCollision(request);
     if (!response.ok()) return response.status();
     verified.response = *std::move(response);
-    const v1::CheckCollisionResponse& answer = verified.response;
-    absl::StatusOr<Verification> verification =
-        checker.Check({request.a(), request.b(), answer.relation(), answer.certificate(),
-                       answer.hull_a(), answer.hull_b()});
+    absl::StatusOr<Verification> verification = checker.Check(request, verified.response);
     if (!verification.ok()) return verification.status();
     verified.verification = *std::move(verification);
     if (verified.verification.verdict != Verdict::kMoved) break;

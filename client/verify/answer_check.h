@@ -6,8 +6,10 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "client/client.h"
+#include "client/verify/exact_hull.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -39,7 +41,7 @@ struct CheckedAnswer {
   const v1::HullVersion& hull_b;
 };
 
-// Checks answers against the hulls that GetHullMesh returns.
+// Checks answers against the hulls that GetHullMesh returns, and the bodies that GetBody does.
 class AnswerChecker {
  public:
   // `client` must outlive this.
@@ -48,13 +50,30 @@ class AnswerChecker {
   // Fetches the hulls that it does not have yet and returns the errors of that. A hull that was
   // deleted is kMoved.
   absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
+  // The same of a single call, which may be about bodies.
+  absl::StatusOr<Verification> Check(const v1::CheckCollisionRequest& request,
+                                     const v1::CheckCollisionResponse& response);
 
  private:
+  using Versions = std::map<std::string, const v1::HullVersion*>;
+
   // Null, with the reason, when the server no longer has the mesh at that version.
   absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
+  // The same of a body; null without a reason where there is none of this ID.
+  absl::StatusOr<const v1::GetBodyResponse*> FetchBody(const v1::HullVersion& version,
+                                                       Verification* problem);
+  // The pieces of what is placed, or of a hull itself; none, with the reason, when the server no
+  // longer has all. `named`: whether the answer names a piece of it. They refer to what this keeps.
+  absl::StatusOr<std::vector<PlacedVertices>> FetchPieces(const v1::Placement& placement,
+                                                          const v1::HullVersion& version,
+                                                          bool named, const Versions& hulls,
+                                                          Verification* problem);
+  absl::StatusOr<Verification> CheckBodies(const v1::CheckCollisionRequest& request,
+                                           const v1::CheckCollisionResponse& response);
 
   const Client& client_;
   std::map<std::string, HullMesh> meshes_;
+  std::map<std::string, v1::GetBodyResponse> bodies_;
 };
 
 // Asks and checks the answer; a few times, as long as a hull changes in between. Returns the last

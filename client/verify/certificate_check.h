@@ -3,18 +3,10 @@
 
 #include <absl/status/status.h>
 
-#include <span>
-
+#include "client/verify/exact_hull.h"
 #include "hulld/v1/collision.pb.h"
-#include "hulld/v1/geometry.pb.h"
 
 namespace hulld {
-
-// A hull as the check takes it: its vertices, x y z each, and its pose.
-struct PlacedVertices {
-  std::span<const double> xyz;
-  const v1::Pose& pose;
-};
 
 // Whether the certificate proves that A and B are in this relation, in exact arithmetic over the
 // doubles given, from the definitions in collision.proto and geometry.proto alone: this code shares
@@ -27,6 +19,13 @@ struct PlacedVertices {
 // Cost: O(vertices) operations on integers of any length: about a microsecond per vertex.
 absl::Status CheckCertificate(v1::Relation relation, const v1::Certificate& certificate,
                               const PlacedVertices& a, const PlacedVertices& b);
+
+// The same for hulls that are not empty, both at one exponent.
+absl::Status CheckExactly(v1::Relation relation, const v1::Certificate& certificate,
+                          const ExactHull& a, const ExactHull& b);
+
+// OK, or FAILED_PRECONDITION: a relation that no certificate proves.
+absl::Status CheckRelation(v1::Relation relation);
 
 }  // namespace hulld
 

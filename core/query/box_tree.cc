@@ -36,11 +36,14 @@ Box BoundingBox(const PlacedHull& placed) {
   if (placed.empty()) return Box::Empty();
   const Vector& t = placed.X_WH().t;
   const double size = placed.query_hull().max_abs_coordinate() + t.cwiseAbs().maxCoeff();
-  if (!IsFilterSize(size)) {
+  // That of a product is relative to its factors, which may be far larger than all of the hull.
+  const double translation_error =
+      placed.product() == nullptr ? 0 : placed.product()->translation_error();
+  if (!IsFilterSize(size) || !std::isfinite(translation_error)) {
     return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
   }
   const QueryHull& hull = placed.query_hull();
-  const double error = kSupportErrorFactor * size;
+  const double error = kSupportErrorFactor * size + translation_error;
   Box box;
   for (int axis = 0; axis < 3; ++axis) {
     const PlainVector n = Vector(placed.R_WH().row(axis));

@@ -79,8 +79,8 @@ class SceneSearch {
 
   // The answer of a candidate, and what else is wanted of it if it is found. pieces: where not
   // null, becomes the pair that decided of a candidate with a body (BodyAnswer::pieces). CANCELLED:
-  // should_stop said so. INVALID_ARGUMENT: a candidate with a body, and what ValidateBodyOptions
-  // refuses.
+  // should_stop said so. INVALID_ARGUMENT: a candidate with a body, and what
+  // ValidateOptionsAmongMany refuses.
   absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b,
                              std::optional<PiecePair>* pieces = nullptr) const;
   // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.

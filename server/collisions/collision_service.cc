@@ -7,6 +7,9 @@
 #include <chrono>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -20,8 +23,10 @@
 #include "server/collisions/collision_watch.h"
 #include "server/collisions/query_settings.h"
 #include "server/collisions/scene_stream.h"
+#include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 #include "server/registry/bodies/body_resolution.h"
+#include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 
@@ -96,15 +101,65 @@ const QueryHull& HullOfPiece(const BodyQuestion::Side& side, uint32_t piece) {
   return *side.placed().body().pieces()[piece].hull;
 }
 
+// The hulls of all pieces, each once; of a hull, itself.
+void EncodeHulls(const std::string& store_id, const BodyQuestion::Side& side,
+                 std::set<std::string_view>* known, v1::CheckCollisionResponse* response) {
+  const auto encode = [&](const HullView& view) {
+    if (!known->insert(view.record.hull_id).second) return;
+    EncodeVersion(store_id, view.record, response->add_piece_hulls());
+  };
+  if (!side.is_body()) return encode(side.view());
+  for (const HullView& view : side.view().body->hulls) encode(view);
+}
+
+// What the relation of bodies follows from. RESOURCE_EXHAUSTED: it is too much for a reply.
+absl::Status EncodeProof(const std::string& store_id,
+                         const std::vector<PieceCertificate>& certificates,
+                         const BodyQuestion::Side& a, const BodyQuestion::Side& b,
+                         v1::CheckCollisionResponse* response) {
+  std::set<std::string_view> known;
+  EncodeHulls(store_id, a, &known, response);
+  EncodeHulls(store_id, b, &known, response);
+  size_t bytes = response->ByteSizeLong();
+  for (const PieceCertificate& certificate : certificates) {
+    // Tag and length.
+    constexpr size_t kEntryBytes = 4;
+    const auto [piece_a, piece_b] = certificate.pieces;
+    v1::PieceCertificate* const message = response->add_piece_certificates();
+    message->set_piece_a(piece_a);
+    message->set_piece_b(piece_b);
+    message->set_relation(EncodeRelation(certificate.relation));
+    EncodeCertificate(certificate.certificate, HullOfPiece(a, piece_a).hull(),
+                      HullOfPiece(b, piece_b).hull(), message->mutable_certificate());
+    bytes += kEntryBytes + message->ByteSizeLong();
+    if (bytes > Config::kMaxProofBytes) break;
+  }
+  if (bytes <= Config::kMaxProofBytes) return absl::OkStatus();
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat("the certificates of ", certificates.size(),
+                                                " pairs of pieces and the hulls of all take "
+                                                "more than the ",
+                                                Config::kMaxProofBytes,
+                                                " bytes of a reply; ask about bodies of fewer "
+                                                "pieces, or without certificates")),
+      v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", uint64_t{Config::kMaxProofBytes}}});
+}
+
 absl::Status EncodeBodyAnswer(const std::string& store_id, const BodyAnswer& answer,
                               const BodyQuestion::Side& a, const BodyQuestion::Side& b,
                               const v1::Wanted& wanted, v1::CheckCollisionResponse* response) {
-  if (!answer.pieces) return EncodeAnswer(answer.answer, NoHull(), NoHull(), wanted, response);
-  const PiecePair pieces = *answer.pieces;
-  if (a.is_body()) EncodePiece(store_id, a, pieces.a, response->mutable_piece_a());
-  if (b.is_body()) EncodePiece(store_id, b, pieces.b, response->mutable_piece_b());
-  return EncodeAnswer(answer.answer, HullOfPiece(a, pieces.a), HullOfPiece(b, pieces.b), wanted,
-                      response);
+  absl::Status encoded;
+  if (!answer.pieces) {
+    encoded = EncodeAnswer(answer.answer, NoHull(), NoHull(), wanted, response);
+  } else {
+    const PiecePair pieces = *answer.pieces;
+    if (a.is_body()) EncodePiece(store_id, a, pieces.a, response->mutable_piece_a());
+    if (b.is_body()) EncodePiece(store_id, b, pieces.b, response->mutable_piece_b());
+    encoded = EncodeAnswer(answer.answer, HullOfPiece(a, pieces.a), HullOfPiece(b, pieces.b),
+                           wanted, response);
+  }
+  if (!encoded.ok() || !wanted.certificate()) return encoded;
+  return EncodeProof(store_id, answer.certificates, a, b, response);
 }
 
 }  // namespace
@@ -173,13 +228,33 @@ void CollisionService::PairQuery::Place(const Registry& registry, Resolved resol
 }
 
 struct CollisionService::TextbookQuery {
-  TextbookQuery(PairQuery given_pair, bool for_team)
-      : pair(std::move(given_pair)), is_for_team(for_team) {}
+  TextbookQuery(Registry& registry, PairQuery given_pair, bool for_team)
+      : pair(std::move(given_pair)),
+        is_for_team(for_team),
+        charge(registry.memory(), MemoryUse::kReading) {}
+
+  // RESOURCE_EXHAUSTED: there is no room for what a large pair holds from slice to slice, or it has
+  // too many axes.
+  absl::Status Begin(Registry& registry);
 
   PairQuery pair;
   const bool is_for_team;
   std::optional<TextbookCheck> check;
+  // Counts the check.
+  MemoryCharge charge;
 };
+
+absl::Status CollisionService::TextbookQuery::Begin(Registry& registry) {
+  if (is_for_team) {
+    if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  }
+  absl::StatusOr<TextbookCheck> begun =
+      TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
+  if (!begun.ok()) return NameQueryLimit(begun.status(), pair.options);
+  check = *std::move(begun);
+  charge.Set(check->MemoryBytes());
+  return absl::OkStatus();
+}
 
 absl::Status CollisionService::PairQuery::Encode(const absl::StatusOr<Answer>& answer,
                                                  const v1::Wanted& wanted, Metrics& metrics,
@@ -238,7 +313,7 @@ void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, C
                       call->call().client(),
                       [this, call](const absl::StatusOr<BodyAnswer>& answer,
                                    const BodyQuestion::Side& a, const BodyQuestion::Side& b) {
-                        if (!answer.ok()) return call->End(answer.status());
+                        if (!answer.ok()) return call->End(NameProofLimit(answer.status()));
                         RungCounts counts;
                         counts.Add(answer->answer.rung);
                         call->call().metrics().CountPairs(counts);
@@ -254,7 +329,8 @@ void CollisionService::Compute(PairQuery query, CheckCall* call) {
   if (query.options.method == Method::kTextbookSat) {
     const bool is_for_team = query.IsForTeam();
     if (is_for_team) query.options.threads = executor_.threads();
-    return SubmitPiece(std::make_shared<TextbookQuery>(std::move(query), is_for_team), call);
+    return SubmitPiece(std::make_shared<TextbookQuery>(registry_, std::move(query), is_for_team),
+                       call);
   }
   // `wanted` lives until the call ends.
   const auto answer = [call, response, &wanted, &metrics](const PairQuery& pair) {
@@ -274,10 +350,7 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
         const auto end = std::chrono::steady_clock::now() +
                          (query->is_for_team ? Executor::kSliceTime : TaskPool::kSliceTime);
         if (!query->check.has_value()) {
-          absl::StatusOr<TextbookCheck> begun =
-              TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
-          if (!begun.ok()) return call->End(NameQueryLimit(begun.status(), pair.options));
-          query->check = *std::move(begun);
+          if (absl::Status s = query->Begin(registry_); !s.ok()) return call->End(s);
         }
         const absl::StatusOr<bool> done = query->check->Advance(end);
         if (!done.ok()) return call->End(done.status());

@@ -27,7 +27,7 @@ PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
   if (!table.is_body(a) && !table.is_body(b)) {
     return {CheckCollision(table.placed()[a], table.placed()[b], options, cache), std::nullopt};
   }
-  if (absl::Status s = ValidateForBodies(options); !s.ok()) return {s, std::nullopt};
+  if (absl::Status s = ValidateForBodiesAmongMany(options); !s.ok()) return {s, std::nullopt};
   absl::StatusOr<BodyAnswer> found = CheckBodies(table.bodies()[a], table.bodies()[b], options);
   if (!found.ok()) return {found.status(), std::nullopt};
   return {std::move(found->answer), found->pieces};

@@ -23,8 +23,9 @@ struct PlacedAnswer {
   std::optional<PiecePair> pieces;
 };
 
-// Asks about a pair of placements. What is for hulls alone leaves a pair with a body without an
-// answer. cache: of a pair of hulls; may be null. Requires that both are answerable.
+// Asks about a pair of placements. A certificate, and what is for hulls alone, leaves a pair with a
+// body without an answer. cache: of a pair of hulls; may be null. Requires that both are
+// answerable.
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 

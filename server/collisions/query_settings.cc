@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include "core/query/body/body_search.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/wire/decode.h"
 
@@ -42,12 +43,17 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
         absl::StrCat("wanted.clearance is ", wanted.clearance(), "; it is a length of at least 0"));
   }
   options.max_textbook_axes = limits.max_textbook_axes;
+  options.max_piece_certificates = Config::kMaxPieceCertificates;
   options.should_stop = [&lifetime] { return lifetime.ShouldStop(); };
   return options;
 }
 
 absl::Status ValidateForBodies(const QueryOptions& options) {
   return ValidateBodyOptions(options, kFieldNames);
+}
+
+absl::Status ValidateForBodiesAmongMany(const QueryOptions& options) {
+  return ValidateOptionsAmongMany(options, kFieldNames);
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {
@@ -66,13 +72,23 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
   // Some 10 ms of one thread: far more than a team waits for its slowest thread, and not so much
   // that it matters to other calls when one thread of the pool is busy with it.
   constexpr double kTeamProjections = 1e7;
-  const double axes = static_cast<double>(a.edges().size()) * static_cast<double>(b.edges().size());
+  const auto edges_a = static_cast<double>(a.edges().size());
+  const auto edges_b = static_cast<double>(b.edges().size());
+  // Edges count once more, as a flat difference has an axis for each.
+  const double axes = edges_a * edges_b + edges_a + edges_b +
+                      static_cast<double>(a.facet_count() + b.facet_count());
   return axes * static_cast<double>(a.vertices().size() + b.vertices().size()) > kTeamProjections;
 }
 
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   return AtLimit(status, options.max_textbook_axes, "max-textbook-axes");
+}
+
+absl::Status NameProofLimit(const absl::Status& status) {
+  if (status.code() != absl::StatusCode::kResourceExhausted) return status;
+  return WithReason(status, v1::ERROR_REASON_PROOF_TOO_LARGE,
+                    {{"limit", uint64_t{Config::kMaxPieceCertificates}}});
 }
 
 }  // namespace hulld::server

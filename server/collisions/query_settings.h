@@ -17,8 +17,10 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);
 
-// OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone.
+// OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone; and, for one of many
+// pairs, what only an answer about one pair has room for.
 absl::Status ValidateForBodies(const QueryOptions& options);
+absl::Status ValidateForBodiesAmongMany(const QueryOptions& options);
 
 // Whether the relation of this hull and another such takes no longer than moving the bytes of the
 // question and of the answer does, so that one of gRPC's threads may find it.
@@ -32,6 +34,10 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& a, const P
 // An error of a query with these options in the words of the server: RESOURCE_EXHAUSTED names the
 // limit and its flag.
 absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& options);
+
+// The same of a question about bodies: RESOURCE_EXHAUSTED means that it would need too many
+// certificates.
+absl::Status NameProofLimit(const absl::Status& status);
 
 }  // namespace hulld::server
 

@@ -13,7 +13,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -107,7 +106,7 @@ class RocksDbStore : public Store {
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
-  void DropLostIncarnations(const std::set<std::string>& ending, rocksdb::WriteBatch* batch);
+  absl::Status DropLostIncarnations();
   absl::Status LoadBase(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status LoadDeltas(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status Probe();

@@ -33,6 +33,15 @@ void AddPieces(const v1::CheckCollisionResponse& response, Table* table) {
   if (response.has_piece_b()) table->Row({"piece of B", PieceText(response.piece_b())});
 }
 
+// What proves the relation: of bodies, a list that is for programs.
+std::string ProofText(const v1::CheckCollisionResponse& response) {
+  if (response.piece_hulls().empty()) return CertificateText(response.certificate());
+  const int count = response.piece_certificates_size();
+  const std::string pairs = count == 1 ? " pair of pieces" : " pairs of pieces";
+  const bool by_boxes = response.relation() != v1::RELATION_OVERLAPPING;
+  return "of " + std::to_string(count) + pairs + (by_boxes ? "; boxes settle the others" : "");
+}
+
 std::string FeatureText(const v1::Feature& feature) {
   constexpr int kShown = 8;
   std::string text = feature.vertex_indices_size() == 1 ? "vertex" : "vertices";
@@ -95,7 +104,7 @@ void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
   AddMeasures(request, response, &table);
   if (request.wanted().axis()) AddAxis(response, &table);
   if (request.wanted().certificate()) {
-    table.Row({"certificate", CertificateText(response.certificate())});
+    table.Row({"certificate", ProofText(response)});
   }
   if (verification != nullptr) table.Row({"verified", VerificationText(*verification, run.paint)});
   if (response.has_analysis()) {
@@ -201,7 +210,8 @@ void AddCheckCommand(Command program, Invocation* invocation) {
       .ValueName("FILE");
   command.SetDetails(
       "Lengths are in the unit of the points. Of a body ('hullctl body --help') the answer names\n"
-      "the pieces that decided; certificates and --textbook are for hulls alone.");
+      "the pieces that decided; its certificate is one for each pair of pieces that boxes do not\n"
+      "settle, which --output json shows. --textbook is for hulls alone.");
   command.SetExamples(
       {{"Do they collide?", "hullctl check arm box --pose-b 0.2,0,0"},
        {"How far apart are they, and where?",

@@ -34,9 +34,7 @@ ExitCode Verify(const Invocation& run, const std::string& path) {
   const Client client = run.MakeClient();
   AnswerChecker checker(client);
   const v1::CheckCollisionResponse& response = answer->response;
-  const auto verification =
-      checker.Check({answer->request.a(), answer->request.b(), response.relation(),
-                     response.certificate(), response.hull_a(), response.hull_b()});
+  const auto verification = checker.Check(answer->request, response);
   if (!verification.ok()) return run.Fail(verification.status());
   if (run.json()) {
     run.out << VerificationJson(*verification) << "\n";

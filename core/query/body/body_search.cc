@@ -72,12 +72,19 @@ bool IsInOrder(const PlacedBody& a, const PlacedBody& b) {
   return true;
 }
 
+// What is asked of the pair that decided: certificates are found apart.
+QueryOptions OfDecidingPair(const QueryOptions& options) {
+  QueryOptions deciding = options;
+  deciding.want_certificate = false;
+  return deciding;
+}
+
 QueryOptions ForEachPair(const QueryOptions& options) {
-  QueryOptions each = options;
+  QueryOptions each = OfDecidingPair(options);
+  each.want_separation = each.WantsDetails();
   each.want_axis = false;
   each.want_analysis = false;
   each.want_witness = false;
-  each.want_separation = options.WantsDetails();
   each.threads = 1;
   return each;
 }
@@ -91,11 +98,17 @@ absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames&
     return absl::InvalidArgumentError(
         absl::StrCat(names.textbook, " is for pairs of hulls, not of bodies; leave it out"));
   }
+  return ValidateOptions(options, names);
+}
+
+absl::Status ValidateOptionsAmongMany(const QueryOptions& options, const OptionNames& names) {
   if (options.want_certificate) {
     return absl::InvalidArgumentError(
-        absl::StrCat(names.certificate, " is for pairs of hulls, not of bodies; leave it out"));
+        absl::StrCat(names.certificate,
+                     " of bodies is for a pair that is asked about alone, as CheckCollision does; "
+                     "ask so, or leave it out"));
   }
-  return ValidateOptions(options, names);
+  return ValidateBodyOptions(options, names);
 }
 
 void BodySearch::PlacedLeaf::Enter(uint32_t leaf) {
@@ -117,7 +130,7 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
       y_(x_ == &a ? &b : &a),
       options_(&options),
       each_(ForEachPair(options)),
-      wants_least_(options.WantsDetails()),
+      wants_least_(each_.want_separation),
       limit_(std::max(0.0, options.clearance.value_or(0))),
       gap_(*x_, *y_),
       poll_(options.should_stop, kStepsPerLook) {
@@ -128,20 +141,33 @@ BodySearch::BodySearch(const PlacedBody& a, const PlacedBody& b, const QueryOpti
 absl::StatusOr<bool> BodySearch::Advance(uint64_t steps) {
   for (; steps > 0 && !ended_; --steps) {
     if (poll_.Step()) return absl::CancelledError("stopped in a query of bodies");
-    if (!candidates_.empty()) {
-      const Candidate candidate = candidates_.back();
-      candidates_.pop_back();
-      if (candidate.gap > Limit()) continue;
-      if (absl::Status s = Ask(candidate); !s.ok()) return s;
-    } else if (!waiting_.empty()) {
-      const Nodes nodes = waiting_.back();
-      waiting_.pop_back();
-      if (nodes.gap <= Limit()) Descend(nodes);
-    } else {
-      ended_ = true;
-    }
+    if (absl::Status s = found_ ? Prove() : Search(); !s.ok()) return s;
+    ended_ = found_ && (!options_->want_certificate || (certification_ && certification_->ended()));
   }
   return ended_;
+}
+
+// One step towards the relation.
+absl::Status BodySearch::Search() {
+  if (!candidates_.empty()) {
+    const Candidate candidate = candidates_.back();
+    candidates_.pop_back();
+    if (candidate.gap <= Limit()) return Ask(candidate);
+  } else if (!waiting_.empty()) {
+    const Nodes nodes = waiting_.back();
+    waiting_.pop_back();
+    if (nodes.gap <= Limit()) Descend(nodes);
+  } else {
+    found_ = true;
+  }
+  return absl::OkStatus();
+}
+
+// One step towards what proves it.
+absl::Status BodySearch::Prove() {
+  if (certification_) return certification_->Step();
+  certification_.emplace(*a_, *b_, *options_, relation_, decided_);
+  return absl::OkStatus();
 }
 
 double BodySearch::Gap(const Box& of_x, const Box& of_y) {
@@ -222,7 +248,7 @@ void BodySearch::TakeUp(const Answer& answer, PiecePair pieces) {
   if (is_stronger) relation_ = answer.relation;
   within_clearance_ |= within;
   const bool is_within_known = within_clearance_ || !options_->clearance.has_value();
-  ended_ = relation_ == Relation::kOverlapping && is_within_known;
+  found_ = relation_ == Relation::kOverlapping && is_within_known;
 }
 
 void BodySearch::TakeUpSeparation(const Answer& answer, PiecePair pieces) {
@@ -239,7 +265,12 @@ void BodySearch::TakeUpSeparation(const Answer& answer, PiecePair pieces) {
 
 absl::StatusOr<BodyAnswer> BodySearch::Take() {
   HULLD_CHECK(ended_);
-  if (wants_least_ && decided_) return TakeLeast();
+  absl::StatusOr<BodyAnswer> result = wants_least_ && decided_ ? TakeLeast() : TakeRelation();
+  if (result.ok() && certification_) result->certificates = certification_->Take();
+  return result;
+}
+
+BodyAnswer BodySearch::TakeRelation() const {
   BodyAnswer result;
   result.answer.relation = relation_;
   result.answer.rung = rung_;
@@ -253,12 +284,12 @@ absl::StatusOr<BodyAnswer> BodySearch::Take() {
 }
 
 // The answer of the named pair, with what holds of the bodies.
-absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() {
+absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   const PlacedPiece a(*a_, decided_->a);
   const PlacedPiece b(*b_, decided_->b);
-  absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), *options_);
+  absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), OfDecidingPair(*options_));
   if (!answer.ok()) return answer.status();
-  BodyAnswer result = {*std::move(answer), decided_};
+  BodyAnswer result = {*std::move(answer), decided_, {}};
   // The signs of separations are exact, so that of the least one is the strongest relation.
   HULLD_CHECK(result.answer.relation == relation_);
   result.answer.rung = rung_;

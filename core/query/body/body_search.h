@@ -11,6 +11,7 @@
 
 #include "core/base/stop_poll.h"
 #include "core/query/body/box_gap.h"
+#include "core/query/body/piece_certification.h"
 #include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/terms/answer.h"
@@ -19,19 +20,14 @@
 
 namespace hulld {
 
-// A piece of A and a piece of B, by index; that of a hull is 0.
-struct PiecePair {
-  uint32_t a;
-  uint32_t b;
-  friend bool operator==(const PiecePair&, const PiecePair&) = default;
-};
-
 struct BodyAnswer {
   // Of the bodies. Axis, witness points and analysis are those of the named pair.
   Answer answer;
   // The pair that decided. None where the relation alone shows that no pair collides, nor is within
   // the clearance; where either body holds no points, too.
   std::optional<PiecePair> pieces;
+  // When wanted, what proves the relation (PieceCertification), and Answer::certificate is none.
+  std::vector<PieceCertificate> certificates;
 };
 
 // What a search looked at.
@@ -51,8 +47,12 @@ struct BodyCounts {
 // and it is the named pair; else that of the least separation is. So swapping A and B mirrors an
 // answer, and the named pair does not depend on threads.
 //
+// A certificate does not count among these wishes: where it is wanted, those of pieces that prove
+// the relation are found once it is known.
+//
 // The search is made in steps, so that long ones can be cut into slices. Cost: O(log n) boxes and
-// the pairs that are near, where boxes of pieces overlap little.
+// the pairs that are near, where boxes of pieces overlap little; that of PieceCertification comes
+// on top.
 class BodySearch {
  public:
   // All must outlive the search. `options` must be valid (ValidateBodyOptions).
@@ -61,7 +61,8 @@ class BodySearch {
   BodySearch& operator=(const BodySearch&) = delete;
 
   // Makes at most so many steps, of one node or one pair of pieces each. Returns whether the search
-  // has ended. CANCELLED: should_stop said so.
+  // has ended. CANCELLED: should_stop said so. RESOURCE_EXHAUSTED: more certificates would be
+  // needed than options.max_piece_certificates.
   absl::StatusOr<bool> Advance(uint64_t steps);
   // Requires that the search has ended; once.
   absl::StatusOr<BodyAnswer> Take();
@@ -97,10 +98,13 @@ class BodySearch {
   void Descend(const Nodes& nodes);
   void Push(uint32_t x, uint32_t y);
   void EnterLeaves(const Nodes& nodes);
+  absl::Status Search();
+  absl::Status Prove();
   absl::Status Ask(const Candidate& candidate);
   void TakeUp(const Answer& answer, PiecePair pieces);
   void TakeUpSeparation(const Answer& answer, PiecePair pieces);
-  absl::StatusOr<BodyAnswer> TakeLeast();
+  absl::StatusOr<BodyAnswer> TakeLeast() const;
+  BodyAnswer TakeRelation() const;
 
   const PlacedBody* a_;
   const PlacedBody* b_;
@@ -119,7 +123,10 @@ class BodySearch {
   std::vector<Candidate> candidates_;
   PlacedLeaf leaf_x_;
   PlacedLeaf leaf_y_;
+  // Whether the relation and what decided are known.
+  bool found_ = false;
   bool ended_ = false;
+  std::optional<PieceCertification> certification_;
 
   BodyCounts counts_;
   Relation relation_ = Relation::kSeparated;
@@ -132,11 +139,15 @@ class BodySearch {
   double least_high_ = std::numeric_limits<double>::infinity();
 };
 
-// OK, or INVALID_ARGUMENT: ValidateOptions; the textbook method or a wanted certificate, which are
-// for pairs of hulls.
+// OK, or INVALID_ARGUMENT: ValidateOptions; the textbook method, which is for pairs of hulls.
 absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames& names = {});
 
-// A whole search. INVALID_ARGUMENT: ValidateBodyOptions. CANCELLED: should_stop said so.
+// The same for bodies in one of many pairs, whose answers hold no certificates of pieces:
+// INVALID_ARGUMENT also for a wanted certificate.
+absl::Status ValidateOptionsAmongMany(const QueryOptions& options, const OptionNames& names = {});
+
+// A whole search. INVALID_ARGUMENT: ValidateBodyOptions. CANCELLED, RESOURCE_EXHAUSTED:
+// BodySearch::Advance.
 absl::StatusOr<BodyAnswer> CheckBodies(const PlacedBody& a, const PlacedBody& b,
                                        const QueryOptions& options, BodyCounts* counts = nullptr);
 

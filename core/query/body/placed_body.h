@@ -49,6 +49,13 @@ class PlacedPiece {
   std::optional<PlacedHull> placed_;
 };
 
+// A piece of A and a piece of B, by index; that of a hull is 0.
+struct PiecePair {
+  uint32_t a;
+  uint32_t b;
+  friend bool operator==(const PiecePair&, const PiecePair&) = default;
+};
+
 // A box, world frame, that is certain to hold all pieces: larger than the least one where the body
 // is turned. All of space where doubles do not reach; empty where all pieces are.
 Box BoundingBox(const PlacedBody& placed);

@@ -35,6 +35,8 @@ struct QueryOptions {
   double tolerance = 0;
   // Textbook only: more candidate axes than this are refused.
   uint64_t max_textbook_axes = std::numeric_limits<uint64_t>::max();
+  // Bodies only: more certificates of pieces than this are refused.
+  uint64_t max_piece_certificates = std::numeric_limits<uint64_t>::max();
   // Polled inside long loops, possibly from several threads; true ends the query with CANCELLED.
   // May be empty.
   std::function<bool()> should_stop;

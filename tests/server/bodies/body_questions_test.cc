@@ -89,14 +89,8 @@ TEST_F(BodyQuestions, PosesComposeExactly) {
   EXPECT_EQ(Ask(left, right)->relation(), v1::RELATION_TOUCHING);
 }
 
-TEST_F(BodyQuestions, WhatIsForHullsAloneIsRefused) {
+TEST_F(BodyQuestions, TheTextbookIsForHullsAlone) {
   PutPair("pair");
-  v1::Wanted wanted;
-  wanted.set_certificate(true);
-  const auto certificate = Ask(PlacementOf("pair"), PlacementOf("cube"), wanted);
-  EXPECT_TRUE(absl::IsInvalidArgument(certificate.status()));
-  EXPECT_THAT(std::string(certificate.status().message()),
-              HasSubstr("wanted.certificate is for pairs of hulls, not of bodies"));
   v1::CheckCollisionRequest request;
   *request.mutable_a() = PlacementOf("pair");
   *request.mutable_b() = PlacementOf("cube");
@@ -184,9 +178,10 @@ TEST_F(BodyQuestions, BatchesTakeBoth) {
   ASSERT_TRUE(apart.ok()) << apart.status();
   EXPECT_NEAR(apart->columns().separations(0), 1.5, 1e-10);
   EXPECT_GE(apart->columns().pieces(0), 0);
-  // What bodies have none of is a problem of the pair.
+  // What is for single questions is a problem of the pair.
   packed.mutable_wanted()->set_certificate(true);
-  EXPECT_THAT(Batch(packed)->columns().pair_problems(0).message(), HasSubstr("not of bodies"));
+  EXPECT_THAT(Batch(packed)->columns().pair_problems(0).message(),
+              HasSubstr("wanted.certificate of bodies is for a pair that is asked about alone"));
 }
 
 TEST_F(BodyQuestions, WithoutBodiesThereIsNoColumnOfPieces) {

@@ -26,10 +26,14 @@ class Limits:
     max_waiting_calls: int
     max_streams_per_client: int
     max_concurrent_batches: int
+    max_pieces_per_body: int
     #: Seconds for one request, or one message of a collision stream; None: unlimited.
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
+    #: Of a client, which is a token or, without tokens, an address.
+    max_calls_per_client: int
+    max_batches_per_client: int
 
 
 @dataclass(frozen=True)

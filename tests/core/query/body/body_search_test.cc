@@ -4,14 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <optional>
 #include <vector>
 
 #include "core/query/collision.h"
 #include "tests/core/checks/point_sets.h"
+#include "tests/core/query/body/own_body.h"
 #include "tests/core/query/body/rational_world.h"
 
 namespace hulld {
@@ -21,51 +22,7 @@ using testing::HasSubstr;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Pose At(double x, double y, double z) {
-  Pose pose;
-  pose.t = Vector(x, y, z);
-  return pose;
-}
-
-// A body that owns its hulls.
-struct OwnBody {
-  std::deque<Hull> hulls;
-  std::deque<QueryHull> query_hulls;
-  std::vector<BodyPiece> pieces;
-  std::optional<QueryBody> query;
-
-  void Add(const std::vector<Vector>& points, const Pose& X_BP) {
-    hulls.push_back(points.empty() ? Hull() : BuildHull(points));
-    query_hulls.emplace_back(hulls.back());
-    pieces.push_back({&query_hulls.back(), X_BP});
-  }
-  void Finish() { query.emplace(pieces); }
-  PlacedBody Placed(const Pose& X_WB) const { return PlacedBody(*query, X_WB); }
-};
-
-void Fill(Random& random, int pieces, OwnBody* body) {
-  for (int i = 0; i < pieces; ++i) {
-    Pose pose = At(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
-    if (i % 2 == 0) pose.q = {1, 1.0 * random.Between(-1, 1), 0, 1.0 * random.Between(-1, 1)};
-    const int points = i % 5 == 4 ? 0 : random.Between(1, 5);
-    body->Add(RandomLatticePoints(random, points, 3), pose);
-  }
-  body->Finish();
-}
-
 int Strength(Relation relation) { return static_cast<int>(relation); }
-
-// Cubes of side 1 whose corners are `spacing` apart.
-void FillGrid(int side, double spacing, OwnBody* body) {
-  for (int x = 0; x < side; ++x) {
-    for (int y = 0; y < side; ++y) {
-      for (int z = 0; z < side; ++z) {
-        body->Add(LatticeCube(2, 1), At(spacing * x, spacing * y, spacing * z));
-      }
-    }
-  }
-  body->Finish();
-}
 
 QueryOptions Detailed() {
   QueryOptions options;
@@ -336,8 +293,10 @@ TEST(BodySearch, RefusesWhatIsForPairsOfHulls) {
       HasSubstr("not of bodies"));
   options = QueryOptions();
   options.want_certificate = true;
-  EXPECT_TRUE(absl::IsInvalidArgument(
-      CheckBodies(cube.Placed(Pose()), cube.Placed(Pose()), options).status()));
+  EXPECT_TRUE(ValidateBodyOptions(options).ok());
+  const absl::Status among_many = ValidateOptionsAmongMany(options);
+  EXPECT_TRUE(absl::IsInvalidArgument(among_many));
+  EXPECT_THAT(std::string(among_many.message()), HasSubstr("asked about alone"));
 }
 
 TEST(BodySearch, CoordinatesBeyondTheRangeOfBoxesAreAskedAboutAllTheSame) {

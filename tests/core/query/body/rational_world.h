@@ -50,9 +50,9 @@ inline RationalPoint Placed(const PoseChain& poses, RationalPoint p) {
   return p;
 }
 
-// The relation of two hulls at products of poses, by the oracle of integers.
-inline Relation RationalRelation(const Hull& a, const PoseChain& poses_a, const Hull& b,
-                                 const PoseChain& poses_b) {
+// Two hulls at products of poses in the world, at one common scale that makes integers of all.
+inline oracle::WorldPoints RationalWorld(const Hull& a, const PoseChain& poses_a, const Hull& b,
+                                         const PoseChain& poses_b) {
   using boost::multiprecision::denominator;
   using boost::multiprecision::numerator;
   std::vector<RationalPoint> all;
@@ -71,6 +71,13 @@ inline Relation RationalRelation(const Hull& a, const PoseChain& poses_a, const 
     }
     (i < a.vertices().size() ? world.a : world.b).push_back(scaled);
   }
+  return world;
+}
+
+// The relation of two hulls at products of poses, by the oracle of integers.
+inline Relation RationalRelation(const Hull& a, const PoseChain& poses_a, const Hull& b,
+                                 const PoseChain& poses_b) {
+  const oracle::WorldPoints world = RationalWorld(a, poses_a, b, poses_b);
   if (world.a.empty() || world.b.empty()) return Relation::kSeparated;
   return FromOracle(world.a.size() * world.b.size() <= 36 ? oracle::RelationByPolarCone(world)
                                                           : oracle::RelationByLinearProgram(world));

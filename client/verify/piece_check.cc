@@ -1,0 +1,213 @@
+#include "client/verify/piece_check.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "client/verify/certificate_check.h"
+
+namespace hulld {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+absl::Status Fails(const std::string& what) { return absl::FailedPreconditionError(what); }
+
+std::string PairText(size_t a, size_t b) {
+  return absl::StrCat("pieces ", a, " of A and ", b, " of B");
+}
+
+// A number >= 1 in its leading 62 bits, times 2^exponent.
+struct Leading {
+  double value;
+  int exponent;
+};
+
+Leading LeadingBits(const BigInteger& number) {
+  constexpr unsigned kBits = 62;
+  const unsigned bits = msb(number) + 1;
+  const unsigned dropped = bits > kBits ? bits - kBits : 0;
+  return {static_cast<double>(static_cast<int64_t>(number >> dropped)), static_cast<int>(dropped)};
+}
+
+// Doubles that number 2^exponent / scale lies between. A quotient of two rounded numbers errs by
+// less than 2^-50 of itself.
+std::pair<double, double> Between(const BigInteger& number, const BigInteger& scale, int exponent) {
+  if (number == 0) return {0, 0};
+  const Leading top = LeadingBits(abs(number));
+  const Leading bottom = LeadingBits(scale);
+  const double size =
+      std::ldexp(top.value / bottom.value, top.exponent - bottom.exponent + exponent);
+  // So that neither bound is out of the range where errors are relative.
+  if (!std::isnormal(size) || !std::isnormal(size / 2) || !std::isnormal(size * 2)) {
+    return {-kInfinity, kInfinity};
+  }
+  const double value = number > 0 ? size : -size;
+  return {value - size * 0x1p-48, value + size * 0x1p-48};
+}
+
+// The least box about a hull along the axes of the world.
+struct WorldBox {
+  WorldBox(const ExactHull& hull, int exponent) : scale(hull.scale) {
+    for (int k = 0; k < 3; ++k) {
+      BigVector axis = {0, 0, 0};
+      axis[k] = 1;
+      std::tie(low[k], high[k]) = hull.Extent(axis);
+      rounded_low[k] = Between(low[k], scale, exponent).first;
+      rounded_high[k] = Between(high[k], scale, exponent).second;
+    }
+  }
+
+  // Times scale.
+  BigVector low;
+  BigVector high;
+  BigInteger scale;
+  // Outwards.
+  std::array<double, 3> rounded_low;
+  std::array<double, 3> rounded_high;
+};
+
+bool AreApart(const WorldBox& a, const WorldBox& b) {
+  for (int k = 0; k < 3; ++k) {
+    if (a.rounded_high[k] < b.rounded_low[k] || b.rounded_high[k] < a.rounded_low[k]) return true;
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (a.high[k] * b.scale < b.low[k] * a.scale) return true;
+    if (b.high[k] * a.scale < a.low[k] * b.scale) return true;
+  }
+  return false;
+}
+
+// The pieces of one side; each is made exact when it is needed.
+class ExactPieces {
+ public:
+  explicit ExactPieces(std::span<const PlacedVertices> pieces)
+      : pieces_(pieces), exact_(pieces.size()) {}
+
+  size_t size() const { return pieces_.size(); }
+  bool empty(size_t i) const { return pieces_[i].xyz.empty(); }
+
+  absl::Status Check(const char* side, CommonExponent* lengths) const {
+    for (size_t i = 0; i < size(); ++i) {
+      if (empty(i)) continue;
+      if (absl::Status s = CheckPlacement(pieces_[i]); !s.ok()) {
+        return Fails(absl::StrCat("piece ", i, " of ", side, ": ", s.message()));
+      }
+      IncludeLengths(pieces_[i], lengths);
+    }
+    return absl::OkStatus();
+  }
+
+  // Requires a piece that is not empty, and an exponent that serves all.
+  const ExactHull& At(size_t i, const CommonExponent& lengths) {
+    if (exact_[i]) return *exact_[i];
+    const std::span<const double> xyz = pieces_[i].xyz;
+    BigVertices& vertices = vertices_[xyz.data()];
+    if (vertices == nullptr) vertices = ToIntegers(xyz, lengths);
+    return exact_[i].emplace(pieces_[i], vertices, lengths);
+  }
+
+  // None for empty pieces.
+  std::vector<std::optional<WorldBox>> Boxes(const CommonExponent& lengths) {
+    std::vector<std::optional<WorldBox>> boxes(size());
+    for (size_t i = 0; i < size(); ++i) {
+      if (!empty(i)) boxes[i].emplace(At(i, lengths), lengths.exponent());
+    }
+    return boxes;
+  }
+
+ private:
+  std::span<const PlacedVertices> pieces_;
+  std::vector<std::optional<ExactHull>> exact_;
+  // Of a hull that is a piece several times, once.
+  std::map<const double*, BigVertices> vertices_;
+};
+
+using Pairs = std::set<std::pair<uint32_t, uint32_t>>;
+
+absl::Status CheckOne(v1::Relation relation, const v1::PieceCertificate& of, ExactPieces* a,
+                      ExactPieces* b, const CommonExponent& lengths, Pairs* proven) {
+  const std::string name = PairText(of.piece_a(), of.piece_b());
+  if (of.piece_a() >= a->size() || of.piece_b() >= b->size()) {
+    return Fails(absl::StrCat(name, " have a certificate, but A has ", a->size(), " pieces and B ",
+                              b->size()));
+  }
+  if (!proven->emplace(of.piece_a(), of.piece_b()).second) {
+    return Fails(absl::StrCat(name, " have two certificates"));
+  }
+  if (absl::Status s = CheckRelation(of.relation()); !s.ok()) {
+    return Fails(absl::StrCat(name, ": ", s.message()));
+  }
+  // In the order of their numbers, a relation is stronger than those before it.
+  if (of.relation() > relation) {
+    return Fails(absl::StrCat(name, " are ", v1::Relation_Name(of.relation()),
+                              ", so the bodies are not ", v1::Relation_Name(relation)));
+  }
+  if (a->empty(of.piece_a()) || b->empty(of.piece_b())) {
+    if (of.relation() == v1::RELATION_SEPARATED) return absl::OkStatus();
+    return Fails(absl::StrCat(name, ": a hull is empty, and so separated from everything"));
+  }
+  const absl::Status checked = CheckExactly(
+      of.relation(), of.certificate(), a->At(of.piece_a(), lengths), b->At(of.piece_b(), lengths));
+  if (checked.ok()) return checked;
+  return Fails(absl::StrCat(name, ": ", checked.message()));
+}
+
+// Whether boxes settle every pair that has no certificate.
+absl::Status CheckOthers(const Pairs& proven, ExactPieces* a, ExactPieces* b,
+                         const CommonExponent& lengths) {
+  const std::vector<std::optional<WorldBox>> boxes_a = a->Boxes(lengths);
+  const std::vector<std::optional<WorldBox>> boxes_b = b->Boxes(lengths);
+  auto next = proven.begin();
+  for (uint32_t i = 0; i < boxes_a.size(); ++i) {
+    for (uint32_t j = 0; j < boxes_b.size(); ++j) {
+      if (next != proven.end() && *next == std::pair(i, j)) {
+        ++next;
+        continue;
+      }
+      if (!boxes_a[i] || !boxes_b[j] || AreApart(*boxes_a[i], *boxes_b[j])) continue;
+      return Fails(absl::StrCat(PairText(i, j),
+                                " have no certificate, and their boxes along the axes meet"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status CheckPieceCertificates(v1::Relation relation, const PieceCertificates& certificates,
+                                    std::span<const PlacedVertices> a,
+                                    std::span<const PlacedVertices> b) {
+  if (absl::Status s = CheckRelation(relation); !s.ok()) return s;
+  ExactPieces exact_a(a);
+  ExactPieces exact_b(b);
+  CommonExponent lengths;
+  if (absl::Status s = exact_a.Check("A", &lengths); !s.ok()) return s;
+  if (absl::Status s = exact_b.Check("B", &lengths); !s.ok()) return s;
+  Pairs proven;
+  bool is_shown = relation == v1::RELATION_SEPARATED;
+  for (const v1::PieceCertificate& of : certificates) {
+    absl::Status s = CheckOne(relation, of, &exact_a, &exact_b, lengths, &proven);
+    if (!s.ok()) return s;
+    is_shown |= of.relation() == relation;
+  }
+  if (!is_shown) {
+    return Fails(
+        absl::StrCat("no certificate shows two pieces that are ", v1::Relation_Name(relation)));
+  }
+  if (relation == v1::RELATION_OVERLAPPING) return absl::OkStatus();
+  return CheckOthers(proven, &exact_a, &exact_b, lengths);
+}
+
+}  // namespace hulld

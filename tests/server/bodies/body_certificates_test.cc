@@ -1,0 +1,195 @@
+// Certificates of bodies: what a single call answers, checked by client/verify alone.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "client/verify/answer_check.h"
+#include "tests/server/bodies/body_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class BodyCertificates : public BodyTest {
+ protected:
+  static v1::CheckCollisionRequest Question(const v1::Placement& a, const v1::Placement& b) {
+    v1::CheckCollisionRequest request;
+    *request.mutable_a() = a;
+    *request.mutable_b() = b;
+    request.mutable_wanted()->set_certificate(true);
+    return request;
+  }
+
+  // The answer, which is checked.
+  v1::CheckCollisionResponse Prove(const v1::CheckCollisionRequest& request) const {
+    const auto verified = CheckCollisionVerified(MakeClient(), request);
+    EXPECT_TRUE(verified.ok()) << verified.status();
+    if (!verified.ok()) return {};
+    EXPECT_EQ(verified->verification.verdict, Verdict::kValid) << verified->verification.reason;
+    EXPECT_FALSE(verified->response.has_certificate());
+    return verified->response;
+  }
+
+  Verification Verify(const v1::CheckCollisionRequest& request,
+                      const v1::CheckCollisionResponse& response) const {
+    const Client client = MakeClient();
+    AnswerChecker checker(client);
+    const auto verification = checker.Check(request, response);
+    EXPECT_TRUE(verification.ok()) << verification.status();
+    return verification.ok() ? *verification : Verification();
+  }
+
+  // A row of unit cubes, 2 apart along x, and a row across it.
+  void PutRows(int count) {
+    Put("cube", Cube());
+    std::vector<v1::Placement> pieces;
+    for (int i = 0; i < count; ++i) pieces.push_back(PlacementOf("cube", 2.0 * i, 0, 0));
+    ASSERT_TRUE(PutBody("row", pieces).ok());
+  }
+
+  static v1::Placement Turned(v1::Placement placement) {
+    v1::Quaternion* const q = placement.mutable_pose()->mutable_rotation();
+    q->set_w(0.3);
+    q->set_x(-0.7);
+    q->set_y(0.2);
+    q->set_z(0.9);
+    return placement;
+  }
+};
+
+TEST_F(BodyCertificates, EveryRelationIsProven) {
+  PutRows(30);
+  const auto overlap = Prove(Question(PlacementOf("row"), PlacementOf("row", 3.5, 0.5, 0)));
+  EXPECT_EQ(overlap.relation(), v1::RELATION_OVERLAPPING);
+  ASSERT_EQ(overlap.piece_certificates_size(), 1);
+  EXPECT_EQ(overlap.piece_certificates(0).piece_a(), overlap.piece_a().index());
+  EXPECT_EQ(overlap.piece_certificates(0).piece_b(), overlap.piece_b().index());
+  ASSERT_EQ(overlap.piece_hulls_size(), 1);
+  EXPECT_EQ(overlap.piece_hulls(0).hull_id(), "cube");
+  EXPECT_EQ(overlap.piece_hulls(0).revision(), Get("cube").hull().revision());
+
+  const auto touching = Prove(Question(PlacementOf("row"), PlacementOf("row", 0, 1, 0)));
+  EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
+  EXPECT_EQ(touching.piece_certificates_size(), 30);
+
+  // Turned as one, the boxes meet and the hulls do not.
+  const auto apart =
+      Prove(Question(Turned(PlacementOf("row")), Turned(PlacementOf("row", 0.8, 0.8, 0.8))));
+  EXPECT_EQ(apart.relation(), v1::RELATION_SEPARATED);
+  EXPECT_GT(apart.piece_certificates_size(), 10);
+  EXPECT_FALSE(apart.has_piece_a());
+
+  const auto far = Prove(Question(PlacementOf("row"), PlacementOf("row", 0, 9, 0)));
+  EXPECT_EQ(far.relation(), v1::RELATION_SEPARATED);
+  EXPECT_EQ(far.piece_certificates_size(), 0);
+}
+
+TEST_F(BodyCertificates, AHullBesideABodyAndDetailsBesideCertificates) {
+  PutRows(3);
+  Put("probe", Cube());
+  v1::CheckCollisionRequest request = Question(PlacementOf("probe", 2, 1, 0), PlacementOf("row"));
+  request.mutable_wanted()->set_separation(true);
+  request.mutable_wanted()->set_axis(true);
+  const auto touching = Prove(request);
+  EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
+  EXPECT_FALSE(touching.has_piece_a());
+  EXPECT_EQ(touching.piece_b().index(), 1u);
+  EXPECT_EQ(touching.separation().value(), 0);
+  EXPECT_TRUE(touching.has_axis());
+  std::set<std::string> hulls;
+  for (const v1::HullVersion& hull : touching.piece_hulls()) hulls.insert(hull.hull_id());
+  EXPECT_EQ(hulls, (std::set<std::string>{"cube", "probe"}));
+}
+
+TEST_F(BodyCertificates, PosesComposeExactly) {
+  Put("cube", Cube());
+  ASSERT_TRUE(PutBody("left", {PlacementOf("cube", 0.25, 0.2, 0.3)}).ok());
+  ASSERT_TRUE(PutBody("right", {PlacementOf("cube", 1.25, 0.2, 0.3)}).ok());
+  const auto touching = Prove(Question(Turned(PlacementOf("left", 17.3, -4.1, 1e6)),
+                                       Turned(PlacementOf("right", 17.3, -4.1, 1e6))));
+  EXPECT_EQ(touching.relation(), v1::RELATION_TOUCHING);
+}
+
+TEST_F(BodyCertificates, WhatIsAlteredIsRefused) {
+  PutRows(3);
+  const v1::CheckCollisionRequest request =
+      Question(PlacementOf("row"), PlacementOf("row", 0, 1, 0));
+  const v1::CheckCollisionResponse proven = Prove(request);
+  ASSERT_EQ(proven.piece_certificates_size(), 3);
+  const auto refused = [&](const v1::CheckCollisionResponse& altered) {
+    const Verification verification = Verify(request, altered);
+    EXPECT_EQ(verification.verdict, Verdict::kInvalid);
+    return verification.reason;
+  };
+  v1::CheckCollisionResponse altered = proven;
+  altered.mutable_piece_certificates()->DeleteSubrange(2, 1);
+  EXPECT_THAT(refused(altered), HasSubstr("pieces 2 of A and 2 of B have no certificate"));
+  altered = proven;
+  altered.mutable_piece_certificates(1)->set_piece_b(2);
+  EXPECT_THAT(refused(altered), HasSubstr("pieces 1 of A and 2 of B"));
+  altered = proven;
+  altered.set_relation(v1::RELATION_SEPARATED);
+  EXPECT_THAT(refused(altered), HasSubstr("pieces 0 of A and 0 of B are RELATION_TOUCHING"));
+  altered = proven;
+  altered.mutable_piece_b()->set_index(1);
+  EXPECT_THAT(refused(altered), HasSubstr("no certificate shows that"));
+  altered = proven;
+  altered.clear_piece_hulls();
+  EXPECT_EQ(Verify(request, altered).verdict, Verdict::kCannotCheck);
+  *altered.add_piece_hulls() = proven.piece_hulls(0);
+  altered.mutable_piece_hulls(0)->set_hull_id("other");
+  EXPECT_THAT(refused(altered), HasSubstr("piece 0 of body row is hull cube"));
+  // A pose that the question did not have.
+  v1::CheckCollisionRequest moved = request;
+  moved.mutable_b()->mutable_pose()->mutable_translation()->set_y(1.5);
+  EXPECT_EQ(Verify(moved, proven).verdict, Verdict::kInvalid);
+}
+
+TEST_F(BodyCertificates, WhatChangedSinceCannotBeChecked) {
+  PutRows(3);
+  Put("probe", Cube());
+  const v1::CheckCollisionRequest request =
+      Question(PlacementOf("row"), PlacementOf("probe", 0, 1, 0));
+  const v1::CheckCollisionResponse proven = Prove(request);
+  ASSERT_TRUE(PutBody("row", {PlacementOf("cube")}).ok());
+  Verification later = Verify(request, proven);
+  EXPECT_EQ(later.verdict, Verdict::kMoved);
+  EXPECT_THAT(later.reason, HasSubstr("body row is at revision"));
+  const v1::CheckCollisionResponse again = Prove(request);
+  ::hulld::server::Appender appender(*hulls_, "cube", "grow");
+  ASSERT_TRUE(appender.Append(1, {3, 0.5, 0.5}).has_value());
+  ASSERT_TRUE(appender.Finish().ok());
+  later = Verify(request, again);
+  EXPECT_EQ(later.verdict, Verdict::kMoved);
+  EXPECT_THAT(later.reason, HasSubstr("hull cube is at revision"));
+  ASSERT_TRUE(MakeClient().DeleteBody("row").ok());
+  EXPECT_THAT(Verify(request, again).reason, HasSubstr("body row was deleted"));
+}
+
+TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
+  Put("cube", Cube());
+  std::vector<v1::Placement> pieces(100, PlacementOf("cube"));
+  ASSERT_TRUE(PutBody("heap", pieces).ok());
+  // 10000 pairs touch.
+  const auto many =
+      MakeClient().CheckCollision(Question(PlacementOf("heap"), PlacementOf("heap", 1, 0, 0)));
+  EXPECT_TRUE(absl::IsResourceExhausted(many.status()));
+  EXPECT_EQ(ReasonOf(many.status()), v1::ERROR_REASON_PROOF_TOO_LARGE);
+  EXPECT_THAT(MetadataOf(many.status(), "limit"), testing::Optional(std::string("8192")));
+  EXPECT_THAT(std::string(many.status().message()), HasSubstr("more than 8192 pairs of pieces"));
+  // 8100 do, and fit.
+  ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(81, PlacementOf("cube"))).ok());
+  const auto fits =
+      MakeClient().CheckCollision(Question(PlacementOf("heap"), PlacementOf("less", 1, 0, 0)));
+  ASSERT_TRUE(fits.ok()) << fits.status();
+  EXPECT_EQ(fits->piece_certificates_size(), 8100);
+  EXPECT_LT(fits->ByteSizeLong(), size_t{4} << 20);
+}
+
+}  // namespace
+}  // namespace hulld::server
