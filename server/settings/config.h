@@ -117,8 +117,8 @@ struct Config {
   // Vertices of one feature of an axis, so that an answer stays under the 4 MiB that every gRPC
   // client takes: 2 features x 65536 x (24 bytes of coordinates + at most 5 of index) = 3.6 MiB.
   static constexpr size_t kMaxFeatureVertices = 1 << 16;
-  // Certificates of pairs of pieces in one answer about bodies, and the bytes of such an answer, for
-  // the same clients. One of SEPARATED takes some 50 bytes, one of TOUCHING some 350.
+  // Certificates of pairs of pieces in one answer about bodies, and the bytes of such an answer,
+  // for the same clients. One of SEPARATED takes some 50 bytes, one of TOUCHING some 350.
   static constexpr uint64_t kMaxPieceCertificates = 1 << 13;
   static constexpr size_t kMaxProofBytes = (size_t{4} << 20) - (1 << 14);
   // Length of hull IDs and writer IDs.
