@@ -40,6 +40,17 @@ bool DoBoxesMeet(const oracle::WorldPoints& world) {
 
 oracle::Relation ForOracle(Relation relation) { return static_cast<oracle::Relation>(relation); }
 
+// Pieces that are large for how far apart they are, so that many boxes meet.
+void FillLarge(Random& random, int pieces, OwnBody* body) {
+  for (int i = 0; i < pieces; ++i) {
+    Pose pose = At(random.Between(-4, 4), random.Between(-3, 3), 0);
+    if (i % 2 == 0) pose.q = {1, 1.0 * random.Between(-1, 1), 0, 1.0 * random.Between(-1, 1)};
+    const int points = i % 4 == 3 ? 0 : random.Between(2, 8);
+    body->Add(RandomLatticePoints(random, points, 4), pose);
+  }
+  body->Finish();
+}
+
 struct Proven {
   size_t certificates = 0;
   size_t settled = 0;
@@ -88,15 +99,16 @@ TEST(PieceCertification, ProvesEveryRelation) {
   Random random(TestSeed(4));
   std::array<int, 3> relations = {};
   Proven proven;
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 420; ++round) {
     OwnBody a, b;
-    Fill(random, random.Between(1, 4), &a);
-    Fill(random, random.Between(1, 4), &b);
+    FillLarge(random, random.Between(1, 4), &a);
+    FillLarge(random, random.Between(1, 4), &b);
     Pose X_WA = At(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
     X_WA.q = {2, 1, 0, 1};
     Pose X_WB = X_WA;
     if (round % 4 == 0) X_WB.q = {1, 0.1, 1, 0};
-    X_WB.t += Vector(random.Between(-3, 3), random.Between(-3, 3), random.Between(-3, 3));
+    // Those of one pose meet as lattices do.
+    if (round % 3 != 0) X_WB.t += Vector(random.Between(-4, 4), random.Between(-4, 4), 0);
     QueryOptions options = Certified();
     // Beside the least separation, whose pair is found otherwise.
     options.want_separation = round % 2 == 0;
@@ -106,9 +118,9 @@ TEST(PieceCertification, ProvesEveryRelation) {
     ++relations[static_cast<size_t>(answer->answer.relation)];
     ExpectProof(a, X_WA, b, X_WB, *answer, &proven);
   }
-  for (const int count : relations) EXPECT_GT(count, 5);
-  EXPECT_GT(proven.certificates, 100u) << relations[0] << " " << relations[1];
-  EXPECT_GT(proven.settled, 500u);
+  for (const int count : relations) EXPECT_GT(count, 3);
+  EXPECT_GT(proven.certificates, 100u);
+  EXPECT_GT(proven.settled, 200u);
 }
 
 // Where floating point does not reach, boxes are all of space or far too large: then pairs are
