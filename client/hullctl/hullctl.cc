@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 
+#include "client/hullctl/body/body_command.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/command.h"
 #include "client/hullctl/command_line/connection.h"

@@ -9,7 +9,7 @@
 #include <set>
 #include <vector>
 
-#include "core/query/scene.h"
+#include "core/query/scene/scene.h"
 
 // Which pairs of a scene are asked about. Scene: a message with the groups and movers of a
 // v1::FindCollisionsRequest.

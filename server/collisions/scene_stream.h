@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/query/scene.h"
+#include "core/query/scene/scene.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/collisions/pieced_replies.h"
 #include "server/collisions/placed_answer.h"

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "server/process/synchronization.h"
-#include "server/registry/locked.h"
-#include "server/registry/memory_budget.h"
+#include "server/registry/memory/locked.h"
+#include "server/registry/memory/memory_budget.h"
 #include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 

@@ -10,7 +10,7 @@
 
 #include "server/process/metrics.h"
 #include "server/process/synchronization.h"
-#include "server/registry/locked.h"
+#include "server/registry/memory/locked.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

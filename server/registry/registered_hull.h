@@ -18,10 +18,10 @@
 #include "core/query/placed/live_hull.h"
 #include "server/process/synchronization.h"
 #include "server/registry/hull_state.h"
-#include "server/registry/locked.h"
-#include "server/registry/memory_budget.h"
+#include "server/registry/memory/locked.h"
+#include "server/registry/memory/memory_budget.h"
+#include "server/registry/memory/served_hull.h"
 #include "server/registry/registry_types.h"
-#include "server/registry/served_hull.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {

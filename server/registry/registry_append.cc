@@ -8,7 +8,7 @@
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
-#include "server/registry/hull_loader.h"
+#include "server/registry/memory/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/base/check.h"
 #include "server/contract/limit_error.h"
-#include "server/registry/hull_loader.h"
+#include "server/registry/memory/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 

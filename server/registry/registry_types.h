@@ -14,7 +14,7 @@
 #include "core/numeric/vector.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/fair_queue.h"
-#include "server/registry/served_hull.h"
+#include "server/registry/memory/served_hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
 

@@ -1,3 +1,5 @@
+#include "client/hullctl/body/body_command.h"
+
 #include <memory>
 #include <optional>
 #include <string>
@@ -5,7 +7,6 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/body_pieces.h"
-#include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 

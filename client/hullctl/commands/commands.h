@@ -14,7 +14,6 @@ void AddCreateCommand(Command program, Invocation* invocation);
 void AddAppendCommand(Command program, Invocation* invocation);
 void AddReplaceCommand(Command program, Invocation* invocation);
 void AddDeleteCommand(Command program, Invocation* invocation);
-void AddBodyCommand(Command program, Invocation* invocation);
 void AddListCommand(Command program, Invocation* invocation);
 void AddGetCommand(Command program, Invocation* invocation);
 void AddMeshCommand(Command program, Invocation* invocation);

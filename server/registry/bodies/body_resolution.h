@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/query/body/query_body.h"
-#include "server/registry/bodies/body.h"
+#include "server/registry/body.h"
 #include "server/registry/known_hulls.h"
 #include "server/registry/registry.h"
 

@@ -9,7 +9,7 @@
 #include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
-#include "server/registry/bodies/body.h"
+#include "server/registry/body.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 

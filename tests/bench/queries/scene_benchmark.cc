@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/query/scene.h"
+#include "core/query/scene/scene.h"
 #include "tests/bench/bench_random.h"
 #include "tests/bench/queries/fcl_scene.h"
 #include "tests/bench/queries/query_sets.h"

@@ -11,7 +11,7 @@
 #include <tuple>
 
 #include "core/query/batch.h"
-#include "core/query/scene.h"
+#include "core/query/scene/scene.h"
 #include "tests/bench/bench_random.h"
 #include "tests/bench/queries/query_sets.h"
 #include "tests/bench/service/remote_subject.h"

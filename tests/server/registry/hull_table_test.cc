@@ -1,4 +1,4 @@
-#include "server/registry/table/hull_table.h"
+#include "server/registry/hull_table.h"
 
 #include <gtest/gtest.h>
 #include <malloc.h>

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_HULL_LOADER_H_
-#define HULLD_SERVER_REGISTRY_HULL_LOADER_H_
+#ifndef HULLD_SERVER_REGISTRY_MEMORY_HULL_LOADER_H_
+#define HULLD_SERVER_REGISTRY_MEMORY_HULL_LOADER_H_
 
 #include <absl/status/statusor.h>
 
@@ -30,4 +30,4 @@ absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_HULL_LOADER_H_
+#endif  // HULLD_SERVER_REGISTRY_MEMORY_HULL_LOADER_H_

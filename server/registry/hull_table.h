@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_TABLE_HULL_TABLE_H_
-#define HULLD_SERVER_REGISTRY_TABLE_HULL_TABLE_H_
+#ifndef HULLD_SERVER_REGISTRY_HULL_TABLE_H_
+#define HULLD_SERVER_REGISTRY_HULL_TABLE_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "server/registry/hull_state.h"
-#include "server/registry/memory_budget.h"
+#include "server/registry/memory/memory_budget.h"
 #include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 
@@ -102,4 +102,4 @@ class HullTable {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_TABLE_HULL_TABLE_H_
+#endif  // HULLD_SERVER_REGISTRY_HULL_TABLE_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_MEMORY_BUDGET_H_
-#define HULLD_SERVER_REGISTRY_MEMORY_BUDGET_H_
+#ifndef HULLD_SERVER_REGISTRY_MEMORY_MEMORY_BUDGET_H_
+#define HULLD_SERVER_REGISTRY_MEMORY_MEMORY_BUDGET_H_
 
 #include <absl/status/status.h>
 
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "server/process/synchronization.h"
-#include "server/registry/locked.h"
+#include "server/registry/memory/locked.h"
 
 namespace hulld::server {
 
@@ -223,4 +223,4 @@ class MemoryCharge {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_MEMORY_BUDGET_H_
+#endif  // HULLD_SERVER_REGISTRY_MEMORY_MEMORY_BUDGET_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_SERVED_HULL_H_
-#define HULLD_SERVER_REGISTRY_SERVED_HULL_H_
+#ifndef HULLD_SERVER_REGISTRY_MEMORY_SERVED_HULL_H_
+#define HULLD_SERVER_REGISTRY_MEMORY_SERVED_HULL_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -16,7 +16,7 @@
 #include "core/numeric/vector.h"
 #include "core/query/placed/query_hull.h"
 #include "server/process/synchronization.h"
-#include "server/registry/memory_budget.h"
+#include "server/registry/memory/memory_budget.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
@@ -109,4 +109,4 @@ class ServedHull {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_SERVED_HULL_H_
+#endif  // HULLD_SERVER_REGISTRY_MEMORY_SERVED_HULL_H_

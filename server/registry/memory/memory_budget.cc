@@ -1,4 +1,4 @@
-#include "server/registry/memory_budget.h"
+#include "server/registry/memory/memory_budget.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_LOCKED_H_
-#define HULLD_SERVER_REGISTRY_LOCKED_H_
+#ifndef HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_
+#define HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_
 
 #include <algorithm>
 #include <atomic>
@@ -155,4 +155,4 @@ class Locked {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_LOCKED_H_
+#endif  // HULLD_SERVER_REGISTRY_MEMORY_LOCKED_H_

@@ -1,4 +1,4 @@
-#include "server/registry/served_hull.h"
+#include "server/registry/memory/served_hull.h"
 
 #include <chrono>
 #include <mutex>
@@ -7,7 +7,7 @@
 
 #include "core/base/check.h"
 #include "core/hull/growth/hull_builder.h"
-#include "server/registry/hull_loader.h"
+#include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
 namespace {

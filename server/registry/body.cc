@@ -1,4 +1,4 @@
-#include "server/registry/bodies/body.h"
+#include "server/registry/body.h"
 
 #include <absl/strings/str_cat.h>
 

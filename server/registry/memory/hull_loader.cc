@@ -1,4 +1,4 @@
-#include "server/registry/hull_loader.h"
+#include "server/registry/memory/hull_loader.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>

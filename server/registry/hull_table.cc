@@ -1,4 +1,4 @@
-#include "server/registry/table/hull_table.h"
+#include "server/registry/hull_table.h"
 
 #include "core/base/check.h"
 #include "server/registry/registered_hull.h"

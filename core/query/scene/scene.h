@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_QUERY_SCENE_H_
-#define HULLD_CORE_QUERY_SCENE_H_
+#ifndef HULLD_CORE_QUERY_SCENE_SCENE_H_
+#define HULLD_CORE_QUERY_SCENE_SCENE_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -167,4 +167,4 @@ absl::StatusOr<SceneTotals> FindCollisions(
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_QUERY_SCENE_H_
+#endif  // HULLD_CORE_QUERY_SCENE_SCENE_H_

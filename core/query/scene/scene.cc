@@ -1,4 +1,4 @@
-#include "core/query/scene.h"
+#include "core/query/scene/scene.h"
 
 #include <absl/strings/str_cat.h>
 
