@@ -11,8 +11,10 @@
 #include "server/access/secret_file.h"
 #include "server/access/tls_identity.h"
 #include "server/access/token_table.h"
+#include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics_endpoint.h"
+#include "server/store/postgres/conninfo.h"
 
 namespace hulld::server {
 
@@ -30,8 +32,11 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
                                                      std::chrono::system_clock::time_point now) {
   std::vector<std::string> findings;
   if (absl::Status s = CheckListening(config); !s.ok()) return s;
-  if (config.store != "memory" && !config.data_dir.empty()) {
+  if (config.store == "rocksdb" && !config.data_dir.empty()) {
     if (absl::Status s = CheckDataDir(config.data_dir); !s.ok()) return s;
+  }
+  if (config.store == "postgres") {
+    if (absl::Status s = CheckConninfoFile(config.postgres_conninfo_file); !s.ok()) return s;
   }
   if (config.has_tls()) {
     const absl::StatusOr<TlsIdentity> identity = LoadTlsIdentity(config);
@@ -68,6 +73,13 @@ absl::Status CheckDataDir(const std::string& path) {
     return problem(nearest.string(), "cannot be written by the user who runs this");
   }
   return absl::OkStatus();
+}
+
+absl::Status CheckConninfoFile(const std::string& path) {
+  const char* const setting = "--postgres-conninfo-file";
+  const absl::StatusOr<std::string> text = ReadSecretFile(path, setting);
+  if (!text.ok()) return text.status();
+  return Prefixed(absl::StrCat(setting, " ", path, ": "), Conninfo::Parse(*text).status());
 }
 
 std::vector<std::string> ExposureWarnings(const Config& config) {

@@ -26,6 +26,11 @@ absl::Status CheckListening(const Config& config);
 // INVALID_ARGUMENT names --data-dir.
 absl::Status CheckDataDir(const std::string& path);
 
+// OK when this file holds a connection string for PostgreSQL that only we may read; whether the
+// database is there is not asked. INVALID_ARGUMENT names --postgres-conninfo-file, and quotes
+// nothing of what the file holds.
+absl::Status CheckConninfoFile(const std::string& path);
+
 // What an operator should know about who can reach the server, a sentence each. Requires a valid
 // config.listen.
 std::vector<std::string> ExposureWarnings(const Config& config);

@@ -2,7 +2,9 @@
 
 #include <signal.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -31,6 +33,9 @@ sigset_t HandledSignals() {
 void LogStore(const Config& config) {
   if (config.store == "memory") {
     spdlog::info("hulls live in memory and end with this process");
+  } else if (config.store == "postgres") {
+    // The store said more when it was opened.
+    spdlog::info("this is the active server of its database");
   } else if (config.durability == "sync") {
     spdlog::info("hulls live in {}; what is acknowledged is on disk", config.data_dir);
   } else {
@@ -55,6 +60,13 @@ int WaitForEnd(const sigset_t& signals, Server& server) {
       GiveBackFreeMemory();
     }
   }
+}
+
+// Whether a signal waits that asks the process to end.
+bool IsEndAsked() {
+  sigset_t pending;
+  sigpending(&pending);
+  return sigismember(&pending, SIGTERM) == 1 || sigismember(&pending, SIGINT) == 1;
 }
 
 void LogStart(const Config& config, const Server& server) {
@@ -86,13 +98,28 @@ int Run(const Config& config) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
 
-  const absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(config);
+  // Outlives the server.
+  std::atomic<bool> store_ended = false;
+  const absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(config, IsEndAsked);
+  if (absl::IsCancelled(server.status())) {
+    spdlog::info("{}", std::string(server.status().message()));
+    return 0;
+  }
   if (!server.ok()) {
     spdlog::error("{}", std::string(server.status().message()));
     return kExitFailure;
   }
   LogStart(config, **server);
+  (*server)->OnStoreEnded([&store_ended] {
+    store_ended = true;
+    kill(getpid(), SIGTERM);
+  });
   const int received = WaitForEnd(signals, **server);
+  if (store_ended) {
+    // What it has in memory may be behind from now on, so no call goes on.
+    spdlog::error("the store is no longer this server's: ending without draining");
+    return kExitFailure;
+  }
   spdlog::info("{} received: draining for at most {} ms; once more ends at once",
                received == SIGTERM ? "SIGTERM" : "SIGINT", config.drain_timeout.count());
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);

@@ -7,14 +7,17 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <limits>
 #include <utility>
 
+#include "server/access/secret_file.h"
 #include "server/call/transport.h"
 #include "server/config_check.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
 #include "server/settings/cpu_limit.h"
 #include "server/store/memory_store.h"
+#include "server/store/postgres/postgres_store.h"
 #include "server/store/rocksdb_store.h"
 
 namespace hulld::server {
@@ -40,8 +43,19 @@ int AnswerThreads(const Config& config) {
   return config.threads > 0 ? config.threads : DefaultThreads();
 }
 
-absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config) {
+absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
+                                                 std::function<bool()> should_stop) {
   if (config.store == "memory") return std::make_unique<MemoryStore>();
+  if (config.store == "postgres") {
+    absl::StatusOr<std::string> conninfo =
+        ReadSecretFile(config.postgres_conninfo_file, "--postgres-conninfo-file");
+    if (!conninfo.ok()) return conninfo.status();
+    PostgresOptions options;
+    options.conninfo = *std::move(conninfo);
+    options.take_over = config.take_over;
+    options.should_stop = std::move(should_stop);
+    return PostgresStore::Open(std::move(options));
+  }
   RocksDbOptions options;
   options.data_dir = config.data_dir;
   options.durability = config.durability == "sync" ? Durability::kSync : Durability::kRelaxed;
@@ -104,7 +118,9 @@ void Server::AddSizesToMetrics() {
     if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
       store.disk_bytes.Set(static_cast<double>(disk->bytes));
       store.log_bytes.Set(static_cast<double>(disk->log_bytes));
-      store.free_bytes.Set(static_cast<double>(disk->free_bytes));
+      // Not a number is less than nothing, as an alert needs it.
+      store.free_bytes.Set(disk->free_bytes.has_value() ? static_cast<double>(*disk->free_bytes)
+                                                        : std::numeric_limits<double>::quiet_NaN());
       store.stalled.Set(disk->is_stalled ? 1 : 0);
       advance(store.stalls, disk->stalls);
     }
@@ -123,10 +139,11 @@ void Server::AddSizesToMetrics() {
                     [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
 }
 
-absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config) {
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
+                                                      std::function<bool()> should_stop) {
   absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
   if (!guard.ok()) return guard.status();
-  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config);
+  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config, std::move(should_stop));
   if (!store.ok()) return store.status();
   std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
   if (absl::Status s = server->registry_.Load(); !s.ok()) return s;

@@ -5,8 +5,10 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "server/access/guard.h"
 #include "server/admin/maintenance_service.h"
@@ -32,8 +34,12 @@ class Server {
  public:
   // Opens the store and listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs
   // TLS or --insecure, or a file of certificates or tokens is wrong. UNAVAILABLE: the address
-  // cannot be bound. Errors of RocksDbStore::Open.
-  static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config);
+  // cannot be bound. Errors of RocksDbStore::Open or
+  // PostgresStore::Open.
+  // With --store=postgres this waits while another server is active, until should_stop, which may
+  // be empty, says so: CANCELLED.
+  static absl::StatusOr<std::unique_ptr<Server>> Start(const Config& config,
+                                                       std::function<bool()> should_stop = {});
 
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -50,6 +56,9 @@ class Server {
 
   // Looks at the files of certificates and tokens now, rather than within the next interval.
   void ReloadFiles() { guard_->Reload(); }
+
+  // Store::OnEnded: this server is to end, without draining.
+  void OnStoreEnded(std::function<void()> ended) { store_->OnEnded(std::move(ended)); }
 
   // Turns health to NOT_SERVING and refuses new calls with UNAVAILABLE; running ones go on.
   void BeginDrain();

@@ -81,6 +81,7 @@ constexpr std::string_view kRooms[] = {
     "server/contract",
     "server/process",
     "server/store",
+    "server/store/postgres",
     "server/registry",
     "server/access",
     "server/call",

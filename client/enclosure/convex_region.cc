@@ -88,6 +88,40 @@ class HalfSpaceMaker {
   std::vector<HalfSpace> made_;
 };
 
+// Half spaces of a hull in its own frame H as half spaces of the frame W in which it stands.
+//
+// With the quaternion in integers, the rotation is M / D: M of products of two of its numbers, D
+// the sum of their squares. A point P of W is M^T (P - T) / D in H, so that n . p_H <= o is (M n) .
+// P <= D o + (M n) . T.
+class HalfSpaceMover {
+ public:
+  HalfSpaceMover(const RigidPose& X_WH, const CommonExponent& grid)
+      : grid_(grid), T_(OnGrid({X_WH[4], X_WH[5], X_WH[6]}, grid)) {
+    CommonExponent quaternion;
+    quaternion.Include(std::span(X_WH).first(4));
+    const BigInteger w = quaternion.ToInteger(X_WH[0]);
+    const BigInteger x = quaternion.ToInteger(X_WH[1]);
+    const BigInteger y = quaternion.ToInteger(X_WH[2]);
+    const BigInteger z = quaternion.ToInteger(X_WH[3]);
+    M_ = {BigVector{w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)},
+          BigVector{2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)},
+          BigVector{2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z}};
+    D_ = w * w + x * x + y * y + z * z;
+  }
+
+  HalfSpace Move(const HalfSpace& half) const {
+    const BigVector normal = {Dot(M_[0], half.normal()), Dot(M_[1], half.normal()),
+                              Dot(M_[2], half.normal())};
+    return HalfSpace(normal, D_ * half.offset() + Dot(normal, T_), grid_);
+  }
+
+ private:
+  const CommonExponent& grid_;
+  const BigVector T_;
+  std::array<BigVector, 3> M_;
+  BigInteger D_;
+};
+
 }  // namespace
 
 HalfSpace::HalfSpace(BigVector normal, BigInteger offset, const CommonExponent& grid)
@@ -148,6 +182,15 @@ absl::StatusOr<ConvexRegion> ConvexRegion::Make(const HullMesh& mesh, const Comm
     begin += size;
   }
   region.half_spaces_ = maker.Take();
+  return region;
+}
+
+absl::StatusOr<ConvexRegion> ConvexRegion::Make(const HullMesh& mesh, const RigidPose& X_WH,
+                                                const CommonExponent& grid) {
+  auto region = Make(mesh, grid);
+  if (!region.ok() || X_WH == kNoMotion) return region;
+  const HalfSpaceMover mover(X_WH, grid);
+  for (HalfSpace& half : region->half_spaces_) half = mover.Move(half);
   return region;
 }
 

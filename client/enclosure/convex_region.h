@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/pose/rigid_pose.h"
 #include "client/verify/exact_vector.h"
 
 namespace hulld {
@@ -42,6 +43,11 @@ class ConvexRegion {
   // From the vertices and facets of a hull of the server. All numbers of the mesh must have been
   // included in the grid. INTERNAL: facets that do not fit the vertices.
   static absl::StatusOr<ConvexRegion> Make(const HullMesh& mesh, const CommonExponent& grid);
+  // The same of a hull at a pose, exact: nothing is rounded, as half spaces turn by the
+  // quaternion's products alone, without a quotient. The translation must have been included in the
+  // grid, too. Requires a quaternion that is not zero; unchecked, as the server takes no other.
+  static absl::StatusOr<ConvexRegion> Make(const HullMesh& mesh, const RigidPose& X_WH,
+                                           const CommonExponent& grid);
 
   bool empty() const { return empty_; }
   const std::vector<HalfSpace>& half_spaces() const { return half_spaces_; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "client/enclosure/convex_region.h"
@@ -119,26 +120,29 @@ double DistanceToTriangle(const Point& p, const Point& a, const Point& b, const 
   return from(a, ab, vb / sum, ac, vc / sum);
 }
 
-Point VertexOf(const HullMesh& mesh, size_t index) {
-  const double* const p = mesh.xyz.data() + 3 * index;
-  return {p[0], p[1], p[2]};
+// The vertices where they stand, rounded.
+std::vector<Point> VerticesOf(const PlacedHull& piece) {
+  std::vector<Point> vertices;
+  const std::vector<double>& xyz = piece.mesh->xyz;
+  for (size_t i = 0; i + 2 < xyz.size(); i += 3) {
+    const RigidPose X_WV = Compose(piece.X_WH, {1, 0, 0, 0, xyz[i], xyz[i + 1], xyz[i + 2]});
+    vertices.push_back({X_WV[4], X_WV[5], X_WV[6]});
+  }
+  return vertices;
 }
 
-// The distance of a point outside from a piece: that of the nearest facet.
-double DistanceTo(const HullMesh& piece, const Point& p) {
+// The distance of a point outside from a piece with these vertices: that of the nearest facet.
+double DistanceTo(const HullMesh& piece, const std::vector<Point>& vertices, const Point& p) {
   double least = std::numeric_limits<double>::infinity();
-  if (piece.facet_sizes.empty() && piece.vertex_count() > 0) {
-    const Point a = VertexOf(piece, 0);
-    const Point b = VertexOf(piece, piece.vertex_count() - 1);
-    return DistanceToTriangle(p, a, b, b);
+  if (piece.facet_sizes.empty() && !vertices.empty()) {
+    return DistanceToTriangle(p, vertices.front(), vertices.back(), vertices.back());
   }
   size_t begin = 0;
   for (const uint32_t size : piece.facet_sizes) {
-    const Point a = VertexOf(piece, piece.facet_indices[begin]);
+    const Point a = vertices[piece.facet_indices[begin]];
     for (size_t i = 2; i < size; ++i) {
-      least = std::min(least,
-                       DistanceToTriangle(p, a, VertexOf(piece, piece.facet_indices[begin + i - 1]),
-                                          VertexOf(piece, piece.facet_indices[begin + i])));
+      least = std::min(least, DistanceToTriangle(p, a, vertices[piece.facet_indices[begin + i - 1]],
+                                                 vertices[piece.facet_indices[begin + i]]));
     }
     begin += size;
   }
@@ -148,17 +152,21 @@ double DistanceTo(const HullMesh& piece, const Point& p) {
 // One mesh against pieces that stand ready.
 class Cover {
  public:
-  Cover(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh)
+  Cover(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh)
       : pieces_(pieces), mesh_(mesh) {
-    for (const HullMesh& piece : pieces) grid_.Include(piece.xyz);
+    for (const PlacedHull& piece : pieces) {
+      grid_.Include(piece.mesh->xyz);
+      grid_.Include(std::span(piece.X_WH).last(3));
+    }
     for (const Point& p : mesh.vertices) grid_.Include(p);
   }
 
   absl::Status Prepare() {
-    for (const HullMesh& piece : pieces_) {
-      auto region = ConvexRegion::Make(piece, grid_);
+    for (const PlacedHull& piece : pieces_) {
+      auto region = ConvexRegion::Make(*piece.mesh, piece.X_WH, grid_);
       if (!region.ok()) return region.status();
       regions_.push_back(*std::move(region));
+      vertices_.push_back(VerticesOf(piece));
     }
     for (const Point& p : mesh_.vertices) {
       on_grid_.push_back(OnGrid(p, grid_));
@@ -248,8 +256,8 @@ class Cover {
       for (const Corner& corner : polygon) {
         corners.push_back(Rounded(corner));
         double distance = std::numeric_limits<double>::infinity();
-        for (const HullMesh& piece : pieces_) {
-          distance = std::min(distance, DistanceTo(piece, corners.back()));
+        for (size_t i = 0; i < pieces_.size(); ++i) {
+          distance = std::min(distance, DistanceTo(*pieces_[i].mesh, vertices_[i], corners.back()));
         }
         if (distance <= found.distance) continue;
         found.distance = distance;
@@ -270,10 +278,12 @@ class Cover {
            2;
   }
 
-  const std::vector<HullMesh>& pieces_;
+  const std::vector<PlacedHull>& pieces_;
   const TriangleMesh& mesh_;
   CommonExponent grid_;
   std::vector<ConvexRegion> regions_;
+  // Of each piece, for distances.
+  std::vector<std::vector<Point>> vertices_;
   std::vector<BigVector> on_grid_;
   // For each vertex, which pieces hold it.
   std::vector<std::vector<bool>> holds_;
@@ -281,7 +291,7 @@ class Cover {
 
 }  // namespace
 
-absl::StatusOr<Coverage> CoverMesh(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh,
+absl::StatusOr<Coverage> CoverMesh(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh,
                                    const std::function<void(uint64_t done)>& progress) {
   Cover cover(pieces, mesh);
   if (absl::Status ready = cover.Prepare(); !ready.ok()) return ready;

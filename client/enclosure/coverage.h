@@ -6,10 +6,12 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "client/client.h"
 #include "client/formats/mesh_file.h"
+#include "client/pose/rigid_pose.h"
 
 namespace hulld {
 
@@ -35,6 +37,12 @@ struct Coverage {
   double distance = 0;
 };
 
+// A hull at a pose: a convex piece. Its vertices and facets are those of the hull; never null.
+struct PlacedHull {
+  std::shared_ptr<const HullMesh> mesh;
+  RigidPose X_WH = kNoMotion;
+};
+
 // Whether convex pieces enclose a mesh, its triangles taken as closed sets in exact arithmetic.
 //
 // A triangle whose corners are all in one piece lies in it. Any other is cut: by the half spaces of
@@ -43,12 +51,14 @@ struct Coverage {
 // is rounded before the answer. Cut points are reduced, so that their digits are bounded by those
 // of the planes that meet in them, however many cuts led there.
 //
+// Poses are exact, too: a piece that is turned is cut by its half spaces as they turn with it.
+//
 // It is the surface that is asked about. One piece that holds the surface holds what it encloses,
 // for it is convex; several may leave a hollow inside of a solid whose surface they cover.
 //
 // `progress` is told the triangles that are done. INTERNAL: facets that do not fit their vertices.
 // Cost: a test for each vertex and facet, and exact arithmetic for each cut.
-absl::StatusOr<Coverage> CoverMesh(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh,
+absl::StatusOr<Coverage> CoverMesh(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh,
                                    const std::function<void(uint64_t done)>& progress);
 
 }  // namespace hulld

@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <chrono>
+#include <cstddef>
 #include <optional>
 
 #include "core/hull/hull.h"
@@ -39,6 +40,9 @@ class TextbookCheck {
 
   // Requires that Advance said so. CANCELLED: should_stop said so.
   absl::StatusOr<Answer> Finish();
+
+  // What it holds (TextbookSearch); nothing where a hull is empty.
+  size_t MemoryBytes() const { return search_.has_value() ? search_->MemoryBytes() : 0; }
 
  private:
   TextbookCheck(const PlacedHull& a, const PlacedHull& b, const QueryOptions& options)

@@ -89,6 +89,11 @@ class AxisTable {
     return -n;
   }
 
+  size_t MemoryBytes() const {
+    return exact_.MemoryBytes() + flat_axes_.capacity() * sizeof(IntegerVector) +
+           (positions_a_.capacity() + positions_b_.capacity()) * sizeof(Vector);
+  }
+
  private:
   // Facet corners, or the ends of an edge of A and of an edge of B.
   std::pair<Edge, Edge> EdgePair(uint64_t axis) const {
@@ -333,6 +338,8 @@ Answer TextbookSearch::Finish() {
   }
   return answer;
 }
+
+size_t TextbookSearch::MemoryBytes() const { return sizeof(State) + state_->axes.MemoryBytes(); }
 
 absl::StatusOr<Answer> TextbookSat(const PlacedHull& a, const PlacedHull& b,
                                    const QueryOptions& options) {

@@ -4,6 +4,7 @@
 #include <absl/status/statusor.h>
 
 #include <chrono>
+#include <cstddef>
 #include <memory>
 
 #include "core/query/placed/placed_hull.h"
@@ -46,6 +47,9 @@ class TextbookSearch {
 
   // Requires that Advance said so.
   Answer Finish();
+
+  // What it holds: every vertex of both hulls in integers, some 500 bytes each.
+  size_t MemoryBytes() const;
 
  private:
   struct State;

@@ -79,9 +79,7 @@ Admission::Admission(const Limits& limits, Metrics& metrics)
   for (size_t i = 0; i < kRpcCount; ++i) {
     running_gauges_[i] = &metrics_.RunningCalls(static_cast<Rpc>(i));
   }
-  if (limits_.max_request_time > std::chrono::milliseconds::zero()) {
-    watchman_ = std::thread([this] { CancelOverdue(); });
-  }
+  watchman_ = std::thread([this] { CancelOverdue(); });
 }
 
 Admission::~Admission() {
@@ -91,7 +89,7 @@ Admission::~Admission() {
     ending_ = true;
     watched_changed_.notify_all();
   }
-  if (watchman_.joinable()) watchman_.join();
+  watchman_.join();
 }
 
 absl::Status Admission::CheckRoom(Rpc rpc, const Ticket::Client& client) {
@@ -160,8 +158,9 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   }
   if (ticket.kind_ == CallKind::kStream) ++client.streams;
   if (!arrival.caller.name.empty() && arrival.lifetime != nullptr) {
-    ticket.revocable_ =
-        revocable_.insert(revocable_.end(), {arrival.caller, arrival.call, arrival.lifetime});
+    ticket.revocable_ = revocable_.insert(
+        revocable_.end(), {arrival.caller, arrival.call, arrival.lifetime, arrival.on_revoked});
+    ticket.revocable_->list = &revocable_;
     ticket.is_revocable_ = true;
   }
   Watch(arrival.call, &ticket);
@@ -169,28 +168,37 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
 }
 
 size_t Admission::EndRevoked(const std::function<bool(const Caller&)>& is_valid) {
-  std::vector<grpc_call*> calls;
+  const auto end = std::chrono::steady_clock::now() + kGrace;
+  std::vector<std::function<void()>> waiting;
+  size_t count = 0;
   {
     const std::lock_guard lock(mutex_);
-    for (const Ticket::Revocable& revocable : revocable_) {
-      if (is_valid(revocable.caller)) continue;
-      revocable.lifetime->Revoke();
-      grpc_call_ref(revocable.call);
-      calls.push_back(revocable.call);
+    for (auto next = revocable_.begin(); next != revocable_.end();) {
+      const auto call = next++;
+      if (is_valid(call->caller)) continue;
+      call->lifetime->Revoke();
+      call->end = end;
+      if (call->on_revoked) waiting.push_back(std::move(call->on_revoked));
+      MoveTo(revoked_, call);
+      ++count;
     }
+    watched_changed_.notify_all();
   }
-  // gRPC may call back, and those calls may leave, before this returns.
-  for (grpc_call* const call : calls) {
-    grpc_call_cancel_with_status(call, GRPC_STATUS_UNAUTHENTICATED, CallLifetime::kRevoked,
-                                 nullptr);
-    grpc_call_unref(call);
-  }
-  return calls.size();
+  // Those calls may leave before this returns.
+  for (const std::function<void()>& end_call : waiting) end_call();
+  return count;
+}
+
+void Admission::MoveTo(std::list<Ticket::Revocable>& list,
+                       std::list<Ticket::Revocable>::iterator call) {
+  list.splice(list.end(), *call->list, call);
+  call->list = &list;
 }
 
 void Admission::Watch(grpc_call* call, Ticket* ticket) {
   const bool sends_much = ticket->kind_ == CallKind::kBatch || ticket->kind_ == CallKind::kDownload;
-  if (!watchman_.joinable() || call == nullptr || !sends_much) return;
+  const bool is_limited = limits_.max_request_time > std::chrono::milliseconds::zero();
+  if (!is_limited || call == nullptr || !sends_much) return;
   const auto end = std::chrono::steady_clock::now() + limits_.max_request_time + kGrace;
   grpc_call_ref(call);
   ticket->watched_ = watched_.insert(watched_.end(), {end, call});
@@ -201,22 +209,33 @@ void Admission::Watch(grpc_call* call, Ticket* ticket) {
 void Admission::CancelOverdue() {
   std::unique_lock lock(mutex_);
   while (!ending_) {
-    if (watched_.empty()) {
+    if (watched_.empty() && revoked_.empty()) {
       watched_changed_.wait(lock);
       continue;
     }
-    const auto end = watched_.front().end;
+    const bool is_revoked =
+        watched_.empty() || (!revoked_.empty() && revoked_.front().end < watched_.front().end);
+    const auto end = is_revoked ? revoked_.front().end : watched_.front().end;
     if (std::chrono::steady_clock::now() < end) {
       watched_changed_.wait_until(lock, end);
       continue;
     }
-    watched_.front().is_cancelled = true;
-    grpc_call* const call = watched_.front().call;
+    grpc_call* const call = is_revoked ? revoked_.front().call : watched_.front().call;
     grpc_call_ref(call);
-    cancelled_.splice(cancelled_.end(), watched_, watched_.begin());
+    if (is_revoked) {
+      MoveTo(cut_off_, revoked_.begin());
+    } else {
+      watched_.front().is_cancelled = true;
+      cancelled_.splice(cancelled_.end(), watched_, watched_.begin());
+    }
     // gRPC may call back, and those calls may leave, before this returns.
     lock.unlock();
-    grpc_call_cancel(call, nullptr);
+    if (is_revoked) {
+      grpc_call_cancel_with_status(call, GRPC_STATUS_UNAUTHENTICATED, CallLifetime::kRevoked,
+                                   nullptr);
+    } else {
+      grpc_call_cancel(call, nullptr);
+    }
     grpc_call_unref(call);
     lock.lock();
   }
@@ -241,7 +260,7 @@ void Admission::Leave(Ticket& ticket) {
       watched = ticket.watched_->call;
       (ticket.watched_->is_cancelled ? cancelled_ : watched_).erase(ticket.watched_);
     }
-    if (ticket.is_revocable_) revocable_.erase(ticket.revocable_);
+    if (ticket.is_revocable_) ticket.revocable_->list->erase(ticket.revocable_);
     Ticket::Client& client = ticket.client_->second;
     HULLD_CHECK(client.calls > 0);
     if (ticket.kind_ == CallKind::kBatch) {

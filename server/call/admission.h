@@ -47,9 +47,9 @@ class Authenticator;
 // Whether a call waits for the writers' pool; others wait for the readers' and for that of answers.
 bool UsesWriters(Rpc rpc);
 
-// Lets calls in while the limits leave room and until the server drains, counts those that run, and
-// cancels those that neither end nor poll for their end, as when a client reads no more, and those
-// whose token is no longer valid.
+// Lets calls in while the limits leave room and until the server drains, counts those that run,
+// tells those to end whose token is no longer valid, and cancels those that neither end nor poll
+// for their end, as when a client reads no more.
 //
 // Each client has its share: so many calls, streams and batches. A part of all calls, and of each
 // client's, is kept for single calls, so what lasts never keeps them out.
@@ -89,6 +89,11 @@ class Admission {
       Caller caller;
       grpc_call* call;
       CallLifetime* lifetime;
+      std::function<void()> on_revoked;
+      // Once it is revoked: when it is cancelled unless it ended by itself.
+      std::chrono::steady_clock::time_point end = {};
+      // The list that it is in.
+      std::list<Revocable>* list = nullptr;
     };
     Ticket(Admission* admission, Rpc rpc);
 
@@ -129,16 +134,20 @@ class Admission {
     // gRPC's.
     grpc_call* call = nullptr;
     // Whose token it carries, if it does, and what ends when that is no longer valid, which must
-    // outlive the ticket.
+    // outlive the ticket. Then on_revoked is called, if there is one, on any thread, perhaps when
+    // the ticket is gone: it ends a call that waits and so polls for nothing.
     Caller caller = {};
     CallLifetime* lifetime = nullptr;
+    std::function<void()> on_revoked = {};
   };
 
   // Lets a call in. UNAVAILABLE once the server drains; RESOURCE_EXHAUSTED naming the limit, with a
   // time to retry.
   absl::StatusOr<Ticket> Admit(const Arrival& arrival);
 
-  // Ends every call of a token that `is_valid` does not know any more: UNAUTHENTICATED. How many.
+  // Ends every call of a token that `is_valid` does not know any more: UNAUTHENTICATED. A call that
+  // does not end by itself within two seconds, as where the client does not read what is written,
+  // is cancelled, and then without details of the error. How many.
   size_t EndRevoked(const std::function<bool(const Caller&)>& is_valid);
 
   void BeginDrain();
@@ -153,6 +162,8 @@ class Admission {
   // Both require the mutex; unchecked, as a std::mutex cannot tell who holds it.
   absl::Status CheckRoom(Rpc rpc, const Ticket::Client& client);
   void Watch(grpc_call* call, Ticket* ticket);
+  static void MoveTo(std::list<Ticket::Revocable>& list,
+                     std::list<Ticket::Revocable>::iterator call);
 
   void Leave(Ticket& ticket);
   // The watchman's thread.
@@ -176,11 +187,16 @@ class Admission {
   // Those that have calls here alone.
   Ticket::Clients clients_;
   ClientId last_client_ = kNoClient;
+  // Those with a valid token; those that are to end, in the order in which they are cancelled
+  // otherwise; and those that were.
   std::list<Ticket::Revocable> revocable_;
+  std::list<Ticket::Revocable> revoked_;
+  std::list<Ticket::Revocable> cut_off_;
   // In the order in which they end, as all are given the same time.
   std::list<Ticket::Watched> watched_;
   // Those of which the time was up: nothing more is done about them.
   std::list<Ticket::Watched> cancelled_;
+  // Of watched_ or revoked_.
   std::condition_variable watched_changed_;
   bool ending_ = false;
   std::thread watchman_;

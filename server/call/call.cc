@@ -36,7 +36,7 @@ bool IsFault(absl::StatusCode code) {
 
 }  // namespace
 
-absl::Status Call::Begin() {
+absl::Status Call::Begin(std::function<void()> on_revoked) {
   const auto& metadata = context_.client_metadata();
   const auto given = metadata.find(kRequestIdKey);
   if (given != metadata.end()) {
@@ -53,8 +53,8 @@ absl::Status Call::Begin() {
   const uint64_t generation = authenticator == nullptr ? 0 : authenticator->generation();
   if (absl::Status s = Authenticate(); !s.ok()) return s;
 
-  absl::StatusOr<Admission::Ticket> ticket =
-      admission_.Admit({rpc_, Client(), context_.c_call(), caller_, &lifetime_});
+  absl::StatusOr<Admission::Ticket> ticket = admission_.Admit(
+      {rpc_, Client(), context_.c_call(), caller_, &lifetime_, std::move(on_revoked)});
   if (!ticket.ok()) return ticket.status();
   ticket_.emplace(*std::move(ticket));
   // The tokens may have changed before it could be found among the calls that run.

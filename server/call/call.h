@@ -7,6 +7,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -51,14 +52,16 @@ class Call {
 
   const CallLifetime& lifetime() const { return lifetime_; }
   bool ShouldStop() const { return lifetime_.ShouldStop(); }
+  bool is_revoked() const { return lifetime_.is_revoked(); }
   // Requires ShouldStop(), as CallLifetime::StopStatus does.
   absl::Status StopStatus() const { return lifetime_.StopStatus(); }
   void Cancel() { lifetime_.Cancel(); }
 
   // Finds out who calls and lets the call in; it must be ended with the error if there is one.
+  // on_revoked: as Admission::Arrival says.
   // UNAUTHENTICATED, PERMISSION_DENIED: as Authenticator::Authenticate. UNAVAILABLE: the server
   // drains. RESOURCE_EXHAUSTED: a limit on calls.
-  absl::Status Begin();
+  absl::Status Begin(std::function<void()> on_revoked = {});
 
   // Counts what the call asked for.
   void AddPairs(uint64_t pairs) { pairs_.fetch_add(pairs, std::memory_order_relaxed); }

@@ -31,7 +31,7 @@ class CallLifetime {
   // Ends the call after `limit` (--max-request-time), from now on; zero: never. A stream that lasts
   // as long as its client likes begins anew with every message.
   void LimitTime(std::chrono::milliseconds limit) {
-    limit_ = limit;
+    limit_.store(limit, std::memory_order_relaxed);
     const bool unlimited = limit == std::chrono::milliseconds::zero();
     limit_end_.store(unlimited ? Clock::duration::max() : (Clock::now() + limit).time_since_epoch(),
                      std::memory_order_relaxed);
@@ -40,16 +40,17 @@ class CallLifetime {
   void Cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   // The token of the call is no longer valid.
   void Revoke() {
-    revoked_.store(true, std::memory_order_relaxed);
+    revoked_.store(true);
     Cancel();
   }
+  bool is_revoked() const { return revoked_.load(); }
 
   bool ShouldStop() const { return cancelled_.load(std::memory_order_relaxed) || Expired(); }
 
   // Why the call stopped. Requires ShouldStop(); unchecked, as EndMessage may have lifted the limit
   // since.
   absl::Status StopStatus() const {
-    if (revoked_.load(std::memory_order_relaxed)) {
+    if (is_revoked()) {
       return WithReason(absl::UnauthenticatedError(kRevoked), v1::ERROR_REASON_TOKEN_UNKNOWN);
     }
     if (Clock::now() >= deadline_) {
@@ -57,8 +58,9 @@ class CallLifetime {
           "the deadline passed while the call was running; give it more time or ask for less");
     }
     if (Expired()) {
+      const auto limit = limit_.load(std::memory_order_relaxed);
       return LimitExceeded("the request took too long; ask for less at once",
-                           absl::StrCat(static_cast<double>(limit_.count()) / 1000, " s"),
+                           absl::StrCat(static_cast<double>(limit.count()) / 1000, " s"),
                            "max-request-time");
     }
     return absl::CancelledError("the call was cancelled");
@@ -83,8 +85,7 @@ class CallLifetime {
   }
 
   const Clock::time_point deadline_;
-  // Set before anyone polls.
-  std::chrono::milliseconds limit_{0};
+  std::atomic<std::chrono::milliseconds> limit_ = std::chrono::milliseconds(0);
   std::atomic<Clock::duration> limit_end_ = Clock::duration::max();
   std::atomic<bool> cancelled_ = false;
   std::atomic<bool> revoked_ = false;

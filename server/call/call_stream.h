@@ -4,7 +4,9 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <memory>
+#include <mutex>
 #include <utility>
 
 #include "core/base/check.h"
@@ -31,13 +33,19 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   // Admits the call of a new stream and opens it; a call that is not admitted ends at once.
   static Reactor* Launch(const std::shared_ptr<CallStream>& stream) {
     stream->self_ = stream;
-    absl::Status begun = stream->call_.Begin();
+    absl::Status begun = stream->call_.Begin([weak = std::weak_ptr<CallStream>(stream)] {
+      const std::shared_ptr<CallStream> revoked = weak.lock();
+      if (revoked != nullptr && revoked->opened_) revoked->OnRevoked();
+    });
     if (begun.ok()) begun = stream->Receive();
-    if (begun.ok()) {
-      stream->Open();
-    } else {
+    if (!begun.ok()) {
       stream->FinishCall(begun);
+      return stream.get();
     }
+    stream->Open();
+    // One of the two sees what the other did.
+    stream->opened_ = true;
+    if (stream->call_.is_revoked()) stream->OnRevoked();
     return stream.get();
   }
 
@@ -54,6 +62,10 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   virtual absl::Status Receive() { return absl::OkStatus(); }
   // Starts the first step, on gRPC's thread: neither waits nor computes for long.
   virtual void Open() = 0;
+  // The token is no longer valid: ends the call if it waits for something that may never come.
+  // What computes or writes sees by itself that it should stop. On any thread, perhaps twice, and
+  // perhaps when the call has finished.
+  virtual void OnRevoked() {}
 
   // Runs `step` on a pool or lane, which keeps this alive until then.
   template <typename Pool, typename Step>
@@ -85,9 +97,13 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
   void OnCancel() override { call_.Cancel(); }
   void OnDone() override { self_.reset(); }
 
+  // Whether one mutex guards all that several threads touch.
+  static constexpr bool kIsLocked = false;
+
  private:
   // Destroyed last: its ticket keeps the server alive.
   Call call_;
+  std::atomic<bool> opened_ = false;
   bool finished_ = false;
   // Keeps this alive until gRPC is done with it.
   std::shared_ptr<CallStream> self_;
@@ -122,12 +138,9 @@ class ReadingStream : public Stream {
   using Stream::Stream;
 
   // Starts to read the next message. Requires that none is being read, and that the call has not
-  // finished.
+  // finished. A call whose token is no longer valid ends instead.
   void Read() {
-    HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
-    if (share_.bytes() > kKeptBytes) request_ = Request();
-    share_.GiveBack();
-    this->StartRead(&bytes_);
+    if (!BeginRead()) OnNoMessage(absl::OkStatus());
   }
   bool reading() const { return reading_; }
   // The message that was read. Requires that none is being read.
@@ -142,20 +155,49 @@ class ReadingStream : public Stream {
 
   // What follows a read, as Stream::React runs it.
   virtual void OnMessage() = 0;
-  // OK: the client has said all, or is gone. Otherwise as ParseRequest says of its last message.
+  // OK: the client has said all, or is gone, or is no longer let in. Otherwise as ParseRequest says
+  // of its last message.
   virtual void OnNoMessage(const absl::Status& why) = 0;
 
  private:
   // What a request may hold on to while the next one is awaited, uncounted.
   static constexpr uint64_t kKeptBytes = 64 << 10;
 
+  bool BeginRead() {
+    const auto lock = LockRead();
+    if (!Stream::kIsLocked && this->call().is_revoked()) return false;
+    HULLD_CHECK(!std::exchange(reading_, true) && !this->finished());
+    if (share_.bytes() > kKeptBytes) request_ = Request();
+    share_.GiveBack();
+    this->StartRead(&bytes_);
+    return true;
+  }
+  // Whether a message was awaited until now.
+  bool EndRead() {
+    const auto lock = LockRead();
+    return std::exchange(reading_, false);
+  }
+  std::unique_lock<std::mutex> LockRead() {
+    return Stream::kIsLocked ? std::unique_lock<std::mutex>() : std::unique_lock(read_mutex_);
+  }
+
+  void OnRevoked() final {
+    if constexpr (Stream::kIsLocked) {
+      Stream::OnRevoked();
+    } else if (EndRead()) {
+      // Nothing else is under way: what gRPC still reads is dropped.
+      this->React([this] { OnNoMessage(absl::OkStatus()); });
+    }
+  }
+
   void OnReadDone(bool ok) final {
+    if (!Stream::kIsLocked && !EndRead()) return;
     absl::Status parsed;
     if (ok) {
       parsed = ParseRequest(bytes_, this->call().request_memory(), &request_, share_);
     }
     this->React([this, ok, &parsed] {
-      HULLD_CHECK(std::exchange(reading_, false));
+      if constexpr (Stream::kIsLocked) HULLD_CHECK(EndRead());
       if (ok && parsed.ok()) {
         OnMessage();
       } else {
@@ -168,6 +210,9 @@ class ReadingStream : public Stream {
   grpc::ByteBuffer bytes_;
   RequestMemory::Share share_;
   Request request_;
+  // Guards `reading_` where no mutex of the stream does: a revocation ends a read from another
+  // thread.
+  std::mutex read_mutex_;
   bool reading_ = false;
 };
 

@@ -12,7 +12,8 @@ namespace hulld::server {
 
 // A stream whose replies are pulled: each is made when the one before was written, so a client that
 // reads slowly costs one message of memory. One thing at a time is under way: a read, a task or a
-// write. Nothing else touches the state, so it needs no mutex.
+// write. Nothing else touches the state, so it needs no mutex. A revocation takes the place of a
+// read that is under way.
 template <typename Reactor, typename Reply>
 class PulledStream : public CallStream<Reactor> {
  protected:

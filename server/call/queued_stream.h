@@ -21,7 +21,7 @@ namespace hulld::server {
 // and gRPC calls back without it.
 //
 // The stream ends once an end is set, the replies before are written, and no work is under way. A
-// client that is gone ends it without the replies that wait.
+// client that is gone, or is no longer let in, ends it without the replies that wait.
 template <typename Reactor, typename Reply>
 class QueuedStream : public CallStream<Reactor> {
  protected:
@@ -41,6 +41,11 @@ class QueuedStream : public CallStream<Reactor> {
   template <typename Step>
   void React(Step&& step) {
     Locked(std::forward<Step>(step));
+  }
+
+  static constexpr bool kIsLocked = true;
+  void OnRevoked() override {
+    Locked([this] { Abandon(); });
   }
 
   // The rest requires the mutex, so is for steps of Locked.
@@ -107,7 +112,7 @@ class QueuedStream : public CallStream<Reactor> {
     Locked([this] { Abandon(); });
   }
 
-  // The client reads no more.
+  // The client reads no more, or is no longer let in.
   void Abandon() {
     this->call().Cancel();
     DropWaiting();

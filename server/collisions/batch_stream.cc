@@ -111,6 +111,11 @@ uint64_t BatchStream::EndOfPiece(uint64_t begin, uint64_t end) const {
   return end;
 }
 
+// The team works on one pair at a time. What is begun holds memory, so a batch begins one.
+bool BatchStream::MayRunAhead(const PairsPiece& piece) const {
+  return !IsForTeam(PairAt(piece.next));
+}
+
 void BatchStream::Submit(PairsPiece& piece) {
   if (!IsForTeam(PairAt(piece.next))) return PiecedReplies::Submit(piece);
   RunOn(team_lane_, [this, &piece] { RunSlice(piece); });
@@ -155,9 +160,12 @@ absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point 
   const bool is_for_hulls = !table_.is_body(pair.a) && !table_.is_body(pair.b);
   if (!IsAnswerable(pair) || !is_for_hulls) return Answer(piece, columns, counts);
   if (!piece.check.has_value()) {
-    absl::StatusOr<TextbookCheck> begun =
-        TextbookCheck::Begin(table_.placed()[pair.a], table_.placed()[pair.b],
-                             IsForTeam(pair) ? team_options_ : options_);
+    const bool is_for_team = IsForTeam(pair);
+    if (is_for_team) {
+      if (absl::Status s = registry().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+    }
+    absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(
+        table_.placed()[pair.a], table_.placed()[pair.b], is_for_team ? team_options_ : options_);
     if (!begun.ok()) return Add({begun.status(), std::nullopt}, piece, columns, counts);
     piece.check = *std::move(begun);
   }

@@ -26,6 +26,8 @@ namespace hulld::server {
 // A range of pairs, and how far the textbook came with the next of them, if it began.
 struct PairsPiece : Piece<v1::BatchCheckCollisionsResponse> {
   std::optional<TextbookCheck> check;
+
+  size_t held_bytes() const { return check.has_value() ? check->MemoryBytes() : 0; }
 };
 
 // One BatchCheckCollisions call: resolves every hull once, on a reader thread, then answers ranges
@@ -51,6 +53,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   bool QueueHead() override;
   uint64_t CountUnits() override { return pair_count_; }
   uint64_t EndOfPiece(uint64_t begin, uint64_t end) const override;
+  bool MayRunAhead(const PairsPiece& piece) const override;
   void Submit(PairsPiece& piece) override;
   void Deliver(PairsPiece& piece) override;
   bool Join(const v1::BatchCheckCollisionsResponse& reply,

@@ -228,13 +228,33 @@ void CollisionService::PairQuery::Place(const Registry& registry, Resolved resol
 }
 
 struct CollisionService::TextbookQuery {
-  TextbookQuery(PairQuery given_pair, bool for_team)
-      : pair(std::move(given_pair)), is_for_team(for_team) {}
+  TextbookQuery(Registry& registry, PairQuery given_pair, bool for_team)
+      : pair(std::move(given_pair)),
+        is_for_team(for_team),
+        charge(registry.memory(), MemoryUse::kReading) {}
+
+  // RESOURCE_EXHAUSTED: there is no room for what a large pair holds from slice to slice, or it has
+  // too many axes.
+  absl::Status Begin(Registry& registry);
 
   PairQuery pair;
   const bool is_for_team;
   std::optional<TextbookCheck> check;
+  // Counts the check.
+  MemoryCharge charge;
 };
+
+absl::Status CollisionService::TextbookQuery::Begin(Registry& registry) {
+  if (is_for_team) {
+    if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  }
+  absl::StatusOr<TextbookCheck> begun =
+      TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
+  if (!begun.ok()) return NameQueryLimit(begun.status(), pair.options);
+  check = *std::move(begun);
+  charge.Set(check->MemoryBytes());
+  return absl::OkStatus();
+}
 
 absl::Status CollisionService::PairQuery::Encode(const absl::StatusOr<Answer>& answer,
                                                  const v1::Wanted& wanted, Metrics& metrics,
@@ -309,7 +329,8 @@ void CollisionService::Compute(PairQuery query, CheckCall* call) {
   if (query.options.method == Method::kTextbookSat) {
     const bool is_for_team = query.IsForTeam();
     if (is_for_team) query.options.threads = executor_.threads();
-    return SubmitPiece(std::make_shared<TextbookQuery>(std::move(query), is_for_team), call);
+    return SubmitPiece(std::make_shared<TextbookQuery>(registry_, std::move(query), is_for_team),
+                       call);
   }
   // `wanted` lives until the call ends.
   const auto answer = [call, response, &wanted, &metrics](const PairQuery& pair) {
@@ -329,10 +350,7 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
         const auto end = std::chrono::steady_clock::now() +
                          (query->is_for_team ? Executor::kSliceTime : TaskPool::kSliceTime);
         if (!query->check.has_value()) {
-          absl::StatusOr<TextbookCheck> begun =
-              TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
-          if (!begun.ok()) return call->End(NameQueryLimit(begun.status(), pair.options));
-          query->check = *std::move(begun);
+          if (absl::Status s = query->Begin(registry_); !s.ok()) return call->End(s);
         }
         const absl::StatusOr<bool> done = query->check->Advance(end);
         if (!done.ok()) return call->End(done.status());

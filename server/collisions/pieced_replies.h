@@ -36,8 +36,10 @@ struct Piece {
   size_t bytes = 0;
   bool is_done = false;
 
-  // For PiecedReplies: a slice is queued or runs; what the slices took so far.
+  // For PiecedReplies: a slice is queued or runs; what the piece held before that; what the slices
+  // took so far.
   bool is_running = false;
+  size_t noted_bytes = 0;
   uint64_t units = 0;
   std::chrono::steady_clock::duration elapsed{0};
 
@@ -129,6 +131,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual uint64_t EndOfPiece(uint64_t begin, uint64_t end) const {
     static_cast<void>(begin);
     return end;
+  }
+  // Whether a slice of the piece may start while others are before it.
+  virtual bool MayRunAhead(const Work& piece) const {
+    static_cast<void>(piece);
+    return true;
   }
   // Starts a slice of the piece. To be overridden where some pieces run elsewhere.
   virtual void Submit(Work& piece) {
@@ -240,7 +247,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   void NoteHeldBytes() {
     size_t bytes = fixed_bytes_ + this->unsent_bytes();
     for (const std::unique_ptr<Work>& piece : pieces_) {
-      if (!piece->is_running) bytes += piece->bytes + piece->held_bytes();
+      if (!piece->is_running) piece->noted_bytes = piece->bytes + piece->held_bytes();
+      bytes += piece->noted_bytes;
     }
     charge_.Set(bytes);
   }
@@ -256,7 +264,8 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     }
     for (const std::unique_ptr<Work>& piece : pieces_) {
       if (piece->is_running || piece->is_done) continue;
-      if (piece != pieces_.front() && piece->bytes >= kMostHeldBytes) continue;
+      const bool is_front = piece == pieces_.front();
+      if (!is_front && (piece->bytes >= kMostHeldBytes || !MayRunAhead(*piece))) continue;
       piece->is_running = true;
       ++running_;
       Submit(*piece);

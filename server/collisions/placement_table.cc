@@ -55,6 +55,13 @@ const QueryHull& QueryHullOf(const absl::StatusOr<HullView>& hull, bool canonica
   return canonical ? hull->served->canonical_query_hull() : hull->served->query_hull();
 }
 
+// About what an error takes beside the pointer to it: its message, its reason, and what they are
+// kept in, which is a guess.
+size_t ErrorBytes(const absl::Status& status) {
+  constexpr size_t kReasonBytes = 384;
+  return status.ok() ? 0 : kReasonBytes + status.message().size();
+}
+
 absl::Status CheckCount(int count, const char* of, uint64_t max_placements, const char* what) {
   if (static_cast<uint64_t>(count) <= max_placements) return absl::OkStatus();
   return LimitExceeded(absl::StrCat(what, " holds ", count, of), max_placements, "max-placements");
@@ -158,11 +165,17 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
 size_t PlacementTable::MemoryBytes() const {
   size_t of_ids = 0;
   for (const std::string& id : ids_) of_ids += id.capacity();
+  size_t of_errors = 0;
+  for (const Entry& entry : entries_) {
+    // Placements share what is wrong with an ID that packed ones name.
+    if (!is_packed_ || entry.hull.has_value()) of_errors += ErrorBytes(entry.malformed);
+  }
+  for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
   return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull)) + named_.size() * sizeof named_[0] +
          ids_.size() *
              (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
-         entries_.size() * sizeof(uint32_t) + of_ids + BodyBytes();
+         entries_.size() * sizeof(uint32_t) + of_ids + of_errors + BodyBytes();
 }
 
 // Known once they are resolved.

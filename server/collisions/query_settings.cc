@@ -72,7 +72,11 @@ bool IsTextbookForTeam(const QueryOptions& options, const PlacedHull& placed_a,
   // Some 10 ms of one thread: far more than a team waits for its slowest thread, and not so much
   // that it matters to other calls when one thread of the pool is busy with it.
   constexpr double kTeamProjections = 1e7;
-  const double axes = static_cast<double>(a.edges().size()) * static_cast<double>(b.edges().size());
+  const auto edges_a = static_cast<double>(a.edges().size());
+  const auto edges_b = static_cast<double>(b.edges().size());
+  // Edges count once more, as a flat difference has an axis for each.
+  const double axes = edges_a * edges_b + edges_a + edges_b +
+                      static_cast<double>(a.facet_count() + b.facet_count());
   return axes * static_cast<double>(a.vertices().size() + b.vertices().size()) > kTeamProjections;
 }
 

@@ -96,13 +96,15 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     auto& self = static_cast<AppendStream&>(*stream);
     self.Locked([&] { self.Fail(reason); });
   };
-  registry_.OpenAppend(open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
-                       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
-                         Locked([&] {
-                           opening_ = false;
-                           HandleOpened(opened);
-                         });
-                       });
+  registry_.OpenAppend(
+      open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
+      [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
+        Locked([&] {
+          opening_ = false;
+          HandleOpened(opened);
+        });
+      },
+      call().client());
 }
 
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {

@@ -152,15 +152,27 @@ void WatchStream::OnSent() {
 
 void WatchStream::OnCancel() {
   PulledStream::OnCancel();
-  if (watch_ != nullptr) registry_.NudgeWatch(watch_);
+  Nudge();
+}
+
+void WatchStream::Nudge() {
+  std::shared_ptr<ChangeWatch> watch;
+  {
+    const std::lock_guard lock(watch_mutex_);
+    watch = watch_;
+  }
+  if (watch != nullptr) registry_.NudgeWatch(watch);
 }
 
 void WatchStream::OnDone() {
   const auto self = shared_from_this();
   PulledStream::OnDone();
-  if (watch_ == nullptr) return;
-  registry_.CloseWatch(watch_);
-  watch_.reset();
+  std::shared_ptr<ChangeWatch> watch;
+  {
+    const std::lock_guard lock(watch_mutex_);
+    watch = std::exchange(watch_, nullptr);
+  }
+  if (watch != nullptr) registry_.CloseWatch(watch);
 }
 
 }  // namespace hulld::server

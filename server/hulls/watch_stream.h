@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
@@ -34,6 +35,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void Open() override;
   void OnSent() override;
   void OnCancel() override;
+  void OnRevoked() override { Nudge(); }
   void OnDone() override;
 
   absl::StatusOr<WatchTarget> ReadTarget() const;
@@ -41,10 +43,13 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void TellNext();
   absl::Status LoadBoxes(WatchPiece* piece);
   void Tell(const WatchPiece& piece);
+  // Has it look whether it should stop.
+  void Nudge();
 
   Registry& registry_;
   WorkerPool& readers_;
-  // Written before anything else can happen.
+  // Written before anything else can happen; guards the end of it.
+  std::mutex watch_mutex_;
   std::shared_ptr<ChangeWatch> watch_;
   // What was there has been told.
   bool is_synced_ = false;

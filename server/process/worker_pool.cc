@@ -1,5 +1,6 @@
 #include "server/process/worker_pool.h"
 
+#include <mutex>
 #include <utility>
 
 #include "core/base/check.h"
@@ -9,7 +10,7 @@ namespace hulld::server {
 WorkerPool::WorkerPool(int threads, std::optional<PoolMetrics> metrics) : metrics_(metrics) {
   HULLD_CHECK(threads > 0);
   threads_.reserve(threads);
-  for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { Work(); });
+  for (int i = 0; i < threads; ++i) threads_.push_back(Thread([this] { Work(); }));
 }
 
 WorkerPool::~WorkerPool() {
@@ -18,13 +19,13 @@ WorkerPool::~WorkerPool() {
     ending_ = true;
   }
   ready_.notify_all();
-  for (std::thread& thread : threads_) thread.join();
+  for (Thread& thread : threads_) thread.join();
 }
 
 void WorkerPool::Submit(std::function<void()> task, ClientId client) {
   {
     const std::lock_guard lock(mutex_);
-    tasks_.Push(client, {std::move(task), std::chrono::steady_clock::now()});
+    tasks_.Push(client, {std::move(task), SteadyClock::now()});
     NoteWaiting();
   }
   ready_.notify_one();
@@ -44,7 +45,7 @@ void WorkerPool::Work() {
     NoteWaiting();
     lock.unlock();
     if (metrics_.has_value()) {
-      const auto waited = std::chrono::steady_clock::now() - task.submitted;
+      const auto waited = SteadyClock::now() - task.submitted;
       metrics_->wait_seconds.Observe(std::chrono::duration<double>(waited).count());
     }
     task.run();

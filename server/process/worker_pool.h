@@ -3,16 +3,14 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
 #include "server/process/fair_queue.h"
 #include "server/process/metrics.h"
+#include "server/process/synchronization.h"
 
 namespace hulld::server {
 
@@ -38,7 +36,7 @@ class WorkerPool {
  private:
   struct Task {
     std::function<void()> run;
-    std::chrono::steady_clock::time_point submitted;
+    SteadyClock::time_point submitted;
   };
 
   void Work();
@@ -46,12 +44,12 @@ class WorkerPool {
   void NoteWaiting();
 
   std::optional<PoolMetrics> metrics_;
-  std::mutex mutex_;
-  std::condition_variable ready_;
+  Mutex mutex_;
+  ConditionVariable ready_;
   FairQueue<Task> tasks_;
   std::atomic<size_t> waiting_ = 0;
   bool ending_ = false;
-  std::vector<std::thread> threads_;
+  std::vector<Thread> threads_;
 };
 
 }  // namespace hulld::server

@@ -1,6 +1,7 @@
 #include "server/registry/change_feed.h"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "core/base/check.h"
@@ -344,7 +345,7 @@ void ChangeFeed::MakeReady(const std::shared_ptr<ChangeWatch>& watch) {
 
 void ChangeFeed::Run() {
   Locked locked(order_);
-  auto next_marks = std::chrono::steady_clock::now() + mark_interval_;
+  auto next_marks = SteadyClock::now() + mark_interval_;
   while (!ending_) {
     if (due_.empty() && ready_.empty()) {
       if (watches_.empty()) {
@@ -359,7 +360,7 @@ void ChangeFeed::Run() {
         if (watch->is_armed) MakeReady(watch);
       }
     }
-    if (const auto now = std::chrono::steady_clock::now(); now >= next_marks) {
+    if (const auto now = SteadyClock::now(); now >= next_marks) {
       next_marks = now + mark_interval_;
       NudgeForMarks();
     }

@@ -2,22 +2,20 @@
 #define HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
 
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "server/process/synchronization.h"
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
 #include "server/registry/registry_types.h"
@@ -182,12 +180,12 @@ class ChangeFeed {
   MemoryCharge charge_;
 
   // For the thread.
-  std::condition_variable wake_;
+  ConditionVariable wake_;
   Interests due_;
   std::vector<std::shared_ptr<ChangeWatch>> ready_;
   bool has_ended_ = false;
   bool ending_ = false;
-  std::thread thread_;
+  Thread thread_;
 };
 
 }  // namespace hulld::server

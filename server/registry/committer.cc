@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <mutex>
 #include <string>
 #include <utility>
 
@@ -87,7 +88,15 @@ void Committer::Settle(std::vector<Pending>& batch, const absl::Status& status) 
       queue_.clear();
     }
   }
-  for (const Pending& pending : batch) pending.done(locked, status);
+  size_t completed = 0;
+  for (const Pending& pending : batch) {
+    if (status.ok() && completed > 0 && completed % kMostPerHold == 0) {
+      locked.Unlock();
+      locked.Lock();
+    }
+    pending.done(locked, status);
+    ++completed;
+  }
   // Replies go out now; the changes themselves, which may be large, end without a lock.
   locked.Unlock();
 }

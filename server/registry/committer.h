@@ -3,14 +3,13 @@
 
 #include <absl/status/status.h>
 
-#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "server/process/metrics.h"
+#include "server/process/synchronization.h"
 #include "server/registry/locked.h"
 #include "server/store/store.h"
 
@@ -33,17 +32,22 @@ struct CommitStatistics {
 // submitters undo it. The store is made to recover before the next batch.
 //
 // Two locks. `order` belongs to the submitters. They hold it while they submit, so the order of the
-// queue is that of their records. The completions of a batch run under it in one go, which makes a
-// refusal safe: from the moment when the queue is emptied to the last completion, no change that
-// builds on a refused one can be submitted. The queue has a mutex of its own, so that the
+// queue is that of their records. The completions of a refused batch run under it in one go, which
+// makes a refusal safe: from the moment when the queue is emptied to the last completion, no change
+// that builds on a refused one can be submitted. Those of a batch that was kept let others pass
+// after every kMostPerHold: each change stands for itself, and what is submitted in between follows
+// as it does while the store works. The queue has a mutex of its own, so that the
 // committer's thread takes the next batch without waiting for the records. That mutex is taken
 // after `order`, and nothing is called under it. No lock is held while the store works.
 class Committer {
  public:
   // Told whether a change is committed: OK, or why it was refused. Called once, on the committer's
-  // thread, with `order` held: completions come in the order of submission, no batch of another
-  // comes between, and no submission either. May submit the next change.
+  // thread, with `order` held: completions come in the order of submission, and no submission comes
+  // between refusals of one batch. May submit the next change.
   using Completion = std::function<void(Locked& order, const absl::Status&)>;
+
+  // Completions of kept changes within one hold of `order`; each takes about a microsecond.
+  static constexpr size_t kMostPerHold = 128;
 
   // Both must outlive this.
   Committer(Store& store, FairMutex& order);
@@ -75,13 +79,13 @@ class Committer {
   FairMutex& order_;
   StoreMetrics* metrics_ = nullptr;
 
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   // The rest is guarded by mutex_.
-  std::condition_variable ready_;
+  ConditionVariable ready_;
   std::vector<Pending> queue_;
   CommitStatistics statistics_;
   bool ending_ = false;
-  std::thread thread_;
+  Thread thread_;
 };
 
 }  // namespace hulld::server

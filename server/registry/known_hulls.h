@@ -21,13 +21,19 @@ namespace hulld::server {
 // ID. Not thread-safe.
 class RecentChanges {
  public:
-  // Half a megabyte.
+  // Half a megabyte, once there were as many.
   static constexpr uint64_t kMost = 1 << 16;
 
   static uint64_t HashOf(std::string_view id) { return std::hash<std::string_view>()(id); }
 
-  RecentChanges() : hashes_(kMost) {}
-  void Note(std::string_view id) { hashes_[end_++ % kMost] = HashOf(id); }
+  void Note(std::string_view id) {
+    if (end_ < kMost) {
+      hashes_.push_back(HashOf(id));
+    } else {
+      hashes_[end_ % kMost] = HashOf(id);
+    }
+    ++end_;
+  }
   // After the last change.
   uint64_t end() const { return end_; }
   // Whether all changes from this one on are known.

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "server/process/synchronization.h"
 
 namespace hulld::server {
 
@@ -51,14 +52,16 @@ class FairMutex {
 
   // Requires that it is held.
   HoldStatistics Statistics() const {
-    const bool is_recent = MinuteOf(Clock::now()) <= minute_ + 1;
-    return {is_recent ? std::max(longest_, longest_before_) : std::chrono::nanoseconds(0),
-            std::max(most_lookups_, lookups_)};
+    const int64_t age = MinuteOf(Clock::now()) - minute_;
+    const auto longest = age == 0   ? std::max(longest_, longest_before_)
+                         : age == 1 ? longest_
+                                    : std::chrono::nanoseconds(0);
+    return {longest, std::max(most_lookups_, lookups_)};
   }
 
  private:
   friend class Locked;
-  using Clock = std::chrono::steady_clock;
+  using Clock = SteadyClock;
 
   static int64_t MinuteOf(Clock::time_point time) {
     return std::chrono::floor<std::chrono::minutes>(time.time_since_epoch()).count();
@@ -78,8 +81,8 @@ class FairMutex {
     most_lookups_ = std::max(most_lookups_, lookups_);
   }
 
-  std::mutex entry_;
-  std::mutex mutex_;
+  Mutex entry_;
+  Mutex mutex_;
   // Written by who holds entry_.
   std::atomic<bool> is_wanted_ = false;
   // The rest is guarded by mutex_.

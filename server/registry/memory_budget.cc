@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <mutex>
 
 #include "core/base/check.h"
 #include "server/contract/limit_error.h"

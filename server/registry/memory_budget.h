@@ -9,10 +9,10 @@
 #include <functional>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <utility>
 #include <vector>
 
+#include "server/process/synchronization.h"
 #include "server/registry/locked.h"
 
 namespace hulld::server {
@@ -59,10 +59,10 @@ class MemoryBudget {
   enum Kind : size_t { kForReading, kForWriting, kAtRest };
   // Outlives the budget where parts do.
   struct Books {
-    std::mutex mutex;
+    Mutex mutex;
     std::array<uint64_t, 3> bytes{};
 
-    // Requires the mutex (unchecked: a std::mutex does not tell).
+    // Requires the mutex (unchecked: a Mutex does not tell).
     void Add(Kind kind, uint64_t amount) { bytes[kind] += amount; }
     void Remove(Kind kind, uint64_t amount);
   };

@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <list>
@@ -17,6 +16,7 @@
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
+#include "server/process/synchronization.h"
 #include "server/registry/hull_state.h"
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
@@ -128,7 +128,7 @@ struct RegisteredHull {
   // What it holds, also while a thread owns it.
   uint64_t builder_bytes = 0;
   // Told of each step of `state`, and when points were read from the store.
-  std::condition_variable changed;
+  ConditionVariable changed;
   std::list<PendingChunk> chunks;
   // What waits until the hull is quiet; goes before chunks.
   std::list<std::function<void(Locked&)>> exclusive;

@@ -42,6 +42,7 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
       memory_(limits_.memory_limit, ReadersShare(limits_.memory_limit, store), mutex_),
+      hulls_(store.keeps_hulls(), memory_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
   preparers_.emplace(1, preparers);
@@ -55,7 +56,9 @@ Registry::~Registry() {
   preparers_.reset();
   // Closed sessions may hold hulls for longer.
   const std::lock_guard lock(mutex_);
-  for (const auto& [id, hull] : hulls_) hull->account.Close();
+  for (const auto& [id, hull] : hulls_.entries()) {
+    if (hull.awake() != nullptr) hull.awake()->account.Close();
+  }
 }
 
 absl::Status Registry::Load() {
@@ -66,14 +69,14 @@ absl::Status Registry::Load() {
   const absl::Status status =
       store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
         if (stored.ok()) {
-          Insert(*stored, HullState::Present());
+          hulls_.AddResting(*stored);
           vertex_count_ += stored->record.vertex_count;
           return;
         }
         spdlog::error("{}", std::string(stored.status().message()));
         StoredHull nothing;
         nothing.record.hull_id = id;
-        MarkDamaged(*Insert(nothing, HullState::Present()), stored.status());
+        MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
       });
   if (cache_.damaged > 0) {
     spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
@@ -82,29 +85,15 @@ absl::Status Registry::Load() {
   return LoadBodies();
 }
 
-Registry::HullPointer Registry::Find(const std::string& id) const {
-  const auto found = hulls_.find(id);
-  return found == hulls_.end() ? nullptr : found->second;
-}
-
-Registry::HullPointer Registry::FindVisible(const std::string& id) const {
-  HullPointer hull = Find(id);
+Registry::HullPointer Registry::FindVisible(const std::string& id) {
+  HullPointer hull = hulls_.Find(id);
   return hull != nullptr && hull->state.visible() ? hull : nullptr;
-}
-
-Registry::HullPointer Registry::Insert(const StoredHull& stored, const HullState& state) {
-  auto hull = std::make_shared<RegisteredHull>(stored, state, store_.keeps_hulls(), memory_);
-  const bool is_new = hulls_.emplace(stored.record.hull_id, hull).second;
-  HULLD_CHECK(is_new);
-  return hull;
 }
 
 // Takes a hull that is gone out of sight and out of memory, and tells its sessions why.
 void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason) {
   HULLD_CHECK(hull->state.gone());
-  const auto found = hulls_.find(hull->committed.record.hull_id);
-  HULLD_CHECK(found != hulls_.end() && found->second == hull);
-  hulls_.erase(found);
+  hulls_.Erase(hull);
   for (auto& [number, on_gone] : hull->watches) {
     locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
   }
@@ -132,7 +121,7 @@ void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult>
 
 void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                             const Reply<CreateResult>& done) {
-  const HullPointer existing = Find(id);
+  const HullPointer existing = hulls_.Find(id);
   if (existing == nullptr) {
     return CreateNew(locked, id,
                      [this, done](Locked& later, const absl::StatusOr<HullPointer>& hull) {
@@ -166,7 +155,7 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
   change.revision = ++assigned_revision_;
   change.hull.record.hull_id = id;
   change.hull.record.create_revision = change.hull.record.revision = change.revision;
-  const HullPointer hull = Insert(change.hull, HullState::Creating());
+  const HullPointer hull = hulls_.Insert(change.hull, HullState::Creating());
   ++creating_;
   Submit(locked, hull, std::move(change),
          [this, hull, done](Locked& later, const absl::Status& status) {
@@ -190,7 +179,7 @@ void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision
 
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
-  const HullPointer hull = Find(id);
+  const HullPointer hull = hulls_.Find(id);
   if (hull == nullptr) return Answer<uint64_t>(locked, done, NoSuchHull(id));
   if (!hull->state.quiet()) {
     hull->exclusive.push_back(
@@ -233,7 +222,7 @@ void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
 
 void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                              const Reply<ReplaceResult>& done) {
-  const HullPointer former = Find(replacement->hull_id);
+  const HullPointer former = hulls_.Find(replacement->hull_id);
   if (former != nullptr && !former->state.quiet()) {
     former->exclusive.push_back(
         [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
@@ -293,7 +282,7 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
   Change change = MakeChange(former.get(), replacement);
   HullPointer hull;
   if (former == nullptr) {
-    hull = Insert(change.hull, HullState::Creating());
+    hull = hulls_.Insert(change.hull, HullState::Creating());
     ++creating_;
   } else {
     // Unknown to others until it takes the place of the former.
@@ -322,7 +311,7 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
     hull->state.Commit();
     vertex_count_ -= former->committed.record.vertex_count;
     Forget(locked, former, Gone(record.hull_id, "replaced"));
-    hulls_[record.hull_id] = hull;
+    hulls_.Insert(hull);
   }
   if (!status.ok()) return status;
   vertex_count_ += record.vertex_count;
@@ -361,6 +350,7 @@ void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
           memory_.Evict(later);
         }
         Advance(later, hull);
+        hulls_.RestSome();
       });
 }
 
@@ -375,7 +365,7 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   if (hull->chunks.empty()) return;
   if (hull->state.gone() || hull->state.damaged()) {
     // Replies come on other threads than the one that asks.
-    writers_.Submit([this, hull] { RefuseChunks(hull); });
+    writers_.Submit([this, hull] { RefuseChunks(hull); }, hull->chunks.front().session.client);
     return;
   }
   if (!hull->state.can_schedule() || !hull->exclusive.empty()) return;
@@ -384,7 +374,7 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   // What such a chunk finds must be committed.
   if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
   hull->state.Schedule();
-  writers_.Submit([this, hull] { RunNextChunk(hull); });
+  writers_.Submit([this, hull] { RunNextChunk(hull); }, next.session.client);
 }
 
 void Registry::NoteChange(const RegisteredHull& hull) {
@@ -404,15 +394,16 @@ HullPage Registry::List(const std::string& prefix, const std::string& after,
   HullPage page;
   const std::lock_guard lock(mutex_);
   page.store_revision = revision_;
-  auto next = after.empty() ? hulls_.lower_bound(prefix) : hulls_.upper_bound(after);
-  for (; next != hulls_.end() && next->first.starts_with(prefix); ++next) {
-    const RegisteredHull& hull = *next->second;
-    if (!hull.state.visible()) continue;
+  const HullTable::Entries& all = hulls_.entries();
+  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
+  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
+    if (!next->second.visible()) continue;
     if (page.hulls.size() == page_size) {
       page.more = true;
       break;
     }
-    page.hulls.push_back({hull.committed.record, hull.state.damaged()});
+    HullChange hull = next->second.Describe(next->first);
+    page.hulls.push_back({std::move(hull.record), hull.damaged});
   }
   return page;
 }

@@ -26,6 +26,7 @@
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
 #include "server/registry/registry_types.h"
+#include "server/registry/table/hull_table.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -170,9 +171,10 @@ class Registry {
   // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
   // thread, with the reason when the hull is deleted or replaced before the session is closed.
   // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
-  // RESOURCE_EXHAUSTED: --max-writers-per-hull.
+  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: who takes turns with others for a thread.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
-                  std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done);
+                  std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
+                  ClientId client = kNoClient);
 
   void CloseAppend(const AppendSession& session);
 
@@ -209,9 +211,7 @@ class Registry {
   enum class Verdict;
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  HullPointer Find(const std::string& id) const;
-  HullPointer FindVisible(const std::string& id) const;
-  HullPointer Insert(const StoredHull& stored, const HullState& state);
+  HullPointer FindVisible(const std::string& id);
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   absl::Status CheckHullCount() const;
   // The last revision that a change was given becomes visible.
@@ -247,6 +247,7 @@ class Registry {
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
 
+  void RunOpen(const std::shared_ptr<OpenRequest>& request);
   void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
   void OpenSession(Locked& locked, const HullPointer& hull,
                    const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
@@ -304,7 +305,7 @@ class Registry {
   uint64_t assigned_revision_ = 0;
   uint64_t vertex_count_ = 0;
   uint64_t last_watch_ = 0;
-  std::map<std::string, HullPointer> hulls_;
+  HullTable hulls_;
   // No ID is in both.
   std::map<std::string, RegisteredBody> bodies_;
   // As many as bodies_ holds.

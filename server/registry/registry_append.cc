@@ -21,6 +21,7 @@ struct Registry::OpenRequest {
   bool created_hull = false;
   std::function<void(const absl::Status&)> on_gone;
   Reply<OpenResult> done;
+  ClientId client = kNoClient;
 };
 
 // What the rules say of a chunk that they allow.
@@ -82,14 +83,20 @@ void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequen
 
 void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
                           bool create_if_absent, std::function<void(const absl::Status&)> on_gone,
-                          Reply<OpenResult> done) {
-  const auto request = std::make_shared<OpenRequest>(
-      OpenRequest{id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done)});
+                          Reply<OpenResult> done, ClientId client) {
+  const auto request = std::make_shared<OpenRequest>(OpenRequest{
+      id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
   // The store may have to be read.
-  writers_.Submit([this, request] {
-    Locked locked(mutex_);
-    OpenLocked(locked, request);
-  });
+  RunOpen(request);
+}
+
+void Registry::RunOpen(const std::shared_ptr<OpenRequest>& request) {
+  writers_.Submit(
+      [this, request] {
+        Locked locked(mutex_);
+        OpenLocked(locked, request);
+      },
+      request->client);
 }
 
 // On a thread of `writers_`. May release the mutex to ask the store.
@@ -97,7 +104,7 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer<OpenResult>(later, request->done, status);
   };
-  const HullPointer hull = Find(request->hull_id);
+  const HullPointer hull = hulls_.Find(request->hull_id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
@@ -110,12 +117,7 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
         });
   }
   if (hull->state.changing_life()) {
-    hull->exclusive.push_back([this, request](Locked&) {
-      writers_.Submit([this, request] {
-        Locked later(mutex_);
-        OpenLocked(later, request);
-      });
-    });
+    hull->exclusive.push_back([this, request](Locked&) { RunOpen(request); });
     return;
   }
   if (hull->state.damaged()) return refuse(locked, hull->state.damage());
@@ -136,7 +138,7 @@ void Registry::OpenSession(Locked& locked, const HullPointer& hull,
   result.store_revision = revision_;
   result.hull = hull->committed.record;
   result.last_sequence = last_sequence;
-  result.session = {hull, request->writer_id, request->created_hull, last_watch_};
+  result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
   Answer<OpenResult>(locked, request->done, std::move(result));
 }
 

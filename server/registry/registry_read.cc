@@ -117,7 +117,10 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls&
     known.view = HullView{hull->committed.record, hull->Serve()};
     known.bytes = hull->SharedBytes();
     hull->NoteUse();
-    if (was_missing) memory_.Evict(locked);
+    if (was_missing) {
+      memory_.Evict(locked);
+      hulls_.RestSome();
+    }
     return absl::OkStatus();
   }
 }

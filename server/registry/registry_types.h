@@ -13,6 +13,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/live_hull.h"
+#include "server/process/fair_queue.h"
 #include "server/registry/served_hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
@@ -165,6 +166,8 @@ struct AppendSession {
   std::string writer_id;
   bool created_hull = false;
   uint64_t watch = 0;
+  // In whose turn its chunks are built.
+  ClientId client = kNoClient;
 };
 
 struct OpenResult {

@@ -36,7 +36,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
   WatchPiece piece;
   piece.anew = std::exchange(watch.anew, false);
   piece.revision = watch.after_revision;
-  const auto is_there = [this](const std::string& id) { return FindVisible(id) != nullptr; };
+  const auto is_there = [this](const std::string& id) { return hulls_.IsVisible(id); };
   switch (watch.stage) {
     case ChangeWatch::Stage::kDeletions:
       if (!feed_.TakeDeletions(watch, is_there, &piece)) watch.stage = ChangeWatch::Stage::kPresent;
@@ -57,15 +57,15 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = feed_.TargetOf(watch);
   const std::string& prefix = target.ids.empty() ? target.prefix : target.ids.front();
-  auto next =
-      watch.last_id.empty() ? hulls_.lower_bound(prefix) : hulls_.upper_bound(watch.last_id);
-  for (size_t looked_at = 0; next != hulls_.end() && next->first.starts_with(prefix); ++next) {
+  const HullTable::Entries& all = hulls_.entries();
+  auto next = watch.last_id.empty() ? all.lower_bound(prefix) : all.upper_bound(watch.last_id);
+  for (size_t looked_at = 0; next != all.end() && next->first.starts_with(prefix); ++next) {
     if (!target.ids.empty() && next->first != prefix) break;
     if (looked_at++ == ChangeFeed::kMostPerPiece) return;
     watch.last_id = next->first;
-    const RegisteredHull& hull = *next->second;
-    const bool is_new = hull.committed.record.revision > watch.after_revision;
-    if (is_new && hull.state.visible()) piece->changes.push_back(hull.Describe());
+    const HullTable::Entry& hull = next->second;
+    const bool is_new = hull.revision() > watch.after_revision;
+    if (is_new && hull.visible()) piece->changes.push_back(hull.Describe(next->first));
   }
   watch.stage = ChangeWatch::Stage::kChanges;
   watch.synced_at = revision_;

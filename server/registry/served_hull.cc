@@ -1,6 +1,7 @@
 #include "server/registry/served_hull.h"
 
 #include <chrono>
+#include <mutex>
 #include <utility>
 #include <vector>
 

@@ -5,7 +5,6 @@
 #include <absl/status/statusor.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -16,6 +15,7 @@
 #include "core/hull/hull.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/query_hull.h"
+#include "server/process/synchronization.h"
 #include "server/registry/memory_budget.h"
 #include "server/store/hull_record.h"
 
@@ -58,8 +58,8 @@ class CanonicalHull {
   void Count() const;
 
   const std::shared_ptr<MemoryPart> part_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
+  Mutex mutex_;
+  ConditionVariable changed_;
   // Guarded by the mutex: a thread makes it.
   bool making_ = false;
   // Written once, before hull_bytes_ says so.

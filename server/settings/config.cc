@@ -138,15 +138,23 @@ class Parser {
   }
 
   void AddStore() {
-    Add("store", config_.store, "Where hulls live: on disk, or in memory until the server ends")
-        ->check(CLI::IsMember({"rocksdb", "memory"}));
+    Add("store", config_.store,
+        "Where hulls live: on disk, in a PostgreSQL database, or in memory until the server ends")
+        ->check(CLI::IsMember({"rocksdb", "postgres", "memory"}));
     Add("data-dir", config_.data_dir,
-        "Directory of the store; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
+        "Directory of --store rocksdb; made when missing. Default: hulld in $XDG_STATE_HOME, or in "
         "~/.local/state, or else ./hulld-data");
     Add("durability", config_.durability,
         "Acknowledge what is on disk (sync), or what was given to the operating system, which an "
         "outage of the machine can lose (relaxed)")
         ->check(CLI::IsMember({"sync", "relaxed"}));
+    Add("postgres-conninfo-file", config_.postgres_conninfo_file,
+        "File of the connection string of --store postgres, which only hulld may read");
+    app_.add_flag(
+            "--take-over", config_.take_over,
+            "With --store postgres: take the store from the server that is active, which then "
+            "ends, instead of waiting for its end; on the command line alone")
+        ->configurable(false);
   }
 
   void AddObservation() {
@@ -265,6 +273,24 @@ std::string DefaultDataDir(const Environment& environment) {
   return "hulld-data";
 }
 
+// What settings of the store say together.
+absl::Status CheckStore(const Config& config) {
+  const bool is_postgres = config.store == "postgres";
+  if (is_postgres && config.postgres_conninfo_file.empty()) {
+    return absl::InvalidArgumentError(
+        "--store postgres needs --postgres-conninfo-file, which tells where the database is");
+  }
+  if (is_postgres && config.durability != "sync") {
+    return absl::InvalidArgumentError(
+        "--durability relaxed is for --store rocksdb; with --store postgres the database decides, "
+        "as by ALTER ROLE ... SET synchronous_commit = off");
+  }
+  if (config.take_over && !is_postgres) {
+    return absl::InvalidArgumentError("--take-over is for --store postgres");
+  }
+  return absl::OkStatus();
+}
+
 absl::Status WithAdvice(const absl::Status& status, const char* where) {
   return absl::InvalidArgumentError(
       absl::StrCat(where, status.message(), " (hulld --help lists the settings)"));
@@ -299,6 +325,7 @@ absl::StatusOr<CommandLine> ParseCommandLine(const std::vector<std::string>& arg
   result = CommandLine();
   const absl::Status status = Parser().Parse(std::move(all), &result);
   if (!status.ok()) return WithAdvice(status, "");
+  if (absl::Status s = CheckStore(result.config); !s.ok()) return WithAdvice(s, "");
   if (result.config.data_dir.empty()) result.config.data_dir = DefaultDataDir(environment);
   return result;
 }

@@ -77,11 +77,16 @@ struct Config {
   std::string tokens_file;
   // Threads that compute answers; 0: DefaultThreads() of cpu_limit.h.
   int threads = 0;
-  // Where hulls live: "rocksdb" or "memory".
+  // Where hulls live: "rocksdb", "postgres" or "memory".
   std::string store = "rocksdb";
-  // The directory of a durable store. Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state, or
+  // The directory of "rocksdb". Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state, or
   // else hulld-data where the server is started; ParseCommandLine puts that in its place.
   std::string data_dir;
+  // The file that holds the connection string of "postgres".
+  std::string postgres_conninfo_file;
+  // Whether this takes the store of "postgres" from the server that is active, instead of waiting;
+  // on the command line alone, as servers that always did would take it from each other.
+  bool take_over = false;
   // What an acknowledged change survives: "sync" (on disk) or "relaxed" (written; synced within
   // kRelaxedSyncInterval).
   std::string durability = "sync";

@@ -177,7 +177,9 @@ absl::Status RocksDbStore::ReadMeta() {
   if (!revision.ok()) return Prefixed("the store's revision: ", revision.status());
   if (!revision->has_value()) return absl::DataLossError("the store's revision is missing");
   revision_ = **revision;
-  return options_.read_only ? absl::OkStatus() : BeginRun();
+  if (options_.read_only) return absl::OkStatus();
+  if (absl::Status s = BeginRun(); !s.ok()) return s;
+  return DropLostIncarnations();
 }
 
 absl::Status RocksDbStore::InitializeMeta() {

@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "server/contract/status_map.h"
 #include "server/store/rocksdb_store.h"
+#include "server/store/sealed_hull.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
 
@@ -85,13 +85,7 @@ absl::Status RocksDbStore::ForEachHull(const StoredHullVisitor& visit) {
   return ScanRange(std::string(1, kHullPrefix), std::string(1, kHullPrefix + 1),
                    [&](std::string_view key, std::string_view sealed) {
                      const std::string hull_id(key.substr(1));
-                     const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
-                     absl::StatusOr<StoredHull> hull =
-                         value.ok() ? DecodeStoredHull(hull_id, *value) : value.status();
-                     if (!hull.ok()) {
-                       hull = DamagedHull(hull_id, std::string(hull.status().message()));
-                     }
-                     visit(hull_id, std::move(hull));
+                     visit(hull_id, UnsealStoredHull(hull_id, sealed));
                      return absl::OkStatus();
                    });
 }
@@ -100,70 +94,41 @@ absl::Status RocksDbStore::ForEachBody(const StoredBodyVisitor& visit) {
   return ScanRange(std::string(1, kBodyPrefix), std::string(1, kBodyPrefix + 1),
                    [&](std::string_view key, std::string_view sealed) {
                      const std::string body_id(key.substr(1));
-                     const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
-                     absl::StatusOr<StoredBody> body =
-                         value.ok() ? DecodeStoredBody(body_id, *value) : value.status();
-                     if (!body.ok()) {
-                       body = DamagedBody(body_id, std::string(body.status().message()));
-                     }
-                     visit(body_id, std::move(body));
+                     visit(body_id, UnsealStoredBody(body_id, sealed));
                      return absl::OkStatus();
                    });
 }
 
 absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull& hull) {
-  std::vector<Vector> vertices;
-  vertices.reserve(hull.layout.base_vertices + hull.layout.delta_vertices);
-  absl::Status status = LoadBase(hull, &vertices);
-  if (status.ok()) status = LoadDeltas(hull, &vertices);
-  if (absl::IsDataLoss(status)) {
-    return DamagedHull(hull.record.hull_id, std::string(status.message()));
-  }
-  if (!status.ok()) return status;
-  return vertices;
+  VertexAssembly assembly(hull);
+  absl::Status status = LoadBase(hull, &assembly);
+  if (status.ok()) status = LoadDeltas(hull, &assembly);
+  return std::move(assembly).Finish(std::move(status));
 }
 
-absl::Status RocksDbStore::LoadBase(const StoredHull& hull, std::vector<Vector>* vertices) {
-  const uint64_t incarnation = hull.record.create_revision;
-  const VertexLayout& layout = hull.layout;
-  for (uint32_t part = 0; vertices->size() < layout.base_vertices; ++part) {
-    const absl::StatusOr<std::optional<std::string>> value =
-        Read(BaseKey(incarnation, layout.base_revision, part));
-    const std::string name = absl::StrCat("part ", part, " of its base: ");
-    if (!value.ok()) return Prefixed(name, value.status());
-    if (!value->has_value()) return absl::DataLossError(absl::StrCat(name, "it is missing"));
-    if ((*value)->empty()) return absl::DataLossError(absl::StrCat(name, "it is empty"));
-    if (absl::Status s = AppendVertices(**value, vertices); !s.ok()) return Prefixed(name, s);
+absl::Status RocksDbStore::LoadBase(const StoredHull& hull, VertexAssembly* assembly) {
+  while (assembly->wants_base_part()) {
+    const absl::StatusOr<std::optional<std::string>> value = Read(
+        BaseKey(hull.record.create_revision, hull.layout.base_revision, assembly->next_part()));
+    absl::StatusOr<std::string_view> part = absl::DataLossError("it is missing");
+    if (!value.ok()) {
+      part = value.status();
+    } else if (value->has_value()) {
+      part = **value;
+    }
+    if (absl::Status s = assembly->AddBasePart(part); !s.ok()) return s;
   }
-  if (vertices->size() == layout.base_vertices) return absl::OkStatus();
-  return absl::DataLossError(
-      absl::StrCat("its base holds ", vertices->size(), " vertices, not ", layout.base_vertices));
+  return absl::OkStatus();
 }
 
-absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices) {
+absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, VertexAssembly* assembly) {
+  if (hull.layout.delta_count == 0) return absl::OkStatus();
   const uint64_t incarnation = hull.record.create_revision;
-  const VertexLayout& layout = hull.layout;
-  const size_t base = vertices->size();
-  uint64_t count = 0;
-  if (layout.delta_count > 0) {
-    const absl::Status scanned = ScanRange(
-        DeltaKey(incarnation, layout.base_revision + 1),
-        DeltaKey(incarnation, hull.record.revision + 1),
-        [&](std::string_view key, std::string_view sealed) {
-          const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
-          const absl::Status status =
-              value.ok() ? AppendVertices(*value, vertices) : value.status();
-          ++count;
-          return Prefixed(absl::StrCat("its delta of revision ", DeltaRevision(key), ": "), status);
-        });
-    if (!scanned.ok()) return scanned;
-  }
-  if (count == layout.delta_count && vertices->size() - base == layout.delta_vertices) {
-    return absl::OkStatus();
-  }
-  return absl::DataLossError(absl::StrCat("it has ", count, " deltas with ",
-                                          vertices->size() - base, " vertices, not ",
-                                          layout.delta_count, " with ", layout.delta_vertices));
+  return ScanRange(DeltaKey(incarnation, hull.layout.base_revision + 1),
+                   DeltaKey(incarnation, hull.record.revision + 1),
+                   [&](std::string_view key, std::string_view sealed) {
+                     return assembly->AddDelta(DeltaRevision(key), Unseal(key, sealed));
+                   });
 }
 
 absl::StatusOr<uint64_t> RocksDbStore::LoadSequence(const HullRecord& hull,

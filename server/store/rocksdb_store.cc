@@ -39,23 +39,25 @@ absl::Status RocksDbStore::ReadFailed(const rocksdb::Status& status) {
   return ReadError(status, "cannot read");
 }
 
-// Deletes what belongs to no hull. A hull whose record is damaged leaves it when it ends, as its
-// incarnation is not known. While the record of another hull is damaged nothing is deleted, as it
-// may belong to that one; the end of the last of them deletes it all. Cost: reads all records, and
-// seeks once for each incarnation.
-void RocksDbStore::DropLostIncarnations(const std::set<std::string>& ending,
-                                        rocksdb::WriteBatch* batch) {
+// Deletes what belongs to no hull, if there may be such: a hull whose record is damaged leaves it
+// when it ends, as its incarnation is not known, and finding it takes a look at all records. Hence
+// at a start. While the record of another hull is damaged nothing is deleted, as it may belong to
+// that one. Cost, where it has to look: reads all records, and seeks once for each incarnation.
+absl::Status RocksDbStore::DropLostIncarnations() {
+  const absl::StatusOr<std::optional<std::string>> lost = Read(kLostKey);
+  if (absl::IsUnavailable(lost.status())) return lost.status();
+  // A damaged mark is one.
+  if (lost.ok() && !lost->has_value()) return absl::OkStatus();
   std::unordered_set<uint64_t> known;
   bool certain = true;
   const absl::Status read =
-      ForEachHull([&](const std::string& hull_id, const absl::StatusOr<StoredHull>& hull) {
-        if (ending.contains(hull_id)) return;
+      ForEachHull([&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
         certain = certain && hull.ok();
         if (hull.ok()) known.insert(hull->record.create_revision);
       });
-  if (!read.ok() || !certain) return;
-  const std::shared_lock lock(db_mutex_);
-  if (db_ == nullptr) return;
+  if (!read.ok()) return read;
+  if (!certain) return absl::OkStatus();
+  rocksdb::WriteBatch batch;
   for (const char prefix : {kWriterPrefix, kBasePrefix, kDeltaPrefix}) {
     const std::unique_ptr<rocksdb::Iterator> it(db_->NewIterator(rocksdb::ReadOptions()));
     it->Seek(std::string(1, prefix));
@@ -63,24 +65,23 @@ void RocksDbStore::DropLostIncarnations(const std::set<std::string>& ending,
       const uint64_t incarnation = IncarnationOf(it->key().ToStringView());
       const std::string end = IncarnationKey(prefix, incarnation + 1);
       if (!known.contains(incarnation)) {
-        batch->DeleteRange(IncarnationKey(prefix, incarnation), end);
+        batch.DeleteRange(IncarnationKey(prefix, incarnation), end);
       }
       it->Seek(end);
     }
+    // What cannot be read now is looked for again by the next start.
+    if (!it->status().ok()) return absl::OkStatus();
   }
+  batch.Delete(kLostKey);
+  return WriteMeta(&batch);
 }
 
 absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   rocksdb::WriteBatch batch;
-  std::set<std::string> unknown;
-  for (const Change* change : changes) {
-    if (EndsUnknown(*change)) unknown.insert(change->hull.record.hull_id);
-  }
-  // First, as it is about what was committed before.
-  if (!unknown.empty()) DropLostIncarnations(unknown, &batch);
   uint64_t revision = 0;
   for (const Change* change : changes) {
     EncodeChange(batch, *change);
+    if (EndsUnknown(*change)) PutSealed(batch, kLostKey, "");
     revision = std::max(revision, change->revision);
   }
   PutSealed(batch, kRevisionKey, EncodeNumber(revision));

@@ -13,7 +13,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <shared_mutex>
 #include <span>
 #include <string>
@@ -22,6 +21,7 @@
 #include <vector>
 
 #include "server/store/log_file_system.h"
+#include "server/store/sealed_hull.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -106,9 +106,9 @@ class RocksDbStore : public Store {
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);
-  void DropLostIncarnations(const std::set<std::string>& ending, rocksdb::WriteBatch* batch);
-  absl::Status LoadBase(const StoredHull& hull, std::vector<Vector>* vertices);
-  absl::Status LoadDeltas(const StoredHull& hull, std::vector<Vector>* vertices);
+  absl::Status DropLostIncarnations();
+  absl::Status LoadBase(const StoredHull& hull, VertexAssembly* assembly);
+  absl::Status LoadDeltas(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status Probe();
   absl::Status Reopen();
   absl::Status SyncLog();

@@ -80,8 +80,8 @@ struct StoreDisk {
   // All its files, and its log of these.
   uint64_t bytes = 0;
   uint64_t log_bytes = 0;
-  // What the disk has left for it.
-  uint64_t free_bytes = 0;
+  // What the disk has left for it; none where that is not known.
+  std::optional<uint64_t> free_bytes;
   // How often changes were slowed down or stopped since it was opened, and whether they are.
   uint64_t stalls = 0;
   bool is_stalled = false;
@@ -128,6 +128,10 @@ class Store {
   // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
   // directory, which the caller removes. FAILED_PRECONDITION: nothing is kept.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
+
+  // `ended` is called, on any thread, once nothing can be committed or read here any more because
+  // another server took the store over; at once if that is so already. The process is to end then.
+  virtual void OnEnded(std::function<void()> ended) { (void)ended; }
 
   // Whether the next change is to bring a new base instead of a delta of `new_vertices`: once the
   // deltas outgrew the base, so that all bases together are as large as all deltas, a few times at

@@ -15,6 +15,7 @@
 #include <random>
 #include <span>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -23,6 +24,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "tests/server/harness/history_client.h"
 #include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/postgres/postgres_cluster.h"
 #include "tests/server/harness/restartable_server.h"
 #include "tests/server/harness/test_server.h"
 
@@ -45,13 +47,22 @@ constexpr int kWriters = 8;
 constexpr int kReaders = 8;
 constexpr int kHulls = 5;
 
-class Crash : public RestartableServer {
+// Over each store that keeps hulls: "rocksdb", "postgres".
+class Crash : public RestartableServer, public ::testing::WithParamInterface<const char*> {
  protected:
   Crash() {
     for (int i = 0; i < kWriters + kReaders; ++i) {
       clients_.push_back(std::make_unique<HistoryClient>(
           Channel(i), history_, absl::StrCat("client-", i), Seed() + static_cast<uint64_t>(i)));
     }
+  }
+
+  void SetUp() override {
+    if (GetParam() == std::string_view("rocksdb")) return;
+    if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+    PostgresCluster& cluster = PostgresCluster::Shared();
+    store_ = {"--store", "postgres", "--postgres-conninfo-file",
+              cluster.WriteConninfo(cluster.MakeDatabase())};
   }
 
   // Clients call until the server is killed, which is when about `calls` more have been answered.
@@ -73,6 +84,35 @@ class Crash : public RestartableServer {
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(server_->Wait(), -1) << "hulld ended by itself" << Said();
     history_.Settle();
+  }
+
+  // Clients call, and go on calling, while the database is killed and started again, each time when
+  // about `calls` more have been answered.
+  void CallWhileTheDatabaseIsKilled(int kills, uint64_t calls) {
+    std::atomic<bool> ending = false;
+    std::vector<std::thread> threads;
+    for (int i = 0; i < kWriters + kReaders; ++i) {
+      threads.emplace_back([this, i, &ending] {
+        HistoryClient& client = *clients_[static_cast<size_t>(i)];
+        client.Connect(Channel(i));
+        std::mt19937_64 random(Seed() + static_cast<uint64_t>(i));
+        while (!ending) {
+          const std::string hull = absl::StrCat("crash/", random() % kHulls);
+          if (!(i < kWriters ? client.ChangeAtRandom(hull) : client.ReadAtRandom(hull))) continue;
+          ++answered_;
+          answered_.notify_all();
+        }
+      });
+    }
+    for (int kill = 0; kill <= kills; ++kill) {
+      const uint64_t enough = answered_ + calls;
+      for (uint64_t now = answered_; now < enough; now = answered_) answered_.wait(now);
+      if (kill == kills) break;
+      PostgresCluster::Shared().StopImmediately();
+      PostgresCluster::Shared().Start();
+    }
+    ending = true;
+    for (std::thread& thread : threads) thread.join();
   }
 
   void AuditAll() {
@@ -97,9 +137,12 @@ class Crash : public RestartableServer {
   int audited_ = 0;
 };
 
+INSTANTIATE_TEST_SUITE_P(Stores, Crash, ::testing::Values("rocksdb", "postgres"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
 // Every call that was answered is there after the next start, exactly once, and what was not
 // answered is there wholly or not at all: the history over all lives of the store is linearizable.
-TEST_F(Crash, NothingAcknowledgedIsLostOverManyKills) {
+TEST_P(Crash, NothingAcknowledgedIsLostOverManyKills) {
   RecordProperty("seed", std::to_string(Seed()));
   std::mt19937_64 random(Seed());
   const int crashes = Crashes();
@@ -130,6 +173,26 @@ TEST_F(Crash, NothingAcknowledgedIsLostOverManyKills) {
   EXPECT_GT(lost, static_cast<size_t>(crashes));
   EXPECT_GT(replaced, static_cast<size_t>(crashes));
   EXPECT_GT(audited_, crashes);
+}
+
+class DatabaseCrash : public Crash {};
+
+INSTANTIATE_TEST_SUITE_P(Stores, DatabaseCrash, ::testing::Values("postgres"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
+// The server lives on, and so do the calls that wait meanwhile.
+TEST_P(DatabaseCrash, NothingAcknowledgedIsLostWhenTheDatabaseIsKilled) {
+  RecordProperty("seed", std::to_string(Seed()));
+  StartServer();
+  clients_[0]->Connect(Channel(0));
+  clients_[0]->MakeProbe();
+  CallWhileTheDatabaseIsKilled(Crashes() / 3, 300);
+  AuditAll();
+  EXPECT_EQ(HistoryFault(history_), "") << "seed " << Seed();
+  Kill();
+  StartServer();
+  AuditAll();
+  EXPECT_GT(audited_, 0);
 }
 
 // `count` blocks of points in a ball that grows from block to block, so that each changes the hull.

@@ -7,6 +7,7 @@
 
 #include <string>
 
+#include "client/pose/rigid_pose.h"
 #include "hulld/v1/collision.pb.h"
 #include "hulld/v1/geometry.pb.h"
 
@@ -20,6 +21,9 @@ absl::StatusOr<v1::Placement> ParsePiece(const std::string& text);
 // Adds the pieces of a JSON file, which 'hullctl body get --output json' writes: {"pieces":[...]};
 // "-" is standard input. INVALID_ARGUMENT and NOT_FOUND name the file.
 absl::Status ReadPieces(const std::string& path, Pieces* pieces);
+
+// The numbers of a pose; what it does not say moves nothing.
+RigidPose NumbersOf(const v1::Pose& pose);
 
 // A pose as ParsePose reads it, in the fewest numbers; empty for the identity.
 std::string PoseText(const v1::Pose& pose);

@@ -263,14 +263,16 @@ void AddAppendCommand(Command program, Invocation* invocation) {
       .Needs(writer);
   command
       .AddText("--split", &arguments->split,
-               "Make a hull ID/PART of each part: of what the file names (objects and groups of "
-               "obj, solids of stl, nodes of gltf), or of what hangs together")
+               "Make a hull ID/PART of each part, and a body ID of them: of what the file names "
+               "(objects and groups of obj, solids of stl, nodes of gltf), or of what hangs "
+               "together")
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(
       "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf.\n"
       "--create makes the hull when there are points for it; files that are refused leave none.\n"
       "--resume needs the same files, options and writer as before.\n"
+      "--split may be run again: a body that has the parts stays as it is.\n"
       "Of meshes (obj, off, stl, gltf) it is said how much larger the hull is: its volume over "
       "that\n"
       "of the mesh, both summed exactly, where the mesh is closed. From 1.5 on there is a "
@@ -281,7 +283,7 @@ void AddAppendCommand(Command program, Invocation* invocation) {
        {"One that can be carried on with after an interruption",
         "hullctl append ball ball.xyz --create --writer lab"},
        {"", "hullctl append ball ball.xyz --writer lab --resume"},
-       {"Each object of a file as chair/OBJECT",
+       {"Each object of a file as chair/OBJECT, and all as the body chair",
         "hullctl append chair chair.obj --split names --create"}});
   command.OnGiven([=] { invocation->action = [=] { return Append(*invocation, *arguments); }; });
 }

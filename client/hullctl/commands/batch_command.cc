@@ -216,7 +216,9 @@ class BatchRun {
       run_.out << RelationText(row.relation) << "\n";
       return;
     }
-    run_.out << RowText(row, run_.paint);
+    run_.out << RowText(row, run_.paint,
+                        scene_.NamesOfPieces(pairs_[2 * pair], pairs_[2 * pair + 1],
+                                             row.pieces.value_or(std::pair(-1, -1))));
     if (verification) run_.out << "\t" << VerificationText(*verification, run_.paint);
     run_.out << "\n";
   }
@@ -268,7 +270,7 @@ class BatchRun {
 ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
   const auto source = ByteSource::Open(arguments.file);
   if (!source.ok()) return run.FailUsage(source.status());
-  const auto scene = ReadScene(source->get());
+  const auto scene = ReadScene(source->get(), FormFor(arguments.wishes));
   if (!scene.ok()) return run.FailUsage(scene.status());
   if (absl::Status rest = RefuseUpdates(source->get(), "batch"); !rest.ok()) {
     return run.FailUsage(rest);
@@ -277,6 +279,12 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
 }
 
 }  // namespace
+
+BodyForm FormFor(const QueryWishes& wishes) {
+  const bool about_hulls =
+      wishes.verify || wishes.wanted.certificate() || wishes.method == v1::METHOD_TEXTBOOK_SAT;
+  return about_hulls ? BodyForm::kPieces : BodyForm::kWhole;
+}
 
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
                      const QueryWishes& wishes, bool colliding) {

@@ -41,6 +41,8 @@ void AddManCommand(Command program, Invocation* invocation);
 // Asks about the pairs of a scene that was read from `file`, as 'hullctl batch' does.
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,
                      const QueryWishes& wishes, bool colliding);
+// How bodies of a scene are asked about: certificates and the textbook's test are about hulls.
+BodyForm FormFor(const QueryWishes& wishes);
 
 }  // namespace hulld
 

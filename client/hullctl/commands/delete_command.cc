@@ -1,7 +1,3 @@
-#include <absl/strings/str_cat.h>
-#include <unistd.h>
-
-#include <iostream>
 #include <memory>
 #include <optional>
 #include <set>
@@ -9,6 +5,7 @@
 #include <vector>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/deletion.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
@@ -31,32 +28,14 @@ struct Doomed {
   std::optional<uint64_t> if_revision;
 };
 
-std::string Naming(const std::vector<Doomed>& doomed) {
-  constexpr size_t kNamed = 5;
-  std::string text;
-  for (size_t i = 0; i < doomed.size() && i < kNamed; ++i) {
-    absl::StrAppend(&text, i > 0 ? ", " : "", doomed[i].hull_id);
-  }
-  if (doomed.size() > kNamed) absl::StrAppend(&text, ", ...");
-  return text;
-}
-
 // Whether what was asked is meant. One hull that is named is; more need a yes, by option or by a
 // person at a terminal.
 absl::StatusOr<bool> IsMeant(const Invocation& run, const DeleteArguments& arguments,
                              const std::vector<Doomed>& doomed) {
   if (arguments.yes || (doomed.size() == 1 && !arguments.has_prefix)) return true;
-  const bool is_terminal = isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
-  if (!is_terminal) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("this would delete ", doomed.size(), " hulls (", Naming(doomed),
-                     "); say --yes if that is meant, as nobody can be asked here"));
-  }
-  run.err << "Delete " << doomed.size() << (doomed.size() == 1 ? " hull (" : " hulls (")
-          << Naming(doomed) << ")? [y/N] " << std::flush;
-  std::string answer;
-  std::getline(std::cin, answer);
-  return answer == "y" || answer == "Y" || answer == "yes";
+  std::vector<std::string> ids;
+  for (const Doomed& hull : doomed) ids.push_back(hull.hull_id);
+  return ConfirmDeletion(run, ids, "hull", "hulls");
 }
 
 absl::StatusOr<std::vector<Doomed>> Choose(const Client& client, const DeleteArguments& arguments) {

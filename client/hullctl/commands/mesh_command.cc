@@ -8,6 +8,7 @@
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/mesh_obj.h"
 #include "client/hullctl/printing/progress_bar.h"
+#include "client/verify/simplification_check.h"
 
 namespace hulld {
 namespace {
@@ -18,6 +19,7 @@ struct MeshArguments {
   uint64_t max_vertices = 0;
   double max_error = 0;
   bool outside = false;
+  bool verify = false;
 };
 
 v1::GetHullMeshRequest RequestFor(const MeshArguments& arguments) {
@@ -48,20 +50,46 @@ void WriteMessages(const HullMesh& mesh, std::ostream& out) {
   out << MessageJson(facets) << "\n";
 }
 
+// The mesh; with --verify only one that is what it claims, else its verification says why not.
+absl::StatusOr<VerifiedMesh> Fetch(const Invocation& run, const MeshArguments& arguments) {
+  const v1::GetHullMeshRequest request = RequestFor(arguments);
+  std::optional<ProgressBar> bar;
+  const auto show = [&](const HullMesh& so_far) {
+    const uint64_t total = so_far.header.vertex_count() + so_far.header.facet_count();
+    if (!bar) bar.emplace(run.err, run.shows_progress, "vertices", total);
+    bar->Update(so_far.vertex_count() + so_far.facet_sizes.size(), so_far.vertex_count());
+  };
+  const Client client = run.MakeClient();
+  if (arguments.verify) return GetSimplificationVerified(client, request, show);
+  absl::StatusOr<HullMesh> mesh = client.GetHullMesh(request, show);
+  if (!mesh.ok()) return mesh.status();
+  return VerifiedMesh{*std::move(mesh), {}};
+}
+
+ExitCode Refuse(const Invocation& run, const Verification& verification) {
+  const bool invalid = verification.verdict == Verdict::kInvalid;
+  run.err << "hullctl: the simplification "
+          << (invalid ? "is not what it claims" : "cannot be checked")
+          << ", so it is not written: " << verification.reason << "\n";
+  return invalid ? ExitCode::kInvalidCertificate : ExitCode::kCannotCheck;
+}
+
 ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
-  if (arguments.outside && arguments.max_vertices == 0 && arguments.max_error == 0) {
+  const bool is_simplified = arguments.max_vertices > 0 || arguments.max_error > 0;
+  if (arguments.outside && !is_simplified) {
     return run.FailUsage(absl::InvalidArgumentError(
         "--outside says how to simplify; give --max-vertices, --max-error or both as well"));
   }
-  std::optional<ProgressBar> bar;
-  const auto mesh =
-      run.MakeClient().GetHullMesh(RequestFor(arguments), [&](const HullMesh& so_far) {
-        const uint64_t total = so_far.header.vertex_count() + so_far.header.facet_count();
-        if (!bar) bar.emplace(run.err, run.shows_progress, "vertices", total);
-        bar->Update(so_far.vertex_count() + so_far.facet_sizes.size(), so_far.vertex_count());
-      });
-  bar.reset();
-  if (!mesh.ok()) return run.Fail(mesh.status());
+  if (arguments.verify && !is_simplified) {
+    return run.FailUsage(absl::InvalidArgumentError(
+        "--verify checks a simplification; give --max-vertices, --max-error or both as well"));
+  }
+  const auto fetched = Fetch(run, arguments);
+  if (!fetched.ok()) return run.Fail(fetched.status());
+  if (arguments.verify && fetched->verification.verdict != Verdict::kValid) {
+    return Refuse(run, fetched->verification);
+  }
+  const HullMesh* const mesh = &fetched->mesh;
   const absl::Status written = WriteOutput(arguments.file, run.out, [&](std::ostream& out) {
     run.json() ? WriteMessages(*mesh, out) : WriteObj(*mesh, out);
   });
@@ -69,7 +97,8 @@ ExitCode Mesh(const Invocation& run, const MeshArguments& arguments) {
   if (!arguments.file.empty() && arguments.file != "-") {
     run.err << arguments.file << ": " << mesh->vertex_count() << " vertices, "
             << mesh->facet_sizes.size() << " facets of " << arguments.hull_id << " at revision "
-            << mesh->header.hull().revision() << ErrorText(*mesh) << "\n";
+            << mesh->header.hull().revision() << ErrorText(*mesh)
+            << (arguments.verify ? ", verified" : "") << "\n";
   }
   return ExitCode::kDone;
 }
@@ -98,9 +127,15 @@ void AddMeshCommand(Command program, Invocation* invocation) {
       .ValueName("LENGTH");
   command.AddFlag("--outside", &arguments->outside,
                   "Simplify to a hull that encloses this one, instead of one inside it");
+  command.AddFlag("--verify", &arguments->verify,
+                  "Fetch the hull, too, and check the simplification and its error exactly");
   command.SetDetails(
       "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
-      "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.");
+      "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.\n"
+      "--verify takes nothing from the server but vertices: that the simplification is inside or\n"
+      "outside, and how far from the hull it is, is found out by exact arithmetic of hullctl's "
+      "own.\n"
+      "One that is not what it claims is not written.");
   command.SetExamples({{"", "hullctl mesh spider -o spider-hull.obj"},
                        {"At most 16 vertices, all of the hull within",
                         "hullctl mesh spider --max-vertices 16 --outside -o simple.obj"}});

@@ -80,7 +80,9 @@ class SceneRun {
     if (cause != nullptr) {
       run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + *cause) << "\n";
     } else {
-      run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint)) << "\n";
+      const auto pieces = scene_.NamesOfPieces(a, b, row.pieces.value_or(std::pair(-1, -1)));
+      run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint, pieces))
+               << "\n";
     }
   }
 
@@ -107,10 +109,10 @@ struct SceneArguments {
 };
 
 // Reads what nothing may follow.
-absl::StatusOr<Scene> ReadWhole(const std::string& file) {
+absl::StatusOr<Scene> ReadWhole(const std::string& file, const QueryWishes& wishes) {
   const auto source = ByteSource::Open(file);
   if (!source.ok()) return source.status();
-  auto scene = ReadScene(source->get());
+  auto scene = ReadScene(source->get(), FormFor(wishes));
   if (!scene.ok()) return scene.status();
   if (absl::Status rest = RefuseUpdates(source->get(), "scene"); !rest.ok()) return rest;
   return scene;
@@ -132,7 +134,7 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(
         "FILE is required: 'hullctl scene FILE', or 'hullctl scene apply|check|diff|delete FILE'"));
   }
-  auto read = ReadWhole(arguments.file);
+  auto read = ReadWhole(arguments.file, arguments.wishes);
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
     return run.FailUsage(absl::InvalidArgumentError(
@@ -144,7 +146,7 @@ ExitCode FindInScene(const Invocation& run, const SceneArguments& arguments) {
 }
 
 ExitCode CheckScene(const Invocation& run, const SceneArguments& arguments) {
-  auto read = ReadWhole(arguments.file);
+  auto read = ReadWhole(arguments.file, arguments.wishes);
   if (!read.ok()) return run.FailUsage(read.status());
   if (read->pairs.has_value()) {
     return AnswerPairs(run, arguments.file, *read, arguments.wishes, /*colliding=*/false);
@@ -159,8 +161,9 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
   AddWantedOptions(command, &arguments->wishes);
   command.SetDetails(
       "Where the file names pairs, each is answered, as by 'hullctl batch'; else all pairs that\n"
-      "collide, or are within the clearance, are found, as by 'hullctl scene FILE'. The hulls are\n"
-      "those of the server: 'hullctl scene apply' puts them there. 'hullctl scene apply --help'\n"
+      "collide, or are within the clearance, are found, as by 'hullctl scene FILE'. Hulls and\n"
+      "bodies are those of the server: 'hullctl scene apply' puts them there. 'hullctl scene apply "
+      "--help'\n"
       "shows how a scene in YAML asks.");
   command.SetExamples({{"", "hullctl scene check cell.yaml --separation"}});
   command.OnGiven([=] {

@@ -22,6 +22,8 @@ void AddMoreLimits(const v1::Limits& limits, Table* table) {
       .Row({"max waiting calls", std::to_string(limits.max_waiting_calls())})
       .Row({"max streams per client", std::to_string(limits.max_streams_per_client())})
       .Row({"max concurrent batches", std::to_string(limits.max_concurrent_batches())})
+      .Row({"max calls per client", std::to_string(limits.max_calls_per_client())})
+      .Row({"max batches per client", std::to_string(limits.max_batches_per_client())})
       .Row({"max pieces per body", std::to_string(limits.max_pieces_per_body())})
       .Row({"max writers per hull", std::to_string(limits.max_writers_per_hull())})
       .Row({"memory limit bytes", std::to_string(limits.memory_limit_bytes())});

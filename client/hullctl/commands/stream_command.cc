@@ -85,7 +85,9 @@ class StreamRun {
         const std::string text = cause != causes.end() ? cause->second : ProblemOf(a, b);
         run_.out << run_.paint(Hue::kBad, "FAILED") << (run_.names() ? "" : "\t" + text) << "\n";
       } else {
-        run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint)) << "\n";
+        const auto pieces = scene_.NamesOfPieces(a, b, row.pieces.value_or(std::pair(-1, -1)));
+        run_.out << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint, pieces))
+                 << "\n";
       }
     }
     run_.out << std::flush;

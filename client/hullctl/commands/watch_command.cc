@@ -127,7 +127,8 @@ v1::CollisionWatchOpen OpenOf(const Scene& scene) {
 ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   const auto source = ByteSource::Open(options.scene);
   if (!source.ok()) return run.FailUsage(source.status());
-  const auto scene = ReadScene(source->get());
+  // A watch takes hulls alone.
+  const auto scene = ReadScene(source->get(), BodyForm::kPieces);
   if (!scene.ok()) return run.FailUsage(scene.status());
   if (absl::Status rest = RefuseUpdates(source->get(), "watch"); !rest.ok()) {
     return run.FailUsage(rest);

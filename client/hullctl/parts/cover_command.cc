@@ -3,11 +3,13 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <map>
 #include <memory>
 #include <utility>
 
 #include "client/enclosure/coverage.h"
 #include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 
@@ -23,30 +25,62 @@ struct CoverArguments {
   uint64_t limit = kDefaultLimit;
 };
 
-// The hulls of the words; one that ends in a slash stands for all whose IDs start so.
-absl::StatusOr<std::vector<HullMesh>> FetchPieces(const Client& client,
-                                                  std::vector<std::string> words) {
-  std::vector<std::string> ids;
-  for (const std::string& word : words) {
-    if (word.back() != '/') {
-      ids.push_back(word);
-      continue;
+// Collects pieces; each hull is fetched once.
+class PieceFetcher {
+ public:
+  explicit PieceFetcher(const Client& client) : client_(client) {}
+
+  // A hull, the pieces of a body, or, where it ends in a slash, all hulls whose IDs start so.
+  absl::Status Add(const std::string& word) {
+    if (word.back() == '/') return AddAll(word);
+    const absl::Status added = AddHull(word, kNoMotion);
+    if (!absl::IsNotFound(added)) return added;
+    const auto body = client_.GetBody(word);
+    // What is neither is told of as a hull.
+    if (absl::IsNotFound(body.status())) return added;
+    if (!body.ok()) return body.status();
+    for (int i = 0; i < body->pieces_size(); ++i) {
+      const v1::Placement& piece = body->pieces(i);
+      const absl::Status taken = AddHull(piece.hull_id(), NumbersOf(piece.pose()));
+      if (absl::IsNotFound(taken)) {
+        return absl::NotFoundError(
+            absl::StrCat("body ", Quoted(word), ": piece ", i, ": ", taken.message()));
+      }
+      if (!taken.ok()) return taken;
     }
-    const auto list = client.ListAllHulls(word);
+    return absl::OkStatus();
+  }
+
+  std::vector<PlacedHull> Take() { return std::move(pieces_); }
+
+ private:
+  absl::Status AddAll(const std::string& prefix) {
+    const auto list = client_.ListAllHulls(prefix);
     if (!list.ok()) return list.status();
     if (list->hulls().empty()) {
-      return absl::NotFoundError(absl::StrCat("no hull starts with ", Quoted(word)));
+      return absl::NotFoundError(absl::StrCat("no hull starts with ", Quoted(prefix)));
     }
-    for (const v1::HullInfo& hull : list->hulls()) ids.push_back(hull.hull_id());
+    for (const v1::HullInfo& hull : list->hulls()) {
+      if (absl::Status added = AddHull(hull.hull_id(), kNoMotion); !added.ok()) return added;
+    }
+    return absl::OkStatus();
   }
-  std::vector<HullMesh> pieces;
-  for (const std::string& id : ids) {
-    auto mesh = client.GetHullMesh(id);
-    if (!mesh.ok()) return mesh.status();
-    pieces.push_back(*std::move(mesh));
+
+  absl::Status AddHull(const std::string& id, const RigidPose& X_WH) {
+    std::shared_ptr<const HullMesh>& mesh = meshes_[id];
+    if (mesh == nullptr) {
+      auto fetched = client_.GetHullMesh(id);
+      if (!fetched.ok()) return fetched.status();
+      mesh = std::make_shared<const HullMesh>(*std::move(fetched));
+    }
+    pieces_.push_back({mesh, X_WH});
+    return absl::OkStatus();
   }
-  return pieces;
-}
+
+  const Client& client_;
+  std::map<std::string, std::shared_ptr<const HullMesh>> meshes_;
+  std::vector<PlacedHull> pieces_;
+};
 
 std::string PointText(const std::array<double, 3>& p) {
   return absl::StrCat(ShortestText(p[0]), " ", ShortestText(p[1]), " ", ShortestText(p[2]));
@@ -102,7 +136,7 @@ void Print(const Invocation& run, const CoverArguments& arguments, const Triangl
 ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   if (arguments.words.size() < 2) {
     return run.FailUsage(absl::InvalidArgumentError(
-        "name the hulls, and the file of the mesh behind them: hullctl cover HULL... FILE"));
+        "name hulls or bodies, and the file of the mesh behind them: hullctl cover ID... FILE"));
   }
   std::vector<std::string> hulls = arguments.words;
   const std::string file = hulls.back();
@@ -113,10 +147,13 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
     return run.FailUsage(absl::InvalidArgumentError(file + ": there is no triangle in it"));
   }
   const Client client = run.MakeClient();
-  const auto pieces = FetchPieces(client, std::move(hulls));
-  if (!pieces.ok()) return run.Fail(pieces.status());
+  PieceFetcher fetcher(client);
+  for (const std::string& hull : hulls) {
+    if (absl::Status added = fetcher.Add(hull); !added.ok()) return run.Fail(added);
+  }
+  const std::vector<PlacedHull> pieces = fetcher.Take();
   ProgressBar bar(run.err, run.shows_progress, "triangles", mesh->triangles.size());
-  auto coverage = CoverMesh(*pieces, *mesh, [&bar](uint64_t done) { bar.Update(done); });
+  auto coverage = CoverMesh(pieces, *mesh, [&bar](uint64_t done) { bar.Update(done); });
   bar.Clear();
   if (!coverage.ok()) return run.Fail(coverage.status());
   std::stable_sort(coverage->uncovered.begin(), coverage->uncovered.end(),
@@ -126,7 +163,7 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
   if (run.json()) {
     PrintJson(run, *mesh, *coverage);
   } else {
-    Print(run, arguments, *mesh, pieces->size(), *coverage);
+    Print(run, arguments, *mesh, pieces.size(), *coverage);
   }
   return ExitCode::kDone;
 }
@@ -135,10 +172,10 @@ ExitCode AnswerCover(const Invocation& run, const CoverArguments& arguments) {
 
 void AddCoverCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<CoverArguments>();
-  Command command = program.AddCommand("cover", "Ask whether hulls enclose a mesh");
+  Command command = program.AddCommand("cover", "Ask whether hulls or a body enclose a mesh");
   command
-      .AddTexts("HULL", &arguments->words,
-                "Names of the hulls, then the mesh (obj, off, stl, gltf)")
+      .AddTexts("ID", &arguments->words,
+                "Names of hulls or bodies, then the mesh (obj, off, stl, gltf)")
       .Required()
       .Completes(ValueKind::kHull);
   command.AddNumber(
@@ -148,6 +185,7 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   command.SetDetails(
       "Whether each point of each triangle of the mesh is in one of the hulls, boundaries "
       "included.\n"
+      "A body stands for its pieces, at their poses, which are not rounded.\n"
       "That is decided exactly, by cutting triangles in integers of any length: no triangle that\n"
       "sticks out is missed, none is named that does not. By how much is computed in floating\n"
       "point: for one hull it is the largest distance, for several it is at least that large. It\n"
@@ -156,7 +194,8 @@ void AddCoverCommand(Command program, Invocation* invocation) {
       "so. Triangles count from 0, in the order of the file; polygons are fans of them. That\n"
       "something sticks out is an answer: exit code 0.");
   command.SetExamples({{"", "hullctl cover bracket bracket.stl"},
-                       {"The parts of a mesh together", "hullctl cover chair/ chair.obj"}});
+                       {"The pieces of a body together", "hullctl cover chair chair.obj"},
+                       {"All hulls that start so", "hullctl cover chair/ chair.obj"}});
   command.OnGiven(
       [=] { invocation->action = [=] { return AnswerCover(*invocation, *arguments); }; });
 }

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 
+#include "client/formats/text_number.h"
 #include "client/hullctl/command_line/hull_segment.h"
 #include "client/hullctl/parts/swell.h"
 #include "client/hullctl/printing/json.h"
@@ -24,7 +26,7 @@ struct NamedPart {
   MeshPart part;
 };
 
-absl::StatusOr<std::vector<NamedPart>> ReadAll(const std::string& hull_id,
+absl::StatusOr<std::vector<NamedPart>> ReadAll(const std::string& body_id,
                                                const std::vector<std::string>& files,
                                                SplitBy split) {
   std::vector<NamedPart> all;
@@ -35,7 +37,7 @@ absl::StatusOr<std::vector<NamedPart>> ReadAll(const std::string& hull_id,
     for (MeshPart& part : *parts) {
       const std::string name = part.name.empty() ? "part" : part.name;
       const std::string segment = UniqueHullSegment(name, &taken);
-      all.push_back({absl::StrCat(hull_id, "/", segment), std::move(part)});
+      all.push_back({absl::StrCat(body_id, "/", segment), std::move(part)});
     }
   }
   return all;
@@ -59,13 +61,87 @@ absl::StatusOr<AppendTotals> Send(const Client& client, const NamedPart& named, 
   return (*stream)->totals();
 }
 
+// The body that the parts are to stand in, as it is before they are appended: without an ID where
+// there is none yet. ALREADY_EXISTS: a hull has its ID. NOT_FOUND: there is none, and it is not to
+// be created.
+absl::StatusOr<v1::GetBodyResponse> FindBody(const Client& client, const std::string& id,
+                                             bool create) {
+  const absl::Status hull = client.GetHull(id).status();
+  if (hull.ok() || absl::IsDataLoss(hull)) {
+    return absl::AlreadyExistsError(absl::StrCat(
+        "there is a hull ", Quoted(id),
+        "; --split makes a body of the parts under that name, so give another one; nothing was "
+        "changed"));
+  }
+  if (!absl::IsNotFound(hull)) return hull;
+  auto body = client.GetBody(id);
+  if (!absl::IsNotFound(body.status())) return body;
+  if (create) return v1::GetBodyResponse();
+  return absl::NotFoundError(absl::StrCat("body ", Quoted(id),
+                                          " not found; create it, and the hulls of its parts, with "
+                                          "--create"));
+}
+
+// The body with the parts: pieces that it has stay where they are, those that it lacks come behind
+// them, as built. Empty where it lacks none.
+std::optional<v1::PutBodyRequest> Extended(const v1::GetBodyResponse& body, const std::string& id,
+                                           const std::vector<NamedPart>& parts) {
+  v1::PutBodyRequest request;
+  request.set_body_id(id);
+  *request.mutable_pieces() = body.pieces();
+  request.set_if_revision(body.body().revision());
+  std::set<std::string> had;
+  for (const v1::Placement& piece : body.pieces()) had.insert(piece.hull_id());
+  for (const NamedPart& part : parts) {
+    if (had.insert(part.hull_id).second) request.add_pieces()->set_hull_id(part.hull_id);
+  }
+  if (request.pieces_size() == body.pieces_size()) return std::nullopt;
+  return request;
+}
+
+// Makes the body of the parts, and says what became of it.
+ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBodyResponse& found,
+                   const std::string& id, const std::vector<NamedPart>& parts) {
+  v1::BodyInfo body = found.body();
+  const auto request = Extended(found, id, parts);
+  if (request.has_value()) {
+    const auto put = client.PutBody(*request);
+    if (!put.ok()) {
+      run.err << "hullctl: all parts were appended, but not put into the body " << id << "\n";
+      return run.Fail(put.status());
+    }
+    body = put->body();
+  }
+  const uint64_t added = body.piece_count() - static_cast<uint64_t>(found.pieces_size());
+  if (run.names()) {
+    run.out << id << "\n";
+  } else if (run.json()) {
+    run.out << JsonObject()
+                   .Add("bodyId", id)
+                   .Add("pieces", uint64_t{body.piece_count()})
+                   .Add("added", added)
+                   .Add("revision", uint64_t{body.revision()})
+                   .Close()
+            << "\n";
+  } else if (added == 0) {
+    run.out << "body " << id << " has them already, at revision " << body.revision() << "\n";
+  } else {
+    run.out << "body " << id << (found.pieces().empty() ? " created" : " extended")
+            << " at revision " << body.revision() << ", " << body.piece_count()
+            << (body.piece_count() == 1 ? " piece" : " pieces") << "\n";
+  }
+  return ExitCode::kDone;
+}
+
 }  // namespace
 
-ExitCode AppendParts(const Invocation& run, const std::string& hull_id,
+ExitCode AppendParts(const Invocation& run, const std::string& body_id,
                      const std::vector<std::string>& files, SplitBy split, bool create) {
-  const auto parts = ReadAll(hull_id, files, split);
+  const auto parts = ReadAll(body_id, files, split);
   if (!parts.ok()) return run.FailUsage(parts.status());
   const Client client = run.MakeClient();
+  const auto body = FindBody(client, body_id, create);
+  if (!body.ok()) return run.Fail(body.status());
   ProgressBar bar(run.err, run.shows_progress, "parts", parts->size());
   Table table;
   table.Row({"HULL", "TRIANGLES", "POINTS", "VERTICES", "VOLUME OF THE HULL"});
@@ -96,7 +172,7 @@ ExitCode AppendParts(const Invocation& run, const std::string& hull_id,
                swell->text.empty() ? "-" : swell->text});
   }
   if (!run.names() && !run.json()) table.Print(run.out);
-  return ExitCode::kDone;
+  return JoinParts(run, client, *body, body_id, *parts);
 }
 
 }  // namespace hulld

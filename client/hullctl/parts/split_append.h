@@ -9,9 +9,10 @@
 
 namespace hulld {
 
-// Adds each part of the meshes to a hull of its own, ID/PART, and prints what became of it.
-// create: makes hulls that are not there.
-ExitCode AppendParts(const Invocation& run, const std::string& hull_id,
+// Adds each part of the meshes to a hull of its own, ID/PART, puts those that the body of the ID
+// lacks into it, and prints what became of them. create: makes hulls, and the body, that are not
+// there. Changes nothing where a hull has the ID.
+ExitCode AppendParts(const Invocation& run, const std::string& body_id,
                      const std::vector<std::string>& files, SplitBy split, bool create);
 
 }  // namespace hulld

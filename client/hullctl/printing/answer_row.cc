@@ -59,7 +59,8 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
   return row;
 }
 
-std::string RowText(const AnswerRow& row, const Painter& paint) {
+std::string RowText(const AnswerRow& row, const Painter& paint,
+                    const std::array<std::string, 2>& piece_names) {
   std::vector<std::string> cells = {PaintedRelation(row.relation, paint)};
   if (row.separation) cells.push_back(SeparationText(*row.separation));
   if (row.witness) {
@@ -68,9 +69,11 @@ std::string RowText(const AnswerRow& row, const Painter& paint) {
   }
   if (row.within_clearance) cells.emplace_back(*row.within_clearance ? "within" : "beyond");
   if (row.pieces) {
-    const auto name = [](int32_t piece) { return piece < 0 ? "-" : std::to_string(piece); };
-    cells.push_back(
-        absl::StrCat("pieces ", name(row.pieces->first), " ", name(row.pieces->second)));
+    const auto name = [](int32_t piece, const std::string& known) {
+      return piece < 0 ? "-" : known.empty() ? std::to_string(piece) : known;
+    };
+    cells.push_back(absl::StrCat("pieces ", name(row.pieces->first, piece_names[0]), " ",
+                                 name(row.pieces->second, piece_names[1])));
   }
   if (row.axis != nullptr) {
     const bool found = row.axis->kind() != v1::AXIS_KIND_UNSPECIFIED;

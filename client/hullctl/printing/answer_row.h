@@ -1,6 +1,7 @@
 #ifndef HULLD_CLIENT_HULLCTL_PRINTING_ANSWER_ROW_H_
 #define HULLD_CLIENT_HULLCTL_PRINTING_ANSWER_ROW_H_
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -34,8 +35,10 @@ bool AreParallel(const v1::AnswerColumns& columns, size_t count);
 // ask AreParallel once for all rows.
 AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 
-// For people, separated by tabs, the relation first.
-std::string RowText(const AnswerRow& row, const Painter& paint);
+// For people, separated by tabs, the relation first. Pieces are told by their names, or by their
+// indices where those are empty.
+std::string RowText(const AnswerRow& row, const Painter& paint,
+                    const std::array<std::string, 2>& piece_names = {});
 
 // Adds a member for each field that there is.
 void AddRow(const AnswerRow& row, JsonObject* object);

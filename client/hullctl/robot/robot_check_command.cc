@@ -1,13 +1,14 @@
 #include <absl/strings/str_cat.h>
 
-#include <array>
 #include <atomic>
 #include <deque>
 #include <memory>
 #include <optional>
+#include <unordered_map>
 #include <utility>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/query_options.h"
@@ -105,7 +106,7 @@ class RobotCheck {
   std::vector<uint64_t> lines_;
   std::atomic<bool> stopped_ = false;
 
-  std::array<uint64_t, 5> counts_ = {};
+  std::unordered_map<int, uint64_t> counts_;
   uint64_t waypoints_ = 0;
   uint64_t failed_ = 0;
   uint64_t beyond_limits_ = 0;
@@ -126,7 +127,7 @@ absl::Status RobotCheck::AddScene() {
   if (arguments_.scene.empty()) return absl::OkStatus();
   const auto source = ByteSource::Open(arguments_.scene);
   if (!source.ok()) return source.status();
-  const auto scene = ReadScene(source->get());
+  const auto scene = ReadScene(source->get(), BodyForm::kPieces);
   if (!scene.ok()) return scene.status();
   for (uint32_t i = 0; i < scene->size(); ++i) {
     cast_.names.push_back(scene->NameOf(i));
@@ -312,7 +313,7 @@ void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
                       const std::string& problem) {
   // With --first, what the message of the first contact holds beyond it is passed over.
   if (arguments_.first && first_.has_value() && waypoint > first_->waypoint) return;
-  ++counts_[static_cast<size_t>(row.relation)];
+  ++counts_[row.relation];
   const bool collides =
       row.relation == v1::RELATION_TOUCHING || row.relation == v1::RELATION_OVERLAPPING;
   if (collides && !first_.has_value()) first_ = Contact{waypoint, pair, row.relation};

@@ -44,8 +44,8 @@ class WaypointStream {
   size_t lanes() const { return lanes_; }
 
   // Asks about `count` waypoints, at most lanes(): the poses of all moving parts, seven numbers
-  // each, waypoint after waypoint. Answers come by waypoint, then by pair. Only the first call may
-  // have fewer waypoints than later ones.
+  // each, waypoint after waypoint. Answers come by waypoint, then by pair. No call may have more
+  // waypoints than the first: INTERNAL.
   absl::Status Ask(size_t count, const std::vector<double>& poses);
 
   absl::Status Close();

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/deletion.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/scene_sync.h"
 #include "client/hullctl/scene/yaml_scene.h"
@@ -20,7 +21,7 @@ constexpr char kYamlHelp[] =
     "    bracket: {file: bracket.stl, scale: cm}    # the hull of the file's points\n"
     "    table: {box: [2, 1, 0.1]}                  # edges; it stands around the origin\n"
     "    wedge: {points: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]}\n"
-    "  bodies:                    # hulls that stand together\n"
+    "  bodies:                    # several hulls as one, under one name\n"
     "    corner:\n"
     "      - {hull: bracket}\n"
     "      - {hull: wedge, at: [0, 0, 0.1]}\n"
@@ -35,7 +36,16 @@ constexpr char kYamlHelp[] =
     "or {xyz: ..., quaternion: ...}. ask takes pairs: [[a, b]] or movers: [a], and what 'hullctl\n"
     "check' asks for: separation, witness, axis, certificate, analysis, clearance, max_error,\n"
     "tolerance. Coordinates of files become metres by `scale`, rounded once. Files stand beside\n"
-    "the scene file. Bodies are placed piece by piece, as NAME/PIECE.\n";
+    "the scene file.\n";
+
+absl::StatusOr<v1::ResponseHeader> Delete(const Client& client, const Kept& kept) {
+  if (kept.is_body) {
+    const auto deleted = client.DeleteBody(kept.id);
+    return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
+  }
+  const auto deleted = client.DeleteHull(kept.id);
+  return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
+}
 
 struct SyncArguments {
   std::string file;
@@ -44,7 +54,8 @@ struct SyncArguments {
   bool yes = false;
 };
 
-// Goes through a scene hull by hull, so that a run that ended early goes on where it was.
+// Goes through a scene hull by hull, then body by body, so that a run that ended early goes on
+// where it was, and the hulls of a body are there before it.
 class SceneSync {
  public:
   SceneSync(const Invocation& run, const SceneDescription& scene)
@@ -55,47 +66,74 @@ class SceneSync {
     for (const HullDefinition& hull : scene_.hulls) {
       const auto xyz = PointsOf(hull);
       if (!xyz.ok()) return run_.FailUsage(xyz.status());
-      const auto change = Compare(client_, hull.hull_id, *xyz);
-      if (!change.ok()) return run_.Fail(change.status());
-      if (*change == HullChange::kNone) {
-        ++same_;
-        continue;
-      }
-      if (changes) {
-        if (absl::Status put = PutHull(client_, hull.hull_id, *xyz); !put.ok()) {
-          return run_.Fail(put);
-        }
-      }
-      const bool is_new = *change == HullChange::kCreate;
-      Tell(is_new ? "+" : "~", hull.hull_id,
-           changes ? (is_new ? "created" : "replaced") : (is_new ? "to create" : "to replace"));
+      const absl::Status taken =
+          Take({hull.hull_id, false}, Compare(client_, hull.hull_id, *xyz), changes,
+               [&] { return PutHull(client_, hull.hull_id, *xyz); });
+      if (!taken.ok()) return run_.Fail(taken);
     }
-    const auto strangers = Strangers(client_, scene_);
-    if (!strangers.ok()) return run_.Fail(strangers.status());
-    for (const std::string& id : *strangers) {
-      if (prune && changes) {
-        const auto deleted = client_.DeleteHull(id);
-        if (!deleted.ok() && !absl::IsNotFound(deleted.status()))
-          return run_.Fail(deleted.status());
-      }
-      Tell(prune ? "-" : "?", id, !prune ? "not in the file" : changes ? "deleted" : "to delete");
+    for (const BodyDefinition& body : scene_.bodies) {
+      const absl::Status taken = Take({body.body_id, true}, CompareBody(client_, body), changes,
+                                      [&] { return client_.PutBody(BodyRequest(body)).status(); });
+      if (!taken.ok()) return run_.Fail(taken);
     }
-    if (!run_.json() && !run_.names())
-      run_.out << "# " << same_ << " hulls are as the file has them\n";
+    const absl::Status told = TellStrangers(changes, prune);
+    if (!told.ok()) return run_.Fail(told);
+    if (!run_.json() && !run_.names()) {
+      run_.out << "# " << same_hulls_ << " hulls";
+      if (!scene_.bodies.empty()) run_.out << " and " << same_bodies_ << " bodies";
+      run_.out << " are as the file has them\n";
+    }
     return ExitCode::kDone;
   }
 
   bool found_differences() const { return differences_ > 0; }
 
  private:
-  void Tell(const char* mark, const std::string& id, const char* what) {
+  template <typename Put>
+  absl::Status Take(const Kept& kept, const absl::StatusOr<Change>& change, bool changes,
+                    const Put& put) {
+    if (!change.ok()) return change.status();
+    if (*change == Change::kNone) {
+      ++(kept.is_body ? same_bodies_ : same_hulls_);
+      return absl::OkStatus();
+    }
+    if (changes) {
+      if (absl::Status done = put(); !done.ok()) return done;
+    }
+    const bool is_new = *change == Change::kCreate;
+    Tell(is_new ? "+" : "~", kept,
+         changes ? (is_new ? "created" : "replaced") : (is_new ? "to create" : "to replace"));
+    return absl::OkStatus();
+  }
+
+  absl::Status TellStrangers(bool changes, bool prune) {
+    const auto strangers = Strangers(client_, scene_);
+    if (!strangers.ok()) return strangers.status();
+    for (const Kept& stranger : *strangers) {
+      if (prune && changes) {
+        const absl::Status deleted = Delete(client_, stranger).status();
+        if (!deleted.ok() && !absl::IsNotFound(deleted)) return deleted;
+      }
+      Tell(prune ? "-" : "?", stranger,
+           !prune    ? "not in the file"
+           : changes ? "deleted"
+                     : "to delete");
+    }
+    return absl::OkStatus();
+  }
+
+  void Tell(const char* mark, const Kept& kept, const char* what) {
     ++differences_;
     if (run_.json()) {
-      run_.out << JsonObject().Add("hullId", id).Add("change", what).Close() << "\n";
+      run_.out << JsonObject()
+                      .Add(kept.is_body ? "bodyId" : "hullId", kept.id)
+                      .Add("change", what)
+                      .Close()
+               << "\n";
     } else if (run_.names()) {
-      run_.out << id << "\n";
+      run_.out << kept.id << "\n";
     } else {
-      run_.out << mark << " " << id << "\t" << what << "\n";
+      run_.out << mark << " " << kept.id << "\t" << (kept.is_body ? "body " : "") << what << "\n";
     }
     run_.out << std::flush;
   }
@@ -103,7 +141,8 @@ class SceneSync {
   const Invocation& run_;
   const SceneDescription& scene_;
   const Client client_;
-  uint64_t same_ = 0;
+  uint64_t same_hulls_ = 0;
+  uint64_t same_bodies_ = 0;
   uint64_t differences_ = 0;
 };
 
@@ -122,23 +161,61 @@ ExitCode DiffScene(const Invocation& run, const SyncArguments& arguments) {
   return sync.found_differences() ? ExitCode::kRequestFailed : ExitCode::kDone;
 }
 
+// What the scene defines and the server has, bodies before the hulls that they are made of.
+absl::StatusOr<std::vector<Kept>> DefinedAndThere(const Client& client,
+                                                  const SceneDescription& scene) {
+  std::vector<Kept> kept;
+  const auto take = [&kept](const std::string& id, bool is_body, const absl::Status& found) {
+    // What is damaged can be deleted.
+    if (found.ok() || absl::IsDataLoss(found)) kept.push_back({id, is_body});
+    return absl::IsNotFound(found) || absl::IsDataLoss(found) ? absl::OkStatus() : found;
+  };
+  for (const BodyDefinition& body : scene.bodies) {
+    const absl::Status found = client.GetBody(body.body_id).status();
+    if (absl::Status taken = take(body.body_id, true, found); !taken.ok()) return taken;
+  }
+  for (const HullDefinition& hull : scene.hulls) {
+    const absl::Status found = client.GetHull(hull.hull_id).status();
+    if (absl::Status taken = take(hull.hull_id, false, found); !taken.ok()) return taken;
+  }
+  return kept;
+}
+
 ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
   const auto scene = ReadYamlScene(arguments.file);
   if (!scene.ok()) return run.FailUsage(scene.status());
-  std::vector<std::string> words = {"delete"};
   const Client client = run.MakeClient();
-  for (const HullDefinition& hull : scene->hulls) {
-    const auto there = client.GetHull(hull.hull_id);
-    if (absl::IsNotFound(there.status())) continue;
-    if (!there.ok()) return run.Fail(there.status());
-    words.push_back(hull.hull_id);
-  }
-  if (words.size() == 1) {
-    if (!run.json() && !run.names()) run.out << "# none of the hulls is there\n";
+  const auto doomed = DefinedAndThere(client, *scene);
+  if (!doomed.ok()) return run.Fail(doomed.status());
+  if (doomed->empty()) {
+    if (!run.json() && !run.names()) run.out << "# nothing that the file defines is there\n";
     return ExitCode::kDone;
   }
-  if (arguments.yes) words.emplace_back("--yes");
-  return static_cast<ExitCode>(run.run_line(words));
+  std::vector<std::string> ids;
+  for (const Kept& kept : *doomed) ids.push_back(kept.id);
+  if (!arguments.yes && ids.size() > 1) {
+    const bool has_body = doomed->front().is_body;
+    const auto meant = ConfirmDeletion(run, ids, "hull", has_body ? "bodies and hulls" : "hulls");
+    if (!meant.ok()) return run.FailUsage(meant.status());
+    if (!*meant) return run.FailUsage(absl::InvalidArgumentError("nothing was deleted"));
+  }
+  for (const Kept& kept : *doomed) {
+    const auto header = Delete(client, kept);
+    if (absl::IsNotFound(header.status())) continue;
+    if (!header.ok()) return run.Fail(header.status());
+    if (run.json()) {
+      run.out << JsonObject()
+                     .Add(kept.is_body ? "bodyId" : "hullId", kept.id)
+                     .Add("change", "deleted")
+                     .Close()
+              << "\n";
+    } else if (run.names()) {
+      run.out << kept.id << "\n";
+    } else {
+      run.out << kept.id << " deleted at revision " << header->revision() << "\n";
+    }
+  }
+  return ExitCode::kDone;
 }
 
 }  // namespace
@@ -158,21 +235,24 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
     const char* example;
   };
   const Declared commands[] = {
-      {"apply", "Make the server's hulls those of a scene file", ApplyScene,
-       "Creates and replaces hulls until the server has those of the file, one after another, "
-       "each\n"
-       "at once for all readers. A hull that is the same is left alone, which exact arithmetic\n"
-       "decides: each point is in it, and each vertex is one of the points. So it may be run\n"
-       "again, and goes on where it was interrupted. What is under the prefix and not in the file\n"
-       "is told (?), and deleted with --prune.\n",
+      {"apply", "Make the server's hulls and bodies those of a scene file", ApplyScene,
+       "Creates and replaces hulls, then bodies, until the server has those of the file, one "
+       "after\n"
+       "another, each at once for all readers. A hull that is the same is left alone, which exact\n"
+       "arithmetic decides: each point is in it, and each vertex is one of the points; so is a "
+       "body\n"
+       "of the same hulls at the same poses. So it may be run again, and goes on where it was\n"
+       "interrupted. What is under the prefix and not in the file is told (?), and deleted with\n"
+       "--prune.\n",
        "hullctl scene apply cell.yaml --dry-run"},
-      {"diff", "Tell how the server's hulls differ from a scene file", DiffScene,
+      {"diff", "Tell how the server's hulls and bodies differ from a scene file", DiffScene,
        "Prints what 'hullctl scene apply' would do, and changes nothing. Exit code 1 when there "
        "is\n"
        "a difference.\n",
        "hullctl scene diff cell.yaml"},
-      {"delete", "Delete the hulls that a scene file defines", DeleteScene,
-       "Asks as 'hullctl delete' does. Hulls that the file names by id stay.\n",
+      {"delete", "Delete the hulls and bodies that a scene file defines", DeleteScene,
+       "Bodies go before their hulls. Asks as 'hullctl delete' does. What the file names by id "
+       "stays.\n",
        "hullctl scene delete cell.yaml --yes"},
   };
   for (const Declared& declared : commands) {
@@ -182,7 +262,7 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
     if (declared.act == ApplyScene) {
       command.AddFlag("--dry-run", &arguments->dry_run, "Say what would change; change nothing");
       command.AddFlag("--prune", &arguments->prune,
-                      "Delete hulls under the prefix that the file does not define");
+                      "Delete what is under the prefix and the file does not define");
     }
     if (declared.act == DeleteScene) {
       command.AddFlag("--yes", &arguments->yes, "Delete without asking");

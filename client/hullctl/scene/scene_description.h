@@ -11,7 +11,7 @@
 
 namespace hulld {
 
-// What a scene file in YAML says, names resolved, before bodies are taken apart.
+// What a scene file in YAML says, names resolved.
 
 // What coordinates of a file are multiplied or divided by; each is rounded once.
 struct LengthScale {
@@ -45,6 +45,8 @@ struct PieceDefinition {
 
 struct BodyDefinition {
   std::string name;
+  // With the prefix.
+  std::string body_id;
   std::vector<PieceDefinition> pieces;
 };
 

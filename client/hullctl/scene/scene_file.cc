@@ -161,7 +161,7 @@ absl::StatusOr<Scene> ReadJsonScene(ByteSource* source, std::string text) {
 }
 
 // The rest of the source, behind `first`, as one YAML document.
-absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first) {
+absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first, BodyForm form) {
   // Lines before it count in errors.
   std::string text(static_cast<size_t>(source->line() - 1), '\n');
   text.append(first);
@@ -169,7 +169,7 @@ absl::StatusOr<Scene> ReadRestAsYaml(ByteSource* source, std::string_view first)
   if (!source->status().ok()) return source->status();
   const auto description = ParseYamlScene(text + "\n", source->name());
   if (!description.ok()) return description.status();
-  return ToScene(*description, source->name());
+  return ToScene(*description, source->name(), form);
 }
 
 // Which pairs of placements are never asked about together.
@@ -238,7 +238,19 @@ std::string Scene::NameOf(uint32_t placement) const {
   return absl::StrCat(placement, ":", hull == nullptr ? "" : *hull);
 }
 
-absl::StatusOr<Scene> ReadScene(ByteSource* source) {
+std::array<std::string, 2> Scene::NamesOfPieces(uint32_t a, uint32_t b,
+                                                std::pair<int32_t, int32_t> pieces) const {
+  const auto name = [this](uint32_t placement, int32_t piece) -> std::string {
+    const int body = placement < body_of.size() ? body_of[placement] : -1;
+    if (body < 0 || piece < 0) return "";
+    // The server's body may be another than the file's.
+    const std::vector<std::string>& named = piece_names[static_cast<size_t>(body)];
+    return static_cast<size_t>(piece) < named.size() ? named[static_cast<size_t>(piece)] : "";
+  };
+  return {name(a, pieces.first), name(b, pieces.second)};
+}
+
+absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form) {
   TextSceneReader text(source);
   bool first = true;
   for (std::string_view line; source->ReadLine(&line);) {
@@ -247,7 +259,7 @@ absl::StatusOr<Scene> ReadScene(ByteSource* source) {
       return ReadJsonScene(source, std::string(line));
     }
     if (first && !trimmed.empty() && trimmed.front() != '#') {
-      if (LooksLikeYaml(trimmed)) return ReadRestAsYaml(source, line);
+      if (LooksLikeYaml(trimmed)) return ReadRestAsYaml(source, line, form);
       first = false;
     }
     if (absl::Status status = text.TakeLine(line); !status.ok()) return status;

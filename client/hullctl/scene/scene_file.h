@@ -3,9 +3,11 @@
 
 #include <absl/status/statusor.h>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/formats/byte_source.h"
@@ -13,7 +15,17 @@
 
 namespace hulld {
 
-// Hulls at poses, and which pairs of them are asked about: what every format of a scene comes to.
+// How the bodies that a scene in YAML defines are placed.
+enum class BodyForm {
+  // As bodies of the server, where 'hullctl scene apply' puts them; poses compose exactly.
+  kWhole,
+  // As the hulls of their pieces, named NAME/PIECE, at poses composed in floating point: for
+  // questions that take hulls alone.
+  kPieces
+};
+
+// Hulls and bodies at poses, and which pairs of them are asked about: what every format of a scene
+// comes to.
 struct Scene {
   // Placements, in one of their two forms; groups and movers; what is wanted, and the tolerance.
   v1::FindCollisionsRequest request;
@@ -25,6 +37,10 @@ struct Scene {
   bool only_changes = false;
   // The names of the placements; none where the format has none.
   std::vector<std::string> names;
+  // Of a scene in YAML: which body it defines a placement stands for, -1 for none; and the names of
+  // the pieces of each.
+  std::vector<int> body_of;
+  std::vector<std::vector<std::string>> piece_names;
 
   uint32_t size() const;
   // The hull of a placement; null where there is no such placement, or it names no hull.
@@ -34,6 +50,10 @@ struct Scene {
   v1::Placement PlacementOf(uint32_t placement) const;
   // The placement's name, or its index and hull, as in "0:spider".
   std::string NameOf(uint32_t placement) const;
+  // The names that the file has for the pieces that decided about two placements, given by their
+  // indices; empty where it has none.
+  std::array<std::string, 2> NamesOfPieces(uint32_t a, uint32_t b,
+                                           std::pair<int32_t, int32_t> pieces) const;
 };
 
 // The most pairs that one file may ask for.
@@ -65,7 +85,7 @@ inline constexpr char kSceneFileHelp[] =
 // object to the end of the line that its last brace is on. INVALID_ARGUMENT "NAME:LINE: message",
 // "NAME:LINE:COLUMN: message" for YAML, or "NAME: message" for an object of several lines. YAML
 // names files and hulls that 'hullctl scene apply' puts on the server; none is opened here.
-absl::StatusOr<Scene> ReadScene(ByteSource* source);
+absl::StatusOr<Scene> ReadScene(ByteSource* source, BodyForm form = BodyForm::kWhole);
 
 // The pairs of the scene, two indices each: named, or all that groups and movers leave.
 // INVALID_ARGUMENT: there are more than kMostPairs, or none; or groups do not fit the placements.

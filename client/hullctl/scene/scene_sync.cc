@@ -3,12 +3,17 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <set>
 #include <utility>
 
 #include "client/enclosure/convex_region.h"
 #include "client/formats/point_file.h"
+#include "client/hullctl/body/body_pieces.h"
+#include "client/hullctl/scene/yaml_scene.h"
 
 namespace hulld {
 namespace {
@@ -33,6 +38,10 @@ absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
       absl::StrCat(hull.file, ": scaled, a coordinate is beyond the largest double"));
 }
 
+std::array<uint64_t, 7> BitsOf(const v1::Pose& pose) {
+  return std::bit_cast<std::array<uint64_t, 7>>(NumbersOf(pose));
+}
+
 }  // namespace
 
 absl::StatusOr<std::vector<double>> PointsOf(const HullDefinition& hull) {
@@ -43,14 +52,29 @@ absl::StatusOr<std::vector<double>> PointsOf(const HullDefinition& hull) {
   return absl::InvalidArgumentError(absl::StrCat(hull.where, ": ", message));
 }
 
-absl::StatusOr<HullChange> Compare(const Client& client, const std::string& hull_id,
-                                   const std::vector<double>& xyz) {
+absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
+                               const std::vector<double>& xyz) {
   const auto mesh = client.GetHullMesh(hull_id);
-  if (absl::IsNotFound(mesh.status())) return HullChange::kCreate;
+  if (absl::IsNotFound(mesh.status())) return Change::kCreate;
   if (!mesh.ok()) return mesh.status();
   const auto same = IsHullOf(*mesh, xyz);
   if (!same.ok()) return same.status();
-  return *same ? HullChange::kNone : HullChange::kReplace;
+  return *same ? Change::kNone : Change::kReplace;
+}
+
+absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& body) {
+  const auto found = client.GetBody(body.body_id);
+  if (absl::IsNotFound(found.status())) return Change::kCreate;
+  // A damaged one is mended by putting it anew.
+  if (absl::IsDataLoss(found.status())) return Change::kReplace;
+  if (!found.ok()) return found.status();
+  const v1::PutBodyRequest defined = BodyRequest(body);
+  const bool same =
+      std::equal(defined.pieces().begin(), defined.pieces().end(), found->pieces().begin(),
+                 found->pieces().end(), [](const v1::Placement& a, const v1::Placement& b) {
+                   return a.hull_id() == b.hull_id() && BitsOf(a.pose()) == BitsOf(b.pose());
+                 });
+  return same ? Change::kNone : Change::kReplace;
 }
 
 absl::Status PutHull(const Client& client, const std::string& hull_id,
@@ -73,16 +97,22 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
       .status();
 }
 
-absl::StatusOr<std::vector<std::string>> Strangers(const Client& client,
-                                                   const SceneDescription& scene) {
-  std::vector<std::string> strangers;
+absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene) {
+  std::vector<Kept> strangers;
   if (scene.prefix.empty()) return strangers;
+  std::set<std::string> defined_bodies;
+  for (const BodyDefinition& body : scene.bodies) defined_bodies.insert(body.body_id);
+  const auto bodies = client.ListAllBodies(scene.prefix);
+  if (!bodies.ok()) return bodies.status();
+  for (const v1::BodyInfo& body : bodies->bodies()) {
+    if (!defined_bodies.contains(body.body_id())) strangers.push_back({body.body_id(), true});
+  }
   std::set<std::string> defined;
   for (const HullDefinition& hull : scene.hulls) defined.insert(hull.hull_id);
   const auto list = client.ListAllHulls(scene.prefix);
   if (!list.ok()) return list.status();
   for (const v1::HullInfo& hull : list->hulls()) {
-    if (!defined.contains(hull.hull_id())) strangers.push_back(hull.hull_id());
+    if (!defined.contains(hull.hull_id())) strangers.push_back({hull.hull_id(), false});
   }
   return strangers;
 }

@@ -11,8 +11,8 @@
 
 namespace hulld {
 
-// What it takes to make the server's hull that of the file.
-enum class HullChange { kNone, kCreate, kReplace };
+// What it takes to make the server's hull or body that of the file.
+enum class Change { kNone, kCreate, kReplace };
 
 // The points of a definition, scaled, x y z each. INVALID_ARGUMENT starts with where the definition
 // is and names the file and what is wrong with it.
@@ -20,17 +20,26 @@ absl::StatusOr<std::vector<double>> PointsOf(const HullDefinition& hull);
 
 // Whether the server has the hull of these points under that ID: exact, each point in the hull and
 // each vertex one of them. Reads only.
-absl::StatusOr<HullChange> Compare(const Client& client, const std::string& hull_id,
-                                   const std::vector<double>& xyz);
+absl::StatusOr<Change> Compare(const Client& client, const std::string& hull_id,
+                               const std::vector<double>& xyz);
+
+// Whether the server has a body under that ID of the same pieces in the same order: the same hulls,
+// at poses whose numbers are the same bit for bit. Reads only.
+absl::StatusOr<Change> CompareBody(const Client& client, const BodyDefinition& body);
 
 // Puts the hull of the points there, at once for all readers.
 absl::Status PutHull(const Client& client, const std::string& hull_id,
                      const std::vector<double>& xyz);
 
-// The hulls of the server under the scene's prefix that the scene does not define. None where it
-// has no prefix.
-absl::StatusOr<std::vector<std::string>> Strangers(const Client& client,
-                                                   const SceneDescription& scene);
+// A hull or a body of the server.
+struct Kept {
+  std::string id;
+  bool is_body = false;
+};
+
+// What the server has under the scene's prefix that the scene does not define, bodies first. None
+// where it has no prefix.
+absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene);
 
 }  // namespace hulld
 

@@ -232,6 +232,7 @@ class SceneParser {
       }
       BodyDefinition body;
       body.name = name;
+      body.body_id = scene_.prefix + name;
       if (!value.IsSequence() || value.size() == 0) {
         return yaml_.ErrorAt(value, absl::StrCat("body ", Quoted(name),
                                                  " takes a list of pieces, {hull: NAME, at: POSE} "
@@ -504,11 +505,10 @@ class Classes {
   std::set<std::pair<uint32_t, uint32_t>> ignored_;
 };
 
-void AddPlacement(const std::string& hull_id, const RigidPose& X_WP,
-                  v1::FindCollisionsRequest* request) {
-  v1::Placement& placement = *request->add_placements();
-  placement.set_hull_id(hull_id);
-  if (X_WP == kNoMotion) return;
+v1::Placement PlacementAt(const std::string& id, const RigidPose& X_WP) {
+  v1::Placement placement;
+  placement.set_hull_id(id);
+  if (X_WP == kNoMotion) return placement;
   v1::Pose& pose = *placement.mutable_pose();
   if (X_WP[1] != 0 || X_WP[2] != 0 || X_WP[3] != 0) {
     v1::Quaternion& rotation = *pose.mutable_rotation();
@@ -521,26 +521,45 @@ void AddPlacement(const std::string& hull_id, const RigidPose& X_WP,
   translation.set_x(X_WP[4]);
   translation.set_y(X_WP[5]);
   translation.set_z(X_WP[6]);
+  return placement;
 }
 
-// Adds a placement, or its pieces; returns their indices.
-std::vector<uint32_t> AddPieces(const SceneDescription& from, const PlacementDefinition& placement,
-                                Scene* scene) {
+// Adds a placement, or, of a body in pieces, its pieces; returns their indices.
+std::vector<uint32_t> AddPlacement(const SceneDescription& from,
+                                   const PlacementDefinition& placement, BodyForm form,
+                                   Scene* scene) {
+  const auto add = [scene](const std::string& name, const std::string& id, const RigidPose& X_WP,
+                           int body) {
+    *scene->request.add_placements() = PlacementAt(id, X_WP);
+    scene->names.push_back(name);
+    scene->body_of.push_back(body);
+    return scene->size() - 1;
+  };
   if (placement.body < 0) {
-    AddPlacement(placement.hull_id, placement.X_WO, &scene->request);
-    scene->names.push_back(placement.name);
-    return {scene->size() - 1};
+    return {add(placement.name, placement.hull_id, placement.X_WO, -1)};
+  }
+  const BodyDefinition& body = from.bodies[static_cast<size_t>(placement.body)];
+  if (form == BodyForm::kWhole) {
+    return {add(placement.name, body.body_id, placement.X_WO, placement.body)};
   }
   std::vector<uint32_t> indices;
-  for (const PieceDefinition& piece : from.bodies[static_cast<size_t>(placement.body)].pieces) {
-    AddPlacement(piece.hull_id, Compose(placement.X_WO, piece.X_BP), &scene->request);
-    scene->names.push_back(absl::StrCat(placement.name, "/", piece.name));
-    indices.push_back(scene->size() - 1);
+  for (const PieceDefinition& piece : body.pieces) {
+    indices.push_back(add(absl::StrCat(placement.name, "/", piece.name), piece.hull_id,
+                          Compose(placement.X_WO, piece.X_BP), -1));
   }
   return indices;
 }
 
 }  // namespace
+
+v1::PutBodyRequest BodyRequest(const BodyDefinition& body) {
+  v1::PutBodyRequest request;
+  request.set_body_id(body.body_id);
+  for (const PieceDefinition& piece : body.pieces) {
+    *request.add_pieces() = PlacementAt(piece.hull_id, piece.X_BP);
+  }
+  return request;
+}
 
 bool LooksLikeYaml(std::string_view line) {
   if (line.substr(0, 3) == "---" || line.substr(0, 5) == "%YAML") return true;
@@ -561,8 +580,15 @@ absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path) {
   return ParseYamlScene(*text, path);
 }
 
-absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name) {
+absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name,
+                              BodyForm form) {
+  // Certificates are about hulls.
+  if (description.wanted.certificate()) form = BodyForm::kPieces;
   Scene scene;
+  for (const BodyDefinition& body : description.bodies) {
+    std::vector<std::string>& names = scene.piece_names.emplace_back();
+    for (const PieceDefinition& piece : body.pieces) names.push_back(piece.name);
+  }
   const Classes classes(description);
   const size_t count = description.placements.size();
   std::vector<size_t> order(description.movers.begin(), description.movers.end());
@@ -570,10 +596,11 @@ absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::st
   for (size_t i = 0; i < count; ++i) {
     if (!first.contains(i)) order.push_back(i);
   }
-  std::vector<std::vector<uint32_t>> pieces(count);
+  // The indices that each placement came to.
+  std::vector<std::vector<uint32_t>> placed(count);
   uint32_t movers = 0;
   for (const size_t i : order) {
-    pieces[i] = AddPieces(description, description.placements[i], &scene);
+    placed[i] = AddPlacement(description, description.placements[i], form, &scene);
     scene.request.mutable_groups()->Resize(static_cast<int>(scene.size()), classes.of(i));
     if (first.contains(i)) movers = scene.size();
   }
@@ -588,11 +615,11 @@ absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::st
   if (!description.pairs.has_value()) return scene;
   scene.pairs.emplace();
   for (const auto& [a, b] : *description.pairs) {
-    for (const uint32_t one : pieces[static_cast<size_t>(a)]) {
-      for (const uint32_t other : pieces[static_cast<size_t>(b)]) {
+    for (const uint32_t one : placed[static_cast<size_t>(a)]) {
+      for (const uint32_t other : placed[static_cast<size_t>(b)]) {
         if (scene.pairs->size() >= 2 * kMostPairs) {
           return absl::InvalidArgumentError(
-              absl::StrCat(name, ": more than ", kMostPairs, " pairs of pieces are named"));
+              absl::StrCat(name, ": more than ", kMostPairs, " pairs are named"));
         }
         scene.pairs->insert(scene.pairs->end(), {one, other});
       }

@@ -8,6 +8,7 @@
 
 #include "client/hullctl/scene/scene_description.h"
 #include "client/hullctl/scene/scene_file.h"
+#include "hulld/v1/body.pb.h"
 
 namespace hulld {
 
@@ -26,11 +27,14 @@ absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path);
 // The most pieces that the placements of a scene may come to.
 inline constexpr size_t kMostPieces = size_t{1} << 22;
 
-// The placements as the server takes them: each body as its pieces, NAME/PIECE each, whose poses
-// are composed in floating point. Pieces of one placement, members of one group, and what is
-// ignored are never asked about together. Movers come first. INVALID_ARGUMENT: more pairs than
+// The body as it is put on the server.
+v1::PutBodyRequest BodyRequest(const BodyDefinition& body);
+
+// The placements as the server takes them. Pieces of one placement, members of one group, and what
+// is ignored are never asked about together. Movers come first. INVALID_ARGUMENT: more pairs than
 // kMostPairs are named.
-absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name);
+absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name,
+                              BodyForm form);
 
 }  // namespace hulld
 

@@ -9,6 +9,7 @@
 #include "client/formats/byte_source.h"
 #include "client/formats/mesh_file.h"
 #include "client/formats/point_file.h"
+#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
@@ -126,23 +127,10 @@ absl::Status AddHulls(const Client& client, const std::string& id_or_prefix, Vie
   return absl::OkStatus();
 }
 
-Pose7 NumbersOf(const v1::Pose& pose) {
-  Pose7 numbers = kIdentityPose;
-  if (pose.has_rotation()) {
-    const v1::Quaternion& q = pose.rotation();
-    numbers = {q.w(), q.x(), q.y(), q.z(), 0, 0, 0};
-  }
-  const v1::Vector3& t = pose.translation();
-  numbers[4] = t.x();
-  numbers[5] = t.y();
-  numbers[6] = t.z();
-  return numbers;
-}
-
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
   const auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
-  absl::StatusOr<Scene> file = ReadScene(source->get());
+  absl::StatusOr<Scene> file = ReadScene(source->get(), BodyForm::kPieces);
   if (!file.ok()) return file.status();
   for (uint32_t i = 0; i < file->size(); ++i) {
     const std::string& hull_id = *file->HullOf(i);

@@ -70,8 +70,6 @@ absl::Status AddHulls(const Client& client, const std::string& id_or_prefix, Vie
 // Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the place.
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene);
 
-Pose7 NumbersOf(const v1::Pose& pose);
-
 }  // namespace hulld
 
 #endif  // HULLD_CLIENT_HULLCTL_VIEW_VIEW_SCENE_H_

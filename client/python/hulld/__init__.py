@@ -15,6 +15,7 @@ from hulld.aio.appender import AsyncAppender
 from hulld.aio.client import AsyncClient
 from hulld.aio.collision_stream import AsyncCollisionStream
 from hulld.aio.watches import AsyncCollisionWatch, AsyncHullWatch
+from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import (
     Analysis,
     Answers,
@@ -27,6 +28,7 @@ from hulld.answers.collisions import (
     CollisionChanges,
     CollisionEvent,
     CollisionEventKind,
+    DecidingPiece,
     Feature,
     HullSize,
     HullVersion,
@@ -120,6 +122,8 @@ __all__ = [
     "Backup",
     "Batch",
     "BatchPart",
+    "Body",
+    "BodyInfo",
     "CancelledError",
     "Certificate",
     "Client",
@@ -132,6 +136,7 @@ __all__ = [
     "CreatedHull",
     "DataLossError",
     "DeadlineExceededError",
+    "DecidingPiece",
     "Durability",
     "FailedPreconditionError",
     "Feature",
@@ -170,6 +175,7 @@ __all__ = [
     "PosesLike",
     "Problem",
     "Relation",
+    "ReplacedBody",
     "ReplacedHull",
     "ResourceExhaustedError",
     "RetryPolicy",

@@ -12,6 +12,7 @@ import grpc.experimental
 import numpy.typing as npt
 
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
+from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import Batch, BatchPart, Collision, Method, Scene, ScenePart
 from hulld.answers.hulls import (
     CreatedHull,
@@ -64,7 +65,8 @@ class Client:
 
     Calls raise HulldError (see hulld.errors) where the server refuses them or cannot be reached,
     and ValueError or TypeError where an argument is wrong, before anything is sent. All but
-    delete_hull, create_hull without if_absent, replace_hull and save_backup are safe to repeat.
+    delete_hull, delete_body, create_hull without if_absent, put_body with if_revision, replace_hull
+    and save_backup are safe to repeat.
     Numbers are never changed on the way: the doubles of an array are those that the server gets,
     and those of an answer are those that it sent.
     """
@@ -342,6 +344,54 @@ class Client:
             self._retry,
             self._seconds(timeout),
         )
+
+    # --- Bodies ---
+
+    def put_body(
+        self,
+        body_id: str,
+        pieces: PlacementsLike,
+        *,
+        if_revision: int | None = None,
+        timeout: float | None = None,
+    ) -> ReplacedBody:
+        """Creates a body, or replaces all of its pieces, at once for all readers.
+
+        pieces: hulls at poses in the frame of the body, as placements elsewhere; a hull need not
+        exist yet, and is taken as it is when a question is asked. Placements then name the body by
+        its ID as if it was a hull. if_revision: put only if the body is at this revision; 0: only
+        if there is none; such a call is not retried.
+
+        InvalidArgumentError: no piece. AlreadyExistsError: a hull has the ID. AbortedError:
+        if_revision does not match. ResourceExhaustedError: more pieces, or hulls and bodies, than
+        the server takes.
+        """
+        return self._unary(requests.put_body(body_id, pieces, if_revision), timeout)
+
+    def get_body(self, body_id: str, *, timeout: float | None = None) -> Body:
+        """The pieces of a body. NotFoundError: no such body."""
+        return self._unary(requests.get_body(body_id), timeout)
+
+    def list_bodies(
+        self, prefix: str = "", *, page_size: int = 1000, timeout: float | None = None
+    ) -> Iterator[BodyInfo]:
+        """The bodies whose IDs start with `prefix`, without their pieces; as list_hulls."""
+        token = ""
+        while True:
+            page = self._unary(requests.list_bodies(prefix, page_size, token), timeout)
+            yield from page.bodies
+            token = page.next_page
+            if not token:
+                return
+
+    def delete_body(
+        self, body_id: str, *, if_revision: int | None = None, timeout: float | None = None
+    ) -> Header:
+        """Removes a body; the hulls of its pieces stay. Never retried, as delete_hull.
+
+        NotFoundError: no such body. AbortedError: if_revision does not match.
+        """
+        return self._unary(requests.delete_body(body_id, if_revision), timeout)
 
     # --- Pairs ---
 

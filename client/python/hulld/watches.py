@@ -201,6 +201,8 @@ class CollisionWatch:
                 error: HulldError = InternalError("the server ended the watch without a cause")
             except HulldError as ended:
                 error = ended
+            # It may not have ended: an answer that cannot be read is an error, too.
+            connection.cancel()
             with self._lock:
                 self._connection = None
                 if self._cancelled:

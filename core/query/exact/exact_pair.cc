@@ -120,6 +120,16 @@ void ExactPair::CacheAllVertices() {
   for (uint32_t i = 0; i < b().point_count(); ++i) VertexB(i);
 }
 
+size_t ExactPair::MemoryBytes() const {
+  size_t bytes = 0;
+  for (const Side* const side : {&a_, &b_}) {
+    // A node of a map has a pointer beside the value, and a bucket is one.
+    bytes += side->vertices.size() * (sizeof(*side->vertices.begin()) + sizeof(void*)) +
+             side->vertices.bucket_count() * sizeof(void*);
+  }
+  return bytes;
+}
+
 std::vector<uint32_t> ExactPair::AllOf(const Side& side) const {
   std::vector<uint32_t> all(side.hull->point_count());
   std::iota(all.begin(), all.end(), 0u);

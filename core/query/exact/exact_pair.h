@@ -1,6 +1,7 @@
 #ifndef HULLD_CORE_QUERY_EXACT_EXACT_PAIR_H_
 #define HULLD_CORE_QUERY_EXACT_EXACT_PAIR_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <unordered_map>
@@ -53,6 +54,8 @@ class ExactPair {
   // Multiplies out every vertex: from then on all functions may be called by several threads at
   // once.
   void CacheAllVertices();
+  // About what the vertices that were multiplied out take. Bytes.
+  size_t MemoryBytes() const;
 
   // The vertices of A farthest along n, ascending.
   std::vector<uint32_t> FeatureA(const IntegerVector& n);

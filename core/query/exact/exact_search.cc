@@ -83,7 +83,7 @@ class Search {
     const ExactSpan<Pair> span = FindSpan(pair_);
     if (span.dimension == 3) {
       PortalSearch<Pair> search(pair_, should_stop_);
-      return Report(search.Run(), search.directions_tried());
+      return RunAndReport(search);
     }
     const Coordinates w = pair_.Difference({0, 0});
     if (span.dimension == 0) {
@@ -137,6 +137,11 @@ class Search {
     return result;
   }
 
+  absl::StatusOr<ExactSearchResult> RunAndReport(PortalSearch<Pair>& search) {
+    const PortalResult found = search.Run();
+    return Report(found, search.directions_tried());
+  }
+
   // A and B in parallel planes, and the origin in the plane of C: thickened, the origin's position
   // is that in the plane.
   absl::StatusOr<ExactSearchResult> SearchInPlane(const Direction& normal) {
@@ -151,7 +156,7 @@ class Search {
       half += Sign(width[i]) < 0 ? Number(-width[i]) : width[i];
     }
     search.Thicken(axis, half);
-    absl::StatusOr<ExactSearchResult> result = Report(search.Run(), search.directions_tried());
+    absl::StatusOr<ExactSearchResult> result = RunAndReport(search);
     if (result.ok() && result->relation == Relation::kOverlapping) {
       result->relation = Relation::kTouching;
       if (with_axis_) result->axis = ToInteger(normal);

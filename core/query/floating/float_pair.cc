@@ -58,7 +58,9 @@ Vector FloatPair::InnerPoint(const PlacedHull& placed) {
   const auto inner = placed.query_hull().inner_points();
   Vector sum = Vector::Zero();
   for (const uint32_t i : inner) sum += placed.query_hull().point(i);
-  return placed.R_WH() * (sum / static_cast<double>(inner.size()));
+  // Not Eigen's product: that fuses products and sums where the processor can, and rounds
+  // otherwise.
+  return OutOfOwnFrame(placed, Vector(sum / static_cast<double>(inner.size())));
 }
 
 }  // namespace hulld

@@ -13,10 +13,20 @@
 namespace hulld {
 namespace {
 
-Coverage Cover(const std::vector<HullMesh>& pieces, const TriangleMesh& mesh) {
+PlacedHull Placed(HullMesh mesh, const RigidPose& X_WH) {
+  return {std::make_shared<const HullMesh>(std::move(mesh)), X_WH};
+}
+
+Coverage Cover(const std::vector<PlacedHull>& pieces, const TriangleMesh& mesh) {
   const auto coverage = CoverMesh(pieces, mesh, [](uint64_t) {});
   EXPECT_TRUE(coverage.ok()) << coverage.status();
   return *coverage;
+}
+
+Coverage Cover(const std::vector<HullMesh>& hulls, const TriangleMesh& mesh) {
+  std::vector<PlacedHull> pieces;
+  for (const HullMesh& hull : hulls) pieces.push_back(Placed(hull, kNoMotion));
+  return Cover(pieces, mesh);
 }
 
 TriangleMesh Triangle(const Corner3& a, const Corner3& b, const Corner3& c) {
@@ -45,6 +55,49 @@ TEST(Coverage, TwoHalvesEncloseTheWhole) {
       Cover({BoxHull({0, 0, 0}, {0.7, 1, 1}), BoxHull({0.7, 0, 0}, {2, 1, 1})}, whole);
   EXPECT_TRUE(coverage.uncovered.empty());
   EXPECT_GT(coverage.clipped, 0u);
+}
+
+// A box that is turned by a third about the diagonal (1, 1, 1), and moved, takes its axes with it.
+TEST(Coverage, APieceStandsAtItsPose) {
+  const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {1, 2, 3}), {1, 1, 1, 1, 10, 0, 0});
+  EXPECT_TRUE(Cover({turned}, BoxMesh({10, 0, 0}, {13, 1, 2})).uncovered.empty());
+  const Coverage coverage = Cover({turned}, BoxMesh({10, 0, 0}, {13.5, 1, 2}));
+  EXPECT_FALSE(coverage.uncovered.empty());
+  EXPECT_DOUBLE_EQ(coverage.distance, 0.5);
+}
+
+// The quaternion (2, 0, 0, 1) takes (x, y) to (3x - 4y, 4x + 3y) / 5, so that the points (3s, 4s)
+// lie on an edge of the box, although a rotation rounded to doubles would move it off them. What is
+// off by the smallest step is outside.
+TEST(Coverage, APoseIsNotRounded) {
+  const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {5, 1, 1}), {2, 0, 0, 1, 0, 0, 0});
+  for (const double s : {0.1, 0.3, 0x1.123456789abcdp-3}) {
+    // Of few digits, so that three times and four times it are not rounded.
+    const double t = std::ldexp(std::round(std::ldexp(s, 40)), -40);
+    const Corner3 on = {3 * t, 4 * t, 0.5};
+    EXPECT_TRUE(Cover({turned}, Triangle(on, on, on)).uncovered.empty());
+    const Corner3 off = {std::nextafter(on[0], 9), on[1], 0.5};
+    EXPECT_EQ(Cover({turned}, Triangle(off, off, off)).uncovered.size(), 1u);
+  }
+}
+
+// Two halves of a box, turned and moved together, still meet without a gap; pulled apart by the
+// smallest step, they do not.
+TEST(Coverage, PiecesThatMeetTurned) {
+  const auto half = [](double from, double to, double shift) {
+    return Placed(BoxHull({from, 0, 0}, {to, 1, 1}), {0.3, 0.5, -0.7, 0.11, 1 + shift, 2, 3});
+  };
+  // A triangle inside of both, as nearly as doubles allow, that crosses the cut.
+  const auto at = [](double x, double y, double z) {
+    const RigidPose X = Compose({0.3, 0.5, -0.7, 0.11, 1, 2, 3}, {1, 0, 0, 0, x, y, z});
+    return Corner3{X[4], X[5], X[6]};
+  };
+  const TriangleMesh across = Triangle(at(0.1, 0.2, 0.3), at(1.9, 0.3, 0.4), at(1.5, 0.8, 0.6));
+  const Coverage together = Cover({half(0, 0.7, 0), half(0.7, 2, 0)}, across);
+  EXPECT_TRUE(together.uncovered.empty());
+  EXPECT_EQ(together.clipped, 1u);
+  EXPECT_EQ(Cover({half(0, 0.7, 0), half(std::nextafter(0.7, 1), 2, 0)}, across).uncovered.size(),
+            1u);
 }
 
 // A gap of one unit in the last place is a gap.
@@ -79,7 +132,8 @@ TEST(Coverage, TrianglesWithoutAreaAreSegmentsAndPoints) {
 }
 
 TEST(Coverage, NoPieceCoversNothing) {
-  const Coverage coverage = Cover({}, Triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
+  const Coverage coverage =
+      Cover(std::vector<HullMesh>(), Triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}));
   EXPECT_EQ(coverage.uncovered.size(), 1u);
   HullMesh empty;
   EXPECT_EQ(Cover({empty}, Triangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0})).uncovered.size(), 1u);

@@ -101,6 +101,9 @@ TEST_F(GuardedServer, TokensMadeByHullctlAreWhatTheServerTakes) {
   EXPECT_EQ(role.code, 1);
   EXPECT_THAT(role.err, HasSubstr("token \"view\" has the role read-only"));
   EXPECT_THAT(As("cell", {"status"}).out, HasSubstr("hulls                  -"));
+  const Ran limits = As("cell", {"status", "--output", "wide"});
+  EXPECT_THAT(limits.out, AllOf(HasSubstr("max calls per client    512\n"),
+                                HasSubstr("max batches per client  16\n")));
   EXPECT_EQ(RunTool({"health", "--server", server_->address(), "--ca-cert", authorities_}).out,
             "SERVING\n");
 }

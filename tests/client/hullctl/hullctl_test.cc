@@ -486,6 +486,25 @@ TEST_F(HullctlTest, SimplifiedMeshTellsItsError) {
   EXPECT_EQ(Ask({"mesh", "a", "--max-error", "-1"}).code, 2);
 }
 
+TEST_F(HullctlTest, ASimplificationThatIsNotWhatItClaimsIsNotWritten) {
+  fake_.mesh_parts = Tetrahedron();
+  fake_.mesh_parts[0].mutable_header()->set_error(0);
+  const TempFile file("a.obj", "");
+  const std::vector<std::string> verify = {"mesh",     "a",  "--max-vertices", "4",
+                                           "--verify", "-o", file.path()};
+  const Ran valid = Ask(verify);
+  EXPECT_EQ(valid.code, 0);
+  EXPECT_THAT(valid.err, HasSubstr("simplified from 4 vertices within 0, verified\n"));
+  const Ran many = Ask({"mesh", "a", "--max-vertices", "3", "--verify"});
+  EXPECT_EQ(many.code, 5);
+  EXPECT_EQ(many.out, "");
+  EXPECT_THAT(many.err, HasSubstr("is not what it claims, so it is not written: the simplification "
+                                  "has 4 vertices; at most 3 were asked for"));
+  const Ran whole = Ask({"mesh", "a", "--verify"});
+  EXPECT_EQ(whole.code, 2);
+  EXPECT_THAT(whole.err, HasSubstr("--max-vertices"));
+}
+
 TEST_F(HullctlTest, MeshWritesSegmentsAndPoints) {
   v1::GetHullMeshResponse header;
   header.mutable_header()->mutable_hull()->set_vertex_count(2);

@@ -57,6 +57,8 @@ def test_status_tells_version_and_limits(either: Any) -> None:
     assert status.version and status.store_kind == "memory"
     assert status.limits.max_points_per_chunk == 200000
     assert status.limits.max_request_time == 300
+    assert status.limits.max_calls_per_client == 512
+    assert status.limits.max_batches_per_client == 16
     assert status.uptime >= 0 and status.started.tzinfo is not None
     assert either.check_health() is True
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import pickle
+import threading
 import types
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -13,7 +15,8 @@ import pytest
 
 import hulld
 from fake_hulld import FakeHulld, refuse
-from hulld.calls.requests import watch_hulls
+from hulld.calls.requests import SceneFilter, watch_hulls
+from hulld.calls.told_pairs import WatchedPlacements
 from hulld.errors import from_status
 from hulld.retry import may_retry
 from hulld.v1 import hull_pb2
@@ -209,14 +212,51 @@ def test_an_opening_is_tried_again(caller: Any, fake: FakeHulld) -> None:
 
 
 def test_a_server_that_says_nothing_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
-    import threading
-
     release = threading.Event()
     fake.before = lambda sequence, context: release.wait(60) and None
     client = connect(fake.address, timeout=0.2, retry=QUICK)
     try:
         with pytest.raises(hulld.DeadlineExceededError, match="acknowledged no chunk for 0.2 s"):
             client.append_points("a", np.zeros((1, 3)), create=True)
+    finally:
+        release.set()
+
+
+def test_a_server_that_reads_no_further_is_not_waited_for(connect: Any, fake: FakeHulld) -> None:
+    release = threading.Event()
+    gave_up: list[int] = []
+
+    # More chunks are on their way behind the first than there is room for.
+    def read_no_further(sequence: int, context: Any) -> None:
+        if not release.wait(20):
+            gave_up.append(sequence)
+
+    fake.before = read_no_further
+    client = connect(fake.address, timeout=0.2, retry=QUICK)
+    try:
+        with pytest.raises(hulld.DeadlineExceededError, match="no chunk for 0.2 s"):
+            client.append_points("a", np.zeros((1 << 18, 3)), create=True)
+        assert not gave_up
+    finally:
+        release.set()
+
+
+def test_a_task_that_is_cancelled_while_it_writes_ends(fake: FakeHulld) -> None:
+    release = threading.Event()
+    fake.before = lambda sequence, context: release.wait(60) and None
+
+    async def cancel_a_write() -> None:
+        async with hulld.AsyncClient(fake.address, retry=QUICK) as client:
+            appender = client.open_append("a", create=True)
+            writing = asyncio.create_task(appender.append(np.zeros((1 << 18, 3))))
+            while appender.totals.chunks < 2:
+                await asyncio.sleep(0)
+            writing.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await writing
+
+    try:
+        asyncio.run(cancel_a_write())
     finally:
         release.set()
 
@@ -276,6 +316,31 @@ def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch
 
     watch = hulld.HullWatch(Quiet, lambda after: watch_hulls("", None, after), None, QUICK, 20)
     assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
+
+
+def test_a_watch_that_cannot_read_an_answer_ends_its_call() -> None:
+    cancelled = threading.Event()
+
+    class Garbled:
+        """Goes on telling what is no message, until it is cancelled."""
+
+        def __init__(self, requests: Any, metadata: Any) -> None:
+            pass
+
+        def __iter__(self) -> Iterator[bytes]:
+            while not cancelled.is_set():
+                yield b"\xff"
+
+        def cancel(self) -> None:
+            cancelled.set()
+
+    watched = WatchedPlacements(
+        hulld.Placements.of(["a", "b"]), None, SceneFilter(None, False, None, None), None
+    )
+    watch = hulld.CollisionWatch(Garbled, (), watched, QUICK, 20)
+    with pytest.raises(hulld.InternalError, match="cannot be read"):
+        next(watch)
+    assert cancelled.is_set()
 
 
 # --- Errors ---

@@ -165,6 +165,18 @@ TEST(Collision, TextbookNamesTheFacetThatSeparates) {
   EXPECT_THAT(answer.analysis->stage, testing::Optional(AxisKind::kFacetA));
 }
 
+// Where floating point cannot be used at all, what exact arithmetic tried counts.
+TEST(Collision, CountsTheDirectionsOfExactSearches) {
+  const Hull cube = BuildHull(Scaled(LatticeCube(2, 1), 0x1p1000));
+  for (const double shift : {0.25, 1.0, 1.5}) {
+    const Answer answer = CheckCollision(cube, Pose(), cube, At(shift * 0x1p1000, 0, 0),
+                                         Options(Method::kCertifiedSearch))
+                              .value();
+    EXPECT_EQ(answer.rung, Rung::kExact);
+    EXPECT_GT(answer.analysis->axes_tested, 0u) << shift;
+  }
+}
+
 // Only the cross product of two edges separates these two needles of cubes.
 TEST(Collision, TextbookNamesEdgesThatAloneSeparate) {
   // Cubes on their edges: A's upper edge along y, B's lower edge along x.

@@ -421,22 +421,7 @@ CollisionStreamCheck::CollisionStreamCheck(const v1::CollisionStreamOpen& open)
 
 void CollisionStreamCheck::Sent(const v1::CollisionStreamUpdate& update) {
   ++sent_;
-  for (int i = 0; i < update.placements_size(); ++i) {
-    if (update.placements(i) >= static_cast<uint32_t>(open_.placements_size()) ||
-        update.poses_size() < 7 * (i + 1)) {
-      continue;
-    }
-    v1::Pose* const pose =
-        open_.mutable_placements(static_cast<int>(update.placements(i)))->mutable_pose();
-    const double* const numbers = update.poses().data() + static_cast<ptrdiff_t>(7) * i;
-    pose->mutable_rotation()->set_w(numbers[0]);
-    pose->mutable_rotation()->set_x(numbers[1]);
-    pose->mutable_rotation()->set_y(numbers[2]);
-    pose->mutable_rotation()->set_z(numbers[3]);
-    pose->mutable_translation()->set_x(numbers[4]);
-    pose->mutable_translation()->set_y(numbers[5]);
-    pose->mutable_translation()->set_z(numbers[6]);
-  }
+  MovePlacements(update, open_.mutable_placements());
 }
 
 std::string CollisionStreamCheck::Received(const v1::StreamCollisionsResponse& response) {

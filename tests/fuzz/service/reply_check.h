@@ -1,6 +1,7 @@
 #ifndef HULLD_TESTS_FUZZ_SERVICE_REPLY_CHECK_H_
 #define HULLD_TESTS_FUZZ_SERVICE_REPLY_CHECK_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <set>
 #include <span>
@@ -28,6 +29,43 @@ std::string CheckBatch(const v1::BatchCheckCollisionsRequest& request,
 // Pairs ascend, each at most once, and the totals count them.
 std::string CheckScene(const v1::FindCollisionsRequest& request,
                        std::span<const v1::FindCollisionsResponse> parts);
+
+// Whether a scene asks about these two. Scene: FindCollisionsRequest, or what watches one.
+template <typename Scene>
+bool AsksAbout(const Scene& scene, int a, int b) {
+  if (scene.has_movers() && static_cast<uint32_t>(a) >= scene.movers()) return false;
+  if (scene.groups().empty()) return true;
+  const uint32_t g = scene.groups(a);
+  const uint32_t h = scene.groups(b);
+  if (scene.ignore_same_group() && g == h) return false;
+  for (int i = 0; i < scene.ignored_group_pairs_size(); i += 2) {
+    const uint32_t first = scene.ignored_group_pairs(i);
+    const uint32_t second = scene.ignored_group_pairs(i + 1);
+    if ((first == g && second == h) || (first == h && second == g)) return false;
+  }
+  return true;
+}
+
+// Gives placements the poses of an update, as far as it names them.
+template <typename Update, typename Placements>
+void MovePlacements(const Update& update, Placements* placements) {
+  for (int i = 0; i < update.placements_size(); ++i) {
+    if (update.placements(i) >= static_cast<uint32_t>(placements->size()) ||
+        update.poses_size() < 7 * (i + 1)) {
+      continue;
+    }
+    v1::Pose* const pose =
+        placements->Mutable(static_cast<int>(update.placements(i)))->mutable_pose();
+    const double* const numbers = update.poses().data() + static_cast<ptrdiff_t>(7) * i;
+    pose->mutable_rotation()->set_w(numbers[0]);
+    pose->mutable_rotation()->set_x(numbers[1]);
+    pose->mutable_rotation()->set_y(numbers[2]);
+    pose->mutable_rotation()->set_z(numbers[3]);
+    pose->mutable_translation()->set_x(numbers[4]);
+    pose->mutable_translation()->set_y(numbers[5]);
+    pose->mutable_translation()->set_z(numbers[6]);
+  }
+}
 
 // The relations of a batch, in the order of its pairs.
 std::vector<v1::Relation> RelationsOf(std::span<const v1::BatchCheckCollisionsResponse> parts);

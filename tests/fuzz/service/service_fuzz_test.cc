@@ -14,7 +14,7 @@ namespace hulld::fuzz {
 namespace {
 
 // The fuzzer's target without the fuzzer: as many programs on every run, from a fixed seed.
-constexpr int kPrograms = 500;
+constexpr int kPrograms = 1000;
 
 std::vector<uint8_t> RandomProgram(Random& random) {
   std::vector<uint8_t> bytes(static_cast<size_t>(random.Between(1, 500)));
@@ -62,7 +62,6 @@ constexpr Goal kGoals[] = {
     {"CheckCollision NOT_FOUND", 1},
     {"CheckCollision INVALID_ARGUMENT", 10},
     {"RELATION_SEPARATED", 3},
-    {"RELATION_TOUCHING", 1},
     {"RELATION_OVERLAPPING", 3},
     {"certificate", 10},
     {"BatchCheckCollisions OK", 10},
@@ -78,6 +77,15 @@ constexpr Goal kGoals[] = {
     {"FindCollisions OK", 10},
     {"FindCollisions INVALID_ARGUMENT", 5},
     {"FindCollisions compared", 3},
+    {"WatchHulls told", 20},
+    {"WatchHulls change", 5},
+    {"WatchHulls resumed", 10},
+    {"WatchCollisions OK", 10},
+    {"WatchCollisions INVALID_ARGUMENT", 10},
+    {"WatchCollisions CANCELLED", 1},
+    {"WatchCollisions collision", 3},
+    {"WatchCollisions compared", 3},
+    {"WatchCollisions compared after updates", 5},
     {"GetStatus OK", 3},
     {"SaveBackup OK", 3},
     {"SaveBackup FAILED_PRECONDITION", 8},

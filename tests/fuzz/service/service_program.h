@@ -19,6 +19,7 @@
 #include "tests/fuzz/service/reply_check.h"
 #include "tests/fuzz/service/service_contract.h"
 #include "tests/fuzz/service/service_fuzz.h"
+#include "tests/fuzz/service/watch_check.h"
 
 namespace hulld::fuzz {
 
@@ -54,6 +55,8 @@ class ServiceProgram {
   void FindCollisions();
   void GetStatus();
   void SaveBackup();
+  void WatchHulls();
+  void WatchCollisions();
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0}; }
@@ -65,6 +68,8 @@ class ServiceProgram {
   bool Ended(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
   // A call that its client gives up may still change something: waits until all calls have ended.
   void Settle();
+  // Of a watch: its revision is that of what was told.
+  void SeeStore(const v1::ResponseHeader& header);
   void SeeHeader(const v1::ResponseHeader& header);
   void SeeHull(const v1::HullInfo& hull);
   // A hull that a reply tells of is the one that was acknowledged.
@@ -94,9 +99,17 @@ class ServiceProgram {
   void CompareSceneWithBatch(const v1::FindCollisionsRequest& request,
                              std::span<const v1::FindCollisionsResponse> parts);
 
+  // One WatchHulls call; true when all was told that is to be.
+  bool WatchHullsOnce(const v1::WatchHullsRequest& request, bool then_change,
+                      HullWatchCheck* check);
+  std::vector<std::string> ChangedSince(const std::map<std::string, v1::HullInfo>& before) const;
+  void CompareWatched(const HullWatchCheck& check);
+  void CompareWatchWithBatch(const CollisionWatchCheck& check);
+
   v1::AppendPointsRequest NextAppendMessage(bool first, uint64_t* sequence);
   v1::ReplaceHullRequest NextReplaceMessage(bool first);
   v1::StreamCollisionsRequest NextCollisionMessage(bool first, size_t placements);
+  v1::WatchCollisionsRequest NextWatchMessage(bool first, size_t placements);
   // The same request in its other form, now and then.
   template <typename Request>
   std::optional<Request> MaybePacked(const Request& request);
@@ -113,6 +126,8 @@ class ServiceProgram {
   bool all_doubtful_ = false;
   // Streams that nobody reads; they end with the program.
   std::vector<std::shared_ptr<void>> idle_;
+  // A watch that lasts while other calls are made; null once it was given up.
+  grpc::ClientContext* watch_ = nullptr;
 };
 
 }  // namespace hulld::fuzz

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <string>
 
+#include "client/calls/grpc_status.h"
 #include "tests/server/harness/captured_log.h"
 #include "tests/server/harness/test_certificates.h"
 #include "tests/server/harness/test_server.h"
@@ -52,6 +53,7 @@ class Revocation : public ServerTest {
   static void ExpectRevoked(const grpc::Status& status) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED) << status.error_message();
     EXPECT_THAT(status.error_message(), HasSubstr("no longer valid"));
+    EXPECT_EQ(ReasonOf(FromGrpcStatus(status)), v1::ERROR_REASON_TOKEN_UNKNOWN);
   }
 
   std::string path_;
@@ -80,6 +82,13 @@ TEST_F(Revocation, EndsIdleStreamsOfEveryKindAndThoseOfNobodyElse) {
   Be(poses_context, "gone secret");
   const auto poses = collisions_->StreamCollisions(&poses_context);
   ASSERT_TRUE(poses->Write(open) && poses->Read(&answer));
+  v1::WatchCollisionsResponse event;
+  v1::WatchCollisionsRequest pairs;
+  *pairs.mutable_open()->mutable_placements() = open.open().placements();
+  grpc::ClientContext pairs_context;
+  Be(pairs_context, "gone secret");
+  const auto watched_pairs = collisions_->WatchCollisions(&pairs_context);
+  ASSERT_TRUE(watched_pairs->Write(pairs) && watched_pairs->Read(&event));
   grpc::ClientContext kept_context;
   Be(kept_context, "kept secret");
   const auto kept = collisions_->StreamCollisions(&kept_context);
@@ -96,6 +105,9 @@ TEST_F(Revocation, EndsIdleStreamsOfEveryKindAndThoseOfNobodyElse) {
   while (poses->Read(&answer)) {
   }
   ExpectRevoked(poses->Finish());
+  while (watched_pairs->Read(&event)) {
+  }
+  ExpectRevoked(watched_pairs->Finish());
 
   v1::StreamCollisionsRequest update;
   update.mutable_update()->add_placements(1);
@@ -106,7 +118,7 @@ TEST_F(Revocation, EndsIdleStreamsOfEveryKindAndThoseOfNobodyElse) {
   kept->WritesDone();
   EXPECT_TRUE(kept->Finish().ok());
   server_.reset();
-  EXPECT_THAT(log.text(), HasSubstr("info 3 calls ended, as their tokens are no longer valid"));
+  EXPECT_THAT(log.text(), HasSubstr("info 4 calls ended, as their tokens are no longer valid"));
 }
 
 TEST_F(Revocation, EndsWhatIsBeingComputed) {
@@ -122,6 +134,20 @@ TEST_F(Revocation, EndsWhatIsBeingComputed) {
   while (scene->Read(&part)) {
   }
   ExpectRevoked(scene->Finish());
+  EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
+}
+
+// A stream that waits for its client to read cannot tell it why, but ends.
+TEST_F(Revocation, EndsTheCallOfWhoDoesNotRead) {
+  v1::FindCollisionsRequest request;
+  for (int i = 0; i < 20'000; ++i) *request.add_placements() = PlacementOf("cube");
+  request.mutable_wanted()->set_witness(true);
+  grpc::ClientContext context;
+  Be(context, "gone secret");
+  const auto scene = collisions_->FindCollisions(&context, request);
+  v1::FindCollisionsResponse part;
+  ASSERT_TRUE(scene->Read(&part));
+  ReplaceTokens(kept_);
   EXPECT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
 }
 

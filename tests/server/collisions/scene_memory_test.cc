@@ -117,5 +117,30 @@ TEST_F(SceneMemory, OfABatchCountsAgainstTheSameLimit) {
   EXPECT_THAT(refused.error_message(), HasSubstr("(--memory-limit)"));
 }
 
+// An error takes more than the placement that it is about.
+TEST_F(SceneMemory, OfWhatIsWrongWithPlacementsCounts) {
+  Config config = TestConfig();
+  config.limits.memory_limit = 30'000'000;
+  Restart(config);
+  Put("cube", Cube());
+  const auto ask = [this](const std::string& hull_id) {
+    v1::BatchCheckCollisionsRequest request;
+    for (int i = 0; i < 20'000; ++i) *request.add_placements() = PlacementOf(hull_id);
+    request.add_pairs(0);
+    request.add_pairs(1);
+    grpc::ClientContext context;
+    const auto reader = collisions_->BatchCheckCollisions(&context, request);
+    v1::BatchCheckCollisionsResponse part;
+    while (reader->Read(&part)) {
+    }
+    return reader->Finish();
+  };
+  const grpc::Status answered = ask("cube");
+  EXPECT_TRUE(answered.ok()) << answered.error_message();
+  const grpc::Status refused = ask("-malformed-");
+  EXPECT_EQ(refused.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("(--memory-limit)"));
+}
+
 }  // namespace
 }  // namespace hulld::server

@@ -55,10 +55,10 @@ class RestartableServer : public ::testing::Test {
   }
 
   void StartServer(const std::vector<std::string>& options = {}) {
-    std::vector<std::string> arguments = {"--listen", address(), "--store", "rocksdb", "--data-dir",
-                                          absl::StrCat(directory_.path(), "/store"),
+    std::vector<std::string> arguments = {"--listen", address(),
                                           // Nobody reads what it says while clients call.
                                           "--log-level", "warn"};
+    arguments.insert(arguments.end(), store_.begin(), store_.end());
     arguments.insert(arguments.end(), options.begin(), options.end());
     server_ = std::make_unique<Process>(arguments);
     const auto deadline = std::chrono::system_clock::now() + std::chrono::seconds(60);
@@ -79,6 +79,9 @@ class RestartableServer : public ::testing::Test {
   }
 
   const TemporaryDirectory directory_;
+  // The settings that say where hulls live.
+  std::vector<std::string> store_ = {"--store", "rocksdb", "--data-dir",
+                                     absl::StrCat(directory_.path(), "/store")};
   std::unique_ptr<Process> server_;
 };
 

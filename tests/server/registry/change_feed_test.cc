@@ -103,7 +103,7 @@ class Watcher {
   uint64_t revision_ = 0;
 };
 
-constexpr WatchStart kFromTheStart{true};
+const WatchStart kFromTheStart{true};
 
 WatchTarget Prefix(const std::string& prefix) { return {prefix, {}}; }
 WatchTarget Hull(const std::string& id) { return {"", {id}}; }

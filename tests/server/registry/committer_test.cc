@@ -7,6 +7,7 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -142,6 +143,41 @@ TEST_F(CommitterTest, ARefusedBatchTakesWhatWaitsWithIt) {
   ASSERT_THAT(outcomes_, SizeIs(3));
   for (uint64_t i = 0; i < 3; ++i) {
     EXPECT_EQ(outcomes_[i], Outcome(i + 1, absl::StatusCode::kUnavailable));
+  }
+}
+
+// The thread that waits has its turn before the batch has ended, unless it is refused.
+TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
+  for (const absl::Status& outcome : {absl::OkStatus(), absl::UnavailableError("no disk")}) {
+    outcomes_.clear();
+    GatedStore::Gate gate;
+    store_.Close(gate);
+    Submit(1);
+    gate.entered.get_future().wait();
+    size_t completed_by_then = 0;
+    std::thread passer;
+    {
+      const Locked locked(order_);
+      committer_.Submit(locked, ChangeOf(2), [&](Locked&, const absl::Status&) {
+        passer = std::thread([&] {
+          const std::lock_guard lock(order_);
+          completed_by_then = outcomes_.size();
+        });
+        while (!order_.is_wanted()) std::this_thread::yield();
+      });
+    }
+    constexpr uint64_t kMany = 3 * Committer::kMostPerHold;
+    for (uint64_t revision = 3; revision < kMany; ++revision) Submit(revision);
+    std::future<void> last = Submit(kMany);
+    // A refusal takes all with it, as if they were one batch; else 1 is a batch of its own.
+    gate.outcome.set_value(outcome);
+    last.wait();
+    passer.join();
+    if (outcome.ok()) {
+      EXPECT_LE(completed_by_then, Committer::kMostPerHold);
+    } else {
+      EXPECT_EQ(completed_by_then, kMany - 1);
+    }
   }
 }
 

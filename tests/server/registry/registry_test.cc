@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <atomic>
 #include <future>
+#include <memory>
+#include <mutex>
 #include <thread>
 
 #include "core/hull/growth/hull_builder.h"
@@ -99,6 +101,47 @@ TEST_F(RegistryTest, AnAcknowledgedChunkIsSeenAtOnce) {
     EXPECT_EQ(tried->hulls[0]->served, waited->hulls[0]->served);
     EXPECT_EQ(tried->hulls[1].status(), waited->hulls[1].status());
   }
+}
+
+TEST(RegistryTurns, ClientsTakeTurnsAtBuildingChunks) {
+  MemoryStore store;
+  WorkerPool writers(1);
+  Registry registry(store, Limits(), writers);
+  const auto open = [&](const std::string& id, ClientId client) {
+    std::promise<AppendSession> opened;
+    registry.OpenAppend(
+        id, "w", true, [](const absl::Status&) {},
+        [&](const absl::StatusOr<OpenResult>& result) { opened.set_value(result->session); },
+        client);
+    return opened.get_future().get();
+  };
+  std::vector<AppendSession> sessions = {open("a", 1), open("b", 1), open("c", 1), open("d", 2)};
+  // All of them wait for the one thread.
+  std::promise<void> released;
+  writers.Submit([&] { released.get_future().wait(); });
+  std::mutex mutex;
+  std::vector<size_t> built;
+  std::vector<std::future<void>> ends;
+  for (size_t i = 0; i < sessions.size(); ++i) {
+    const auto building = std::make_shared<std::promise<void>>();
+    const auto ended = std::make_shared<std::promise<void>>();
+    ends.push_back(building->get_future());
+    ends.push_back(ended->get_future());
+    registry.Append(
+        sessions[i], {1, {{1, 2, 3}}, std::nullopt}, {},
+        [&, i, building] {
+          {
+            const std::lock_guard lock(mutex);
+            built.push_back(i);
+          }
+          building->set_value();
+        },
+        [ended](const absl::StatusOr<ChunkResult>&) { ended->set_value(); });
+  }
+  released.set_value();
+  for (std::future<void>& end : ends) end.wait();
+  const std::lock_guard lock(mutex);
+  EXPECT_THAT(built, testing::ElementsAre(0, 3, 1, 2));
 }
 
 // Nothing is ready to be served, and the builder is busy with this very chunk.

@@ -160,6 +160,22 @@ TEST_F(ConfigTest, EverySettingCanComeFromEachSource) {
   expect_all(Accepted({}));
 }
 
+TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
+  const std::vector<std::string> postgres = {"--store=postgres", "--postgres-conninfo-file=/p"};
+  EXPECT_EQ(Accepted(postgres).postgres_conninfo_file, "/p");
+  EXPECT_FALSE(Accepted(postgres).take_over);
+  EXPECT_TRUE(Accepted({postgres[0], postgres[1], "--take-over"}).take_over);
+  ExpectRefused({"--store=postgres"}, "--postgres-conninfo-file");
+  ExpectRefused({postgres[0], postgres[1], "--durability=relaxed"}, "synchronous_commit");
+  ExpectRefused({"--take-over"}, "--take-over is for --store postgres");
+  environment_["HULLD_STORE"] = "postgres";
+  environment_["HULLD_POSTGRES_CONNINFO_FILE"] = "/q";
+  EXPECT_EQ(Accepted({}).postgres_conninfo_file, "/q");
+  // Servers that always took over would take the store from each other for ever.
+  environment_["HULLD_TAKE_OVER"] = "true";
+  EXPECT_FALSE(Accepted({}).take_over);
+}
+
 TEST_F(ConfigTest, ErrorsNameFlagVariableOrKey) {
   ExpectRefused({"--max-hulls", "0"}, "--max-hulls: \"0\" is not a whole number from 1");
   ExpectRefused({"--max-hulls=-1"}, "--max-hulls: \"-1\" is not a whole number");
@@ -227,6 +243,8 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--max-message-bytes",
                            "--data-dir",
                            "--durability",
+                           "--postgres-conninfo-file",
+                           "--take-over",
                            "--memory-limit",
                            "--max-writers-per-hull",
                            "--max-pieces-per-body",

@@ -6,6 +6,7 @@
 
 #include "core/hull/audit.h"
 #include "server/store/store_keys.h"
+#include "tests/server/harness/kept_store.h"
 #include "tests/server/harness/store_fixture.h"
 
 namespace hulld::server {
@@ -13,19 +14,15 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class StoreRecovery : public StoreTest {
+class StoreRecovery : public KeptStoreTest {
  protected:
-  // What is under the incarnation's keys of one kind.
-  size_t CountKeys(char prefix) {
-    rocksdb::DB& db = hulls_->store().db();
-    const std::unique_ptr<rocksdb::Iterator> it(db.NewIterator(rocksdb::ReadOptions()));
-    size_t count = 0;
-    for (it->Seek(std::string(1, prefix)); it->Valid() && it->key()[0] == prefix; it->Next()) {
-      ++count;
-    }
-    return count;
-  }
+  // What is kept under the incarnation's keys of one kind.
+  size_t CountKeys(char prefix) { return kept_->Count(prefix); }
 };
+
+INSTANTIATE_TEST_SUITE_P(Kinds, StoreRecovery, KeptStores(), KeptStoreName);
+
+class RocksDbRecovery : public StoreTest {};
 
 void ExpectSame(const HullView& a, const HullView& b) {
   EXPECT_EQ(a.record, b.record);
@@ -39,8 +36,8 @@ void ExpectSame(const HullView& a, const HullView& b) {
   }
 }
 
-TEST_F(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
-  DurableRegistry& first = Start();
+TEST_P(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
+  KeptRegistry& first = Start();
   ASSERT_TRUE(first.Create("empty").ok());
   ASSERT_TRUE(first.Put("point", {{1, 2, 3}, {1, 2, 3}}).ok());
   ASSERT_TRUE(first.Put("cube", CubeCorners(), "one").ok());
@@ -53,7 +50,7 @@ TEST_F(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
   const HullView point = *first.View("point");
   const HullView cube = *first.View("cube");
 
-  DurableRegistry& second = Start();
+  KeptRegistry& second = Start();
   EXPECT_EQ(second.store().id(), id);
   EXPECT_EQ(second.registry().Sizes().store_revision, sizes.store_revision);
   EXPECT_EQ(second.registry().Sizes().hull_count, 3);
@@ -71,9 +68,9 @@ TEST_F(StoreRecovery, EverythingThatWasAckedIsThereAgain) {
   EXPECT_EQ(second.Open("cube", "one")->last_sequence, 2);
 }
 
-TEST_F(StoreRecovery, AHullOfManyDeltasComesBackBitForBit) {
+TEST_P(StoreRecovery, AHullOfManyDeltasComesBackBitForBit) {
   const std::vector<Vector> sphere = SpherePoints(6000);
-  DurableRegistry& first = Start();
+  KeptRegistry& first = Start();
   const AppendSession session = first.Open("h")->session;
   uint64_t sequence = 0;
   for (size_t i = 0; i < sphere.size(); i += 40) {
@@ -90,8 +87,8 @@ TEST_F(StoreRecovery, AHullOfManyDeltasComesBackBitForBit) {
   ExpectSame(*Start().View("h"), before);
 }
 
-TEST_F(StoreRecovery, AChunkThatChangesNoVertexWritesItsCountersOnly) {
-  DurableRegistry& first = Start();
+TEST_P(StoreRecovery, AChunkThatChangesNoVertexWritesItsCountersOnly) {
+  KeptRegistry& first = Start();
   const AppendSession session = first.Open("h")->session;
   ASSERT_TRUE(first.Append(session, 1, CubeCorners()).ok());
   const size_t vertices = CountKeys(kDeltaPrefix) + CountKeys(kBasePrefix);
@@ -103,8 +100,8 @@ TEST_F(StoreRecovery, AChunkThatChangesNoVertexWritesItsCountersOnly) {
   EXPECT_EQ(Start().View("h")->record.counts.inside, 49'000);
 }
 
-TEST_F(StoreRecovery, ADeletedHullLeavesNothing) {
-  DurableRegistry& first = Start();
+TEST_P(StoreRecovery, ADeletedHullLeavesNothing) {
+  KeptRegistry& first = Start();
   ASSERT_TRUE(first.Put("h", SpherePoints(40'000)).ok());
   EXPECT_GT(CountKeys(kBasePrefix), 1);
   ASSERT_TRUE(first.Delete("h").ok());
@@ -113,15 +110,15 @@ TEST_F(StoreRecovery, ADeletedHullLeavesNothing) {
   }
 }
 
-TEST_F(StoreRecovery, ALargeBaseInPartsComesBack) {
+TEST_P(StoreRecovery, ALargeBaseInPartsComesBack) {
   ASSERT_TRUE(Start().Put("h", SpherePoints(70'000)).ok());
   const HullView before = *hulls_->View("h");
   EXPECT_EQ(CountKeys(kBasePrefix), 3);
   ExpectSame(*Start().View("h"), before);
 }
 
-TEST_F(StoreRecovery, AReplacedHullIsANewIncarnation) {
-  DurableRegistry& first = Start();
+TEST_P(StoreRecovery, AReplacedHullIsANewIncarnation) {
+  KeptRegistry& first = Start();
   ASSERT_TRUE(first.Put("h", SpherePoints(500), "w").ok());
   const HullView old = *first.View("h");
   auto builder = std::make_shared<HullBuilder>();
@@ -142,8 +139,8 @@ TEST_F(StoreRecovery, AReplacedHullIsANewIncarnation) {
   ExpectSame(*Start().View("h"), view);
 }
 
-TEST_F(StoreRecovery, ReplacingWhatIsNotThereNeedsCreateIfAbsent) {
-  DurableRegistry& first = Start();
+TEST_P(StoreRecovery, ReplacingWhatIsNotThereNeedsCreateIfAbsent) {
+  KeptRegistry& first = Start();
   const auto cube = [] {
     auto builder = std::make_shared<HullBuilder>();
     EXPECT_TRUE(builder->Add(CubeCorners()).ok());
@@ -157,10 +154,47 @@ TEST_F(StoreRecovery, ReplacingWhatIsNotThereNeedsCreateIfAbsent) {
   EXPECT_EQ(Start().View("h")->record.vertex_count, 8);
 }
 
-TEST_F(StoreRecovery, ASessionHearsThatItsHullWasReplaced) {
-  DurableRegistry& hulls = Start();
+TEST_P(StoreRecovery, BodiesComeBackAndAreDamagedByThemselves) {
+  KeptRegistry& first = Start();
+  ASSERT_TRUE(first.Put("cube", CubeCorners()).ok());
+  const auto put = [this](const std::string& id, double x) {
+    StoredBody body;
+    body.record.body_id = id;
+    body.hull_ids = {"cube"};
+    body.pieces.resize(2);
+    body.pieces[1].X_BP.t = Vector(x, 0, 0);
+    return KeptRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
+      hulls_->registry().PutBody(body, std::nullopt, std::move(done));
+    });
+  };
+  ASSERT_TRUE(put("changed", 1).ok());
+  ASSERT_TRUE(put("changed", 2).ok());
+  ASSERT_TRUE(put("damaged", 3).ok());
+  ASSERT_TRUE(put("gone", 4).ok());
+  ASSERT_TRUE(KeptRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
+                first.registry().DeleteBody("gone", std::nullopt, std::move(done));
+              }).ok());
+  std::string value = kept_->Get(BodyKey("damaged"));
+  value[value.size() / 2] ^= 4;
+  kept_->Put(BodyKey("damaged"), value);
+  Start();
+  EXPECT_EQ(CountKeys(kBodyPrefix), 2);
+  std::vector<std::string> seen;
+  const absl::Status read = hulls_->store().ForEachBody(
+      [&](const std::string& id, const absl::StatusOr<StoredBody>& body) {
+        seen.push_back(id);
+        EXPECT_EQ(body.ok(), id == "changed") << body.status();
+        EXPECT_EQ(absl::IsDataLoss(body.status()), id == "damaged");
+        EXPECT_EQ(body.ok() ? body->pieces.at(1).X_BP.t.x() : 0, id == "changed" ? 2 : 0);
+      });
+  EXPECT_TRUE(read.ok()) << read;
+  EXPECT_THAT(seen, ::testing::ElementsAre("changed", "damaged"));
+}
+
+TEST_P(StoreRecovery, ASessionHearsThatItsHullWasReplaced) {
+  KeptRegistry& hulls = Start();
   std::promise<absl::Status> gone;
-  const auto opened = DurableRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+  const auto opened = KeptRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
     hulls.registry().OpenAppend(
         "h", "w", true, [&](const absl::Status& reason) { gone.set_value(reason); },
         std::move(done));
@@ -175,8 +209,8 @@ TEST_F(StoreRecovery, ASessionHearsThatItsHullWasReplaced) {
   EXPECT_EQ(hulls.View("h")->record.vertex_count, 0);
 }
 
-TEST_F(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
-  DurableRegistry& hulls = Start();
+TEST_P(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
+  KeptRegistry& hulls = Start();
   constexpr int kHulls = 200;
   std::vector<std::promise<absl::StatusOr<CreateResult>>> replies(kHulls);
   for (int i = 0; i < kHulls; ++i) {
@@ -191,7 +225,7 @@ TEST_F(StoreRecovery, ChangesThatWaitTogetherAreCommittedTogether) {
   EXPECT_LT(hulls.registry().Commits().batches, kHulls);
 }
 
-TEST_F(StoreRecovery, AStartRemovesOldCopiesOfItsOwnAlone) {
+TEST_F(RocksDbRecovery, AStartRemovesOldCopiesOfItsOwnAlone) {
   Start();
   const absl::StatusOr<std::string> copy = hulls_->store().MakeCopy();
   ASSERT_TRUE(copy.ok()) << copy.status();
@@ -203,34 +237,37 @@ TEST_F(StoreRecovery, AStartRemovesOldCopiesOfItsOwnAlone) {
   EXPECT_TRUE(std::filesystem::exists(others));
 }
 
-TEST_F(StoreRecovery, ASecondServerIsRefused) {
+TEST_F(RocksDbRecovery, ASecondServerIsRefused) {
   Start();
   const auto second = OpenStore();
   EXPECT_EQ(second.status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(second.status().message()), HasSubstr("in use by another hulld"));
 }
 
-TEST_F(StoreRecovery, ANewerFormatIsRefused) {
+TEST_P(StoreRecovery, ANewerFormatIsRefused) {
   Start();
-  hulls_->store().db().Put({}, kFormatKey, Seal(kFormatKey, EncodeNumber(kStoreFormat + 1)));
+  const uint64_t latest = kept_->latest_format();
+  kept_->SetFormat(latest + 1);
   hulls_ = nullptr;
-  const auto store = OpenStore();
+  const auto store = kept_->Open();
   EXPECT_EQ(store.status().code(), absl::StatusCode::kFailedPrecondition);
-  EXPECT_THAT(std::string(store.status().message()), HasSubstr("was written in format 3"));
-  EXPECT_THAT(std::string(store.status().message()), HasSubstr("knows format 2"));
+  EXPECT_THAT(std::string(store.status().message()),
+              HasSubstr(absl::StrCat("was written in format ", latest + 1)));
+  EXPECT_THAT(std::string(store.status().message()),
+              HasSubstr(absl::StrCat("knows format ", latest)));
 }
 
-TEST_F(StoreRecovery, WritersPerHullAreLimited) {
+TEST_P(StoreRecovery, WritersPerHullAreLimited) {
   Limits limits;
   limits.max_writers_per_hull = 2;
-  DurableRegistry& hulls = Start(limits);
+  KeptRegistry& hulls = Start(limits);
   ASSERT_TRUE(hulls.Put("h", CubeCorners(), "one").ok());
   ASSERT_TRUE(hulls.Put("h", CubeCorners(), "two").ok());
   const auto third = hulls.Put("h", CubeCorners(), "three");
   EXPECT_EQ(third.status().code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(third.status().message()), HasSubstr("--max-writers-per-hull"));
   EXPECT_TRUE(hulls.Put("h", CubeCorners(), "one").ok());
-  DurableRegistry& again = Start(limits);
+  KeptRegistry& again = Start(limits);
   EXPECT_EQ(again.Put("h", CubeCorners(), "three").status().code(),
             absl::StatusCode::kResourceExhausted);
   EXPECT_TRUE(again.Put("h", CubeCorners(), "two").ok());

@@ -75,8 +75,7 @@ class AsyncAppender:
                 raise self._failed
             if self._connection is None:
                 await self.open()
-            assert self._connection is not None
-            await self._connection.send(self._state.add(chunk, if_revision))
+            await self._send(self._state.add(chunk, if_revision))
             while self._state.full:
                 await self._take_one()
 
@@ -150,12 +149,26 @@ class AsyncAppender:
         if self._connection is not None:
             self._connection.cancel()
         self._connection = AsyncDuplex(self._call, self._metadata)
-        await self._connection.send(self._state.open_request())
         try:
-            return await self._connection.expect(self._timeout)
+            async with asyncio.timeout(self._timeout):
+                await self._connection.send(self._state.open_request())
+                return await self._connection.expect(None)
         except TimeoutError:
             raise DeadlineExceededError(
                 f"the server did not open the stream within {self._timeout} s"
+            ) from None
+
+    async def _send(self, request: bytes) -> None:
+        assert self._connection is not None
+        try:
+            async with asyncio.timeout(self._timeout):
+                await self._connection.send(request)
+        except TimeoutError:
+            raise self._fail(
+                DeadlineExceededError(
+                    f"the server took no chunk for {self._timeout} s; at least "
+                    f"{self.totals.points_acknowledged} points are committed"
+                )
             ) from None
 
     async def _reconnect(self, cause: HulldError) -> None:
@@ -174,9 +187,8 @@ class AsyncAppender:
                 missing = read_answer(self._state.resume, opened)
             except HulldError as error:
                 raise self._fail(error) from None
-            assert self._connection is not None
             for request in missing:
-                await self._connection.send(request)
+                await self._send(request)
             return
 
     async def _take_one(self) -> None:

@@ -14,6 +14,7 @@ from hulld.aio.appender import AsyncAppender
 from hulld.aio.collision_stream import AsyncCollisionStream
 from hulld.aio.watches import AsyncCollisionWatch, AsyncHullWatch
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
+from hulld.answers.bodies import Body, BodyInfo, ReplacedBody
 from hulld.answers.collisions import Batch, BatchPart, Collision, Method, Scene, ScenePart
 from hulld.answers.hulls import (
     CreatedHull,
@@ -298,6 +299,42 @@ class AsyncClient:
             self._retry,
             self._seconds(timeout),
         )
+
+    # --- Bodies ---
+
+    async def put_body(
+        self,
+        body_id: str,
+        pieces: PlacementsLike,
+        *,
+        if_revision: int | None = None,
+        timeout: float | None = None,
+    ) -> ReplacedBody:
+        """As Client.put_body."""
+        return await self._unary(requests.put_body(body_id, pieces, if_revision), timeout)
+
+    async def get_body(self, body_id: str, *, timeout: float | None = None) -> Body:
+        """As Client.get_body."""
+        return await self._unary(requests.get_body(body_id), timeout)
+
+    async def list_bodies(
+        self, prefix: str = "", *, page_size: int = 1000, timeout: float | None = None
+    ) -> AsyncIterator[BodyInfo]:
+        """As Client.list_bodies."""
+        token = ""
+        while True:
+            page = await self._unary(requests.list_bodies(prefix, page_size, token), timeout)
+            for body in page.bodies:
+                yield body
+            token = page.next_page
+            if not token:
+                return
+
+    async def delete_body(
+        self, body_id: str, *, if_revision: int | None = None, timeout: float | None = None
+    ) -> Header:
+        """As Client.delete_body."""
+        return await self._unary(requests.delete_body(body_id, if_revision), timeout)
 
     # --- Pairs ---
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator, Iterable
 from types import TracebackType
 from typing import Any
@@ -122,8 +123,9 @@ class AsyncCollisionStream:
         assert self._connection is not None
         step = StepAssembly(self._count, self._pairs, self._wanted)
         self._count += 1
-        await self._connection.send(request)
         try:
+            async with asyncio.timeout(self._timeout):
+                await self._connection.send(request)
             while not read_answer(step.add, await self._connection.expect(self._timeout)):
                 pass
             return read_answer(lambda _: step.finish(), None)

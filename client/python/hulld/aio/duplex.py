@@ -44,13 +44,16 @@ class AsyncDuplex:
         self._incoming.put_nowait((_END, end))
 
     async def send(self, message: bytes) -> None:
-        """Where the call has ended, nothing happens, and receive tells why."""
+        """Waits until there is room for it on the way. Where the call has ended, nothing happens,
+        and receive tells why."""
         try:
             await self._call.write(message)
         except (grpc.RpcError, asyncio.InvalidStateError):
             pass
         except asyncio.CancelledError:
-            if not self._call.cancelled():
+            # Of this task, with which gRPC cancels the call; else of the call alone.
+            task = asyncio.current_task()
+            if task is not None and task.cancelling() > 0:
                 raise
 
     async def close_sending(self) -> None:

@@ -132,6 +132,8 @@ class AsyncCollisionWatch:
                 error: HulldError = InternalError("the server ended the watch without a cause")
             except HulldError as ended:
                 error = ended
+            # It may not have ended: an answer that cannot be read is an error, too.
+            connection.cancel()
             self._connection = None
             if self._cancelled:
                 raise StopAsyncIteration

@@ -22,6 +22,7 @@ from hulld.answers.collisions import (
     CollisionChanges,
     CollisionEvent,
     CollisionEventKind,
+    DecidingPiece,
     Feature,
     HullSize,
     HullVersion,
@@ -51,6 +52,10 @@ def _vector(message: Any) -> npt.NDArray[np.float64]:
 
 def version_of(message: Any) -> HullVersion:
     return HullVersion(message.hull_id, message.create_revision, message.revision, message.store_id)
+
+
+def _piece_of(message: Any) -> DecidingPiece:
+    return DecidingPiece(message.index, version_of(message.hull))
 
 
 def _problem_of(message: Any) -> Problem:
@@ -128,6 +133,8 @@ def decode_collision(
         part("witness", lambda m: Witness(_vector(m.point_a), _vector(m.point_b), m.error)),
         message.within_clearance if message.HasField("within_clearance") else None,
         header_of(message.header),
+        part("piece_a", _piece_of),
+        part("piece_b", _piece_of),
         question,
         viewer,
     )
@@ -151,6 +158,7 @@ class ColumnReader:
     witness_xyz: list[npt.NDArray[np.float64]] = field(default_factory=list)
     witness_errors: list[npt.NDArray[np.float64]] = field(default_factory=list)
     within_clearance: list[Unsigned] = field(default_factory=list)
+    pieces: list[Unsigned] = field(default_factory=list)
     problems: dict[int, Problem] = field(default_factory=dict)
     rows: int = 0
 
@@ -165,6 +173,7 @@ class ColumnReader:
             8: (self.witness_xyz, packed_doubles),
             9: (self.witness_errors, packed_doubles),
             10: (self.within_clearance, packed_varints),
+            12: (self.pieces, packed_varints),
         }
         for number, _, value in read_fields(data):
             if number in arrays:
@@ -221,6 +230,20 @@ class ColumnReader:
                 )
             return tuple(parts) if wanted else None
 
+        def deciding() -> npt.NDArray[np.int32] | None:
+            empty = np.empty(0, np.uint64)
+            column = np.concatenate([empty, *(part.astype(np.uint64) for part in self.pieces)])
+            if column.size == 0:
+                return None
+            if column.size != 2 * self.rows:
+                raise ValueError(
+                    f"the column pieces holds {column.size} numbers for {self.rows} answers"
+                )
+            # sint32: 0, -1, 1, -2 ... travel as 0, 1, 2, 3 ...
+            half = (column >> np.uint64(1)).astype(np.int64)
+            signed = np.where(column & np.uint64(1), ~half, half)
+            return signed.astype(np.int32).reshape(-1, 2)
+
         wanted = self.wanted
         within = None
         if wanted.clearance is not None:
@@ -237,6 +260,7 @@ class ColumnReader:
             messages(wanted.analysis, self.analyses, "analyses"),
             messages(wanted.certificate, self.certificates, "certificates"),
             self.problems,
+            deciding(),
         )
 
 

@@ -75,6 +75,15 @@ class HullVersion:
 
 
 @dataclass(frozen=True)
+class DecidingPiece:
+    """Of a body, the piece of the pair of pieces that decided. index: in the order of the body,
+    from 0. hull: the hull of the piece that the answer was computed from."""
+
+    index: int
+    hull: HullVersion
+
+
+@dataclass(frozen=True)
 class Separation:
     """|value - true separation| <= bound, and the sign of the value agrees with the relation; in
     the caller's length unit.
@@ -183,8 +192,10 @@ class Collision:
 
     relation: exact, unless WITHIN_TOLERANCE. axis, analysis, certificate, separation, witness:
     where they were wanted and there is one, else None. within_clearance: whether separation <=
-    clearance; None where no clearance was wanted. hull_a, hull_b: the revisions that the answer is
-    about.
+    clearance; None where no clearance was wanted. hull_a, hull_b: the hulls or bodies that the
+    answer is about, and their revisions. piece_a, piece_b: of a body, the piece that decided; axis,
+    analysis and witness are those of its hull. None of a hull, and where no pair of pieces decided
+    alone.
     """
 
     relation: Relation
@@ -198,6 +209,8 @@ class Collision:
     witness: Witness | None
     within_clearance: bool | None
     header: Header
+    piece_a: DecidingPiece | None = None
+    piece_b: DecidingPiece | None = None
     _question: tuple[Placement, Placement] | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
@@ -221,6 +234,8 @@ class Collision:
             ("decided by", self.rung.name),
             ("A", f"{self.hull_a.hull_id} (revision {self.hull_a.revision})"),
             ("B", f"{self.hull_b.hull_id} (revision {self.hull_b.revision})"),
+            ("piece of A", _named(self.piece_a)),
+            ("piece of B", _named(self.piece_b)),
             ("separation", separation and f"{separation.value!r} within {separation.bound!r}"),
             ("point of A", witness and witness.point_a),
             ("point of B", witness and witness.point_b),
@@ -229,6 +244,12 @@ class Collision:
         ]
         viewer = self._viewer or Viewer.absent("this answer did not come from a server")
         return viewer.html(rows, Placements.of(self._question or ()), [(0, 1)])
+
+
+def _named(piece: DecidingPiece | None) -> str | None:
+    if piece is None:
+        return None
+    return f"{piece.index}: {piece.hull.hull_id} (revision {piece.hull.revision})"
 
 
 @dataclass(frozen=True)
@@ -240,7 +261,8 @@ class Answers:
     x 2 x 3: the point of A, then that of B, world frame), witness_errors (m), NaN in rows that have
     none; within_clearance (m, bool); axes, analyses, certificates, None in rows that have none.
     What was not wanted is None. problems: by row, why it has no answer although both its placements
-    could.
+    could. pieces: m x 2, of bodies the pieces that decided, by index; -1 for a hull, and where no
+    pair of pieces decided alone; None where no placement is a body.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -254,6 +276,7 @@ class Answers:
     analyses: Sequence[Analysis | None] | None
     certificates: Sequence[Certificate | None] | None
     problems: Mapping[int, Problem]
+    pieces: npt.NDArray[np.int32] | None = None
 
     def __len__(self) -> int:
         return len(self.relations)

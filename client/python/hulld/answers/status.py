@@ -26,19 +26,23 @@ class Limits:
     max_waiting_calls: int
     max_streams_per_client: int
     max_concurrent_batches: int
+    max_pieces_per_body: int
     #: Seconds for one request, or one message of a collision stream; None: unlimited.
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
+    #: Of a client, which is a token or, without tokens, an address.
+    max_calls_per_client: int
+    max_batches_per_client: int
 
 
 @dataclass(frozen=True)
 class ServerStatus:
     """What runs, since when, and how much it holds.
 
-    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb" or "memory". hull_count,
-    vertex_count: None where the token is limited to a prefix, as it may not see the sizes of
-    others.
+    version: as in "0.1.0". uptime: seconds. store_kind: "rocksdb", "postgres" or "memory".
+    hull_count, vertex_count: None where the token is limited to a prefix, as it may not see the
+    sizes of others.
     """
 
     header: Header

@@ -10,15 +10,28 @@ from typing import Any, Generic, Literal, TypeVar
 import numpy.typing as npt
 import numpy as np
 
-from hulld.answers import collision_messages, hulls, status
+from hulld.answers import bodies, collision_messages, hulls, status
+from hulld.answers.bodies import Body, BodyPage, ReplacedBody
 from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
 from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo, MeshPart
 from hulld.answers.status import ServerStatus
 from hulld.calls.wanted import Wanted
-from hulld.geometry.placements import PlacementLike, Placements, as_placement
-from hulld.geometry.poses import pack_pose
+from hulld.geometry.placements import (
+    PlacementLike,
+    Placements,
+    PlacementsLike,
+    as_placement,
+)
+from hulld.geometry.poses import PoseLike, pack_pose
 from hulld.notebook import Viewer
-from hulld.v1 import collision_pb2, geometry_pb2, hull_pb2, maintenance_pb2, status_pb2
+from hulld.v1 import (
+    body_pb2,
+    collision_pb2,
+    geometry_pb2,
+    hull_pb2,
+    maintenance_pb2,
+    status_pb2,
+)
 from hulld.wire import MessageWriter
 
 T = TypeVar("T")
@@ -37,7 +50,7 @@ class Call(Generic[T]):
 def method_path(service: str, name: str) -> str:
     """gRPC's path of a call of the contract, as in "/hulld.v1.HullService/GetHull". KeyError: there
     is none."""
-    for module in (hull_pb2, collision_pb2, status_pb2, maintenance_pb2):
+    for module in (hull_pb2, body_pb2, collision_pb2, status_pb2, maintenance_pb2):
         found = module.DESCRIPTOR.services_by_name.get(service)
         if found is not None:
             return f"/{found.full_name}/{found.methods_by_name[name].name}"
@@ -135,6 +148,62 @@ def delete_hull(hull_id: str, if_revision: int | None) -> Call[Header]:
     )
 
 
+def _put_placement(target: Any, hull_id: str, pose: PoseLike) -> None:
+    """Into a Placement of the contract."""
+    target.hull_id = hull_id
+    if pose is None:
+        return
+    w, x, y, z, tx, ty, tz = (float(number) for number in pack_pose(pose))
+    target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
+    target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
+
+
+def put_body(body_id: str, pieces: PlacementsLike, if_revision: int | None) -> Call[ReplacedBody]:
+    request = body_pb2.PutBodyRequest(body_id=body_id, if_revision=if_revision)
+    packed = Placements.of(pieces)
+    for index, pose in zip(packed.indices, packed.poses):
+        _put_placement(request.pieces.add(), packed.ids[index], pose)
+    # To put the same again does no harm; a revision that matched does so no more.
+    return Call(
+        method_path("BodyService", "PutBody"),
+        request.SerializeToString(),
+        bodies.decode_replaced,
+        if_revision is None,
+    )
+
+
+def get_body(body_id: str) -> Call[Body]:
+    request = body_pb2.GetBodyRequest(body_id=body_id)
+    return Call(
+        method_path("BodyService", "GetBody"),
+        request.SerializeToString(),
+        bodies.decode_body,
+        True,
+    )
+
+
+def list_bodies(prefix: str, page_size: int, page_token: str) -> Call[BodyPage]:
+    def decode(data: bytes) -> BodyPage:
+        page = bodies.decode_page(data)
+        if page.next_page and page.next_page == page_token:
+            raise ValueError("the server answered a page that continues with itself")
+        return page
+
+    request = body_pb2.ListBodiesRequest(prefix=prefix, page_size=page_size, page_token=page_token)
+    return Call(method_path("BodyService", "ListBodies"), request.SerializeToString(), decode, True)
+
+
+def delete_body(body_id: str, if_revision: int | None) -> Call[Header]:
+    request = body_pb2.DeleteBodyRequest(body_id=body_id, if_revision=if_revision)
+    # As delete_hull.
+    return Call(
+        method_path("BodyService", "DeleteBody"),
+        request.SerializeToString(),
+        bodies.decode_deleted,
+        False,
+    )
+
+
 def watch_hulls(prefix: str, hull_id: str | None, after: Header | None) -> Call[HullChanges]:
     request = hull_pb2.WatchHullsRequest(
         prefix=prefix,
@@ -171,11 +240,7 @@ def check_collision(
         method=collision_pb2.Method.Name(int(method)), tolerance=tolerance, wanted=wanted.message()
     )
     for placement, target in zip(question, (request.a, request.b)):
-        target.hull_id = placement.id
-        if placement.pose is not None:
-            w, x, y, z, tx, ty, tz = (float(number) for number in pack_pose(placement.pose))
-            target.pose.rotation.CopyFrom(geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
-            target.pose.translation.CopyFrom(geometry_pb2.Vector3(x=tx, y=ty, z=tz))
+        _put_placement(target, placement.id, placement.pose)
     return Call(
         method_path("CollisionService", "CheckCollision"),
         request.SerializeToString(),

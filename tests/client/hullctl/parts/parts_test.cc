@@ -62,9 +62,58 @@ TEST_F(HullctlParts, SplitMakesAHullOfEachPart) {
   // The boxes share corners, so they hang together.
   ran = Ask(
       {"append", "k", bracket_.path(), "--split", "components", "--create", "--output", "name"});
-  EXPECT_EQ(ran.out, "k/component-1\n");
+  EXPECT_EQ(ran.out, "k/component-1\nk\n");
   EXPECT_EQ(Ask({"append", "n", bracket_.path(), "--split", "names"}).code, 1);
   EXPECT_EQ(Ask({"append", "n", bracket_.path(), "--split", "names", "--writer", "w"}).code, 2);
+}
+
+TEST_F(HullctlParts, SplitMakesABodyOfTheParts) {
+  const std::vector<std::string> split = {"append",  "l",     bracket_.path(),
+                                          "--split", "names", "--create"};
+  Ran ran = Ask(split);
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("\nbody l created at revision "));
+  EXPECT_THAT(ran.out, HasSubstr(", 2 pieces\n"));
+  EXPECT_EQ(Ask({"body", "get", "l", "--output", "name"}).out, "l/foot\nl/back\n");
+  // Again: the body stays as it is.
+  const std::string before = Ask({"body", "get", "l"}).out;
+  ran = Ask(split);
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("\nbody l has them already, at revision "));
+  EXPECT_EQ(Ask({"body", "get", "l"}).out, before);
+  // A part that it lacks comes behind; one that was moved stays where it is.
+  ASSERT_EQ(Ask({"body", "put", "l", "l/back@0,0,9"}).code, 0);
+  EXPECT_THAT(Ask(split).out, HasSubstr("\nbody l extended at revision "));
+  EXPECT_THAT(AskJson({"body", "get", "l"}).out, HasSubstr("\"z\":9"));
+  EXPECT_EQ(Ask({"body", "get", "l", "--output", "name"}).out, "l/back\nl/foot\n");
+  ran = AskJson({"append", "j", bracket_.path(), "--split", "names", "--create"});
+  EXPECT_THAT(ran.out, HasSubstr("{\"bodyId\":\"j\",\"pieces\":\"2\",\"added\":\"2\","));
+}
+
+TEST_F(HullctlParts, SplitChangesNothingWhereAHullHasTheName) {
+  Put("l", server::Cube());
+  const std::string before = Ask({"list"}).out;
+  Ran ran = Ask({"append", "l", bracket_.path(), "--split", "names", "--create"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("there is a hull \"l\""));
+  EXPECT_EQ(Ask({"list"}).out, before);
+  ran = Ask({"append", "n", bracket_.path(), "--split", "names"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("body \"n\" not found"));
+  EXPECT_EQ(Ask({"list"}).out, before);
+}
+
+TEST_F(HullctlParts, CoverTakesTheBodyAtItsPoses) {
+  ASSERT_EQ(Ask({"append", "l", bracket_.path(), "--split", "names", "--create"}).code, 0);
+  Ran ran = Ask({"cover", "l", bracket_.path()});
+  EXPECT_EQ(ran.out, "ENCLOSED: each of the 24 triangles is in the hulls together (exact)\n");
+  // Moved by the smallest step, it encloses the mesh no more.
+  ASSERT_EQ(Ask({"body", "put", "moved", "l/foot@0,0,5e-324", "l/back"}).code, 0);
+  EXPECT_EQ(Ask({"cover", "moved", bracket_.path(), "--output", "name"}).out, "OUTSIDE\n");
+  ASSERT_EQ(Ask({"body", "put", "half", "l/foot", "nail"}).code, 0);
+  ran = Ask({"cover", "half", bracket_.path()});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("body \"half\": piece 1: hull \"nail\" not found"));
 }
 
 TEST_F(HullctlParts, CoverTellsWhatSticksOut) {

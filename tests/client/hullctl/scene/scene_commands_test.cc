@@ -85,7 +85,108 @@ TEST_F(HullctlScene, DeleteRemovesWhatTheFileDefines) {
   EXPECT_EQ(Ask({"scene", "delete", cell_.path()}).code, 2);
   EXPECT_EQ(Ask({"scene", "delete", cell_.path(), "--yes"}).code, 0);
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "other\n");
-  EXPECT_EQ(Ask({"scene", "delete", cell_.path(), "--yes"}).out, "# none of the hulls is there\n");
+  EXPECT_EQ(Ask({"scene", "delete", cell_.path(), "--yes"}).out,
+            "# nothing that the file defines is there\n");
+}
+
+class HullctlSceneBodies : public HullctlOnServer {
+ protected:
+  static std::string Cell(const std::string& second_pose) {
+    return "prefix: cell/\nhulls:\n  bar: {box: [4, 1, 1]}\n  cube: {box: [1, 1, 1]}\nbodies:\n"
+           "  ell:\n    - {hull: bar}\n    - {hull: cube, at: " +
+           second_pose +
+           "}\nplace:\n  ell: {body: ell}\n  turned: {body: ell, at: [0, 0, 0, 1, 9, 0, 0]}\n"
+           "  probe: {hull: cube, at: [1.5, 1.75, 0]}\nask: {separation: true}\n";
+  }
+
+  const TempFile cell_{"cell.yaml", Cell("[1.5, 1, 0]")};
+};
+
+TEST_F(HullctlSceneBodies, ApplyPutsBodiesBehindTheirHullsAndOnce) {
+  const std::string to_do =
+      "+ cell/bar\tto create\n+ cell/cube\tto create\n+ cell/ell\tbody to create\n"
+      "# 0 hulls and 0 bodies are as the file has them\n";
+  EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).out, to_do);
+  EXPECT_EQ(Ask({"scene", "apply", cell_.path(), "--dry-run"}).out, to_do);
+  EXPECT_EQ(Ask({"body", "list", "--output", "name"}).out, "");
+  Ran ran = Ask({"scene", "apply", cell_.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("+ cell/cube\tcreated\n+ cell/ell\tbody created\n"));
+  // Again nothing is put: the body keeps its revision.
+  const std::string before = Ask({"body", "get", "cell/ell"}).out;
+  EXPECT_THAT(before, HasSubstr("cell/cube  1.5,1,0"));
+  EXPECT_EQ(Ask({"scene", "apply", cell_.path()}).out,
+            "# 2 hulls and 1 bodies are as the file has them\n");
+  EXPECT_EQ(Ask({"body", "get", "cell/ell"}).out, before);
+  EXPECT_EQ(Ask({"scene", "diff", cell_.path()}).code, 0);
+}
+
+TEST_F(HullctlSceneBodies, APoseThatDiffersInOneBitIsPutAnew) {
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  const TempFile moved("moved.yaml", Cell("[1.5000000000000002, 1, 0]"));
+  const TempFile signed_zero("zero.yaml", Cell("[1.5, 1, -0.0]"));
+  for (const TempFile* file : {&moved, &signed_zero}) {
+    Ran ran = Ask({"scene", "diff", file->path()});
+    EXPECT_EQ(ran.code, 1);
+    EXPECT_THAT(ran.out, HasSubstr("~ cell/ell\tbody to replace\n# 2 hulls and 0 bodies"));
+    EXPECT_THAT(Ask({"scene", "apply", file->path()}).out, HasSubstr("~ cell/ell\tbody replaced"));
+    EXPECT_EQ(Ask({"scene", "diff", file->path()}).code, 0);
+    ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  }
+  ASSERT_EQ(Ask({"body", "put", "cell/ell", "cell/cube@1.5,1,0", "cell/bar"}).code, 0);
+  EXPECT_THAT(Ask({"scene", "diff", cell_.path()}).out, HasSubstr("~ cell/ell\tbody to replace"));
+}
+
+TEST_F(HullctlSceneBodies, CheckNamesBodiesAndThePiecesThatDecided) {
+  Ran ran = Ask({"scene", "check", cell_.path()});
+  EXPECT_EQ(ran.code, 4);
+  EXPECT_THAT(ran.err, HasSubstr("placement ell: "));
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  ran = Ask({"scene", "check", cell_.path()});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, testing::StartsWith("ell\tprobe\tOVERLAPPING\t-0.25"));
+  EXPECT_THAT(ran.out, HasSubstr("\tpieces cube -\n# touching 0 overlapping 1 failed 0\n"));
+  EXPECT_EQ(Ask({"scene", cell_.path()}).out, ran.out);
+  EXPECT_EQ(Ask({"batch", cell_.path(), "--output", "name"}).out,
+            "ell\tturned\tSEPARATED\nell\tprobe\tOVERLAPPING\nturned\tprobe\tSEPARATED\n");
+  EXPECT_THAT(Ask({"batch", cell_.path()}).out, HasSubstr("\tpieces cube -\n"));
+  // The answers of a stream have the same names.
+  EXPECT_THAT(Ask({"stream", cell_.path()}).out, HasSubstr("0\tell\tprobe\tOVERLAPPING"));
+}
+
+TEST_F(HullctlSceneBodies, QuestionsAboutHullsAloneTakePieces) {
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  Ran ran = Ask({"batch", cell_.path(), "--verify"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("ell/cube\tprobe\tOVERLAPPING"));
+  ran = Ask({"watch", "--scene", cell_.path(), "--until-synced"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("ENTER\tell/cube\tprobe\t"));
+}
+
+TEST_F(HullctlSceneBodies, PruneAndDeleteRemoveBodiesBeforeHulls) {
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  ASSERT_EQ(Ask({"body", "put", "cell/stray", "cell/cube"}).code, 0);
+  ASSERT_EQ(Ask({"body", "put", "other", "cell/cube"}).code, 0);
+  ASSERT_EQ(Ask({"create", "cell/a"}).code, 0);
+  EXPECT_THAT(Ask({"scene", "diff", cell_.path()}).out,
+              HasSubstr("? cell/stray\tbody not in the file\n? cell/a\tnot in the file\n"));
+  EXPECT_THAT(Ask({"scene", "apply", cell_.path(), "--prune"}).out,
+              HasSubstr("- cell/stray\tbody deleted\n- cell/a\tdeleted\n"));
+  Ran ran = Ask({"scene", "delete", cell_.path()});
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("3 bodies and hulls (cell/ell, cell/bar, cell/cube)"));
+  ran = Ask({"scene", "delete", cell_.path(), "--yes", "--output", "name"});
+  EXPECT_EQ(ran.out, "cell/ell\ncell/bar\ncell/cube\n");
+  EXPECT_EQ(Ask({"body", "list", "--output", "name"}).out, "other\n");
+  EXPECT_EQ(Ask({"list", "--output", "name"}).out, "");
+}
+
+TEST_F(HullctlSceneBodies, AHullOfTheNameIsRefused) {
+  ASSERT_EQ(Ask({"create", "cell/ell"}).code, 0);
+  const Ran ran = Ask({"scene", "apply", cell_.path()});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("\"cell/ell\""));
 }
 
 TEST_F(HullctlScene, AMissingFileNamesItsPlace) {

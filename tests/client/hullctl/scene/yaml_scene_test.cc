@@ -46,8 +46,8 @@ std::string ErrorOf(const std::string& text) {
 }
 
 // The names of the pairs that are asked about.
-std::vector<std::string> PairsIn(const std::string& text) {
-  const auto scene = ToScene(Parse(text), "cell.yaml");
+std::vector<std::string> PairsIn(const std::string& text, BodyForm form = BodyForm::kPieces) {
+  const auto scene = ToScene(Parse(text), "cell.yaml", form);
   EXPECT_TRUE(scene.ok()) << scene.status();
   const auto pairs = PairsOf(*scene, "cell.yaml");
   EXPECT_TRUE(pairs.ok()) << pairs.status();
@@ -75,8 +75,39 @@ TEST(YamlScene, DefinitionsAreRead) {
   EXPECT_EQ(scene.wanted.clearance(), 0.01);
 }
 
+TEST(YamlScene, BodiesArePlacedWhole) {
+  const auto scene = ToScene(Parse(kCell), "cell.yaml", BodyForm::kWhole);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_THAT(scene->names, ElementsAre("floor", "wall", "left", "right"));
+  EXPECT_EQ(scene->PlacementOf(2).hull_id(), "cell/corner");
+  EXPECT_EQ(scene->PlacementOf(2).pose().translation().x(), 10);
+  EXPECT_THAT(PairsIn(kCell, BodyForm::kWhole), ElementsAre("wall right", "left right"));
+  // What decided is named as the file names it; -1 and what the file does not know are not.
+  EXPECT_THAT(scene->NamesOfPieces(2, 3, {1, 2}), ElementsAre("wedge-2", "spider"));
+  EXPECT_THAT(scene->NamesOfPieces(0, 3, {-1, 3}), ElementsAre("", ""));
+}
+
+TEST(YamlScene, BodiesArePutAsTheyAreWritten) {
+  const v1::PutBodyRequest request = BodyRequest(Parse(kCell).bodies[0]);
+  EXPECT_EQ(request.body_id(), "cell/corner");
+  ASSERT_EQ(request.pieces_size(), 3);
+  EXPECT_EQ(request.pieces(0).hull_id(), "cell/wedge");
+  EXPECT_EQ(request.pieces(0).pose().translation().x(), 1);
+  EXPECT_FALSE(request.pieces(1).has_pose());
+  EXPECT_EQ(request.pieces(2).hull_id(), "spider");
+  EXPECT_EQ(request.pieces(2).pose().rotation().z(), 1);
+}
+
+TEST(YamlScene, CertificatesAreAskedOfPieces) {
+  const auto scene = ToScene(Parse("hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}]}\n"
+                                   "place: {b: {body: b}}\nask: {certificate: true}"),
+                             "cell.yaml", BodyForm::kWhole);
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_THAT(scene->names, ElementsAre("b/h"));
+}
+
 TEST(YamlScene, BodiesBecomeTheirPieces) {
-  const auto scene = ToScene(Parse(kCell), "cell.yaml");
+  const auto scene = ToScene(Parse(kCell), "cell.yaml", BodyForm::kPieces);
   ASSERT_TRUE(scene.ok()) << scene.status();
   EXPECT_THAT(scene->names,
               ElementsAre("floor", "wall", "left/wedge", "left/wedge-2", "left/spider",

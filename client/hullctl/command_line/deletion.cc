@@ -1,0 +1,38 @@
+#include "client/hullctl/command_line/deletion.h"
+
+#include <absl/strings/str_cat.h>
+#include <unistd.h>
+
+#include <iostream>
+
+namespace hulld {
+namespace {
+
+std::string Naming(const std::vector<std::string>& ids) {
+  constexpr size_t kNamed = 5;
+  std::string text;
+  for (size_t i = 0; i < ids.size() && i < kNamed; ++i) {
+    absl::StrAppend(&text, i > 0 ? ", " : "", ids[i]);
+  }
+  if (ids.size() > kNamed) absl::StrAppend(&text, ", ...");
+  return text;
+}
+
+}  // namespace
+
+absl::StatusOr<bool> ConfirmDeletion(const Invocation& run, const std::vector<std::string>& ids,
+                                     const std::string& one, const std::string& many) {
+  const bool is_terminal = isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
+  if (!is_terminal) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("this would delete ", ids.size(), " ", many, " (", Naming(ids),
+                     "); say --yes if that is meant, as nobody can be asked here"));
+  }
+  run.err << "Delete " << ids.size() << " " << (ids.size() == 1 ? one : many) << " (" << Naming(ids)
+          << ")? [y/N] " << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "Y" || answer == "yes";
+}
+
+}  // namespace hulld

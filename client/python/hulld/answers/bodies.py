@@ -1,0 +1,102 @@
+"""Answers about bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hulld.answers.hulls import Durability, Header, enum_or_zero, header_of
+from hulld.geometry.placements import Placements
+from hulld.v1 import body_pb2
+
+
+@dataclass(frozen=True)
+class BodyInfo:
+    """A body without its pieces.
+
+    revision: at which its pieces were put last. create_revision: tells incarnations of one ID
+    apart. damaged: what the store keeps of it is damaged; calls that need it raise DataLossError,
+    other fields may be missing, and put_body and delete_body end that.
+    """
+
+    body_id: str
+    create_revision: int
+    revision: int
+    piece_count: int
+    damaged: bool = False
+
+
+@dataclass(frozen=True)
+class Body:
+    """pieces: in the order in which they were put, each a hull at a pose in the frame of the body;
+    the numbers of the poses are those that were put."""
+
+    info: BodyInfo
+    pieces: Placements
+    header: Header
+
+
+@dataclass(frozen=True)
+class ReplacedBody:
+    """created: there was no body before."""
+
+    body: BodyInfo
+    created: bool
+    durability: Durability
+    header: Header
+
+
+@dataclass(frozen=True)
+class BodyPage:
+    """One page of a list; next_page: empty on the last."""
+
+    bodies: Sequence[BodyInfo]
+    next_page: str
+
+
+def _info_of(message: Any) -> BodyInfo:
+    return BodyInfo(
+        message.body_id,
+        message.create_revision,
+        message.revision,
+        message.piece_count,
+        message.damaged,
+    )
+
+
+def decode_replaced(data: bytes) -> ReplacedBody:
+    message = body_pb2.PutBodyResponse.FromString(data)
+    return ReplacedBody(
+        _info_of(message.body),
+        message.created,
+        enum_or_zero(Durability, message.durability),
+        header_of(message.header),
+    )
+
+
+def decode_body(data: bytes) -> Body:
+    message = body_pb2.GetBodyResponse.FromString(data)
+    places: dict[str, int] = {}
+    indices = np.empty(len(message.pieces), np.uint32)
+    poses = np.zeros((len(message.pieces), 7))
+    for row, piece in enumerate(message.pieces):
+        indices[row] = places.setdefault(piece.hull_id, len(places))
+        q, t = piece.pose.rotation, piece.pose.translation
+        turned = piece.pose.HasField("rotation")
+        poses[row, :4] = (q.w, q.x, q.y, q.z) if turned else (1, 0, 0, 0)
+        poses[row, 4:] = (t.x, t.y, t.z)
+    return Body(
+        _info_of(message.body), Placements(list(places), poses, indices), header_of(message.header)
+    )
+
+
+def decode_page(data: bytes) -> BodyPage:
+    message = body_pb2.ListBodiesResponse.FromString(data)
+    return BodyPage([_info_of(body) for body in message.bodies], message.next_page_token)
+
+
+def decode_deleted(data: bytes) -> Header:
+    return header_of(body_pb2.DeleteBodyResponse.FromString(data).header)

@@ -1,0 +1,144 @@
+// Which server is active, and how that ends.
+#include <absl/status/status.h>
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "server/store/postgres/postgres_store.h"
+
+namespace hulld::server {
+namespace {
+
+// Names the advisory lock of the active server within its database: "hulld" as a number.
+constexpr uint64_t kLock = 0x68756c6c64;
+constexpr int kBeatsPerMeasure = 10;
+
+}  // namespace
+
+// Whether there are tables of ours. FAILED_PRECONDITION: of a newer hulld.
+absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
+  const absl::StatusOr<Rows> exists = session.Run("SELECT to_regclass('hulld.store') IS NOT NULL");
+  if (!exists.ok()) return exists.status();
+  if (exists->at(0, 0) != "t") return false;
+  const absl::StatusOr<Rows> format = session.Run("SELECT format FROM hulld.store");
+  if (!format.ok()) return format.status();
+  uint64_t number = 0;
+  if (format->count() != 1 || !absl::SimpleAtoi(std::string(format->at(0, 0)), &number)) {
+    return absl::DataLossError("the row of hulld.store is missing");
+  }
+  if (number <= kFormat) return true;
+  return absl::FailedPreconditionError(absl::StrCat("it was written in format ", number,
+                                                    "; this hulld knows format ", kFormat,
+                                                    " at most; run the hulld that wrote it"));
+}
+
+absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {
+  const absl::StatusOr<Rows> locked =
+      session.Run(absl::StrCat("SELECT pg_try_advisory_lock(", kLock, ")"));
+  if (!locked.ok()) return locked.status();
+  return locked->at(0, 0) == "t";
+}
+
+absl::StatusOr<std::string> PostgresStore::Owner(Session& session) const {
+  const absl::StatusOr<Rows> owner = session.Run("SELECT owner FROM hulld.store");
+  if (!owner.ok()) return owner.status();
+  return owner->count() == 0 ? "" : std::string(owner->at(0, 0));
+}
+
+absl::Status PostgresStore::Superseded(std::string_view owner) {
+  return absl::UnavailableError(absl::StrCat(
+      "another hulld took over the store", owner.empty() ? "" : " (", std::string(owner),
+      owner.empty() ? "" : ")", ": this one ends and changes nothing; call that one"));
+}
+
+void PostgresStore::Keep() {
+  bool failing = false;
+  std::unique_lock lock(mutex_);
+  for (int beat = 1; !wake_.wait_for(lock, options_.beat, [this] { return ending_; }); ++beat) {
+    lock.unlock();
+    absl::Status status = Beat();
+    if (status.ok() && beat % kBeatsPerMeasure == 0) status = MeasureDisk();
+    if (!status.ok()) {
+      keeper_session_ = nullptr;
+      has_lock_ = false;
+    }
+    if (!status.ok() && !failing) {
+      spdlog::error("cannot ask the database whether this is the active server: {}",
+                    std::string(status.message()));
+    }
+    if (status.ok() && failing) spdlog::warn("the database answers again");
+    failing = !status.ok();
+    lock.lock();
+    if (!ended_.ok()) return;
+  }
+}
+
+absl::Status PostgresStore::Beat() {
+  if (keeper_session_ == nullptr) {
+    absl::StatusOr<std::unique_ptr<Session>> session = OpenKeeper();
+    if (!session.ok()) return session.status();
+    keeper_session_ = *std::move(session);
+  }
+  const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
+  if (!owner.ok()) return owner.status();
+  if (*owner != owner_) {
+    End(Superseded(*owner));
+    return absl::OkStatus();
+  }
+  if (has_lock_) return absl::OkStatus();
+  const absl::StatusOr<bool> locked = TryLock(*keeper_session_);
+  if (!locked.ok()) return locked.status();
+  has_lock_ = *locked;
+  return absl::OkStatus();
+}
+
+// What the tables take, as far as the role may ask.
+absl::Status PostgresStore::MeasureDisk() {
+  const absl::StatusOr<Rows> size = keeper_session_->Run(
+      "SELECT sum(pg_total_relation_size(oid)) FROM pg_class "
+      "WHERE relnamespace = 'hulld'::regnamespace AND relkind = 'r'");
+  if (!size.ok()) return size.status();
+  StoreDisk disk;
+  if (size->count() != 1 || !absl::SimpleAtoi(std::string(size->at(0, 0)), &disk.bytes)) {
+    return absl::OkStatus();
+  }
+  const std::lock_guard lock(mutex_);
+  disk_ = disk;
+  return absl::OkStatus();
+}
+
+std::optional<StoreDisk> PostgresStore::disk() const {
+  const std::lock_guard lock(mutex_);
+  return disk_;
+}
+
+// This is not the active server any more, and never will be again.
+void PostgresStore::End(const absl::Status& reason) {
+  std::function<void()> on_ended;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!ended_.ok()) return;
+    ended_ = reason;
+    on_ended = on_ended_;
+  }
+  spdlog::critical("{}", std::string(reason.message()));
+  if (on_ended) on_ended();
+}
+
+absl::Status PostgresStore::ended() const {
+  const std::lock_guard lock(mutex_);
+  return ended_;
+}
+
+void PostgresStore::OnEnded(std::function<void()> ended) {
+  {
+    const std::lock_guard lock(mutex_);
+    on_ended_ = ended;
+    if (ended_.ok()) return;
+  }
+  ended();
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,305 @@
+// How the store is opened: its sessions, its tables, and its turn.
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "server/contract/status_map.h"
+#include "server/process/random_id.h"
+#include "server/store/postgres/batch_statements.h"
+#include "server/store/postgres/postgres_store.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr int kMostReaders = 8;
+constexpr int kLeastServerVersion = 140'000;
+// Between attempts of who waits for its turn.
+constexpr std::chrono::milliseconds kFirstTurnPause{10};
+constexpr std::chrono::milliseconds kLongestTurnPause{250};
+
+// hulld.store has one row. `revision`, and `batch`, the number of batches, are those of the last
+// one that was committed. `epoch` and `owner` are of the server that is active; a batch writes its
+// own epoch as `written_in`, and store_fence refuses it when that is not the same. `relaxed`: with
+// synchronous_commit = off, from the start of a server until it ends in order.
+//
+// hulld.epochs tells what each epoch began with. The other tables hold what store_keys.h lists, by
+// the ID of the hull or body first; an incarnation is a create_revision. record, body, sequence and
+// vertices are sealed values. Coordinates do not compress, hence EXTERNAL.
+//
+// Plain tables and statements, so that databases that speak PostgreSQL's protocol and spread rows
+// by key could take them.
+constexpr char kTables[] = R"(
+  CREATE TABLE hulld.store (
+    one boolean PRIMARY KEY DEFAULT true CHECK (one),
+    format bigint NOT NULL,
+    store_id text NOT NULL,
+    revision bigint NOT NULL,
+    batch bigint NOT NULL,
+    epoch bigint NOT NULL,
+    owner text NOT NULL,
+    written_in bigint NOT NULL,
+    relaxed boolean NOT NULL,
+    CONSTRAINT store_fence CHECK (written_in = epoch));
+  CREATE TABLE hulld.epochs (
+    epoch bigint PRIMARY KEY,
+    owner text NOT NULL,
+    began timestamptz NOT NULL DEFAULT now(),
+    batch bigint NOT NULL,
+    revision bigint NOT NULL);
+  CREATE TABLE hulld.hulls (
+    hull_id text COLLATE "C" PRIMARY KEY,
+    record bytea NOT NULL);
+  CREATE TABLE hulld.bodies (
+    body_id text COLLATE "C" PRIMARY KEY,
+    body bytea NOT NULL);
+  CREATE TABLE hulld.writers (
+    hull_id text COLLATE "C",
+    incarnation bigint,
+    writer_id text COLLATE "C",
+    sequence bytea NOT NULL,
+    PRIMARY KEY (hull_id, incarnation, writer_id));
+  CREATE TABLE hulld.bases (
+    hull_id text COLLATE "C",
+    incarnation bigint,
+    revision bigint,
+    part integer,
+    vertices bytea NOT NULL,
+    PRIMARY KEY (hull_id, incarnation, revision, part));
+  CREATE TABLE hulld.deltas (
+    hull_id text COLLATE "C",
+    incarnation bigint,
+    revision bigint,
+    vertices bytea NOT NULL,
+    PRIMARY KEY (hull_id, incarnation, revision));
+  ALTER TABLE hulld.bases ALTER COLUMN vertices SET STORAGE EXTERNAL;
+  ALTER TABLE hulld.deltas ALTER COLUMN vertices SET STORAGE EXTERNAL;)";
+
+// Of every session. The database gives up what is asked by a server that is gone, or that stands
+// still while it holds locks; the times are a choice, as those in conninfo.cc, and shorter than
+// PostgresOptions::answer_time. Every statement has an index to go by, also where a plan was made
+// when its table was small.
+constexpr char kSettings[] = R"(
+  SET search_path = '';
+  SET default_transaction_isolation = 'read committed';
+  SET enable_seqscan = off;
+  SET jit = off;
+  SET lock_timeout = '15s';
+  SET idle_in_transaction_session_timeout = '10s';
+  SET client_connection_check_interval = '2s';
+  SET tcp_keepalives_idle = 5;
+  SET tcp_keepalives_interval = 2;
+  SET tcp_keepalives_count = 3;)";
+
+constexpr char kPrepareClaims[] = R"(
+    PREPARE hulld_fence(bigint, bigint, bigint) AS
+      UPDATE hulld.store SET revision = $1, batch = $2, written_in = $3;
+    PREPARE hulld_claim(text, text, boolean) AS
+      WITH claimed AS (
+        UPDATE hulld.store SET epoch = epoch + 1, written_in = epoch + 1, owner = $1,
+          store_id = CASE WHEN relaxed THEN $2 ELSE store_id END, relaxed = $3
+        RETURNING epoch, batch, revision, store_id),
+      noted AS (
+        INSERT INTO hulld.epochs (epoch, owner, batch, revision)
+        SELECT epoch, $1, batch, revision FROM claimed)
+      SELECT epoch, batch, revision, store_id FROM claimed;
+    PREPARE hulld_reclaim(text) AS
+      WITH claimed AS (
+        UPDATE hulld.store SET epoch = epoch + 1, written_in = epoch + 1 WHERE owner = $1
+        RETURNING epoch, batch, revision),
+      noted AS (
+        INSERT INTO hulld.epochs (epoch, owner, batch, revision)
+        SELECT epoch, $1, batch, revision FROM claimed)
+      SELECT epoch, batch FROM claimed;
+    PREPARE hulld_next_epoch(bigint) AS
+      SELECT batch FROM hulld.epochs WHERE epoch > $1 ORDER BY epoch LIMIT 1;
+    PREPARE hulld_rename(text) AS
+      UPDATE hulld.store SET store_id = $1, written_in = epoch;
+    PREPARE hulld_close(bigint) AS
+      UPDATE hulld.store SET relaxed = false, written_in = $1;)";
+
+constexpr char kPrepareReads[] = R"(
+    PREPARE hulld_owner AS SELECT owner FROM hulld.store;
+    PREPARE hulld_hulls_after(text, integer) AS
+      SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2;
+    PREPARE hulld_bodies_after(text, integer) AS
+      SELECT body_id, body FROM hulld.bodies WHERE body_id > $1 ORDER BY body_id LIMIT $2;
+    PREPARE hulld_base(text, bigint, bigint) AS
+      SELECT part, vertices FROM hulld.bases
+      WHERE hull_id = $1 AND incarnation = $2 AND revision = $3 ORDER BY part;
+    PREPARE hulld_deltas(text, bigint, bigint, bigint) AS
+      SELECT revision, vertices FROM hulld.deltas
+      WHERE hull_id = $1 AND incarnation = $2 AND revision > $3 AND revision <= $4
+      ORDER BY revision;
+    PREPARE hulld_sequence(text, bigint, text) AS
+      SELECT sequence FROM hulld.writers
+      WHERE hull_id = $1 AND incarnation = $2 AND writer_id = $3;)";
+
+// Machine and process for an operator; the rest makes it unique.
+std::string OwnerName() {
+  char host[256] = "";
+  gethostname(host, sizeof host - 1);
+  return absl::StrCat(host, " process ", getpid(), " ", RandomId());
+}
+
+// What failed, for whoever starts a server.
+absl::Status OpenFailed(const absl::Status& status) {
+  std::string advice;
+  if (SqlState(status) == "42501") {
+    advice =
+        "; the schema \"hulld\" and its tables must belong to the role of hulld, or the role must "
+        "be allowed to make them: CREATE SCHEMA hulld AUTHORIZATION the_role";
+  }
+  return absl::Status(status.code(),
+                      absl::StrCat("the store in PostgreSQL (--postgres-conninfo-file): ",
+                                   status.message(), advice));
+}
+
+}  // namespace
+
+PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
+    : options_(std::move(options)),
+      conninfo_(std::move(conninfo)),
+      owner_(OwnerName()),
+      readers_([this] { return OpenReader(); }, kMostReaders) {}
+
+absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
+  absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(options.conninfo);
+  if (!conninfo.ok()) {
+    return Prefixed("--postgres-conninfo-file: ", conninfo.status());
+  }
+  std::unique_ptr<PostgresStore> store(new PostgresStore(std::move(options), *std::move(conninfo)));
+  absl::StatusOr<std::unique_ptr<Session>> session = store->OpenKeeper();
+  if (!session.ok()) return OpenFailed(session.status());
+  store->keeper_session_ = *std::move(session);
+  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok()) return OpenFailed(s);
+  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(s);
+  if (absl::Status s = store->MakeSchema(*store->keeper_session_); !s.ok()) return OpenFailed(s);
+  if (absl::Status s = store->Begin(); !s.ok()) return OpenFailed(s);
+  store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
+  return store;
+}
+
+absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenSession(
+    const std::string& settings) const {
+  absl::StatusOr<std::unique_ptr<Session>> session = Session::Open(conninfo_, options_.answer_time);
+  if (!session.ok()) return session;
+  const absl::Status set = (*session)->Run(absl::StrCat(kSettings, settings)).status();
+  if (!set.ok()) return set;
+  return session;
+}
+
+absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenWriter() const {
+  return OpenSession(absl::StrCat("SET synchronous_commit = ", synchronous_commit_, ";",
+                                  kPrepareClaims, PrepareBatchStatements()));
+}
+
+absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
+  return OpenSession(
+      absl::StrCat("SET statement_timeout = ", options_.answer_time.count(), ";", kPrepareReads));
+}
+
+// The database ends this session, and with it our turn, when no beat has come for a while.
+absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
+  const auto patience = 10 * options_.beat;
+  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
+                                  "; SET idle_session_timeout = ", patience.count()));
+}
+
+// What the server is and how it commits.
+absl::Status PostgresStore::CheckServer(Session& session) {
+  if (session.server_version() < kLeastServerVersion) {
+    return absl::FailedPreconditionError(absl::StrCat("the database is PostgreSQL ",
+                                                      session.server_version() / 10'000,
+                                                      "; hulld needs 14 or later"));
+  }
+  const absl::StatusOr<Rows> settings =
+      session.Run("SELECT current_setting('synchronous_commit'), current_setting('fsync')");
+  if (!settings.ok()) return settings.status();
+  synchronous_commit_ = std::string(settings->at(0, 0));
+  const bool is_sync = synchronous_commit_ != "off" && settings->at(0, 1) == "on";
+  durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
+  return CheckFormat(session).status();
+}
+
+// What a server that is killed meanwhile leaves is nothing, or all.
+absl::Status PostgresStore::MakeSchema(Session& session) {
+  const absl::StatusOr<bool> exists = CheckFormat(session);
+  if (!exists.ok()) return exists.status();
+  if (*exists) return absl::OkStatus();
+  const absl::StatusOr<Rows> schema =
+      session.Run("SELECT 1 FROM pg_namespace WHERE nspname = 'hulld'");
+  if (!schema.ok()) return schema.status();
+  const absl::Status made =
+      session
+          .Run(absl::StrCat("BEGIN;", schema->count() == 0 ? "CREATE SCHEMA hulld;" : "", kTables,
+                            "INSERT INTO hulld.store (format, store_id, revision, batch, epoch, "
+                            "owner, written_in, relaxed) VALUES (",
+                            kFormat, ", '", RandomId(), "', 0, 0, 0, '', 0, false); COMMIT;"))
+          .status();
+  if (!made.ok()) session.Run("ROLLBACK").status().IgnoreError();
+  return made;
+}
+
+// The store is ours from here on.
+absl::Status PostgresStore::Begin() {
+  absl::StatusOr<std::unique_ptr<Session>> writer = OpenWriter();
+  if (!writer.ok()) return writer.status();
+  writer_ = *std::move(writer);
+  const bool is_relaxed = durability_ == Durability::kRelaxed;
+  const absl::StatusOr<Rows> former = writer_->Run("SELECT store_id, relaxed FROM hulld.store");
+  if (!former.ok()) return former.status();
+  const absl::StatusOr<Rows> claimed = writer_->Ask(
+      {.name = "hulld_claim", .parameters = {owner_, RandomId(), std::string(1, is_relaxed)}});
+  if (!claimed.ok()) return claimed.status();
+  if (claimed->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
+  epoch_ = claimed->bigint(0, 0);
+  batch_ = claimed->bigint(0, 1);
+  revision_ = claimed->bigint(0, 2);
+  id_ = std::string(claimed->at(0, 3));
+  if (id_ != former->at(0, 0)) {
+    spdlog::warn(
+        "store {} was open with synchronous_commit = off and was not closed: what it acknowledged "
+        "last may be lost; at revision {} this is store {}",
+        std::string(former->at(0, 0)), revision_, id_);
+  }
+  spdlog::info(
+      "hulls live in {}, PostgreSQL {}; an acknowledged change is {} (synchronous_commit = "
+      "{}); epoch {}",
+      writer_->Describe(), writer_->server_version() / 10'000,
+      is_relaxed ? "committed there, but an outage may lose it" : "committed there",
+      synchronous_commit_, epoch());
+  MeasureDisk().IgnoreError();
+  return absl::OkStatus();
+}
+
+absl::Status PostgresStore::WaitForTurn() {
+  if (options_.take_over) return absl::OkStatus();
+  // Soon at first: a server that was killed just now is still leaving.
+  for (auto pause = kFirstTurnPause;; pause = std::min(2 * pause, kLongestTurnPause)) {
+    absl::StatusOr<bool> locked = absl::UnavailableError("");
+    if (keeper_session_ != nullptr) locked = TryLock(*keeper_session_);
+    has_lock_ = locked.ok() && *locked;
+    if (has_lock_) return absl::OkStatus();
+    if (!locked.ok()) {
+      // A database that is started again, or that another took the place of, is waited for, too.
+      absl::StatusOr<std::unique_ptr<Session>> session = OpenKeeper();
+      keeper_session_ = session.ok() ? *std::move(session) : nullptr;
+    } else if (pause < kLongestTurnPause && 2 * pause >= kLongestTurnPause) {
+      const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
+      spdlog::info(
+          "another hulld is active over this database ({}): this one waits until that ends; with "
+          "--take-over it would not",
+          owner.ok() && !owner->empty() ? *owner : "it just starts");
+    }
+    if (options_.should_stop && options_.should_stop()) {
+      return absl::CancelledError("told to end before its turn came");
+    }
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+}  // namespace hulld::server

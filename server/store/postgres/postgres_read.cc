@@ -1,0 +1,114 @@
+// How the store is read: all hulls, the vertices of one, a sequence.
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+
+#include <utility>
+
+#include "server/store/postgres/postgres_store.h"
+#include "server/store/sealed_hull.h"
+#include "server/store/store_errors.h"
+#include "server/store/store_keys.h"
+
+namespace hulld::server {
+namespace {
+
+// Rows that are read at a time: some 100 bytes each, but for bodies of many pieces.
+constexpr uint32_t kRowsPerPortion = 4096;
+
+}  // namespace
+
+// Who else became active meanwhile may have changed what was read. The owner is asked last, so all
+// that came before is of a time when it was still us; what was found missing or damaged, too.
+absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> statements) {
+  if (absl::Status s = ended(); !s.ok()) return s;
+  statements.push_back({.name = "hulld_owner"});
+  absl::StatusOr<std::vector<Rows>> rows = readers_.Ask(statements);
+  if (!rows.ok()) {
+    ++read_failures_;
+    return absl::UnavailableError(
+        absl::StrCat("cannot read from the database: ", rows.status().message()));
+  }
+  const Rows owner = std::move(rows->back());
+  rows->pop_back();
+  if (owner.count() == 1 && owner.at(0, 0) == owner_) return rows;
+  End(Superseded(owner.count() == 1 ? owner.at(0, 0) : ""));
+  return ended();
+}
+
+absl::Status PostgresStore::ForEachRow(
+    const char* statement, const std::function<void(const std::string&, std::string_view)>& visit) {
+  std::string last;
+  while (true) {
+    std::vector<Statement> statements(1);
+    statements[0] = {.name = statement, .parameters = {last, EncodeInteger(kRowsPerPortion)}};
+    const absl::StatusOr<std::vector<Rows>> answers = Read(std::move(statements));
+    if (!answers.ok()) return answers.status();
+    const Rows& rows = answers->front();
+    for (int i = 0; i < rows.count(); ++i) {
+      last = std::string(rows.at(i, 0));
+      visit(last, rows.at(i, 1));
+    }
+    if (static_cast<uint32_t>(rows.count()) < kRowsPerPortion) return absl::OkStatus();
+  }
+}
+
+absl::Status PostgresStore::ForEachHull(const StoredHullVisitor& visit) {
+  return ForEachRow("hulld_hulls_after", [&](const std::string& hull_id, std::string_view sealed) {
+    visit(hull_id, UnsealStoredHull(hull_id, sealed));
+  });
+}
+
+absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
+  return ForEachRow("hulld_bodies_after", [&](const std::string& body_id, std::string_view sealed) {
+    visit(body_id, UnsealStoredBody(body_id, sealed));
+  });
+}
+
+absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {
+  const std::string& id = hull.record.hull_id;
+  const uint64_t incarnation = hull.record.create_revision;
+  const std::string incarnation_parameter = EncodeBigint(incarnation);
+  const std::string base_parameter = EncodeBigint(hull.layout.base_revision);
+  const absl::StatusOr<std::vector<Rows>> rows =
+      Read({{.name = "hulld_base", .parameters = {id, incarnation_parameter, base_parameter}},
+            {.name = "hulld_deltas",
+             .parameters = {id, incarnation_parameter, base_parameter,
+                            EncodeBigint(hull.record.revision)}}});
+  if (!rows.ok()) return rows.status();
+  const Rows& base = (*rows)[0];
+  const Rows& deltas = (*rows)[1];
+  VertexAssembly assembly(hull);
+  absl::Status status;
+  for (int i = 0; status.ok() && assembly.wants_base_part(); ++i) {
+    const uint32_t part = assembly.next_part();
+    absl::StatusOr<std::string_view> value = absl::DataLossError("it is missing");
+    if (i < base.count() && base.bigint(i, 0) == part) {
+      value = Unseal(BaseKey(incarnation, hull.layout.base_revision, part), base.at(i, 1));
+    }
+    status = assembly.AddBasePart(value);
+  }
+  for (int i = 0; status.ok() && i < deltas.count(); ++i) {
+    const uint64_t revision = deltas.bigint(i, 0);
+    status = assembly.AddDelta(revision, Unseal(DeltaKey(incarnation, revision), deltas.at(i, 1)));
+  }
+  return std::move(assembly).Finish(std::move(status));
+}
+
+absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
+                                                     const std::string& writer_id) {
+  const uint64_t incarnation = hull.create_revision;
+  std::vector<Statement> statements(1);
+  statements[0] = {.name = "hulld_sequence",
+                   .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}};
+  const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+  if (!rows.ok()) return rows.status();
+  if (rows->front().count() == 0) return 0;
+  const absl::StatusOr<std::string_view> value =
+      Unseal(WriterKey(incarnation, writer_id), rows->front().at(0, 0));
+  const absl::StatusOr<uint64_t> sequence = value.ok() ? DecodeNumber(*value) : value.status();
+  if (sequence.ok()) return sequence;
+  return DamagedHull(hull.hull_id,
+                     absl::StrCat("a writer's sequence: ", sequence.status().message()));
+}
+
+}  // namespace hulld::server

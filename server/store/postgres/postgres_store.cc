@@ -1,0 +1,218 @@
+// How the store is written: commits, what became of them, and the end.
+#include "server/store/postgres/postgres_store.h"
+
+#include <absl/status/status.h>
+#include <absl/strings/cord.h>
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "server/process/random_id.h"
+#include "server/store/postgres/batch_statements.h"
+
+namespace hulld::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Between attempts to reach the database.
+constexpr std::chrono::milliseconds kFirstPause{10};
+constexpr std::chrono::milliseconds kLongestPause{500};
+
+absl::Status OutcomeUnknown(const absl::Status& cause) {
+  return absl::UnavailableError(absl::StrCat(
+      "the database was lost while it committed (", cause.message(),
+      "), and cannot be asked yet whether it did: nobody sees the change, but it may appear if the "
+      "server is restarted; look whether it did before you repeat it"));
+}
+
+absl::Status Refused(const absl::Status& cause) {
+  absl::Status status(
+      cause.code(),
+      absl::StrCat(
+          "cannot write to the database (", cause.message(),
+          "); nothing was changed; repeat it once that is repaired, no restart is needed"));
+  cause.ForEachPayload(
+      [&](absl::string_view name, const absl::Cord& payload) { status.SetPayload(name, payload); });
+  return status;
+}
+
+}  // namespace
+
+PostgresStore::~PostgresStore() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  wake_.notify_all();
+  if (keeper_.joinable()) keeper_.join();
+  if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
+  // Who waits need not wait until the database sees that the session is closed.
+  if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
+}
+
+// Its sync takes along what was committed before. If it fails, the mark stays.
+void PostgresStore::EndRelaxedRun() {
+  if (writer_ == nullptr || !writer_->Run("SET synchronous_commit = on").ok()) return;
+  writer_->Ask({.name = "hulld_close", .parameters = {EncodeBigint(epoch())}})
+      .status()
+      .IgnoreError();
+}
+
+absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
+  ++write_failures_;
+  return status;
+}
+
+// One transaction. Lost: it may have been committed. Other errors: it was not.
+absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t batch) {
+  uint64_t revision = 0;
+  for (const Change* change : changes) revision = std::max(revision, change->revision);
+  std::vector<Statement> statements;
+  statements.push_back({.text = "BEGIN"});
+  // First, so that a server that was superseded writes nothing.
+  statements.push_back(
+      {.name = "hulld_fence",
+       .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch())}});
+  std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
+  statements.push_back({.text = "COMMIT"});
+  writer_->TakeWarned();
+  const absl::Status status = writer_->Ask(statements).status();
+  if (status.ok() && !writer_->TakeWarned()) return status;
+  if (status.ok()) {
+    // As when somebody ended the wait for a standby: it is committed, but not where it was to be.
+    writer_ = nullptr;
+    return absl::Status(absl::StatusCode::kUnavailable, "PostgreSQL warned while it committed");
+  }
+  // A transaction that failed cannot be committed, and ends with its session at the latest.
+  if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
+  return status;
+}
+
+// Whether batch was committed. UNAVAILABLE: that could not be found out until the deadline.
+absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_point deadline) {
+  for (std::chrono::milliseconds pause = kFirstPause;; pause = std::min(2 * pause, kLongestPause)) {
+    const absl::StatusOr<bool> outcome = Reclaim(batch);
+    if (outcome.ok()) return outcome;
+    writer_ = nullptr;
+    if (Clock::now() + pause >= deadline) return outcome;
+    std::unique_lock lock(mutex_);
+    if (wake_.wait_for(lock, pause, [this] { return ending_; })) return outcome;
+  }
+}
+
+// Raises the epoch in a new session. That waits until the transaction of the batch, which has
+// locked the row, has ended, and takes its right to write from it if it has not come so far. Its
+// sync takes along what was committed before.
+absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
+  absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
+  if (!session.ok()) return session.status();
+  writer_ = *std::move(session);
+  const absl::StatusOr<Rows> claimed =
+      writer_->Ask({.name = "hulld_reclaim", .parameters = {owner_}});
+  if (!claimed.ok()) return claimed.status();
+  if (writer_->TakeWarned()) return absl::UnavailableError("PostgreSQL warned while it committed");
+  if (claimed->count() == 0) return OutcomeBeforeOthers(batch);
+  epoch_ = claimed->bigint(0, 0);
+  const uint64_t found = claimed->bigint(0, 1);
+  if (found >= batch_) return found >= batch;
+  // The database lost what it had said to have: an outage without sync, or it was put back to an
+  // earlier time. Its revisions will be given to other changes, so this is another store now.
+  const absl::StatusOr<Rows> renamed =
+      writer_->Ask({.name = "hulld_rename", .parameters = {RandomId()}});
+  if (!renamed.ok()) return renamed.status();
+  End(absl::UnavailableError(absl::StrCat(
+      "the database has lost ", batch_ - found,
+      " batches that this server had committed in it (a standby that was behind, a restored "
+      "backup, or an outage with synchronous_commit = off): this server ends; the next one serves "
+      "what is there, as another store")));
+  return false;
+}
+
+// The first epoch after ours tells how many batches there were when it began.
+absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
+  const absl::StatusOr<Rows> next =
+      writer_->Ask({.name = "hulld_next_epoch", .parameters = {EncodeBigint(epoch())}});
+  if (!next.ok()) return next.status();
+  if (next->count() == 0) {
+    End(absl::UnavailableError(
+        "the database was put back to a time before this server became active: this server ends"));
+    return false;
+  }
+  End(Superseded(""));
+  return next->bigint(0, 0) >= batch;
+}
+
+absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
+  if (absl::Status s = ended(); !s.ok()) return s;
+  if (!unknown_.ok()) return unknown_;
+  const uint64_t batch = batch_ + 1;
+  const Clock::time_point deadline = Clock::now() + options_.patience;
+  while (true) {
+    if (writer_ == nullptr) {
+      // What the session before was doing is settled.
+      absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
+      if (!session.ok()) return WriteFailed(Refused(session.status()));
+      writer_ = *std::move(session);
+    }
+    const absl::Status status = Attempt(changes, batch);
+    if (status.ok()) {
+      batch_ = batch;
+      return status;
+    }
+    if (ViolatedConstraint(status) == "store_fence") {
+      ++write_failures_;
+      End(Superseded(""));
+      return ended();
+    }
+    // An answer of the database, which is: no.
+    if (!SqlState(status).empty()) return WriteFailed(Refused(status));
+    const absl::StatusOr<bool> committed = FindOutcome(batch, deadline);
+    if (!committed.ok()) {
+      unknown_ = OutcomeUnknown(status);
+      return WriteFailed(unknown_);
+    }
+    spdlog::warn("the database was lost while it committed ({}); the batch was {}",
+                 std::string(status.message()), *committed ? "committed" : "not committed");
+    if (*committed) {
+      batch_ = batch;
+      return absl::OkStatus();
+    }
+    if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
+    if (Clock::now() >= deadline) return WriteFailed(Refused(status));
+  }
+}
+
+// Finds out what is not known. What was refused and is there after all cannot be taken back, so
+// the server that refused it ends, and the next one serves it.
+absl::Status PostgresStore::Recover() {
+  if (absl::Status s = ended(); !s.ok()) return s;
+  if (unknown_.ok()) return absl::OkStatus();
+  const absl::StatusOr<bool> committed = Reclaim(batch_ + 1);
+  if (!committed.ok()) {
+    writer_ = nullptr;
+    ++write_failures_;
+    return OutcomeUnknown(committed.status());
+  }
+  unknown_ = absl::OkStatus();
+  if (*committed) {
+    End(absl::UnavailableError(
+        "the database has committed changes whose outcome was reported as unknown: this server "
+        "ends, as what it has in memory is behind; start it again to serve them"));
+  }
+  if (absl::Status s = ended(); !s.ok()) return s;
+  spdlog::warn("the database can be written again");
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::string> PostgresStore::MakeCopy() {
+  return absl::FailedPreconditionError(
+      "the store is PostgreSQL (--store=postgres), whose own tools save it: pg_dump "
+      "--schema=hulld, "
+      "or pg_basebackup with an archive of its log");
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,176 @@
+#ifndef HULLD_SERVER_STORE_POSTGRES_POSTGRES_STORE_H_
+#define HULLD_SERVER_STORE_POSTGRES_POSTGRES_STORE_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "server/store/postgres/conninfo.h"
+#include "server/store/postgres/session.h"
+#include "server/store/postgres/session_pool.h"
+#include "server/store/store.h"
+
+namespace hulld::server {
+
+struct PostgresOptions {
+  // A connection string of libpq.
+  std::string conninfo;
+  // Takes the store from the server that is active, instead of waiting for its end.
+  bool take_over = false;
+  // Asked while this waits for the active server; may be empty.
+  std::function<bool()> should_stop;
+  // How long nothing may come from the database while an answer is due. Longer than kLockTime.
+  std::chrono::milliseconds answer_time{30'000};
+  // How long a commit tries to find out what became of it, or to repeat what did not happen, when
+  // it has lost its session.
+  std::chrono::milliseconds patience{10'000};
+  // How often this looks whether it is still the active server, and the database whether this is
+  // still there: ten times that after the last look.
+  std::chrono::milliseconds beat{1000};
+};
+
+// Keeps hulls in the schema "hulld" of a PostgreSQL database (14 or later); see postgres_open.cc
+// for its tables. Their rows hold the same values, sealed with the same keys, as the RocksDB store.
+//
+// Any number of servers may be started over one database; one is active, the others wait in Open.
+// The active one holds an advisory lock in a session of its own, which ends with it, or soon after
+// it stands still. That lock is for order alone. What keeps two servers apart is the epoch in the
+// row of the store, which each server raises when it becomes active: every transaction of a batch
+// writes the epoch that it belongs to beside it, and a constraint of the table refuses another. So
+// a server that was superseded can commit nothing, whatever it believes, and neither can what a
+// network delivers late.
+//
+// A batch of changes is one transaction, sent in one piece. When the session is lost before its
+// outcome is known, the store raises the epoch again, in a new session: that waits for the
+// transaction if it is still there, and nothing of it can follow. How many batches there were then
+// tells whether it was committed. Nobody is told anything before.
+class PostgresStore : public Store {
+ public:
+  // Waits while another server is active, unless take_over. Makes the schema where there is none.
+  // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld made the schema, or
+  // the database is too old. CANCELLED: should_stop said so. DATA_LOSS: the row of the store is not
+  // there. UNAVAILABLE: it cannot connect, or may not do what it must.
+  static absl::StatusOr<std::unique_ptr<PostgresStore>> Open(PostgresOptions options);
+
+  ~PostgresStore() override;
+
+  std::string kind() const override { return "postgres"; }
+  std::string id() const override { return id_; }
+  // As synchronous_commit was for our sessions when this was opened, which they keep.
+  Durability durability() const override { return durability_; }
+  bool keeps_hulls() const override { return true; }
+  uint64_t revision() const override { return revision_; }
+  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
+  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
+  absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
+  absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
+                                        const std::string& writer_id) override;
+  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Recover() override;
+  StoreFailures failures() const override {
+    return {.write = write_failures_.load(std::memory_order_relaxed),
+            .sync = 0,
+            .read = read_failures_.load(std::memory_order_relaxed)};
+  }
+  std::optional<StoreDisk> disk() const override;
+  absl::StatusOr<std::string> MakeCopy() override;
+  void OnEnded(std::function<void()> ended) override;
+
+  // The version of the tables.
+  static constexpr uint64_t kFormat = 1;
+  // The epoch of this server, which only grows.
+  uint64_t epoch() const { return epoch_.load(); }
+
+ private:
+  PostgresStore(PostgresOptions options, Conninfo conninfo);
+
+  absl::StatusOr<std::unique_ptr<Session>> OpenSession(const std::string& settings) const;
+  absl::StatusOr<std::unique_ptr<Session>> OpenWriter() const;
+  absl::StatusOr<std::unique_ptr<Session>> OpenReader() const;
+  absl::StatusOr<std::unique_ptr<Session>> OpenKeeper() const;
+
+  // Opening, in this order.
+  absl::Status CheckServer(Session& session);
+  absl::Status WaitForTurn();
+  absl::Status MakeSchema(Session& session);
+  absl::Status Begin();
+
+  // Becoming active, and staying so.
+  absl::StatusOr<bool> CheckFormat(Session& session) const;
+  absl::StatusOr<bool> TryLock(Session& session) const;
+  absl::StatusOr<std::string> Owner(Session& session) const;
+  void Keep();
+  absl::Status Beat();
+  absl::Status MeasureDisk();
+  void End(const absl::Status& reason);
+  // Why this is not the active server. owner: which is, if that is known.
+  static absl::Status Superseded(std::string_view owner);
+  absl::Status ended() const;
+
+  // Committing. batch: its number.
+  absl::Status Attempt(std::span<const Change* const> changes, uint64_t batch);
+  absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
+  absl::StatusOr<bool> Reclaim(uint64_t batch);
+  absl::StatusOr<bool> OutcomeBeforeOthers(uint64_t batch);
+  absl::Status WriteFailed(const absl::Status& status);
+  void EndRelaxedRun();
+
+  // Every row of a table, in byte order of the IDs: its ID and its sealed value.
+  absl::Status ForEachRow(const char* statement,
+                          const std::function<void(const std::string&, std::string_view)>& visit);
+  // The answers to statements, asked while this was the active server.
+  absl::StatusOr<std::vector<Rows>> Read(std::vector<Statement> statements);
+
+  const PostgresOptions options_;
+  const Conninfo conninfo_;
+  // Who we are in the database: unique, and tells an operator which process it is.
+  const std::string owner_;
+  std::string id_;
+  uint64_t revision_ = 0;
+  Durability durability_ = Durability::kSync;
+  // The value of synchronous_commit.
+  std::string synchronous_commit_;
+  std::atomic<uint64_t> epoch_ = 0;
+
+  // Commit, Recover and the end, which come one at a time.
+  std::unique_ptr<Session> writer_;
+  // Batches that are committed, as far as is known.
+  uint64_t batch_ = 0;
+  // Set: what became of batch_ + 1 is not known.
+  absl::Status unknown_;
+
+  SessionPool readers_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  // Guarded by mutex_.
+  bool ending_ = false;
+  absl::Status ended_;
+  std::function<void()> on_ended_;
+  std::optional<StoreDisk> disk_;
+
+  std::atomic<uint64_t> write_failures_ = 0;
+  std::atomic<uint64_t> read_failures_ = 0;
+
+  // The keeper's own, once it runs.
+  std::unique_ptr<Session> keeper_session_;
+  bool has_lock_ = false;
+  std::thread keeper_;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_POSTGRES_POSTGRES_STORE_H_

@@ -1,0 +1,215 @@
+#include "server/store/postgres/session.h"
+
+#include <absl/strings/ascii.h>
+#include <absl/strings/cord.h>
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_replace.h>
+#include <poll.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "server/contract/error_info.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr char kLostPayload[] = "hulld/postgres/lost";
+constexpr char kStatePayload[] = "hulld/postgres/sqlstate";
+constexpr char kConstraintPayload[] = "hulld/postgres/constraint";
+constexpr char kDiskFull[] = "53100";
+
+std::string PayloadOf(const absl::Status& status, const char* name) {
+  const absl::optional<absl::Cord> payload = status.GetPayload(name);
+  return payload.has_value() ? std::string(*payload) : "";
+}
+
+// libpq ends its messages with a line feed, and some hold several lines.
+std::string OneLine(const char* message) {
+  return absl::StrReplaceAll(absl::StripAsciiWhitespace(message), {{"\n\t", " "}, {"\n", "; "}});
+}
+
+std::string FieldOf(const PGresult* result, int field) {
+  const char* const text = PQresultErrorField(result, field);
+  return text == nullptr ? "" : text;
+}
+
+bool IsError(const PGresult* result) {
+  switch (PQresultStatus(result)) {
+    case PGRES_COMMAND_OK:
+    case PGRES_TUPLES_OK:
+    case PGRES_EMPTY_QUERY:
+    case PGRES_PIPELINE_SYNC:
+      return false;
+    default:
+      return true;
+  }
+}
+
+}  // namespace
+
+bool IsLost(const absl::Status& status) { return status.GetPayload(kLostPayload).has_value(); }
+
+std::string SqlState(const absl::Status& status) { return PayloadOf(status, kStatePayload); }
+
+std::string ViolatedConstraint(const absl::Status& status) {
+  return PayloadOf(status, kConstraintPayload);
+}
+
+absl::StatusOr<std::unique_ptr<Session>> Session::Open(const Conninfo& conninfo,
+                                                       std::chrono::milliseconds answer_time) {
+  std::vector<const char*> keywords;
+  std::vector<const char*> values;
+  for (const auto& [keyword, value] : conninfo.parameters()) {
+    keywords.push_back(keyword.c_str());
+    values.push_back(value.c_str());
+  }
+  keywords.push_back(nullptr);
+  values.push_back(nullptr);
+  std::unique_ptr<Session> session(
+      new Session(PQconnectdbParams(keywords.data(), values.data(), 0), answer_time));
+  PGconn* const connection = session->connection_.get();
+  if (PQstatus(connection) != CONNECTION_OK) {
+    return session->Lost(absl::StrCat("cannot connect: ", OneLine(PQerrorMessage(connection))));
+  }
+  if (PQsetnonblocking(connection, 1) != 0) return session->Lost("cannot go on without blocking");
+  PQsetNoticeReceiver(connection, &NoteWarning, session.get());
+  return session;
+}
+
+Session::Session(PGconn* connection, std::chrono::milliseconds answer_time)
+    : connection_(connection, PQfinish), answer_time_(answer_time) {}
+
+void Session::NoteWarning(void* session, const PGresult* result) {
+  if (FieldOf(result, PG_DIAG_SEVERITY_NONLOCALIZED) == "WARNING") {
+    static_cast<Session*>(session)->warned_ = true;
+  }
+}
+
+std::string Session::Describe() const {
+  return absl::StrCat("database ", PQdb(connection_.get()), " at ", PQhost(connection_.get()));
+}
+
+absl::Status Session::Lost(const std::string& what) {
+  lost_ = absl::UnavailableError(what);
+  lost_.SetPayload(kLostPayload, absl::Cord("1"));
+  return lost_;
+}
+
+// Waits until a result can be taken without waiting.
+absl::Status Session::AwaitResult() {
+  PGconn* const connection = connection_.get();
+  while (true) {
+    const int unsent = PQflush(connection);
+    if (unsent < 0) return Lost(OneLine(PQerrorMessage(connection)));
+    if (PQisBusy(connection) == 0) return absl::OkStatus();
+    pollfd socket = {PQsocket(connection),
+                     static_cast<short>(unsent > 0 ? POLLIN | POLLOUT : POLLIN), 0};
+    const int ready = poll(&socket, 1, static_cast<int>(answer_time_.count()));
+    if (ready < 0 && errno != EINTR) return Lost(std::strerror(errno));
+    if (ready == 0) return Lost(absl::StrCat("no answer for ", answer_time_.count(), " ms"));
+    if (ready > 0 && (socket.revents & ~POLLOUT) != 0 && PQconsumeInput(connection) == 0) {
+      return Lost(OneLine(PQerrorMessage(connection)));
+    }
+  }
+}
+
+absl::StatusOr<PGresult*> Session::NextResult() {
+  if (absl::Status s = AwaitResult(); !s.ok()) return s;
+  return PQgetResult(connection_.get());
+}
+
+absl::Status Session::ErrorOf(const PGresult* result) {
+  const std::string state = FieldOf(result, PG_DIAG_SQLSTATE);
+  // Not the details, which quote data.
+  std::string message = FieldOf(result, PG_DIAG_MESSAGE_PRIMARY);
+  if (message.empty()) message = OneLine(PQresultErrorMessage(result));
+  const std::string severity = FieldOf(result, PG_DIAG_SEVERITY_NONLOCALIZED);
+  if (PQstatus(connection_.get()) == CONNECTION_BAD || state.empty() || severity == "FATAL" ||
+      severity == "PANIC") {
+    return Lost(message);
+  }
+  absl::Status status = absl::UnavailableError(message);
+  if (state == kDiskFull) {
+    status = WithReason(absl::ResourceExhaustedError(message), v1::ERROR_REASON_DISK_FULL);
+  }
+  status.SetPayload(kStatePayload, absl::Cord(state));
+  status.SetPayload(kConstraintPayload, absl::Cord(FieldOf(result, PG_DIAG_CONSTRAINT_NAME)));
+  return status;
+}
+
+absl::StatusOr<Rows> Session::Run(const std::string& text) {
+  if (!lost_.ok()) return lost_;
+  if (PQsendQuery(connection_.get(), text.c_str()) == 0) {
+    return Lost(OneLine(PQerrorMessage(connection_.get())));
+  }
+  Rows rows(nullptr);
+  absl::Status failure;
+  while (true) {
+    const absl::StatusOr<PGresult*> result = NextResult();
+    if (!result.ok()) return result.status();
+    if (*result == nullptr) break;
+    rows = Rows(*result);
+    if (failure.ok() && IsError(*result)) failure = ErrorOf(*result);
+  }
+  if (!failure.ok()) return failure;
+  return rows;
+}
+
+absl::Status Session::Send(const Statement& statement) {
+  constexpr int kBinary = 1;
+  std::vector<const char*> values;
+  std::vector<int> lengths;
+  for (const std::string& parameter : statement.parameters) {
+    values.push_back(parameter.data());
+    lengths.push_back(static_cast<int>(parameter.size()));
+  }
+  const std::vector<int> formats(values.size(), kBinary);
+  const int count = static_cast<int>(values.size());
+  const int sent = statement.name != nullptr
+                       ? PQsendQueryPrepared(connection_.get(), statement.name, count,
+                                             values.data(), lengths.data(), formats.data(), kBinary)
+                       : PQsendQueryParams(connection_.get(), statement.text, count, nullptr,
+                                           values.data(), lengths.data(), formats.data(), kBinary);
+  if (sent == 0) return Lost(OneLine(PQerrorMessage(connection_.get())));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Rows>> Session::Ask(std::span<const Statement> statements) {
+  if (!lost_.ok()) return lost_;
+  PGconn* const connection = connection_.get();
+  if (PQenterPipelineMode(connection) == 0) return Lost("a statement is under way");
+  for (const Statement& statement : statements) {
+    if (absl::Status s = Send(statement); !s.ok()) return s;
+  }
+  if (PQpipelineSync(connection) == 0) return Lost(OneLine(PQerrorMessage(connection)));
+  std::vector<Rows> rows;
+  absl::Status failure;
+  bool synced = false;
+  while (!synced) {
+    const absl::StatusOr<PGresult*> result = NextResult();
+    if (!result.ok()) return result.status();
+    if (*result == nullptr) {
+      // The end of one statement's results.
+      if (PQstatus(connection) == CONNECTION_OK) continue;
+      return Lost(OneLine(PQerrorMessage(connection)));
+    }
+    Rows one(*result);
+    synced = PQresultStatus(*result) == PGRES_PIPELINE_SYNC;
+    if (failure.ok() && IsError(*result)) failure = ErrorOf(*result);
+    if (!lost_.ok()) return lost_;
+    if (!synced) rows.push_back(std::move(one));
+  }
+  if (PQexitPipelineMode(connection) == 0) return Lost(OneLine(PQerrorMessage(connection)));
+  if (!failure.ok()) return failure;
+  return rows;
+}
+
+absl::StatusOr<Rows> Session::Ask(Statement statement) {
+  absl::StatusOr<std::vector<Rows>> rows = Ask(std::span<const Statement>(&statement, 1));
+  if (!rows.ok()) return rows.status();
+  return std::move(rows->front());
+}
+
+}  // namespace hulld::server

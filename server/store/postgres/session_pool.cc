@@ -1,0 +1,52 @@
+#include "server/store/postgres/session_pool.h"
+
+#include <absl/status/status.h>
+
+#include <utility>
+
+namespace hulld::server {
+
+absl::StatusOr<std::vector<Rows>> SessionPool::Ask(std::span<const Statement> statements) {
+  absl::Status lost;
+  for (const bool fresh : {false, true}) {
+    absl::StatusOr<std::unique_ptr<Session>> session = Take(fresh);
+    if (!session.ok()) return session.status();
+    absl::StatusOr<std::vector<Rows>> rows = (*session)->Ask(statements);
+    const bool is_lost = IsLost(rows.status());
+    GiveBack(is_lost ? nullptr : *std::move(session));
+    if (!is_lost) return rows;
+    lost = rows.status();
+  }
+  return lost;
+}
+
+// fresh: those that are idle are as old as one that was lost.
+absl::StatusOr<std::unique_ptr<Session>> SessionPool::Take(bool fresh) {
+  std::vector<std::unique_ptr<Session>> old;
+  {
+    std::unique_lock lock(mutex_);
+    free_.wait(lock, [this] { return taken_ < most_; });
+    ++taken_;
+    if (fresh) old.swap(idle_);
+    if (!idle_.empty()) {
+      std::unique_ptr<Session> session = std::move(idle_.back());
+      idle_.pop_back();
+      return session;
+    }
+  }
+  absl::StatusOr<std::unique_ptr<Session>> session = open_();
+  if (!session.ok()) GiveBack(nullptr);
+  return session;
+}
+
+// session: null when it is lost.
+void SessionPool::GiveBack(std::unique_ptr<Session> session) {
+  {
+    const std::lock_guard lock(mutex_);
+    --taken_;
+    if (session != nullptr) idle_.push_back(std::move(session));
+  }
+  free_.notify_one();
+}
+
+}  // namespace hulld::server

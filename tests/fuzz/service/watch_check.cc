@@ -1,0 +1,188 @@
+#include "tests/fuzz/service/watch_check.h"
+
+#include <absl/strings/match.h>
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+
+#include "tests/fuzz/service/reply_check.h"
+
+namespace hulld::fuzz {
+namespace {
+
+bool IsColliding(v1::Relation relation) {
+  return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
+}
+
+// The kind of event that leads from one state to another, as the contract has it.
+v1::CollisionEventKind KindOf(v1::Relation before, bool was_near, v1::Relation after,
+                              bool is_near) {
+  if (after == v1::RELATION_UNSPECIFIED) return v1::COLLISION_EVENT_KIND_LOST;
+  if (after == v1::RELATION_OVERLAPPING && before != after) {
+    return v1::COLLISION_EVENT_KIND_ENTER;
+  }
+  if (after == v1::RELATION_TOUCHING && before != after) return v1::COLLISION_EVENT_KIND_TOUCH;
+  if (after != v1::RELATION_SEPARATED) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+  if (IsColliding(before)) return v1::COLLISION_EVENT_KIND_EXIT;
+  if (is_near == was_near) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
+  return is_near ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
+}
+
+}  // namespace
+
+bool HullWatchCheck::Watches(const std::string& hull_id) const {
+  if (!request_.hull_id().empty()) return hull_id == request_.hull_id();
+  return absl::StartsWith(hull_id, request_.prefix());
+}
+
+std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
+  if (response.anew()) {
+    if (request_.after_revision() == 0) return "a watch from the start starts anew";
+    hulls_.clear();
+    is_synced_ = false;
+    is_anew_ = true;
+  } else if (response.header().revision() < header_.revision()) {
+    return "the revision of a watch falls";
+  }
+  if (response.synced() && is_synced_) return "a watch is synced twice";
+  header_ = response.header();
+  std::string last_id;
+  uint64_t last_revision = 0;
+  for (const v1::HullEvent& event : response.events()) {
+    const v1::HullInfo& hull = event.hull();
+    // What went comes first, then what is there.
+    const bool is_there = !is_synced_ && event.kind() != v1::HULL_EVENT_KIND_DELETED;
+    if (is_there && hull.hull_id() <= last_id) return "events are not in the order of IDs";
+    if (!is_there && (hull.revision() < last_revision || !last_id.empty())) {
+      return "events are not in the order of revisions";
+    }
+    if (is_there) last_id = hull.hull_id();
+    if (!is_there) last_revision = hull.revision();
+    if (std::string finding = TakeEvent(event); !finding.empty()) {
+      return absl::StrCat("watched hull ", hull.hull_id(), ": ", finding);
+    }
+  }
+  is_synced_ = is_synced_ || response.synced();
+  return {};
+}
+
+std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
+  const v1::HullInfo& hull = event.hull();
+  if (!Watches(hull.hull_id())) return "it is not watched";
+  const bool is_resumed = request_.after_revision() > 0 && !is_anew_;
+  const bool was_known = hulls_.count(hull.hull_id()) > 0;
+  if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {
+    if (!is_resumed && !was_known) return "it is gone, and was never there";
+    hulls_.erase(hull.hull_id());
+    return {};
+  }
+  if (is_synced_ == (event.kind() == v1::HULL_EVENT_KIND_PRESENT)) {
+    return absl::StrCat("the kind of the event is ", v1::HullEventKind_Name(event.kind()));
+  }
+  if (event.kind() == v1::HULL_EVENT_KIND_CREATED && was_known) return "it is created again";
+  const bool changes =
+      event.kind() == v1::HULL_EVENT_KIND_CHANGED || event.kind() == v1::HULL_EVENT_KIND_REPLACED;
+  if (changes && !is_resumed && !was_known) return "it changes, and was never told of";
+  hulls_[hull.hull_id()] = hull;
+  if (event.has_box_min() != (hull.vertex_count() > 0) ||
+      event.has_box_max() != event.has_box_min()) {
+    return "its box is there without vertices, or the other way round";
+  }
+  return CheckHullInfo(hull);
+}
+
+CollisionWatchCheck::CollisionWatchCheck(v1::CollisionWatchOpen open) : open_(std::move(open)) {
+  for (int i = 0; i + 1 < open_.pairs_size(); i += 2) {
+    ++named_[{open_.pairs(i), open_.pairs(i + 1)}];
+  }
+}
+
+void CollisionWatchCheck::Sent(const v1::CollisionWatchUpdate& update) {
+  ++sent_;
+  MovePlacements(update, open_.mutable_placements());
+}
+
+bool CollisionWatchCheck::IsWatched(const Pair& pair) const {
+  if (!named_.empty()) return named_.count(pair) > 0;
+  return pair.first < pair.second && pair.second < static_cast<uint32_t>(open_.placements_size()) &&
+         AsksAbout(open_, static_cast<int>(pair.first), static_cast<int>(pair.second));
+}
+
+std::string CollisionWatchCheck::Received(const v1::WatchCollisionsResponse& response) {
+  if (response.update() < told_update_ || response.update() > sent_) {
+    return absl::StrCat("update ", response.update(), " is told of after ", told_update_, ", of ",
+                        sent_);
+  }
+  if (response.header().revision() < revision_) return "the revision of a watch falls";
+  revision_ = response.header().revision();
+  told_update_ = response.update();
+  for (const v1::HullVersion& hull : response.hulls()) {
+    if (hull.revision() == 0) return "a hull has no revision";
+  }
+  for (const v1::PlacementProblem& problem : response.placement_problems()) {
+    if (problem.placement() >= static_cast<uint32_t>(open_.placements_size())) {
+      return "a problem is about no placement";
+    }
+  }
+  for (const v1::CollisionEvent& event : response.events()) {
+    if (std::string finding = TakeEvent(event); !finding.empty()) {
+      return absl::StrCat("pair ", event.placement_a(), " ", event.placement_b(), ": ", finding);
+    }
+  }
+  is_synced_ = response.synced();
+  if (is_synced_) told_now_.clear();
+  return {};
+}
+
+std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
+  const Pair pair = {event.placement_a(), event.placement_b()};
+  if (!IsWatched(pair)) return "it is not watched";
+  const bool is_lost = event.kind() == v1::COLLISION_EVENT_KIND_LOST;
+  if (is_lost != (event.revision_a() == 0) || is_lost != (event.revision_b() == 0)) {
+    return "an event has revisions where it has no answer, or the other way round";
+  }
+  if (event.has_within_clearance() != (open_.has_clearance() && !is_lost)) {
+    return "the clearance is told where nobody asked, or the other way round";
+  }
+  State& state = told_[pair];
+  const State before = state;
+  state = {event.relation(), event.within_clearance()};
+  // A pair that is named twice is told of twice.
+  const auto named = named_.find(pair);
+  if (named != named_.end() && named->second > 1) return {};
+  if (!told_now_.insert(pair).second) return "it is told of twice";
+  const v1::CollisionEventKind kind =
+      KindOf(before.relation, before.is_near, state.relation, state.is_near);
+  if (event.kind() == kind) return {};
+  return absl::StrCat("the event is ", v1::CollisionEventKind_Name(event.kind()), " from ",
+                      v1::Relation_Name(before.relation), " to ",
+                      v1::Relation_Name(state.relation));
+}
+
+std::map<std::pair<uint32_t, uint32_t>, v1::Relation> CollisionWatchCheck::Colliding() const {
+  std::map<Pair, v1::Relation> colliding;
+  for (const auto& [pair, state] : told_) {
+    if (!IsColliding(state.relation)) continue;
+    colliding[std::minmax(pair.first, pair.second)] = state.relation;
+  }
+  return colliding;
+}
+
+v1::BatchCheckCollisionsRequest CollisionWatchCheck::AsBatch() const {
+  v1::BatchCheckCollisionsRequest request;
+  *request.mutable_placements() = open_.placements();
+  if (!named_.empty()) {
+    *request.mutable_pairs() = open_.pairs();
+    return request;
+  }
+  for (uint32_t b = 0; b < static_cast<uint32_t>(open_.placements_size()); ++b) {
+    for (uint32_t a = 0; a < b; ++a) {
+      if (!IsWatched({a, b})) continue;
+      request.add_pairs(a);
+      request.add_pairs(b);
+    }
+  }
+  return request;
+}
+
+}  // namespace hulld::fuzz

@@ -1,0 +1,166 @@
+// What pairs for the textbook hold between their slices, and how it is counted.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/hull/growth/hull_builder.h"
+#include "server/collisions/query_settings.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+class TextbookMemory : public ServerTest {
+ protected:
+  // A sphere whose vertices, multiplied out in integers, take more than the readers' share.
+  void PutLarge() {
+    Config config = TestConfig();
+    config.limits.memory_limit = 35'000'000;
+    Restart(config);
+    Put("large", Sphere(kVertices));
+    Put("cube", Cube(-0.5));
+    // Makes the canonical snapshots.
+    v1::CheckCollisionRequest request = Question("large", "cube");
+    request.set_method(v1::METHOD_UNSPECIFIED);
+    request.mutable_wanted()->set_certificate(true);
+    Check(request);
+    before_ = HeldBytes();
+  }
+  static v1::CheckCollisionRequest Question(const std::string& a, const std::string& b) {
+    v1::CheckCollisionRequest request;
+    request.set_method(v1::METHOD_TEXTBOOK_SAT);
+    *request.mutable_a() = PlacementOf(a);
+    *request.mutable_b() = PlacementOf(b);
+    return request;
+  }
+  // What counts against the limit.
+  double HeldBytes() const {
+    for (const prometheus::MetricFamily& family : server_->metrics().Collect()) {
+      if (family.name == "hulld_cache_bytes") return family.metric.front().gauge.value;
+    }
+    return 0;
+  }
+  bool IsCounted() const { return HeldBytes() > before_ + kVertices * 400.0; }
+  void ExpectRefused(const grpc::Status& status) {
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    EXPECT_THAT(status.error_message(), HasSubstr("(--memory-limit)"));
+  }
+
+  static constexpr int kVertices = 40'000;
+  double before_ = 0;
+};
+
+TEST_F(TextbookMemory, OfAPairThatIsBegunIsCountedAndOthersAreRefused) {
+  PutLarge();
+  grpc::ClientContext context;
+  grpc::Status status;
+  std::atomic<bool> is_answered = false;
+  std::thread first([&] {
+    v1::CheckCollisionResponse response;
+    status = collisions_->CheckCollision(&context, Question("large", "cube"), &response);
+    is_answered = true;
+  });
+  while (!IsCounted() && !is_answered) std::this_thread::yield();
+  EXPECT_FALSE(is_answered);
+  ExpectRefused(CheckError(Question("large", "cube")));
+  // A small pair is answered all the same.
+  EXPECT_EQ(Check(Question("cube", "cube")).relation(), v1::RELATION_OVERLAPPING);
+  context.TryCancel();
+  first.join();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
+}
+
+// Also while it waits for its next slice.
+TEST_F(TextbookMemory, OfABatchIsCountedFromSliceToSlice) {
+  PutLarge();
+  v1::BatchCheckCollisionsRequest request;
+  request.set_method(v1::METHOD_TEXTBOOK_SAT);
+  *request.add_placements() = PlacementOf("large");
+  *request.add_placements() = PlacementOf("cube");
+  request.add_pairs(0);
+  request.add_pairs(1);
+  for (int pair = 0; pair < 100'000; ++pair) {
+    request.add_pairs(1);
+    request.add_pairs(1);
+  }
+  grpc::ClientContext context;
+  const auto reader = collisions_->BatchCheckCollisions(&context, request);
+  std::atomic<bool> is_answered = false;
+  std::thread answers([&] {
+    v1::BatchCheckCollisionsResponse part;
+    while (reader->Read(&part)) {
+      if (part.columns().relations_size() > 0) is_answered = true;
+    }
+  });
+  while (!IsCounted() && !is_answered) std::this_thread::yield();
+  for (int look = 0; look < 100 && !is_answered; ++look) EXPECT_TRUE(IsCounted());
+  ExpectRefused(CheckError(Question("large", "cube")));
+  EXPECT_FALSE(is_answered);
+  context.TryCancel();
+  answers.join();
+  EXPECT_EQ(reader->Finish().error_code(), grpc::StatusCode::CANCELLED);
+}
+
+// Two of these pairs hold more than the readers' share of the limit.
+TEST_F(TextbookMemory, ABatchBeginsOneLargePairAtATime) {
+  Config config = TestConfig();
+  config.limits.memory_limit = 16 << 20;
+  Restart(config);
+  Put("large", Sphere(5000));
+  Put("edge", {-0.25, 0, 0, 0.25, 0, 0});
+  v1::BatchCheckCollisionsRequest request;
+  request.set_method(v1::METHOD_TEXTBOOK_SAT);
+  *request.add_placements() = PlacementOf("large");
+  *request.add_placements() = PlacementOf("edge");
+  for (int pair = 0; pair < 4; ++pair) {
+    request.add_pairs(0);
+    request.add_pairs(1);
+  }
+  grpc::ClientContext context;
+  const auto reader = collisions_->BatchCheckCollisions(&context, request);
+  int overlapping = 0;
+  v1::BatchCheckCollisionsResponse part;
+  while (reader->Read(&part)) {
+    for (const int relation : part.columns().relations()) {
+      overlapping += relation == v1::RELATION_OVERLAPPING ? 1 : 0;
+    }
+  }
+  const grpc::Status status = reader->Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(overlapping, 4);
+}
+
+// Facets have axes, too: a large hull against a point has no pair of edges.
+TEST(TextbookTeam, AnswersLargeHullsAgainstPoints) {
+  const auto hull_of = [](const Coordinates& xyz) {
+    std::vector<Vector> points;
+    for (size_t i = 0; i < xyz.size(); i += 3) points.emplace_back(xyz[i], xyz[i + 1], xyz[i + 2]);
+    HullBuilder builder;
+    EXPECT_TRUE(builder.Add(points).ok());
+    return builder.Snapshot();
+  };
+  const Hull large = hull_of(Sphere(5000));
+  const Hull small = hull_of(Cube());
+  const Hull point = hull_of({0, 0, 0});
+  const QueryHull query_large(large);
+  const QueryHull query_small(small);
+  const QueryHull query_point(point);
+  QueryOptions options;
+  options.method = Method::kTextbookSat;
+  const auto is_for_team = [&](const QueryHull& a, const QueryHull& b) {
+    return IsTextbookForTeam(options, PlacedHull(a, Pose()), PlacedHull(b, Pose()));
+  };
+  EXPECT_TRUE(is_for_team(query_large, query_point));
+  EXPECT_TRUE(is_for_team(query_point, query_large));
+  EXPECT_FALSE(is_for_team(query_small, query_point));
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,123 @@
+// Two processes over one PostgreSQL database: the second waits, and takes over.
+
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <memory>
+#include <string>
+
+#include "hulld/v1/hull.grpc.pb.h"
+#include "tests/server/harness/hulld_process.h"
+#include "tests/server/harness/postgres/postgres_cluster.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Failover : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+    PostgresCluster& cluster = PostgresCluster::Shared();
+    conninfo_ = cluster.WriteConninfo(cluster.MakeDatabase());
+  }
+
+  std::unique_ptr<Process> Start(const std::vector<std::string>& options = {}) const {
+    std::vector<std::string> arguments = {
+        "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file", conninfo_};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return std::make_unique<Process>(arguments);
+  }
+  static std::unique_ptr<v1::HullService::Stub> Connect(Process& hulld) {
+    return v1::HullService::NewStub(grpc::CreateChannel(
+        AddressIn(hulld.ReadLineWith("listening on ")), grpc::InsecureChannelCredentials()));
+  }
+  static void Put(v1::HullService::Stub& stub, const Coordinates& xyz) {
+    Appender appender(stub, "h", "w", true);
+    ASSERT_TRUE(appender.Append(appender.opened().last_sequence() + 1, xyz));
+    EXPECT_TRUE(appender.Finish().ok());
+  }
+  static uint64_t Received(v1::HullService::Stub& stub) {
+    grpc::ClientContext context;
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id("h");
+    request.set_audit(true);
+    const grpc::Status status = stub.GetHull(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    EXPECT_TRUE(response.audit().ok());
+    return response.hull().counts().received();
+  }
+
+  std::string conninfo_;
+};
+
+TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneIsKilled) {
+  const std::unique_ptr<Process> active = Start();
+  Put(*Connect(*active), Cube());
+  const std::unique_ptr<Process> next = Start();
+  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  active->Signal(SIGKILL);
+  const auto stub = Connect(*next);
+  EXPECT_EQ(Received(*stub), 8);
+  Put(*stub, {9, 9, 9});
+  EXPECT_EQ(Received(*stub), 9);
+}
+
+// It may run again at any later time: then it changes nothing, and ends.
+TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneStandsStill) {
+  const std::unique_ptr<Process> active = Start();
+  const auto former = Connect(*active);
+  Put(*former, Cube());
+  const std::unique_ptr<Process> next = Start();
+  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  active->Signal(SIGSTOP);
+  const auto stub = Connect(*next);
+  Put(*stub, {9, 9, 9});
+  active->Signal(SIGCONT);
+  Appender appender(*former, "h", "late");
+  appender.Append(1, {7, 7, 7});
+  EXPECT_FALSE(appender.Finish().ok());
+  EXPECT_NE(active->ReadLineWith("another hulld took over the store"), "");
+  EXPECT_EQ(active->Wait(), 1);
+  EXPECT_EQ(Received(*stub), 9);
+}
+
+TEST_F(Failover, TakingOverEndsTheActiveServer) {
+  const std::unique_ptr<Process> active = Start();
+  Put(*Connect(*active), Cube());
+  const std::unique_ptr<Process> next = Start({"--take-over"});
+  EXPECT_EQ(Received(*Connect(*next)), 8);
+  EXPECT_EQ(active->Wait(), 1);
+}
+
+TEST_F(Failover, AServerThatWaitsEndsCleanlyOnASignal) {
+  const std::unique_ptr<Process> active = Start();
+  active->ReadLineWith("listening on ");
+  const std::unique_ptr<Process> next = Start();
+  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+  next->Signal(SIGTERM);
+  EXPECT_EQ(next->Wait(), 0);
+  active->Signal(SIGTERM);
+  EXPECT_EQ(active->Wait(), 0);
+}
+
+TEST_F(Failover, NoLineOfTheLogHoldsThePassword) {
+  const std::unique_ptr<Process> active = Start({"--log-level", "debug"});
+  active->ReadLineWith("listening on ");
+  active->Signal(SIGTERM);
+  active->ReadToEnd();
+  EXPECT_EQ(active->Wait(), 0);
+  for (const std::string& line : active->lines()) {
+    EXPECT_THAT(line, Not(HasSubstr(PostgresCluster::kPassword)));
+  }
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,140 @@
+#include "server/registry/table/hull_table.h"
+
+#include <gtest/gtest.h>
+#include <malloc.h>
+
+#include <string>
+
+#include "server/registry/registered_hull.h"
+
+namespace hulld::server {
+namespace {
+
+StoredHull Stored(const std::string& id, uint64_t revision) {
+  StoredHull hull;
+  hull.record.hull_id = id;
+  hull.record.create_revision = revision;
+  hull.record.revision = revision + 1;
+  hull.record.dimension = 3;
+  hull.record.vertex_count = 8;
+  hull.record.counts = {10, 8, 1, 1};
+  hull.writer_count = 2;
+  hull.layout = {revision + 1, 8, 0, 0};
+  return hull;
+}
+
+class HullTableTest : public ::testing::Test {
+ protected:
+  // Once round, and a step more.
+  void GoRound() {
+    for (size_t i = 0; i <= table_.size(); ++i) table_.RestSome();
+  }
+  bool IsAwake(const std::string& id) const {
+    return table_.entries().find(id)->second.awake() != nullptr;
+  }
+
+  FairMutex mutex_;
+  Locked locked_{mutex_};
+  MemoryBudget budget_{1 << 30, 1 << 29, mutex_};
+  HullTable table_{true, budget_};
+};
+
+TEST_F(HullTableTest, AHullComesBackFromRestAsItWas) {
+  const StoredHull stored = Stored("a", 7);
+  table_.AddResting(stored);
+  EXPECT_FALSE(IsAwake("a"));
+  EXPECT_TRUE(table_.IsVisible("a"));
+  EXPECT_EQ(table_.entries().find("a")->second.Describe("a").record, stored.record);
+  EXPECT_EQ(table_.entries().find("a")->second.revision(), 8);
+  {
+    const auto hull = table_.Find("a");
+    EXPECT_TRUE(IsAwake("a"));
+    EXPECT_EQ(hull->committed, stored);
+    EXPECT_EQ(hull->head, stored);
+    EXPECT_EQ(table_.Find("a"), hull);
+    hull->has_box = true;
+    hull->low = {1, 2, 3};
+    hull->high = {4, 5, 6};
+    GoRound();
+    EXPECT_TRUE(IsAwake("a")) << "while someone holds it";
+  }
+  GoRound();
+  EXPECT_FALSE(IsAwake("a"));
+  const HullChange told = table_.entries().find("a")->second.Describe("a");
+  EXPECT_TRUE(told.has_box);
+  EXPECT_EQ(told.high, Vector(4, 5, 6));
+  const auto again = table_.Find("a");
+  EXPECT_EQ(again->committed, stored);
+  EXPECT_TRUE(again->has_box);
+  EXPECT_EQ(again->low, Vector(1, 2, 3));
+}
+
+// Each of these would be lost.
+TEST_F(HullTableTest, WhatIsInUseStaysAwake) {
+  const auto expect_awake_while = [&](const char* what, auto begin, auto end) {
+    table_.AddResting(Stored("x", 3));
+    begin(*table_.Find("x"));
+    GoRound();
+    EXPECT_TRUE(IsAwake("x")) << what;
+    end(*table_.Find("x"));
+    GoRound();
+    EXPECT_FALSE(IsAwake("x")) << what;
+    table_.Erase(table_.Find("x"));
+  };
+  expect_awake_while(
+      "a session", [](RegisteredHull& hull) { hull.watches[1] = {}; },
+      [](RegisteredHull& hull) { hull.watches.clear(); });
+  expect_awake_while(
+      "a writer's sequence",
+      [](RegisteredHull& hull) {
+        hull.writers["w"] = {4, 5};
+      },
+      [](RegisteredHull& hull) { hull.writers.clear(); });
+  expect_awake_while(
+      "a thread that reads one", [](RegisteredHull& hull) { ++hull.sequence_readers; },
+      [](RegisteredHull& hull) { --hull.sequence_readers; });
+  expect_awake_while(
+      "a thread that loads it", [](RegisteredHull& hull) { hull.loading = true; },
+      [](RegisteredHull& hull) { hull.loading = false; });
+  expect_awake_while(
+      "a thread that prepares it", [](RegisteredHull& hull) { hull.preparing = true; },
+      [](RegisteredHull& hull) { hull.preparing = false; });
+  expect_awake_while(
+      "a change that waits", [](RegisteredHull& hull) { hull.exclusive.emplace_back(); },
+      [](RegisteredHull& hull) { hull.exclusive.clear(); });
+  expect_awake_while(
+      "points", [](RegisteredHull& hull) { hull.live = std::make_shared<LiveHull>(); },
+      [](RegisteredHull& hull) { hull.live = nullptr; });
+  expect_awake_while(
+      "an end on its way", [](RegisteredHull& hull) { hull.state.StartEnding(); },
+      [](RegisteredHull& hull) { hull.state.Refuse(); });
+}
+
+TEST_F(HullTableTest, WhatIsDamagedStaysKnownAsThat) {
+  table_.AddResting(Stored("x", 3));
+  table_.Find("x")->state.Damage(absl::DataLossError("as found"));
+  GoRound();
+  EXPECT_TRUE(table_.Find("x")->state.damaged());
+}
+
+TEST_F(HullTableTest, TheHandGoesRoundAnyNumberOfHulls) {
+  for (int i = 0; i < 37; ++i) table_.AddResting(Stored("h" + std::to_string(i), i + 1));
+  for (int i = 0; i < 37; ++i) ASSERT_NE(table_.Find("h" + std::to_string(i)), nullptr);
+  for (size_t step = 0; step <= 37 / HullTable::kHullsPerStep + 1; ++step) table_.RestSome();
+  for (int i = 0; i < 37; ++i) EXPECT_FALSE(IsAwake("h" + std::to_string(i))) << i;
+}
+
+// Sanitizers have allocators of their own.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST_F(HullTableTest, AHullAtRestTakesLessThan300Bytes) {
+  constexpr int kHulls = 20000;
+  const size_t before = mallinfo2().uordblks;
+  for (int i = 0; i < kHulls; ++i) table_.AddResting(Stored("part/" + std::to_string(i), i + 1));
+  const size_t each = (mallinfo2().uordblks - before) / kHulls;
+  RecordProperty("bytes", static_cast<int>(each));
+  EXPECT_LT(each, 300);
+}
+#endif
+
+}  // namespace
+}  // namespace hulld::server

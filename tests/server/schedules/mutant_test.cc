@@ -1,0 +1,41 @@
+// The registry with a defect that it had once, or could have (mutants/): that schedules find it
+// tells that they look in the right places.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+
+#include "tests/server/schedules/explorer.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr uint64_t kMost = 300'000;
+
+// Returns the exit status of a process that explores: a defect may break an invariant.
+int ExploreElsewhere() {
+  std::fflush(nullptr);
+  const pid_t child = fork();
+  if (child == 0) {
+    Reached reached;
+    const auto found = Explore(NumberIn("HULLD_TEST_SEED", 1), kMost, reached);
+    if (!found.has_value()) _exit(0);
+    std::fputs(Report(*found).c_str(), stderr);
+    _exit(1);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  return status;
+}
+
+TEST(Mutant, HULLD_MUTANT) {
+  const int status = ExploreElsewhere();
+  const bool is_reported = WIFEXITED(status) && WEXITSTATUS(status) == 1;
+  const bool is_broken = WIFSIGNALED(status) && WTERMSIG(status) == SIGABRT;
+  EXPECT_TRUE(is_reported || is_broken) << "not found by " << kMost << " schedules: " << status;
+}
+
+}  // namespace
+}  // namespace hulld::server

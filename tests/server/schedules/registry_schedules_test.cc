@@ -1,0 +1,60 @@
+// The registry, its committer, its budget and its feed, under schedules that a seed chooses.
+//
+// HULLD_SCHEDULES in the environment: how many, by hand. HULLD_TEST_SEED: the first.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdint>
+#include <iostream>
+
+#include "tests/server/schedules/explorer.h"
+
+namespace hulld::server {
+namespace {
+
+#ifdef HULLD_SANITIZED
+constexpr uint64_t kSchedules = 2'000;
+#else
+constexpr uint64_t kSchedules = 50'000;
+#endif
+
+void ExpectAllReached(const Reached& reached) {
+  EXPECT_GT(reached.refused, 100);
+  EXPECT_GT(reached.aborted, 100);
+  EXPECT_GT(reached.cancelled, 100);
+  EXPECT_GT(reached.repeated, 20);
+  EXPECT_GT(reached.gone, 100);
+  EXPECT_GT(reached.gaps, 20);
+  EXPECT_GT(reached.overloaded, 100);
+  EXPECT_GT(reached.damaged, 20);
+  EXPECT_GT(reached.reads, 1000);
+  EXPECT_GT(reached.snapshots, 100);
+  EXPECT_GT(reached.told, 100);
+  EXPECT_GT(reached.loads, 100);
+  EXPECT_GT(reached.sequences, 100);
+  EXPECT_GT(reached.evictions, 100);
+  EXPECT_GT(reached.recovered, 100);
+  EXPECT_GT(reached.kills, 100);
+  EXPECT_GT(reached.revived, 20);
+}
+
+TEST(RegistrySchedules, EachEndsAndKeepsToTheSpecification) {
+  const uint64_t count = NumberIn("HULLD_SCHEDULES", kSchedules);
+  Reached reached;
+  const auto start = std::chrono::steady_clock::now();
+  const auto found = Explore(NumberIn("HULLD_TEST_SEED", 1), count, reached);
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  ASSERT_FALSE(found.has_value()) << Report(*found);
+  std::cout << reached.schedules << " schedules, " << reached.steps << " steps, " << reached.answers
+            << " answers in " << taken.count() << " s\n";
+  if (count >= kSchedules) ExpectAllReached(reached);
+}
+
+TEST(RegistrySchedules, TheSameSeedTakesTheSameSteps) {
+  for (uint64_t seed = 1; seed <= 300; ++seed) {
+    ASSERT_EQ(DigestOf(seed), DigestOf(seed)) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,166 @@
+#include "tests/server/schedules/simulated_store.h"
+
+#include <absl/status/status.h>
+
+#include <optional>
+
+#include "tests/server/schedules/scheduler.h"
+
+namespace hulld::server {
+namespace {
+
+Random& Dice() { return Scheduler::Current().random(); }
+
+absl::Status Killed() { return absl::UnavailableError("the process was killed"); }
+
+}  // namespace
+
+absl::Status SimulatedStore::ForEachHull(const StoredHullVisitor& visit) {
+  for (const auto& [id, kept] : hulls_) visit(id, kept.stored);
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Vector>> SimulatedStore::LoadVertices(const StoredHull& hull) {
+  Scheduler& scheduler = Scheduler::Current();
+  ++counts_.loads;
+  scheduler.Note("store: reads points of a hull at revision", hull.record.revision);
+  if (Dice().OneIn(faults_.read)) {
+    ++counts_.failed_reads;
+    return absl::UnavailableError("the disk does not answer");
+  }
+  const uint64_t incarnation = hull.record.create_revision;
+  if (Dice().OneIn(faults_.damage)) damaged_.insert(incarnation);
+  if (is_damaged(incarnation)) return absl::DataLossError("the points are damaged");
+  const auto found = hulls_.find(hull.record.hull_id);
+  std::vector<Vector> points;
+  if (found != hulls_.end() && found->second.stored.record.create_revision == incarnation) {
+    for (const auto& [revision, point] : found->second.vertices) {
+      if (revision <= hull.record.revision) points.push_back(point);
+    }
+  }
+  scheduler.Note("store: has read points:", points.size());
+  if (points.size() == hull.layout.base_vertices + hull.layout.delta_vertices) return points;
+  return absl::DataLossError("points are missing");
+}
+
+absl::StatusOr<uint64_t> SimulatedStore::LoadSequence(const HullRecord& hull,
+                                                      const std::string& writer_id) {
+  Scheduler& scheduler = Scheduler::Current();
+  ++counts_.sequences;
+  scheduler.Note("store: reads a sequence of a hull at revision", hull.revision);
+  if (Dice().OneIn(faults_.read)) {
+    ++counts_.failed_reads;
+    return absl::UnavailableError("the disk does not answer");
+  }
+  uint64_t sequence = 0;
+  const auto found = hulls_.find(hull.hull_id);
+  if (found != hulls_.end() &&
+      found->second.stored.record.create_revision == hull.create_revision) {
+    const auto writer = found->second.sequences.find(writer_id);
+    if (writer != found->second.sequences.end()) sequence = writer->second;
+  }
+  scheduler.Note("store: has read the sequence", sequence);
+  return sequence;
+}
+
+absl::Status SimulatedStore::Commit(std::span<const Change* const> changes) {
+  Scheduler& scheduler = Scheduler::Current();
+  if (is_busy_) scheduler.Fail("two calls commit at the same time");
+  if (is_failing_) scheduler.Fail("a batch comes after an error without Recover");
+  is_busy_ = true;
+  ++counts_.batches;
+  scheduler.Note("store: begins to commit changes:", changes.size());
+  const absl::Status status = RefuseBatch(changes);
+  is_failing_ = !status.ok();
+  if (status.ok()) {
+    for (const Change* change : changes) Keep(*change, false);
+  }
+  scheduler.Note(status.ok() ? "store: has committed up to revision" : "store: refuses the batch",
+                 ledger_.revision());
+  is_busy_ = false;
+  return status;
+}
+
+// OK where the batch is not refused.
+absl::Status SimulatedStore::RefuseBatch(std::span<const Change* const> changes) {
+  const auto leave_unknown = [&] {
+    ++counts_.unknown;
+    for (const Change* change : changes) unknown_.push_back(*change);
+  };
+  if (is_dead_) {
+    ++counts_.refused;
+    return Killed();
+  }
+  if (counts_.batches == faults_.killed_at_batch) {
+    ++counts_.kills;
+    is_dead_ = true;
+    leave_unknown();
+    return Killed();
+  }
+  if (Dice().OneIn(faults_.full)) {
+    ++counts_.refused;
+    was_full_ = true;
+    return absl::ResourceExhaustedError("the disk is full");
+  }
+  if (Dice().OneIn(faults_.unknown)) {
+    leave_unknown();
+    return absl::UnavailableError("the disk failed, and it is not known what it keeps");
+  }
+  if (Dice().OneIn(faults_.refused)) {
+    ++counts_.refused;
+    return absl::UnavailableError("the disk failed");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SimulatedStore::Recover() {
+  Scheduler& scheduler = Scheduler::Current();
+  if (is_busy_) scheduler.Fail("the store is to recover while it commits");
+  is_busy_ = true;
+  scheduler.Note("store: recovers");
+  const bool fails = is_dead_ || Dice().OneIn(faults_.recover);
+  if (fails) {
+    ++counts_.refused;
+  } else {
+    ++counts_.recovered;
+    is_failing_ = false;
+    unknown_.clear();
+  }
+  scheduler.Note(fails ? "store: cannot recover" : "store: has recovered");
+  is_busy_ = false;
+  return fails ? absl::UnavailableError("the disk still fails") : absl::OkStatus();
+}
+
+absl::StatusOr<std::string> SimulatedStore::MakeCopy() {
+  return absl::FailedPreconditionError("there is no copy of what is simulated");
+}
+
+void SimulatedStore::Reopen() {
+  faults_ = {};
+  is_dead_ = is_failing_ = false;
+  // All or none.
+  if (!unknown_.empty() && Dice().OneIn(2)) {
+    ++counts_.revived;
+    for (const Change& change : unknown_) Keep(change, true);
+  }
+  unknown_.clear();
+}
+
+void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
+  if (auto fault = ledger_.Keep(change, nobody_waits)) Scheduler::Current().Fail(*fault);
+  const HullRecord& record = change.hull.record;
+  if (change.deleted) {
+    hulls_.erase(record.hull_id);
+    return;
+  }
+  Kept& kept = hulls_[record.hull_id];
+  if (change.replaced.has_value()) kept = {};
+  kept.stored = change.hull;
+  if (change.vertex_change == VertexChange::kReplaced) kept.vertices.clear();
+  for (const Vector& vertex : change.vertices) kept.vertices.emplace_back(record.revision, vertex);
+  if (change.writer.has_value()) {
+    kept.sequences[change.writer->writer_id] = change.writer->sequence;
+  }
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,106 @@
+#ifndef HULLD_TESTS_SERVER_SCHEDULES_SIMULATED_STORE_H_
+#define HULLD_TESTS_SERVER_SCHEDULES_SIMULATED_STORE_H_
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/store/store.h"
+#include "tests/server/schedules/ledger.h"
+
+namespace hulld::server {
+
+// How often something fails: once in so many calls; 0: never.
+struct StoreFaults {
+  // A batch is refused and nothing is left of it; it may be so, or not, until Recover succeeds.
+  uint32_t refused = 0;
+  uint32_t unknown = 0;
+  // The disk is full: RESOURCE_EXHAUSTED.
+  uint32_t full = 0;
+  uint32_t recover = 0;
+  // Points, or a sequence, cannot be read now.
+  uint32_t read = 0;
+  // Points are found to be damaged, and stay so.
+  uint32_t damage = 0;
+  // The process is killed at this batch, from 1; 0: at none.
+  uint32_t killed_at_batch = 0;
+};
+
+// A store that works as Store says and as the durable one does, with faults that the schedule
+// chooses. Others may go on before and after each call. It keeps what it should in a Ledger, which
+// checks every change. It outlives the process that was killed: Reopen.
+class SimulatedStore : public Store {
+ public:
+  // How often each happened.
+  struct Counts {
+    uint64_t batches = 0;
+    uint64_t refused = 0;
+    uint64_t unknown = 0;
+    uint64_t recovered = 0;
+    uint64_t failed_reads = 0;
+    uint64_t loads = 0;
+    uint64_t sequences = 0;
+    uint64_t kills = 0;
+    uint64_t revived = 0;
+  };
+
+  explicit SimulatedStore(const StoreFaults& faults) : faults_(faults) {}
+
+  std::string kind() const override { return "simulated"; }
+  std::string id() const override { return "simulated"; }
+  Durability durability() const override { return Durability::kSync; }
+  bool keeps_hulls() const override { return true; }
+  uint64_t revision() const override { return ledger_.revision(); }
+  absl::Status ForEachHull(const StoredHullVisitor& visit) override;
+  absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
+  absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
+                                        const std::string& writer_id) override;
+  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Recover() override;
+  absl::StatusOr<std::string> MakeCopy() override;
+
+  Ledger& ledger() { return ledger_; }
+  const Counts& counts() const { return counts_; }
+  // Failures that calls may have been answered with by now; and with them one that they may yet.
+  uint64_t answered_failures() const { return failed() - (is_failing_ ? 1 : 0); }
+  uint64_t failed() const { return counts_.refused + counts_.unknown + counts_.failed_reads; }
+  bool was_full() const { return was_full_; }
+  bool is_damaged(uint64_t create_revision) const { return damaged_.contains(create_revision); }
+  bool has_damage() const { return !damaged_.empty(); }
+  bool was_killed() const { return is_dead_; }
+
+  // What the next process finds, without faults from now on.
+  void Reopen();
+
+ private:
+  // What is kept of a hull.
+  struct Kept {
+    StoredHull stored;
+    // Each with the revision that brought it.
+    std::vector<std::pair<uint64_t, Vector>> vertices;
+    std::map<std::string, uint64_t> sequences;
+  };
+
+  absl::Status RefuseBatch(std::span<const Change* const> changes);
+  void Keep(const Change& change, bool nobody_waits);
+
+  StoreFaults faults_;
+  Ledger ledger_;
+  Counts counts_;
+  std::map<std::string, Kept> hulls_;
+  // What the next process may find.
+  std::vector<Change> unknown_;
+  // Incarnations, by their first revisions.
+  std::set<uint64_t> damaged_;
+  bool is_busy_ = false;
+  bool is_failing_ = false;
+  bool was_full_ = false;
+  bool is_dead_ = false;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_TESTS_SERVER_SCHEDULES_SIMULATED_STORE_H_

@@ -1,0 +1,153 @@
+#include "tests/server/schedules/simulation.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <memory>
+#include <vector>
+
+#include "server/process/synchronization.h"
+#include "server/process/worker_pool.h"
+#include "tests/server/schedules/client.h"
+#include "tests/server/schedules/watcher.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr uint64_t kPlentyOfMemory = uint64_t{1} << 30;
+
+// What an idle registry must say of itself: that it holds what the store keeps, that it can let go
+// of all of it, and that nothing is counted then.
+void CheckAtRest(const Simulation& simulation) {
+  Scheduler& scheduler = Scheduler::Current();
+  const Ledger& ledger = simulation.ledger();
+  Registry& registry = simulation.registry;
+  uint64_t hulls = 0;
+  uint64_t vertices = 0;
+  for (size_t hull = 0; hull < kHulls; ++hull) {
+    if (!ledger.Last(hull).exists) continue;
+    ++hulls;
+    vertices += ledger.Last(hull).record.vertex_count;
+  }
+  const RegistrySizes sizes = registry.Sizes();
+  if (sizes.hull_count != hulls || sizes.vertex_count != vertices ||
+      sizes.store_revision != ledger.revision()) {
+    scheduler.Fail(absl::StrCat("the registry counts ", sizes.hull_count, " hulls of ",
+                                sizes.vertex_count, " vertices at revision ", sizes.store_revision,
+                                ", and the store keeps ", hulls, " of ", vertices, " at ",
+                                ledger.revision()));
+  }
+  if (auto fault = ledger.Unclaimed()) scheduler.Fail(*fault);
+  if (registry.Cache().damaged > 0 && !simulation.store.has_damage()) {
+    scheduler.Fail("a hull is taken for damaged, and none is");
+  }
+  {
+    const MemoryCharge charge(registry.memory(), MemoryUse::kReading,
+                              simulation.plan.memory_limit + 1);
+    registry.CheckMemory(MemoryUse::kWriting).IgnoreError();
+  }
+  const CacheStatistics cache = registry.Cache();
+  simulation.reached.evictions += cache.evictions;
+  // What is prepared just now is held for a moment longer.
+  if (simulation.plan.preparations > 0 || cache.bytes == 0) return;
+  scheduler.Fail(absl::StrCat("nobody holds anything, and ", cache.bytes,
+                              " bytes are counted, of these ", cache.reading_bytes,
+                              " for readers and ", cache.writing_bytes, " for writers"));
+}
+
+void RunClients(Simulation& simulation) {
+  std::shared_ptr<Watcher> watcher;
+  std::vector<std::unique_ptr<Client>> clients;
+  std::vector<Thread> threads;
+  threads.reserve(simulation.plan.clients + 1);
+  for (size_t i = 0; i < simulation.plan.clients; ++i) {
+    clients.push_back(std::make_unique<Client>(simulation));
+    threads.emplace_back([client = clients.back().get()] { client->Run(); }, "client");
+  }
+  if (simulation.plan.has_watch) {
+    watcher = std::make_shared<Watcher>(simulation);
+    threads.emplace_back([watcher] { watcher->Run(); }, "watcher");
+  }
+  for (size_t i = 0; i < clients.size(); ++i) threads[i].join();
+  if (watcher == nullptr) return;
+  watcher->End();
+  threads.back().join();
+}
+
+void CountStore(const SimulatedStore::Counts& counts, Reached& reached) {
+  reached.loads += counts.loads;
+  reached.sequences += counts.sequences;
+  reached.recovered += counts.recovered;
+  reached.kills += counts.kills;
+  reached.revived += counts.revived;
+}
+
+}  // namespace
+
+void Event::Set() {
+  is_set_ = true;
+  Scheduler::Current().Notify(this, true, std::source_location::current());
+}
+
+void Event::Wait(const std::source_location& where) {
+  const auto holds = [](const void* set) { return *static_cast<const bool*>(set); };
+  while (!is_set_) {
+    Scheduler::Current().Wait(this, Scheduler::kNoDeadline, {holds, &is_set_}, where);
+  }
+}
+
+Plan::Plan(Random& random) {
+  const auto rarely = [&random](uint32_t often) -> uint32_t {
+    return random.OneIn(2) ? 0 : often << random.Below(4);
+  };
+  const auto weight = [&random] { return random.Below(3); };
+  if (random.OneIn(2)) {
+    faults.refused = rarely(3);
+    faults.unknown = rarely(4);
+    faults.full = rarely(8);
+    faults.recover = rarely(2);
+    faults.read = rarely(4);
+    if (random.OneIn(8)) faults.damage = rarely(2);
+    if (random.OneIn(2)) faults.killed_at_batch = 1 + random.Below(8);
+  }
+  memory_limit = random.OneIn(2) ? kPlentyOfMemory : uint64_t{1000} << random.Below(6);
+  has_memory = memory_limit == kPlentyOfMemory;
+  clients = 2 + random.Below(2);
+  hulls = 1 + random.Below(kHulls);
+  writers = 1 + random.Below(kWriters);
+  has_watch = random.OneIn(4);
+  creations = weight();
+  deletions = weight();
+  replacements = weight();
+  streams = 1 + 2 * weight();
+  reads = weight();
+  listings = random.OneIn(4) ? 1 : 0;
+  pressure = random.OneIn(2) ? 0 : weight();
+  conditions = rarely(2);
+  cancellations = rarely(2);
+  preparations = random.OneIn(2) ? 0 : rarely(1);
+  repetitions = rarely(2);
+}
+
+void Simulate(Reached& reached) {
+  const Plan plan(Scheduler::Current().random());
+  SimulatedStore store(plan.faults);
+  Limits limits;
+  limits.memory_limit = plan.memory_limit;
+  const auto run = [&](const auto& body) {
+    WorkerPool writers(2);
+    Registry registry(store, limits, writers);
+    if (!registry.Load().ok()) Scheduler::Current().Fail("what the store keeps cannot be loaded");
+    Simulation simulation{plan, store, registry, reached};
+    body(simulation);
+    CheckAtRest(simulation);
+  };
+  run([](Simulation& simulation) { RunClients(simulation); });
+  if (store.was_killed() || Scheduler::Current().random().OneIn(4)) {
+    Scheduler::Current().Note("test: opens the store anew");
+    store.Reopen();
+    run([](Simulation& simulation) { Client(simulation).CheckAll(); });
+  }
+  CountStore(store.counts(), reached);
+}
+
+}  // namespace hulld::server

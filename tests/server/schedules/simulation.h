@@ -1,0 +1,92 @@
+#ifndef HULLD_TESTS_SERVER_SCHEDULES_SIMULATION_H_
+#define HULLD_TESTS_SERVER_SCHEDULES_SIMULATION_H_
+
+#include <cstdint>
+#include <string>
+
+#include "server/registry/registry.h"
+#include "tests/server/schedules/scheduler.h"
+#include "tests/server/schedules/simulated_store.h"
+
+namespace hulld::server {
+
+// What schedules came to, so that a test can tell that they reach what they are for.
+struct Reached {
+  uint64_t schedules = 0;
+  uint64_t steps = 0;
+  uint64_t answers = 0;
+  uint64_t refused = 0;
+  uint64_t aborted = 0;
+  uint64_t cancelled = 0;
+  uint64_t repeated = 0;
+  uint64_t gone = 0;
+  uint64_t gaps = 0;
+  uint64_t overloaded = 0;
+  uint64_t damaged = 0;
+  uint64_t reads = 0;
+  uint64_t snapshots = 0;
+  uint64_t told = 0;
+  uint64_t loads = 0;
+  uint64_t sequences = 0;
+  uint64_t evictions = 0;
+  uint64_t recovered = 0;
+  uint64_t kills = 0;
+  uint64_t revived = 0;
+};
+
+// Something that happens once, and that threads wait for.
+class Event {
+ public:
+  bool is_set() const { return is_set_; }
+  void Set();
+  void Wait(const std::source_location& where = std::source_location::current());
+
+ private:
+  bool is_set_ = false;
+};
+
+// What a schedule does, drawn from its seed. Leaving out much makes the rest meet more often (swarm
+// testing: Groce, Zhang, Eide, Chen and Regehr 2012).
+struct Plan {
+  explicit Plan(Random& random);
+
+  StoreFaults faults;
+  uint64_t memory_limit = 0;
+  // Whether that is never reached but by pressure.
+  bool has_memory = false;
+  size_t clients = 0;
+  size_t hulls = 0;
+  size_t writers = 0;
+  bool has_watch = false;
+  // How often each kind of call comes, relative to the others.
+  uint32_t creations = 0;
+  uint32_t deletions = 0;
+  uint32_t replacements = 0;
+  uint32_t streams = 0;
+  uint32_t reads = 0;
+  uint32_t listings = 0;
+  uint32_t pressure = 0;
+  // One in so many; 0: none.
+  uint32_t conditions = 0;
+  uint32_t cancellations = 0;
+  uint32_t preparations = 0;
+  uint32_t repetitions = 0;
+};
+
+// What the clients of a schedule share.
+struct Simulation {
+  const Plan& plan;
+  SimulatedStore& store;
+  Registry& registry;
+  Reached& reached;
+
+  Ledger& ledger() const { return store.ledger(); }
+};
+
+// One schedule: a registry over a store with faults, and clients that call it; then a registry over
+// what the store kept. The body of Scheduler::Run.
+void Simulate(Reached& reached);
+
+}  // namespace hulld::server
+
+#endif  // HULLD_TESTS_SERVER_SCHEDULES_SIMULATION_H_

@@ -1,0 +1,48 @@
+#include "server/store/postgres/conninfo.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Conninfo, KeywordsAndUrisAreTaken) {
+  for (const char* text : {"host=db.example dbname=hulls user=hulld password='two words'\n",
+                           "postgresql://hulld:two%20words@db.example/hulls"}) {
+    const absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(text);
+    ASSERT_TRUE(conninfo.ok()) << conninfo.status();
+    EXPECT_EQ(conninfo->parameters().at("host"), "db.example");
+    EXPECT_EQ(conninfo->parameters().at("dbname"), "hulls");
+    EXPECT_EQ(conninfo->parameters().at("password"), "two words");
+  }
+}
+
+TEST(Conninfo, WhatIsLeftOpenHasATimeout) {
+  const auto defaults = Conninfo::Parse("dbname=hulls")->parameters();
+  EXPECT_EQ(defaults.at("connect_timeout"), "5");
+  EXPECT_EQ(defaults.at("tcp_user_timeout"), "10000");
+  EXPECT_EQ(defaults.at("target_session_attrs"), "read-write");
+  const auto given = Conninfo::Parse("dbname=hulls connect_timeout=60")->parameters();
+  EXPECT_EQ(given.at("connect_timeout"), "60");
+}
+
+// Each of these would make a part of the password a host, a port, a database, or a word of an
+// error.
+TEST(Conninfo, NoErrorQuotesAPassword) {
+  for (const char* text :
+       {"password=geheim und noch", "password='geheim", "geheim",
+        "postgresql://hulld:abc@geheim@db.example/hulls", "postgresql://hulld:geheim/x@db/hulls",
+        "postgresql://hulld:12/geheim@db/hulls", "postgresql://hulld:%zzgeheim@db/hulls",
+        "geheim=1 host=db", "host=db port=geheim"}) {
+    const absl::Status status = Conninfo::Parse(text).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(std::string(status.message()), Not(HasSubstr("geheim"))) << text;
+  }
+  EXPECT_EQ(Conninfo::Parse(" \n").status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,191 @@
+// Several servers over one database: one is active, and none that was superseded changes anything.
+
+#include <absl/strings/str_cat.h>
+
+#include <future>
+#include <thread>
+
+#include "tests/server/harness/captured_log.h"
+#include "tests/server/store/postgres/postgres_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class PostgresClaim : public PostgresTest {};
+
+// Of a session: that it is the active server's, and makes it that.
+constexpr char kHasLock[] =
+    "pid IN (SELECT pid FROM pg_locks JOIN pg_database ON database = pg_database.oid WHERE "
+    "locktype = 'advisory' AND granted AND pg_database.datname = current_database())";
+
+TEST_F(PostgresClaim, ASupersededServerCommitsNothing) {
+  // It looks by itself at no time during this test: what refuses it is the database.
+  options_.beat = std::chrono::hours(1);
+  Start();
+  const AppendSession session = hulls_->Open("h")->session;
+  ASSERT_TRUE(hulls_->Append(session, 1, CubeCorners()).ok());
+  const std::unique_ptr<PostgresRegistry> former = std::move(hulls_);
+  bool ended = false;
+  former->store().OnEnded([&] { ended = true; });
+  options_.take_over = true;
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", {{9, 9, 9}}, "other").ok());
+  EXPECT_GT(hulls_->store().epoch(), former->store().epoch());
+  EXPECT_FALSE(ended);
+
+  const absl::Status refused = former->Append(session, 2, {{5, 5, 5}}).status();
+  EXPECT_TRUE(absl::IsUnavailable(refused)) << refused;
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("another hulld took over"));
+  EXPECT_TRUE(ended);
+  EXPECT_TRUE(absl::IsUnavailable(former->Create("new").status()));
+  EXPECT_TRUE(absl::IsUnavailable(former->Delete("h").status()));
+  EXPECT_EQ(ReceivedAnew("h"), 9);
+  EXPECT_EQ(hulls_->registry().Sizes().hull_count, 1);
+}
+
+// What is there now may be newer than what it knows, which is no damage.
+TEST_F(PostgresClaim, ASupersededServerReadsNothing) {
+  options_.beat = std::chrono::hours(1);
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Start();
+  const std::unique_ptr<PostgresRegistry> former = std::move(hulls_);
+  bool ended = false;
+  former->store().OnEnded([&] { ended = true; });
+  options_.take_over = true;
+  Start();
+  ASSERT_TRUE(hulls_->Delete("h").ok());
+  EXPECT_TRUE(absl::IsUnavailable(former->View("h").status()));
+  EXPECT_TRUE(ended);
+  EXPECT_EQ(former->registry().Cache().damaged, 0);
+}
+
+TEST_F(PostgresClaim, AServerThatDoesNothingNoticesThatItWasSuperseded) {
+  options_.beat = std::chrono::milliseconds(10);
+  Start();
+  std::promise<void> ended;
+  hulls_->store().OnEnded([&] { ended.set_value(); });
+  const std::unique_ptr<PostgresRegistry> former = std::move(hulls_);
+  options_.take_over = true;
+  Start();
+  ended.get_future().get();
+}
+
+TEST_F(PostgresClaim, AServerWaitsUntilTheActiveOneEnds) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  std::promise<void> asked;
+  bool told = false;
+  options_.should_stop = [&] {
+    if (!std::exchange(told, true)) asked.set_value();
+    return false;
+  };
+  auto next = std::async(std::launch::async, [this] { return Open(); });
+  // It found the store taken.
+  asked.get_future().get();
+  EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
+  hulls_ = nullptr;
+  absl::StatusOr<std::unique_ptr<PostgresStore>> store = next.get();
+  ASSERT_TRUE(store.ok()) << store.status();
+  EXPECT_EQ(PostgresRegistry(*std::move(store)).View("h")->record.counts.received, 9);
+}
+
+TEST_F(PostgresClaim, WhoWaitsCanBeToldToEnd) {
+  Start();
+  options_.should_stop = [] { return true; };
+  EXPECT_TRUE(absl::IsCancelled(Open().status()));
+}
+
+// As when the machine of the active server is cut off, or the server stands still: the database
+// ends its session, which held the lock.
+TEST_F(PostgresClaim, WhoWaitsTakesOverWhenTheLockOfTheActiveServerGoes) {
+  options_.beat = std::chrono::hours(1);
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  auto next = std::async(std::launch::async, [this] { return Open(); });
+  EndSessions(kHasLock);
+  absl::StatusOr<std::unique_ptr<PostgresStore>> store = next.get();
+  ASSERT_TRUE(store.ok()) << store.status();
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
+  EXPECT_EQ(PostgresRegistry(*std::move(store)).View("h")->record.counts.received, 8);
+}
+
+TEST_F(PostgresClaim, AServerThatLosesItsLockWithNobodyWaitingTakesItAgain) {
+  options_.beat = std::chrono::milliseconds(10);
+  Start();
+  const uint64_t epoch = hulls_->store().epoch();
+  EndSessions(kHasLock);
+  // Bounded by the time limit of the test alone.
+  while (Ask(absl::StrCat("SELECT 1 FROM pg_stat_activity WHERE ", kHasLock)).empty()) {
+    std::this_thread::yield();
+  }
+  EXPECT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  EXPECT_EQ(hulls_->store().epoch(), epoch);
+}
+
+TEST_F(PostgresClaim, WithoutSyncAStoreThatWasNotClosedIsAnotherStore) {
+  Ask("ALTER ROLE hulld SET synchronous_commit = off");
+  Start();
+  EXPECT_EQ(hulls_->store().durability(), Durability::kRelaxed);
+  const std::string id = hulls_->store().id();
+  Start();
+  EXPECT_EQ(hulls_->store().id(), id);
+  const std::unique_ptr<PostgresRegistry> former = std::move(hulls_);
+  options_.take_over = true;
+  Start();
+  EXPECT_NE(hulls_->store().id(), id);
+  Ask("ALTER ROLE hulld RESET synchronous_commit");
+  Start();
+  EXPECT_EQ(hulls_->store().durability(), Durability::kSync);
+}
+
+TEST_F(PostgresClaim, ADatabaseThatWasPutBackIsAnotherStore) {
+  Start();
+  const std::string id = hulls_->store().id();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  // As after a failover to a standby that was behind.
+  Ask("UPDATE hulld.store SET batch = batch - 1");
+  EndSessions("true");
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
+  Start();
+  EXPECT_NE(hulls_->store().id(), id);
+}
+
+TEST_F(PostgresClaim, AWrongPasswordIsSaidAndNotShown) {
+  options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
+                                   " user=hulld password=falsches-Wort");
+  const CapturedLog log;
+  const absl::Status status = Open().status();
+  EXPECT_TRUE(absl::IsUnavailable(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("password authentication failed"));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("--postgres-conninfo-file"));
+  EXPECT_THAT(std::string(status.message()), Not(HasSubstr("falsches-Wort")));
+  EXPECT_THAT(log.text(), Not(HasSubstr("falsches-Wort")));
+}
+
+TEST_F(PostgresClaim, ARoleThatMayNotMakeTheSchemaIsToldWhatItNeeds) {
+  Ask("CREATE ROLE stranger LOGIN PASSWORD 'fremd'");
+  options_.conninfo = absl::StrCat("host=", proxy_->directory(), " dbname=", database_,
+                                   " user=stranger password=fremd");
+  const absl::Status status = Open().status();
+  EXPECT_THAT(std::string(status.message()), HasSubstr("CREATE SCHEMA hulld AUTHORIZATION"));
+}
+
+TEST_F(PostgresClaim, ABackupIsLeftToPostgreSql) {
+  const absl::Status status = Start().store().MakeCopy().status();
+  EXPECT_TRUE(absl::IsFailedPrecondition(status));
+  EXPECT_THAT(std::string(status.message()), HasSubstr("pg_dump"));
+}
+
+TEST_F(PostgresClaim, WhatTheTablesTakeIsKnownAndWhatIsFreeIsNot) {
+  const std::optional<StoreDisk> disk = Start().store().disk();
+  ASSERT_TRUE(disk.has_value());
+  EXPECT_GT(disk->bytes, 0);
+  EXPECT_FALSE(disk->free_bytes.has_value());
+}
+
+}  // namespace
+}  // namespace hulld::server

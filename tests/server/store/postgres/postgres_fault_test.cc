@@ -1,0 +1,199 @@
+// The database fails, or the network does, while hulls grow.
+
+#include <absl/strings/str_cat.h>
+
+#include <future>
+#include <thread>
+
+#include "core/hull/audit.h"
+#include "tests/server/store/postgres/postgres_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using Cut = CuttingProxy::Cut;
+
+class PostgresFault : public PostgresTest {
+ protected:
+  void TearDown() override {
+    if (proxy_ != nullptr) proxy_->SetDown(false);
+    PostgresTest::TearDown();
+  }
+  uint64_t Received() { return hulls_->View("h")->record.counts.received; }
+};
+
+TEST_F(PostgresFault, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const std::string batches = Ask("SELECT batch FROM hulld.store").front();
+  proxy_->CutNext(Cut::kAfterCommit);
+  const auto put = hulls_->Put("h", {{9, 9, 9}});
+  ASSERT_TRUE(put.ok()) << put.status();
+  EXPECT_EQ(proxy_->cuts(), 1);
+  EXPECT_EQ(Ask(absl::StrCat("SELECT batch - ", batches, " FROM hulld.store")).front(), "1");
+  EXPECT_EQ(Received(), 9);
+  ASSERT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
+  EXPECT_EQ(ReceivedAnew("h"), 10);
+}
+
+TEST_F(PostgresFault, ACommitThatDidNotArriveIsRepeated) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  proxy_->CutNext(Cut::kBeforeCommit);
+  const auto put = hulls_->Put("h", {{9, 9, 9}});
+  ASSERT_TRUE(put.ok()) << put.status();
+  EXPECT_EQ(proxy_->cuts(), 1);
+  EXPECT_EQ(ReceivedAnew("h"), 9);
+}
+
+// A transaction that a network holds back arrives when others have followed.
+TEST_F(PostgresFault, WhatArrivesLateChangesNothing) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  proxy_->CutNext(Cut::kHold);
+  ASSERT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
+  EXPECT_EQ(proxy_->cuts(), 1);
+  ASSERT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
+  const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
+  proxy_->Deliver();
+  EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
+  EXPECT_EQ(ReceivedAnew("h"), 10);
+  EXPECT_TRUE(AuditHull(CanonicalOf(*hulls_->View("h"))).ok());
+}
+
+// Nobody can be asked: the answer says so, and nothing is taken until somebody can.
+TEST_F(PostgresFault, AnOutcomeThatIsNotKnownIsSaidToBe) {
+  options_.patience = std::chrono::milliseconds(0);
+  for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
+    const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
+    Start();
+    ASSERT_TRUE(hulls_->Put(id, CubeCorners()).ok());
+    bool ended = false;
+    hulls_->store().OnEnded([&] { ended = true; });
+    proxy_->CutNext(cut);
+    proxy_->GoDownWithCut();
+    const absl::Status unknown = hulls_->Put(id, {{9, 9, 9}}).status();
+    EXPECT_TRUE(absl::IsUnavailable(unknown)) << unknown;
+    EXPECT_THAT(std::string(unknown.message()), HasSubstr("it may appear"));
+    EXPECT_TRUE(absl::IsUnavailable(hulls_->Create("new").status()));
+    // Nobody sees the change; queries go on.
+    EXPECT_EQ(hulls_->View(id)->record.counts.received, 8);
+    EXPECT_FALSE(ended);
+    proxy_->SetDown(false);
+    const absl::Status next = hulls_->Create(id + "/next").status();
+    // What was refused and is there after all is left to the next server.
+    EXPECT_EQ(ended, cut == Cut::kAfterCommit);
+    EXPECT_EQ(next.ok(), cut == Cut::kBeforeCommit) << next;
+    EXPECT_EQ(ReceivedAnew(id), cut == Cut::kAfterCommit ? 9 : 8);
+  }
+}
+
+TEST_F(PostgresFault, ARestartOfTheDatabaseIsNotNoticedByThoseWhoWrite) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  ASSERT_TRUE(hulls_->Put("cold", SpherePoints(100)).ok());
+  StoredHull cold;
+  ASSERT_TRUE(hulls_->store()
+                  .ForEachHull([&](const std::string& id, const absl::StatusOr<StoredHull>& hull) {
+                    if (id == "cold") cold = *hull;
+                  })
+                  .ok());
+  for (int round = 0; round < 2; ++round) {
+    if (round == 0) {
+      cluster().StopImmediately();
+    } else {
+      cluster().Kill();
+    }
+    cluster().Start();
+    const auto put = hulls_->Put("h", {{9.0 + round, 9, 9}});
+    EXPECT_TRUE(put.ok()) << put.status();
+    EXPECT_TRUE(hulls_->store().LoadVertices(cold).ok());
+  }
+  EXPECT_EQ(ReceivedAnew("h"), 10);
+}
+
+TEST_F(PostgresFault, WhileTheDatabaseIsGoneChangesAreRefusedAndNothingElse) {
+  options_.patience = std::chrono::milliseconds(50);
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const HullView before = *hulls_->View("h");
+  const AppendSession session = hulls_->Open("h")->session;
+  for (int round = 0; round < 2; ++round) {
+    proxy_->SetDown(true);
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      EXPECT_TRUE(absl::IsUnavailable(hulls_->Append(session, 2, {{9, 9, 9}}).status()));
+      EXPECT_TRUE(absl::IsUnavailable(hulls_->Create("new").status()));
+      EXPECT_EQ(hulls_->View("h")->record, before.record);
+    }
+    proxy_->SetDown(false);
+  }
+  EXPECT_GT(hulls_->store().failures().write, 0);
+  // No restart, not even a new stream.
+  const auto accepted = hulls_->Append(session, 2, {{9, 9, 9}});
+  ASSERT_TRUE(accepted.ok()) << accepted.status();
+  EXPECT_EQ(ReceivedAnew("h"), 9);
+}
+
+// It neither answers nor closes anything.
+TEST_F(PostgresFault, ADatabaseThatStandsStillHoldsNoThreadForEver) {
+  options_.answer_time = std::chrono::milliseconds(200);
+  options_.patience = std::chrono::milliseconds(100);
+  options_.conninfo += " connect_timeout=2";
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  cluster().Suspend();
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
+  EXPECT_TRUE(
+      absl::IsUnavailable(hulls_->store().LoadSequence(hulls_->View("h")->record, "x").status()));
+  cluster().Resume();
+  // Whatever became of the first, the next server knows, and says the same as this one if it goes
+  // on.
+  const bool goes_on = hulls_->Put("h", {{10, 9, 9}}).ok();
+  const uint64_t received = Received();
+  EXPECT_EQ(ReceivedAnew("h"), goes_on ? received : 9);
+}
+
+// What PostgreSQL answers is no, and nothing of it stays.
+TEST_F(PostgresFault, ARefusalOfTheDatabaseLeavesNothing) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Ask("ALTER TABLE hulld.deltas ADD CONSTRAINT never CHECK (length(vertices) < 20) NOT VALID");
+  const absl::Status refused = hulls_->Put("h", {{9, 9, 9}}).status();
+  EXPECT_TRUE(absl::IsUnavailable(refused));
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("nothing was changed"));
+  EXPECT_EQ(Ask("SELECT batch FROM hulld.store").front(), "2");
+  Ask("ALTER TABLE hulld.deltas DROP CONSTRAINT never");
+  EXPECT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
+  EXPECT_EQ(ReceivedAnew("h"), 9);
+}
+
+// PostgreSQL then says that it has committed, and warns that a standby may not have it.
+TEST_F(PostgresFault, AnEndedWaitForAStandbyIsNoAcknowledgement) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Ask("ALTER SYSTEM SET synchronous_standby_names = 'nobody'");
+  Ask("SELECT pg_reload_conf()");
+  auto put = std::async(std::launch::async, [this] { return hulls_->Put("h", {{9, 9, 9}}); });
+  const std::string waiting = "wait_event = 'SyncRep' AND datname = current_database()";
+  const auto await = [&](const std::string& condition) {
+    while (Ask("SELECT 1 FROM pg_stat_activity WHERE " + condition).empty()) {
+      std::this_thread::yield();
+    }
+  };
+  await(waiting);
+  const std::string first = Ask("SELECT pid FROM pg_stat_activity WHERE " + waiting).front();
+  const std::string epoch = Ask("SELECT epoch FROM hulld.store").front();
+  Ask(absl::StrCat("SELECT pg_cancel_backend(", first, ")"));
+  // The store asks in a new session what became of it, and that waits for the standby, too.
+  await(waiting + " AND pid <> " + first);
+  EXPECT_EQ(put.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  Ask("ALTER SYSTEM RESET synchronous_standby_names");
+  Ask("SELECT pg_reload_conf()");
+  EXPECT_TRUE(put.get().ok());
+  EXPECT_NE(Ask("SELECT epoch FROM hulld.store").front(), epoch);
+  EXPECT_EQ(ReceivedAnew("h"), 9);
+}
+
+}  // namespace
+}  // namespace hulld::server
