@@ -123,7 +123,8 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   if (hull->state.damaged()) return refuse(locked, hull->state.damage());
   const absl::StatusOr<uint64_t> last = CommittedSequence(locked, *hull, request->writer_id);
   if (!last.ok()) return refuse(locked, last.status());
-  if (hull->state.gone()) return OpenLocked(locked, request);
+  // The end of a hull takes its sequences out of the store before the registry knows.
+  if (hull->state.gone() || hull->state.changing_life()) return OpenLocked(locked, request);
   if (*last == 0 && hull->head.writer_count >= limits_.max_writers_per_hull) {
     return refuse(locked, TooManyWriters(hull->head, limits_.max_writers_per_hull));
   }

@@ -2,6 +2,8 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <mutex>
+
 #include "server/contract/error_info.h"
 
 namespace hulld::server {

@@ -7,13 +7,13 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/query/body/query_body.h"
+#include "server/process/synchronization.h"
 #include "server/registry/locked.h"
 #include "server/registry/memory_budget.h"
 #include "server/registry/registry_types.h"
@@ -59,7 +59,7 @@ class Body {
 
   const MemoryCharge charge_;
 
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;
   // Guarded by mutex_.
   mutable MemoryCharge box_charge_;
   mutable std::vector<uint64_t> box_revisions_;

@@ -113,7 +113,7 @@ def check_complete(header, folder):
     page = (folder / 'README.md').read_text()
     by_hand = set(re.findall(r'^- `(k\w+)`', page, re.MULTILINE))
     proved = set()
-    for script in folder.glob('*.g'):
+    for script in folder.rglob('*.g'):
         proved |= {mutant[1] for line in script.read_text().split('\n')
                    if (mutant := MUTANT.match(line))}
         if f'`{script.name}`' not in page:

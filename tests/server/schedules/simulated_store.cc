@@ -135,8 +135,8 @@ absl::StatusOr<std::string> SimulatedStore::MakeCopy() {
   return absl::FailedPreconditionError("there is no copy of what is simulated");
 }
 
-void SimulatedStore::Reopen() {
-  faults_ = {};
+void SimulatedStore::Reopen(const StoreFaults& faults) {
+  faults_ = faults;
   is_dead_ = is_failing_ = false;
   // All or none.
   if (!unknown_.empty() && Dice().OneIn(2)) {

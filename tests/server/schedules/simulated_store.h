@@ -55,6 +55,8 @@ class SimulatedStore : public Store {
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return ledger_.revision(); }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
+  // There are none.
+  absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
@@ -72,8 +74,8 @@ class SimulatedStore : public Store {
   bool has_damage() const { return !damaged_.empty(); }
   bool was_killed() const { return is_dead_; }
 
-  // What the next process finds, without faults from now on.
-  void Reopen();
+  // What the next process finds. faults: from now on.
+  void Reopen(const StoreFaults& faults);
 
  private:
   // What is kept of a hull.

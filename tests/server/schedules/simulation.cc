@@ -144,8 +144,16 @@ void Simulate(Reached& reached) {
   run([](Simulation& simulation) { RunClients(simulation); });
   if (store.was_killed() || Scheduler::Current().random().OneIn(4)) {
     Scheduler::Current().Note("test: opens the store anew");
-    store.Reopen();
+    store.Reopen({});
     run([](Simulation& simulation) { Client(simulation).CheckAll(); });
+  }
+  // Hulls that are not in memory at first.
+  if (Scheduler::Current().random().OneIn(3)) {
+    Scheduler::Current().Note("test: opens the store for clients");
+    StoreFaults faults = plan.faults;
+    faults.killed_at_batch = 0;
+    store.Reopen(faults);
+    run([](Simulation& simulation) { RunClients(simulation); });
   }
   CountStore(store.counts(), reached);
 }
