@@ -11,6 +11,7 @@
 
 #include "client/backup_file.h"
 #include "client/client.h"
+#include "hulld/v1/body.grpc.pb.h"
 #include "server/admin/doctor.h"
 #include "tests/server/harness/faulty_file_system.h"
 #include "tests/server/harness/test_server.h"
@@ -233,6 +234,45 @@ TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
   EXPECT_NE(after.header().store_id(), before.header().store_id());
   Restart(DurableConfig("restored"));
   EXPECT_EQ(Get("sphere").header().store_id(), after.header().store_id());
+}
+
+TEST_F(DurableServer, ABackupHoldsBodies) {
+  Put("cube", Cube());
+  v1::PutBodyRequest put;
+  put.set_body_id("two cubes");
+  for (const double x : {0.0, 0.1}) {
+    v1::Placement& piece = *put.add_pieces();
+    piece.set_hull_id("cube");
+    piece.mutable_pose()->mutable_rotation()->set_w(1);
+    piece.mutable_pose()->mutable_rotation()->set_z(x);
+    piece.mutable_pose()->mutable_translation()->set_x(x);
+  }
+  const auto get = [this] {
+    v1::GetBodyRequest request;
+    request.set_body_id("two cubes");
+    v1::GetBodyResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status =
+        v1::BodyService::NewStub(channel_)->GetBody(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response;
+  };
+  {
+    v1::PutBodyResponse response;
+    grpc::ClientContext context;
+    ASSERT_TRUE(v1::BodyService::NewStub(channel_)->PutBody(&context, put, &response).ok());
+  }
+  const v1::GetBodyResponse before = get();
+  const std::string file = directory_ + "/backup";
+  SaveBackup(file);
+  ASSERT_TRUE(RestoreBackup(file, directory_ + "/restored").ok());
+  Restart(DurableConfig("restored"));
+  const v1::GetBodyResponse after = get();
+  ASSERT_EQ(after.pieces_size(), 2);
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(after.pieces(i).SerializeAsString(), put.pieces(i).SerializeAsString());
+  }
+  EXPECT_EQ(after.body().SerializeAsString(), before.body().SerializeAsString());
 }
 
 TEST_F(DurableServer, ADamagedOrCutBackupIsRefused) {

@@ -59,6 +59,7 @@ class ScriptedStore : public MemoryStore {
 
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override {
+    if (const auto hook = before_load_sequence.Take()) hook();
     uint64_t sequence = 0;
     {
       const std::lock_guard lock(mutex_);
@@ -103,6 +104,7 @@ class ScriptedStore : public MemoryStore {
 
   // Before the points are looked for.
   Hook<void> before_load;
+  Hook<void> before_load_sequence;
   Hook<void> after_load_sequence;
   Hook<absl::Status> before_commit;
   // The store has the change, and the registry does not know it yet.
@@ -116,6 +118,8 @@ class ScriptedStore : public MemoryStore {
     if (change.replaced.has_value()) vertices_.erase(change.replaced->record.create_revision);
     if (change.deleted) {
       vertices_.erase(incarnation);
+      std::erase_if(sequences_,
+                    [&](const auto& entry) { return entry.first.first == incarnation; });
       return;
     }
     std::vector<Vector>& vertices = vertices_[incarnation];
@@ -442,6 +446,38 @@ TEST_F(RegistryInterleaving, ASequenceThatIsReadWhileAnotherIsCommittedIsTheNewe
 }
 
 // The chunk is already with a thread, which has not begun, when the batch before it fails.
+// The store has the deletion before the registry knows: a writer's sequence that is read then is
+// that of no hull.
+TEST_F(RegistryInterleaving, ASequenceThatADeletionTookAwayIsNotThatOfTheHull) {
+  const OpenResult first = OpenResultOf("h", "w");
+  ASSERT_TRUE(Append(first.session, 1, CubeCorners()).ok());
+  registry_.CloseAppend(first.session);
+  // One of two threads is busy, so what is submitted after the opening comes after it.
+  Gate busy, reads, committed;
+  writers_.Submit([&] { busy.Stop(); });
+  busy.WaitUntilReached();
+  store_.before_load_sequence.Set([&] { reads.Stop(); });
+  std::promise<absl::StatusOr<OpenResult>> opened;
+  registry_.OpenAppend(
+      "h", "w", true, [](const absl::Status&) {},
+      [&](absl::StatusOr<OpenResult> result) { opened.set_value(std::move(result)); });
+  reads.WaitUntilReached();
+  store_.after_commit.Set([&] { committed.Stop(); });
+  auto deleted = std::async(std::launch::async, [&] { return Delete("h"); });
+  committed.WaitUntilReached();
+  reads.Open();
+  std::promise<void> went_on;
+  writers_.Submit([&] { went_on.set_value(); });
+  went_on.get_future().wait();
+  committed.Open();
+  busy.Open();
+  EXPECT_TRUE(deleted.get().ok());
+  const absl::StatusOr<OpenResult> second = opened.get_future().get();
+  ASSERT_TRUE(second.ok()) << second.status();
+  EXPECT_EQ(second->last_sequence, 0);
+  EXPECT_GT(second->hull.create_revision, first.hull.create_revision);
+}
+
 TEST_F(RegistryInterleaving, AChunkIsNotBuiltOnOneThatWasRefused) {
   const AppendSession refused = Open("h", "refused");
   const AppendSession kept = Open("h", "kept");
