@@ -239,7 +239,7 @@ TEST_F(DurableServer, ABackupIsAStoreOfItsOwn) {
 TEST_F(DurableServer, ABackupHoldsBodies) {
   Put("cube", Cube());
   v1::PutBodyRequest put;
-  put.set_body_id("two cubes");
+  put.set_body_id("two-cubes");
   for (const double x : {0.0, 0.1}) {
     v1::Placement& piece = *put.add_pieces();
     piece.set_hull_id("cube");
@@ -249,7 +249,7 @@ TEST_F(DurableServer, ABackupHoldsBodies) {
   }
   const auto get = [this] {
     v1::GetBodyRequest request;
-    request.set_body_id("two cubes");
+    request.set_body_id("two-cubes");
     v1::GetBodyResponse response;
     grpc::ClientContext context;
     const grpc::Status status =

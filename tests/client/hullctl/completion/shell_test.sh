@@ -79,7 +79,8 @@ case $kind in
 zmodload zsh/zpty
 zpty -b shell zsh -f -i
 zpty -w shell 'PS1=; autoload -U compinit; compinit -D; source <(hullctl completion zsh); unsetopt beep'
-zpty -w shell 'show() { print -r -- "<<$BUFFER>>"; BUFFER=; zle accept-line }; zle -N show; bindkey "^X" show'
+# Its text, which the terminal echoes, must not look like what it prints.
+zpty -w shell 'show() { print -r -- "<""<$BUFFER>"">"; BUFFER=; zle accept-line }; zle -N show; bindkey "^X" show'
 zpty -w shell 'print READ''Y'
 zpty -r shell answer '*READY*'
 zpty -w -n shell "$1"$'\t\x18'
