@@ -13,7 +13,7 @@ namespace hulld::server {
 namespace {
 
 #ifdef HULLD_SANITIZED
-constexpr uint64_t kSchedules = 2'000;
+constexpr uint64_t kSchedules = 10'000;
 #else
 constexpr uint64_t kSchedules = 50'000;
 #endif
