@@ -14,12 +14,10 @@
 #include "client/formats/point_file.h"
 #include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/scene/yaml_scene.h"
+#include "client/point_messages.h"
 
 namespace hulld {
 namespace {
-
-// About a MiB a message.
-constexpr size_t kNumbersPerMessage = 3 * 40000;
 
 absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
   const auto format = PointFormatOfPath(hull.file);
@@ -82,19 +80,8 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
   v1::ReplaceOpen open;
   open.set_hull_id(hull_id);
   open.set_create_if_absent(true);
-  return client
-      .ReplaceHull(open,
-                   [&xyz](const Client::PointSink& sink) {
-                     for (size_t begin = 0; begin < xyz.size(); begin += kNumbersPerMessage) {
-                       const size_t end = std::min(begin + kNumbersPerMessage, xyz.size());
-                       v1::PointBlock points;
-                       points.mutable_xyz()->Add(xyz.begin() + static_cast<ptrdiff_t>(begin),
-                                                 xyz.begin() + static_cast<ptrdiff_t>(end));
-                       if (absl::Status sent = sink(points); !sent.ok()) return sent;
-                     }
-                     return absl::OkStatus();
-                   })
-      .status();
+  const auto feed = [&xyz](const Client::PointSink& sink) { return SendInMessages(xyz, sink); };
+  return client.ReplaceHull(open, feed).status();
 }
 
 absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene) {
