@@ -84,22 +84,29 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
   return client.ReplaceHull(open, feed).status();
 }
 
+bool OwnsItsPrefix(const SceneDescription& scene) { return scene.prefix.ends_with('/'); }
+
 absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene) {
   std::vector<Kept> strangers;
-  if (scene.prefix.empty()) return strangers;
+  if (!OwnsItsPrefix(scene)) return strangers;
+  const auto add = [&strangers](const std::string& id, bool is_body, const auto& info) {
+    std::optional<uint64_t> revision;
+    if (!info.damaged()) revision = info.revision();
+    strangers.push_back({id, is_body, revision});
+  };
   std::set<std::string> defined_bodies;
   for (const BodyDefinition& body : scene.bodies) defined_bodies.insert(body.body_id);
   const auto bodies = client.ListAllBodies(scene.prefix);
   if (!bodies.ok()) return bodies.status();
   for (const v1::BodyInfo& body : bodies->bodies()) {
-    if (!defined_bodies.contains(body.body_id())) strangers.push_back({body.body_id(), true});
+    if (!defined_bodies.contains(body.body_id())) add(body.body_id(), true, body);
   }
   std::set<std::string> defined;
   for (const HullDefinition& hull : scene.hulls) defined.insert(hull.hull_id);
   const auto list = client.ListAllHulls(scene.prefix);
   if (!list.ok()) return list.status();
   for (const v1::HullInfo& hull : list->hulls()) {
-    if (!defined.contains(hull.hull_id())) strangers.push_back({hull.hull_id(), false});
+    if (!defined.contains(hull.hull_id())) add(hull.hull_id(), false, hull);
   }
   return strangers;
 }
