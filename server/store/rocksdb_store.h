@@ -109,6 +109,8 @@ class RocksDbStore : public Store {
   absl::Status DropLostIncarnations();
   absl::Status LoadBase(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status LoadDeltas(const StoredHull& hull, VertexAssembly* assembly);
+  // Stalls of the database that is open.
+  uint64_t CountStalls() const;
   absl::Status Probe();
   absl::Status Reopen();
   absl::Status SyncLog();
@@ -125,6 +127,8 @@ class RocksDbStore : public Store {
   // Shared while db_ is used, exclusive in Reopen.
   mutable std::shared_mutex db_mutex_;
   std::unique_ptr<rocksdb::DB> db_;
+  // Of the databases that were open here before this one, which each count their own.
+  uint64_t former_stalls_ = 0;
 
   // Held while the log is written or synced.
   std::mutex log_mutex_;

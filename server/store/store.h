@@ -82,7 +82,8 @@ struct StoreDisk {
   uint64_t log_bytes = 0;
   // What the disk has left for it; none where that is not known.
   std::optional<uint64_t> free_bytes;
-  // How often changes were slowed down or stopped since it was opened, and whether they are.
+  // How often changes were slowed down or stopped since the store was opened, which never goes
+  // back, and whether they are.
   uint64_t stalls = 0;
   bool is_stalled = false;
 };
