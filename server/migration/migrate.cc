@@ -171,7 +171,7 @@ int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std
       "A run that was ended is gone on with by the same command. Revisions and writers' sequences "
       "are\nkept; the copy is another store, with an ID of its own.\n"
       "Exit status: 0 all is copied and the same, 1 it failed on its way and can be run again, 2 "
-      "there is\nnothing that it may do.");
+      "it was\nrefused, and nothing was changed.");
   std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
   try {
     app.parse(std::move(reversed));

@@ -88,7 +88,7 @@ class PostgresTarget : public MigrationTarget {
     const absl::Status status = session_->Ask(all).status();
     if (status.ok()) return status;
     if (ViolatedConstraint(status) == "store_fence") {
-      return absl::FailedPreconditionError(
+      return absl::AbortedError(
           "a server took the database over meanwhile; end it, and run this again");
     }
     return absl::Status(status.code(), absl::StrCat("the database: ", status.message()));
