@@ -114,6 +114,8 @@ void Server::AddSizesToMetrics() {
     advance(store.sync_failures, failures.sync);
     advance(store.read_failures, failures.read);
     store.cache_bytes.Set(static_cast<double>(cache.bytes));
+    store.cache_reading_bytes.Set(static_cast<double>(cache.reading_bytes));
+    store.cache_writing_bytes.Set(static_cast<double>(cache.writing_bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
     store.read_only.Set(registry_.Commits().failing ? 1 : 0);
     if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {

@@ -8,9 +8,8 @@
 #include "server/wire/decode.h"
 
 namespace hulld::server {
-namespace {
 
-constexpr OptionNames kFieldNames = {
+const OptionNames kFieldNames = {
     .tolerance = "tolerance",
     .max_error = "wanted.max_error",
     .clearance = "wanted.clearance",
@@ -19,8 +18,6 @@ constexpr OptionNames kFieldNames = {
     .witness = "wanted.witness",
     .textbook = "METHOD_TEXTBOOK_SAT",
 };
-
-}  // namespace
 
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,

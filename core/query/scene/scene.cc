@@ -211,7 +211,7 @@ bool SceneSearch::IsFound(const Answer& answer) const {
 absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
                                             std::optional<PiecePair>* pieces) const {
   if (!IsBody(a) && !IsBody(b)) return CheckCollision(placements_[a], placements_[b], options);
-  if (absl::Status s = ValidateOptionsAmongMany(options); !s.ok()) return s;
+  if (absl::Status s = ValidateOptionsAmongMany(options, options_->names); !s.ok()) return s;
   absl::StatusOr<BodyAnswer> answer =
       CheckBodies(options_->bodies[a], options_->bodies[b], options);
   if (!answer.ok()) return answer.status();
