@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
+#include "client/server_address.h"
 
 namespace hulld {
 namespace {

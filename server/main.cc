@@ -125,9 +125,8 @@ int Run(const Config& config) {
   spdlog::info("{} received: draining for at most {} ms; once more ends at once",
                received == SIGTERM ? "SIGTERM" : "SIGINT", config.drain_timeout.count());
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
-  (*server)->BeginDrain();
-  if (!(*server)->WaitIdle(config.drain_timeout)) {
-    spdlog::warn("the drain timeout passed; cancelling the calls that still run");
+  if (!(*server)->Drain(config.drain_timeout)) {
+    spdlog::warn("the drain timeout passed; cancelled the calls that still ran");
   }
   return 0;
 }

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <iterator>
 #include <limits>
+#include <thread>
 #include <utility>
 
 #include "server/access/secret_file.h"
@@ -207,6 +208,16 @@ void Server::BeginDrain() {
 
 bool Server::WaitIdle(std::chrono::milliseconds timeout) {
   return admission_.WaitIdle(std::chrono::steady_clock::now() + timeout);
+}
+
+bool Server::Drain(std::chrono::milliseconds timeout) {
+  BeginDrain();
+  std::thread closing([this, deadline = std::chrono::system_clock::now() + timeout] {
+    grpc_server_->Shutdown(deadline);
+  });
+  const bool is_idle = WaitIdle(timeout);
+  closing.join();
+  return is_idle;
 }
 
 Server::~Server() {
