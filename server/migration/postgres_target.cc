@@ -85,7 +85,7 @@ class PostgresTarget : public MigrationTarget {
     all[1] = {.name = "migrate_fence", .parameters = {EncodeBigint(store_->epoch())}};
     std::ranges::move(statements, std::back_inserter(all));
     all.push_back({.text = "COMMIT"});
-    const absl::Status status = session_->Ask(all).status();
+    absl::Status status = session_->Ask(all).status();
     if (status.ok()) return status;
     if (ViolatedConstraint(status) == "store_fence") {
       return absl::AbortedError(

@@ -22,8 +22,8 @@ namespace hulld::server {
 class LogFileSystem : public rocksdb::FileSystemWrapper {
  public:
   // directory: where the logs are; copies of them elsewhere are not meant.
-  LogFileSystem(std::shared_ptr<rocksdb::FileSystem> base, std::string directory)
-      : FileSystemWrapper(std::move(base)), directory_(std::move(directory)) {}
+  LogFileSystem(const std::shared_ptr<rocksdb::FileSystem>& base, std::string directory)
+      : FileSystemWrapper(base), directory_(std::move(directory)) {}
   const char* Name() const override { return "LogFileSystem"; }
 
   // Everything that was written to the logs so far is committed.

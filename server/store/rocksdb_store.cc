@@ -50,11 +50,10 @@ absl::Status RocksDbStore::DropLostIncarnations() {
   if (lost.ok() && !lost->has_value()) return absl::OkStatus();
   std::unordered_set<uint64_t> known;
   bool certain = true;
-  const absl::Status read =
-      ForEachHull([&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
-        certain = certain && hull.ok();
-        if (hull.ok()) known.insert(hull->record.create_revision);
-      });
+  absl::Status read = ForEachHull([&](const std::string&, const absl::StatusOr<StoredHull>& hull) {
+    certain = certain && hull.ok();
+    if (hull.ok()) known.insert(hull->record.create_revision);
+  });
   if (!read.ok()) return read;
   if (!certain) return absl::OkStatus();
   rocksdb::WriteBatch batch;

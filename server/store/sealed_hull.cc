@@ -40,7 +40,7 @@ absl::Status VertexAssembly::AddBasePart(const absl::StatusOr<std::string_view>&
   const std::string name = absl::StrCat("part ", next_part_++, " of its base: ");
   if (!value.ok()) return Prefixed(name, value.status());
   if (value->empty()) return absl::DataLossError(absl::StrCat(name, "it is empty"));
-  const absl::Status status = Prefixed(name, AppendVertices(*value, &vertices_));
+  absl::Status status = Prefixed(name, AppendVertices(*value, &vertices_));
   base_vertices_ = vertices_.size();
   return status;
 }

@@ -117,8 +117,7 @@ class Store {
 
   // Every writer of the hull, in byte order of the IDs; as many as are there. FAILED_PRECONDITION:
   // nothing is kept.
-  virtual absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) {
-    (void)hull;
+  virtual absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& /*hull*/) {
     return absl::FailedPreconditionError("this store keeps no writers to read back");
   }
 
