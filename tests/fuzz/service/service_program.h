@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/packed_placements.h"
 #include "server/contract/rpc.h"
 #include "tests/fuzz/byte_reader.h"
 #include "tests/fuzz/service/fuzz_message.h"
@@ -22,6 +23,9 @@
 #include "tests/fuzz/service/watch_check.h"
 
 namespace hulld::fuzz {
+
+// What replies tell of a hull, whichever call they answer.
+std::string Known(const v1::HullInfo& hull);
 
 // One run of one program: decodes and makes its calls, and checks what comes back.
 class ServiceProgram {
@@ -112,7 +116,15 @@ class ServiceProgram {
   v1::WatchCollisionsRequest NextWatchMessage(bool first, size_t placements);
   // The same request in its other form, now and then.
   template <typename Request>
-  std::optional<Request> MaybePacked(const Request& request);
+  std::optional<Request> MaybePacked(const Request& request) {
+    if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {
+      return std::nullopt;
+    }
+    Request packed = request;
+    *packed.mutable_packed_placements() = PackPlacements(request.placements());
+    packed.clear_placements();
+    return packed;
+  }
 
   ServiceFuzz& service_;
   ByteReader in_;

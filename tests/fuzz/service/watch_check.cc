@@ -10,10 +10,6 @@
 namespace hulld::fuzz {
 namespace {
 
-bool IsColliding(v1::Relation relation) {
-  return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
-}
-
 // The kind of event that leads from one state to another, as the contract has it.
 v1::CollisionEventKind KindOf(v1::Relation before, bool was_near, v1::Relation after,
                               bool is_near) {
@@ -23,7 +19,7 @@ v1::CollisionEventKind KindOf(v1::Relation before, bool was_near, v1::Relation a
   }
   if (after == v1::RELATION_TOUCHING && before != after) return v1::COLLISION_EVENT_KIND_TOUCH;
   if (after != v1::RELATION_SEPARATED) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
-  if (IsColliding(before)) return v1::COLLISION_EVENT_KIND_EXIT;
+  if (IsCollision(before)) return v1::COLLISION_EVENT_KIND_EXIT;
   if (is_near == was_near) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
   return is_near ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
 }
@@ -162,7 +158,7 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
 std::map<std::pair<uint32_t, uint32_t>, v1::Relation> CollisionWatchCheck::Colliding() const {
   std::map<Pair, v1::Relation> colliding;
   for (const auto& [pair, state] : told_) {
-    if (!IsColliding(state.relation)) continue;
+    if (!IsCollision(state.relation)) continue;
     colliding[std::minmax(pair.first, pair.second)] = state.relation;
   }
   return colliding;
