@@ -1,6 +1,8 @@
 // Watches: what is there, then what changes.
 #include <absl/status/status.h>
 
+#include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "server/contract/error_info.h"
@@ -95,8 +97,17 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
 
 void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
                          std::span<const std::string> dropped) {
-  const std::lock_guard lock(mutex_);
-  feed_.WatchAlso(watch, added, dropped);
+  // Others pass in between.
+  const auto in_slices = [this](std::span<const std::string> ids, const auto& take) {
+    while (!ids.empty()) {
+      const size_t count = std::min<size_t>(ids.size(), kMostLookupsPerHold);
+      const std::lock_guard lock(mutex_);
+      take(ids.first(count));
+      ids = ids.subspan(count);
+    }
+  };
+  in_slices(added, [&](std::span<const std::string> ids) { feed_.WatchAlso(watch, ids, {}); });
+  in_slices(dropped, [&](std::span<const std::string> ids) { feed_.WatchAlso(watch, {}, ids); });
 }
 
 void Registry::NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) {
