@@ -21,11 +21,6 @@ constexpr int kMostCalls = 24;
 constexpr std::chrono::seconds kPatience(60);
 constexpr int kMostComparedPlacements = 7;
 
-bool Changes(Rpc rpc) {
-  return rpc == Rpc::kCreateHull || rpc == Rpc::kAppendPoints || rpc == Rpc::kReplaceHull ||
-         rpc == Rpc::kDeleteHull;
-}
-
 // A server stream with the context that it needs.
 template <typename Response>
 struct OpenReader {
@@ -52,6 +47,11 @@ std::string Known(const v1::HullInfo& hull) {
                       ", vertices ", hull.vertex_count(), ", ", hull.counts().ShortDebugString());
 }
 
+bool ChangesHulls(Rpc rpc) {
+  return rpc == Rpc::kCreateHull || rpc == Rpc::kAppendPoints || rpc == Rpc::kReplaceHull ||
+         rpc == Rpc::kDeleteHull;
+}
+
 std::string ServiceProgram::Run() {
   for (int i = 0; i < kMostCalls && !in_.empty() && finding_.empty(); ++i) Step();
   idle_.clear();
@@ -59,7 +59,7 @@ std::string ServiceProgram::Run() {
 }
 
 void ServiceProgram::Step() {
-  switch (in_.Below(24)) {
+  switch (in_.Below(28)) {
     case 0:
       return CreateHull();
     case 1:
@@ -98,6 +98,13 @@ void ServiceProgram::Step() {
     case 21:
     case 22:
       return WatchCollisions();
+    case 23:
+    case 24:
+      return PutBody();
+    case 25:
+      return AskAboutBody();
+    case 26:
+      return in_.OneOf(2) ? GetBody() : in_.OneOf(2) ? DeleteBody() : ListBodies();
     default:
       return in_.OneOf(4) ? GetStatus() : AppendPoints();
   }
@@ -167,22 +174,6 @@ void ServiceProgram::SeeKnownHull(const v1::HullInfo& hull) {
 uint64_t ServiceProgram::RevisionToExpect(const std::string& hull_id, uint64_t if_revision) const {
   const auto known = hulls_.find(hull_id);
   return if_revision == revision_ && known != hulls_.end() ? known->second.revision() : if_revision;
-}
-
-template <typename Stub, typename Request, typename Response>
-bool ServiceProgram::Call(Rpc rpc, Stub& stub,
-                          grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&,
-                                                       Response*),
-                          const Request& request, Response* response) {
-  grpc::ClientContext context;
-  CallManner manner;
-  Hurry(context, manner);
-  const bool ok = Ended(rpc, manner, (stub.*method)(&context, request, response));
-  if constexpr (requires { request.hull_id(); }) {
-    if (!ok && manner.hurried && Changes(rpc)) Doubt(request.hull_id());
-  }
-  if (ok) SeeHeader(response->header());
-  return ok;
 }
 
 template <typename Stub, typename Request, typename Response>
@@ -464,6 +455,8 @@ void ServiceProgram::CheckCertificateOf(const v1::CheckCollisionRequest& asked,
   v1::CheckCollisionResponse response;
   const grpc::Status status = service_.collisions_->CheckCollision(&context, request, &response);
   if (!status.ok()) return Note("no certificate: " + status.error_message());
+  // A body that has the ID of a hull that went.
+  if (!response.piece_hulls().empty()) return;
   if (answer.relation() != v1::RELATION_WITHIN_TOLERANCE &&
       answer.relation() != response.relation()) {
     return Note(absl::StrCat("two answers to one question: ", v1::Relation_Name(answer.relation()),
@@ -623,7 +616,8 @@ void ServiceProgram::SendRaw() {
     Note(absl::StrCat(server::RpcName(call.rpc), " takes bytes that are no message"));
   }
   if (call.malformed) Reach("malformed message");
-  if (Changes(call.rpc)) all_doubtful_ = true;
+  if (ChangesHulls(call.rpc)) all_doubtful_ = true;
+  if (call.rpc == Rpc::kPutBody || call.rpc == Rpc::kDeleteBody) bodies_.clear();
 }
 
 std::string ServiceProgram::CheckAcknowledged() {

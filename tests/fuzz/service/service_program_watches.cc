@@ -205,6 +205,7 @@ void ServiceProgram::CompareWatchWithBatch(const CollisionWatchCheck& check) {
     const int at = static_cast<int>(2 * i);
     if (!IsCollision(relations[i])) continue;
     expected[std::minmax(batch.pairs(at), batch.pairs(at + 1))] = relations[i];
+    Reach(absl::StrCat("WatchCollisions ", v1::Relation_Name(relations[i])));
   }
   if (!expected.empty()) Reach("WatchCollisions collision");
   if (check.Colliding() != expected && finding_.empty()) Note("a watch and a batch disagree");
