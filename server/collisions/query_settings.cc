@@ -49,10 +49,6 @@ absl::Status ValidateForBodies(const QueryOptions& options) {
   return ValidateBodyOptions(options, kFieldNames);
 }
 
-absl::Status ValidateForBodiesAmongMany(const QueryOptions& options) {
-  return ValidateOptionsAmongMany(options, kFieldNames);
-}
-
 bool IsQuickToRelate(const QueryHull& hull) {
   // Observed: exact contact of hulls of 10000 vertices takes 60 us
   // (tests/bench/results/query_relation_*.csv). The first few questions about one that is not
@@ -86,6 +82,16 @@ absl::Status NameProofLimit(const absl::Status& status) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   return WithReason(status, v1::ERROR_REASON_PROOF_TOO_LARGE,
                     {{"limit", uint64_t{Config::kMaxPieceCertificates}}});
+}
+
+absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit) {
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "the certificates of ", certificates,
+          " pairs of pieces, and what else is told of the bodies, take more than the ", limit,
+          " bytes of a reply; ask about bodies of fewer pieces, or without "
+          "certificates")),
+      v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", limit}});
 }
 
 }  // namespace hulld::server
