@@ -8,8 +8,9 @@
 #include "server/wire/decode.h"
 
 namespace hulld::server {
+namespace {
 
-const OptionNames kFieldNames = {
+constexpr OptionNames kFieldNames = {
     .tolerance = "tolerance",
     .max_error = "wanted.max_error",
     .clearance = "wanted.clearance",
@@ -18,6 +19,8 @@ const OptionNames kFieldNames = {
     .witness = "wanted.witness",
     .textbook = "METHOD_TEXTBOOK_SAT",
 };
+
+}  // namespace
 
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,

@@ -10,9 +10,6 @@
 
 namespace hulld::server {
 
-// How errors name what is asked: as the messages that hold `wanted` do.
-extern const OptionNames kFieldNames;
-
 // The options of core for what a request wants; the query ends with `lifetime`, which must outlive
 // it. INVALID_ARGUMENT, naming the field: a number that stands for no method, a length that is
 // negative or NaN, or wishes that exclude each other.

@@ -84,7 +84,6 @@ absl::Status SceneStream::Validate() {
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
   if (request().has_movers()) options_.movers = request().movers();
   options_.query = *std::move(options);
-  options_.names = kFieldNames;
   return absl::OkStatus();
 }
 

@@ -44,8 +44,6 @@ struct SceneOptions {
   std::optional<uint32_t> movers;
   // OpenMP threads.
   int threads = 1;
-  // How errors name what is asked.
-  OptionNames names;
 };
 
 // A found pair, a < b, or one that could not be answered.

@@ -218,25 +218,6 @@ TEST_F(BodyQuestions, ScenesTakeBoth) {
   EXPECT_EQ(all.totals().pairs(), 6u);
 }
 
-// A problem of a pair names the field that the caller set.
-TEST_F(BodyQuestions, ScenesNameTheWishThatBodiesCannotHave) {
-  PutPair("pair");
-  v1::FindCollisionsRequest request;
-  *request.add_placements() = PlacementOf("pair");
-  *request.add_placements() = PlacementOf("cube", 0.5, 0, 0);
-  request.mutable_wanted()->set_certificate(true);
-  v1::FindCollisionsResponse all;
-  const absl::Status status =
-      MakeClient().FindCollisions(request, [&](const v1::FindCollisionsResponse& part) {
-        all.MergeFrom(part);
-        return absl::OkStatus();
-      });
-  ASSERT_TRUE(status.ok()) << status;
-  ASSERT_EQ(all.columns().pair_problems_size(), 1);
-  EXPECT_THAT(all.columns().pair_problems(0).message(),
-              testing::StartsWith("wanted.certificate of bodies is for a pair"));
-}
-
 TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   PutPair("pair");
   Put("probe", Cube());
