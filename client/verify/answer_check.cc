@@ -46,14 +46,17 @@ Verification FromStatus(const absl::Status& checked) {
 }
 
 // Whether the pieces that the answer says decided are proven to be in its relation.
-bool IsDecidingPairProven(const v1::CheckCollisionResponse& response) {
-  if (response.relation() == v1::RELATION_SEPARATED) return true;
-  return std::any_of(response.piece_certificates().begin(), response.piece_certificates().end(),
-                     [&](const v1::PieceCertificate& of) {
-                       return of.relation() == response.relation() &&
-                              of.piece_a() == response.piece_a().index() &&
-                              of.piece_b() == response.piece_b().index();
-                     });
+bool IsDecidingPairProven(const CheckedBodies& answer) {
+  if (answer.relation == v1::RELATION_SEPARATED) return true;
+  return std::any_of(
+      answer.certificates.begin(), answer.certificates.end(), [&](const v1::PieceCertificate& of) {
+        return of.relation() == answer.relation && of.piece_a() == answer.piece_a.value_or(0) &&
+               of.piece_b() == answer.piece_b.value_or(0);
+      });
+}
+
+std::optional<uint32_t> IndexOf(bool has_piece, const v1::DecidingPiece& piece) {
+  return has_piece ? std::optional(piece.index()) : std::nullopt;
 }
 
 }  // namespace
@@ -108,7 +111,7 @@ absl::StatusOr<const v1::GetBodyResponse*> AnswerChecker::FetchBody(const v1::Hu
 
 absl::StatusOr<std::vector<PlacedVertices>> AnswerChecker::FetchPieces(
     const v1::Placement& placement, const v1::HullVersion& version, bool named,
-    const Versions& hulls, Verification* problem) {
+    const HullVersions& hulls, Verification* problem) {
   const auto body = FetchBody(version, problem);
   if (!body.ok()) return body.status();
   std::vector<PlacedVertices> pieces;
@@ -159,38 +162,41 @@ absl::StatusOr<Verification> AnswerChecker::Check(const CheckedAnswer& answer) {
 
 absl::StatusOr<Verification> AnswerChecker::Check(const v1::CheckCollisionRequest& request,
                                                   const v1::CheckCollisionResponse& response) {
-  if (!response.piece_hulls().empty()) return CheckBodies(request, response);
+  if (!response.piece_hulls().empty()) {
+    HullVersions hulls;
+    for (const v1::HullVersion& hull : response.piece_hulls()) hulls.emplace(hull.hull_id(), &hull);
+    return Check(CheckedBodies{request.a(), request.b(), response.relation(), response.hull_a(),
+                               response.hull_b(), response.piece_certificates(), hulls,
+                               IndexOf(response.has_piece_a(), response.piece_a()),
+                               IndexOf(response.has_piece_b(), response.piece_b())});
+  }
   if (response.has_piece_a() || response.has_piece_b()) {
     return Verification{Verdict::kCannotCheck, "the answer about bodies has no certificates"};
   }
-  return Check({request.a(), request.b(), response.relation(), response.certificate(),
-                response.hull_a(), response.hull_b()});
+  return Check(CheckedAnswer{request.a(), request.b(), response.relation(), response.certificate(),
+                             response.hull_a(), response.hull_b()});
 }
 
-absl::StatusOr<Verification> AnswerChecker::CheckBodies(
-    const v1::CheckCollisionRequest& request, const v1::CheckCollisionResponse& response) {
-  if (const auto precluded = Precluded(response.relation(), request.a(), response.hull_a(),
-                                       request.b(), response.hull_b())) {
+absl::StatusOr<Verification> AnswerChecker::Check(const CheckedBodies& answer) {
+  if (const auto precluded =
+          Precluded(answer.relation, answer.a, answer.hull_a, answer.b, answer.hull_b)) {
     return *precluded;
   }
-  Versions hulls;
-  for (const v1::HullVersion& hull : response.piece_hulls()) hulls.emplace(hull.hull_id(), &hull);
   Verification verification;
-  const auto a =
-      FetchPieces(request.a(), response.hull_a(), response.has_piece_a(), hulls, &verification);
+  const auto a = FetchPieces(answer.a, answer.hull_a, answer.piece_a.has_value(),
+                             answer.piece_hulls, &verification);
   if (!a.ok()) return a.status();
   if (!verification.reason.empty()) return verification;
-  const auto b =
-      FetchPieces(request.b(), response.hull_b(), response.has_piece_b(), hulls, &verification);
+  const auto b = FetchPieces(answer.b, answer.hull_b, answer.piece_b.has_value(),
+                             answer.piece_hulls, &verification);
   if (!b.ok()) return b.status();
   if (!verification.reason.empty()) return verification;
-  const absl::Status checked =
-      CheckPieceCertificates(response.relation(), response.piece_certificates(), *a, *b);
-  if (!checked.ok() || IsDecidingPairProven(response)) return FromStatus(checked);
+  const absl::Status checked = CheckPieceCertificates(answer.relation, answer.certificates, *a, *b);
+  if (!checked.ok() || IsDecidingPairProven(answer)) return FromStatus(checked);
   return Verification{
       Verdict::kInvalid,
-      absl::StrCat("the answer says that pieces ", response.piece_a().index(), " of A and ",
-                   response.piece_b().index(), " of B decided, but no certificate shows that")};
+      absl::StrCat("the answer says that pieces ", answer.piece_a.value_or(0), " of A and ",
+                   answer.piece_b.value_or(0), " of B decided, but no certificate shows that")};
 }
 
 absl::StatusOr<VerifiedResponse> CheckCollisionVerified(const Client& client,

@@ -5,11 +5,13 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/client.h"
 #include "client/verify/exact_hull.h"
+#include "client/verify/piece_check.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld {
@@ -41,6 +43,24 @@ struct CheckedAnswer {
   const v1::HullVersion& hull_b;
 };
 
+// Revisions of hulls, by ID.
+using HullVersions = std::map<std::string, const v1::HullVersion*>;
+
+// One answer about a pair of which at least one is a body.
+struct CheckedBodies {
+  const v1::Placement& a;
+  const v1::Placement& b;
+  v1::Relation relation;
+  const v1::HullVersion& hull_a;
+  const v1::HullVersion& hull_b;
+  const PieceCertificates& certificates;
+  // The hulls of all pieces, and of a hull beside bodies itself or not.
+  const HullVersions& piece_hulls;
+  // The pieces that the answer says decided; none of a hull, and where it names none.
+  std::optional<uint32_t> piece_a;
+  std::optional<uint32_t> piece_b;
+};
+
 // Checks answers against the hulls that GetHullMesh returns, and the bodies that GetBody does.
 class AnswerChecker {
  public:
@@ -50,13 +70,12 @@ class AnswerChecker {
   // Fetches the hulls that it does not have yet and returns the errors of that. A hull that was
   // deleted is kMoved.
   absl::StatusOr<Verification> Check(const CheckedAnswer& answer);
+  absl::StatusOr<Verification> Check(const CheckedBodies& answer);
   // The same of a single call, which may be about bodies.
   absl::StatusOr<Verification> Check(const v1::CheckCollisionRequest& request,
                                      const v1::CheckCollisionResponse& response);
 
  private:
-  using Versions = std::map<std::string, const v1::HullVersion*>;
-
   // Null, with the reason, when the server no longer has the mesh at that version.
   absl::StatusOr<const HullMesh*> Fetch(const v1::HullVersion& version, Verification* problem);
   // The same of a body; null without a reason where there is none of this ID.
@@ -66,10 +85,8 @@ class AnswerChecker {
   // longer has all. `named`: whether the answer names a piece of it. They refer to what this keeps.
   absl::StatusOr<std::vector<PlacedVertices>> FetchPieces(const v1::Placement& placement,
                                                           const v1::HullVersion& version,
-                                                          bool named, const Versions& hulls,
+                                                          bool named, const HullVersions& hulls,
                                                           Verification* problem);
-  absl::StatusOr<Verification> CheckBodies(const v1::CheckCollisionRequest& request,
-                                           const v1::CheckCollisionResponse& response);
 
   const Client& client_;
   std::map<std::string, HullMesh> meshes_;

@@ -7,6 +7,7 @@
 #include "server/collisions/placed_answer.h"
 #include "server/collisions/query_settings.h"
 #include "server/contract/status_map.h"
+#include "server/wire/answer_columns.h"
 
 namespace hulld::server {
 namespace {
@@ -78,8 +79,7 @@ absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
 
 bool BatchStream::QueueHead() {
   if (next_row_ == 0) table_.EncodeHeader(registry().store(), head_.mutable_header());
-  next_row_ =
-      table_.EncodeHulls(next_row_, head_.mutable_hulls(), head_.mutable_placement_problems());
+  next_row_ = table_.EncodeHulls(next_row_, &head_);
   if (next_row_ == table_.table_rows()) {
     has_head_ = true;
     return false;
@@ -129,12 +129,13 @@ absl::Status BatchStream::Advance(PairsPiece& piece, Clock::time_point end) {
   RungCounts counts;
   absl::Status status;
   uint64_t pairs = 0;
+  const bool looks_each_time = is_textbook || table_.has_bodies();
   do {
     status = is_textbook ? AnswerByTextbook(piece, end, &columns, &counts)
                          : Answer(piece, &columns, &counts);
     ++pairs;
   } while (status.ok() && piece.next < piece.end &&
-           (is_textbook ? Clock::now() < end : pairs % kPairsPerLook != 0 || Clock::now() < end));
+           ((!looks_each_time && pairs % kPairsPerLook != 0) || Clock::now() < end));
   if (!status.ok()) return status;
   call().metrics().CountPairs(counts);
   piece.is_done = piece.next == piece.end;
@@ -166,13 +167,13 @@ absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point 
     }
     absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(
         table_.placed()[pair.a], table_.placed()[pair.b], is_for_team ? team_options_ : options_);
-    if (!begun.ok()) return Add({begun.status(), std::nullopt}, piece, columns, counts);
+    if (!begun.ok()) return Add({begun.status()}, piece, columns, counts);
     piece.check = *std::move(begun);
   }
   const absl::StatusOr<bool> done = piece.check->Advance(end);
   if (!done.ok()) return done.status();
   if (!*done) return absl::OkStatus();
-  PlacedAnswer answer = {piece.check->Finish(), std::nullopt};
+  PlacedAnswer answer = {piece.check->Finish()};
   piece.check.reset();
   return Add(std::move(answer), piece, columns, counts);
 }
@@ -180,13 +181,13 @@ absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point 
 absl::Status BatchStream::Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
                               RungCounts* counts) {
   if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
+  const PlacedPair pair = PairAt(piece.next++);
   if (answer.answer.ok()) {
     counts->Add(answer.answer->rung);
   } else {
-    answer.answer = NameQueryLimit(answer.answer.status(), options_);
+    answer.answer = NameLimit(table_, pair.a, pair.b, answer.answer.status(), options_);
     call().CountLimit(answer.answer.status());
   }
-  const PlacedPair pair = PairAt(piece.next++);
   columns->Add([&](v1::AnswerColumns* to) {
     return AddPlacedAnswer(table_, pair.a, pair.b, answer, request().wanted(), to);
   });
@@ -208,10 +209,9 @@ void BatchStream::Deliver(PairsPiece& piece) {
   DeliverReplies(piece);
 }
 
-// A problem names its row, which would change.
 bool BatchStream::Join(const v1::BatchCheckCollisionsResponse& reply,
                        v1::BatchCheckCollisionsResponse* waiting) {
-  if (reply.columns().pair_problems_size() > 0) return false;
+  if (NamesRows(reply.columns())) return false;
   Append(reply, waiting);
   return true;
 }

@@ -20,9 +20,9 @@
 #include "server/collisions/batch_stream.h"
 #include "server/collisions/body_question.h"
 #include "server/collisions/collision_stream.h"
-#include "server/collisions/collision_watch.h"
 #include "server/collisions/query_settings.h"
 #include "server/collisions/scene_stream.h"
+#include "server/collisions/watch/collision_watch.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
 #include "server/registry/bodies/body_resolution.h"
@@ -124,25 +124,14 @@ absl::Status EncodeProof(const std::string& store_id,
   for (const PieceCertificate& certificate : certificates) {
     // Tag and length.
     constexpr size_t kEntryBytes = 4;
-    const auto [piece_a, piece_b] = certificate.pieces;
     v1::PieceCertificate* const message = response->add_piece_certificates();
-    message->set_piece_a(piece_a);
-    message->set_piece_b(piece_b);
-    message->set_relation(EncodeRelation(certificate.relation));
-    EncodeCertificate(certificate.certificate, HullOfPiece(a, piece_a).hull(),
-                      HullOfPiece(b, piece_b).hull(), message->mutable_certificate());
+    EncodePieceCertificate(certificate, HullOfPiece(a, certificate.pieces.a).hull(),
+                           HullOfPiece(b, certificate.pieces.b).hull(), message);
     bytes += kEntryBytes + message->ByteSizeLong();
     if (bytes > Config::kMaxProofBytes) break;
   }
   if (bytes <= Config::kMaxProofBytes) return absl::OkStatus();
-  return WithReason(
-      absl::ResourceExhaustedError(absl::StrCat("the certificates of ", certificates.size(),
-                                                " pairs of pieces and the hulls of all take "
-                                                "more than the ",
-                                                Config::kMaxProofBytes,
-                                                " bytes of a reply; ask about bodies of fewer "
-                                                "pieces, or without certificates")),
-      v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", uint64_t{Config::kMaxProofBytes}}});
+  return ProofTooLarge(certificates.size(), Config::kMaxProofBytes);
 }
 
 absl::Status EncodeBodyAnswer(const std::string& store_id, const BodyAnswer& answer,

@@ -214,6 +214,9 @@ void CollisionStream::AddAnswer(uint32_t index) {
   PlacedAnswer answer;
   if (answerable) answer = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
   const bool is_answered = answerable && answer.answer.ok();
+  if (answerable && !is_answered) {
+    answer.answer = NameLimit(table_, pair.a, pair.b, answer.answer.status(), options_);
+  }
   if (is_answered) rungs_.Add(answer.answer->rung);
   const v1::Relation relation =
       is_answered ? EncodeRelation(answer.answer->relation) : v1::RELATION_UNSPECIFIED;
@@ -239,16 +242,16 @@ void CollisionStream::SendPart(bool last) {
 // Computes until the answer is complete, a message is full, or it is the turn of others.
 void CollisionStream::AnswerSlice() {
   if (next_row_ < table_.table_rows()) {
-    next_row_ = table_.EncodeHulls(next_row_, reply().mutable_hulls(),
-                                   reply().mutable_placement_problems());
+    next_row_ = table_.EncodeHulls(next_row_, &reply());
     if (next_row_ < table_.table_rows()) return SendPart(false);
     reply_bytes_ = reply().ByteSizeLong();
   }
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
+  const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerLook;
   while (next_asked_ < asked_.size()) {
     if (reply_bytes_ >= FullMessageBytes(wanted_)) break;
     AddAnswer(asked_[next_asked_++]);
-    if (next_asked_ % kPairsPerLook != 0) continue;
+    if (next_asked_ % pairs_per_look != 0) continue;
     if (call().ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
       return RunOn(lane_, [this] { AnswerSlice(); });

@@ -1,14 +1,20 @@
 #include "server/collisions/placed_answer.h"
 
+#include <utility>
+
 #include "core/query/collision.h"
 #include "server/collisions/query_settings.h"
+#include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
+#include "server/wire/encode.h"
 
 namespace hulld::server {
 namespace {
 
 // Two indices, as varints.
 constexpr size_t kPiecesBytes = 10;
+// Tag and length of an entry within its message, and the row of a proof.
+constexpr size_t kEntryBytes = 10;
 
 size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
                  const std::optional<PiecePair>& pieces, v1::AnswerColumns* columns) {
@@ -20,17 +26,67 @@ size_t AddPieces(const PlacementTable& table, uint32_t a, uint32_t b,
   return kPiecesBytes;
 }
 
+// What proves the answer; the bytes that it takes.
+size_t EncodeProof(const PlacementTable& table, uint32_t a, uint32_t b,
+                   const std::vector<PieceCertificate>& certificates, v1::PieceProof* proof) {
+  size_t bytes = kEntryBytes;
+  for (const PieceCertificate& certificate : certificates) {
+    v1::PieceCertificate* const message = proof->add_certificates();
+    EncodePieceCertificate(certificate, table.HullOfPiece(a, certificate.pieces.a).hull(),
+                           table.HullOfPiece(b, certificate.pieces.b).hull(), message);
+    bytes += kEntryBytes + message->ByteSizeLong();
+    if (bytes > Config::kMaxRowProofBytes) break;
+  }
+  return bytes;
+}
+
+// The row of a pair with a body that comes with certificates. It is made apart, as it may turn out
+// to be too large.
+size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const PlacedAnswer& answer, const v1::Wanted& wanted,
+                       v1::AnswerColumns* columns) {
+  const PlacedHull nothing = table.HullOfPiece(a, 0);
+  const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
+  v1::AnswerColumns row;
+  size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
+                           table.HullOfPiece(b, pieces.b), wanted, &row);
+  v1::PieceProof* const proof = row.add_piece_proofs();
+  bytes += EncodeProof(table, a, b, answer.of_body.certificates, proof);
+  bool is_answered = row.pair_problems_size() == 0;
+  if (is_answered && bytes > Config::kMaxRowProofBytes) {
+    row.Clear();
+    bytes = AddAnswer(ProofTooLarge(answer.of_body.certificates.size(), Config::kMaxRowProofBytes),
+                      nothing, nothing, wanted, &row);
+    is_answered = false;
+  }
+  const auto number = static_cast<uint64_t>(columns->relations_size());
+  if (is_answered) {
+    proof->set_row(number);
+  } else {
+    row.clear_piece_proofs();
+    row.mutable_pair_problems(0)->set_row(number);
+  }
+  columns->MergeFrom(row);
+  return bytes +
+         AddPieces(table, a, b, is_answered ? answer.of_body.pieces : std::nullopt, columns);
+}
+
 }  // namespace
+
+absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const absl::Status& status, const QueryOptions& options) {
+  return IsLongToAsk(table, a, b) ? NameProofLimit(status) : NameQueryLimit(status, options);
+}
 
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache) {
   if (!table.is_body(a) && !table.is_body(b)) {
-    return {CheckCollision(table.placed()[a], table.placed()[b], options, cache), std::nullopt};
+    return {CheckCollision(table.placed()[a], table.placed()[b], options, cache)};
   }
-  if (absl::Status s = ValidateForBodiesAmongMany(options); !s.ok()) return {s, std::nullopt};
+  if (absl::Status s = ValidateForBodies(options); !s.ok()) return {s};
   absl::StatusOr<BodyAnswer> found = CheckBodies(table.bodies()[a], table.bodies()[b], options);
-  if (!found.ok()) return {found.status(), std::nullopt};
-  return {std::move(found->answer), found->pieces};
+  if (!found.ok()) return {found.status()};
+  return {std::move(found->answer), PiecesAnswer(*std::move(found))};
 }
 
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
@@ -39,10 +95,13 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   if (!table.has_bodies()) {
     return AddAnswer(answer.answer, table.placed()[a], table.placed()[b], wanted, columns);
   }
-  const PiecePair pieces = answer.pieces.value_or(PiecePair{0, 0});
+  const bool is_proven =
+      wanted.certificate() && answer.answer.ok() && (table.is_body(a) || table.is_body(b));
+  if (is_proven) return AddProvenAnswer(table, a, b, answer, wanted, columns);
+  const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   const size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
                                  table.HullOfPiece(b, pieces.b), wanted, columns);
-  return bytes + AddPieces(table, a, b, answer.pieces, columns);
+  return bytes + AddPieces(table, a, b, answer.of_body.pieces, columns);
 }
 
 size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,

@@ -20,16 +20,26 @@ namespace hulld::server {
 // one is a body.
 struct PlacedAnswer {
   absl::StatusOr<Answer> answer;
-  std::optional<PiecePair> pieces;
+  PiecesAnswer of_body = {};
 };
 
-// Asks about a pair of placements. A certificate, and what is for hulls alone, leaves a pair with a
-// body without an answer. cache: of a pair of hulls; may be null. Requires that both are
-// answerable.
+// Asks about a pair of placements. What is for hulls alone leaves a pair with a body without an
+// answer, as more certificates than a reply holds do. cache: of a pair of hulls; may be null.
+// Requires that both are answerable.
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);
 
-// Adds the row of such an answer, as AddAnswer; and one without an answer.
+// Whether it takes about as long as many pairs of hulls, so that one looks at the clock after it.
+inline bool IsLongToAsk(const PlacementTable& table, uint32_t a, uint32_t b) {
+  return table.is_body(a) || table.is_body(b);
+}
+
+// An error of a query, with the limit that it met.
+absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
+                       const absl::Status& status, const QueryOptions& options);
+
+// Adds the row of such an answer, as AddAnswer; and one without an answer. Certificates of pieces
+// that take more than Config::kMaxRowProofBytes leave a row without an answer.
 size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns);

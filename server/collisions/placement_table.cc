@@ -3,7 +3,9 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "core/base/check.h"
@@ -180,7 +182,8 @@ size_t PlacementTable::MemoryBytes() const {
 
 // Known once they are resolved.
 size_t PlacementTable::BodyBytes() const {
-  size_t bytes = bodies_.capacity() * sizeof(PlacedBody) + known_.BodyBytes();
+  size_t bytes = bodies_.capacity() * sizeof(PlacedBody) + known_.BodyBytes() +
+                 hulls_of_pieces_.capacity() * sizeof(const HullRecord*);
   for (const auto& body : bodies_of_hulls_) {
     if (body != nullptr) bytes += sizeof(QueryBody) + body->boxes().MemoryBytes();
   }
@@ -188,7 +191,7 @@ size_t PlacementTable::BodyBytes() const {
 }
 
 PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPlan& plan) const {
-  return {options.WantsCanonical(), prefix_, takes_bodies_, plan};
+  return {options.WantsCanonical(), prefix_, plan};
 }
 
 absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
@@ -207,7 +210,7 @@ absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
   absl::StatusOr<Resolved> resolved =
       RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
-  Take(registry, *std::move(resolved), options.WantsCanonical());
+  Take(registry, *std::move(resolved), options);
   return absl::OkStatus();
 }
 
@@ -216,7 +219,6 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
-  HULLD_CHECK(!takes_bodies_);
   absl::StatusOr<Resolved> resolved =
       ResolvePlaced(registry, ids, LookupFor(options, {}), options.should_stop);
   if (!resolved.ok()) return resolved.status();
@@ -230,7 +232,11 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
     changed_[k] = !IsSame(before, hulls_[k]);
     query_hull_changed_[k] = std::exchange(query_hulls_[k], &query_hull) != &query_hull;
     for (const uint32_t i : placements_of(k)) placed_[i] = Place(i);
+    if (!has_bodies()) continue;
+    TakeBody(k);
+    for (const uint32_t i : placements_of(k)) bodies_[i] = PlaceBody(i);
   }
+  if (!has_bodies()) TakeBodies();
   store_revision_ = resolved->store_revision;
   return absl::OkStatus();
 }
@@ -239,16 +245,17 @@ bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
                                 const ReadPlan& plan) {
   std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, LookupFor(options, plan));
   if (!resolved.has_value()) return false;
-  Take(registry, *std::move(resolved), options.WantsCanonical());
+  Take(registry, *std::move(resolved), options);
   return true;
 }
 
-// canonical: all that were found have a canonical snapshot, and that is asked.
-void PlacementTable::Take(const Registry& registry, Resolved resolved, bool canonical) {
+// Where the options need canonical snapshots, all that were found have one, and that is asked.
+void PlacementTable::Take(const Registry& registry, Resolved resolved,
+                          const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
   query_hulls.reserve(ids_.size());
   for (const absl::StatusOr<HullView>& hull : resolved.hulls) {
-    query_hulls.push_back(&QueryHullOf(hull, canonical));
+    query_hulls.push_back(&QueryHullOf(hull, options.WantsCanonical()));
   }
   changed_.assign(ids_.size(), true);
   query_hull_changed_.assign(ids_.size(), true);
@@ -266,6 +273,8 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved, bool cano
   placed_.reserve(entries_.size());
   for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
   TakeBodies();
+  hulls_of_pieces_.clear();
+  if (options.want_certificate) TakeHullsOfPieces();
   if (by_hull_begin_.empty()) SortByHull();
 }
 
@@ -278,16 +287,32 @@ void PlacementTable::TakeBodies() {
       hulls_, [](const auto& hull) { return hull.ok() && hull->body != nullptr; });
   if (!has_any) return;
   bodies_of_hulls_.resize(ids_.size());
-  for (size_t k = 0; k < ids_.size(); ++k) {
-    if (hulls_[k].ok() && hulls_[k]->body != nullptr) {
-      query_bodies_.push_back(&hulls_[k]->body->query);
-      continue;
-    }
-    bodies_of_hulls_[k] = std::make_unique<const QueryBody>(*query_hulls_[k]);
-    query_bodies_.push_back(bodies_of_hulls_[k].get());
-  }
+  query_bodies_.resize(ids_.size());
+  for (size_t k = 0; k < ids_.size(); ++k) TakeBody(k);
   bodies_.reserve(entries_.size());
   for (size_t i = 0; i < entries_.size(); ++i) bodies_.push_back(PlaceBody(i));
+}
+
+void PlacementTable::TakeBody(size_t k) {
+  if (hulls_[k].ok() && hulls_[k]->body != nullptr) {
+    bodies_of_hulls_[k] = nullptr;
+    query_bodies_[k] = &hulls_[k]->body->query;
+    return;
+  }
+  bodies_of_hulls_[k] = std::make_unique<const QueryBody>(*query_hulls_[k]);
+  query_bodies_[k] = bodies_of_hulls_[k].get();
+}
+
+void PlacementTable::TakeHullsOfPieces() {
+  std::unordered_set<std::string_view> known;
+  for (const absl::StatusOr<HullView>& hull : hulls_) {
+    if (!hull.ok() || hull->body == nullptr) continue;
+    for (const HullView& of_piece : hull->body->hulls) {
+      if (known.insert(of_piece.record.hull_id).second) {
+        hulls_of_pieces_.push_back(&of_piece.record);
+      }
+    }
+  }
 }
 
 PlacedBody PlacementTable::PlaceBody(size_t i) const {
@@ -341,28 +366,39 @@ void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header
   server::EncodeHeader(store, store_revision_, header);
 }
 
-size_t PlacementTable::EncodeHulls(
-    size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
-    google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const {
+size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
+  const size_t placements = named_.size() + entries_.size();
   size_t bytes = 0;
   size_t row = first;
   for (; row < table_rows() && bytes < Config::kReplyMessageBytes; ++row) {
     bytes += kEntryBytes;
-    const bool is_name = row < named_.size();
-    const size_t i = is_name ? 0 : row - named_.size();
-    if (is_name || !is_packed_) {
-      v1::HullVersion* const version = hulls->Add();
-      const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
-      const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
-      if (known) EncodeHull(*hull, version);
-      bytes += version->ByteSizeLong();
+    if (row < placements) {
+      bytes += EncodePlacement(row, to);
+      continue;
     }
-    if (is_name || problem(i).ok()) continue;
-    v1::PlacementProblem* const encoded = problems->Add();
-    EncodeProblem(i, encoded);
-    bytes += kEntryBytes + encoded->ByteSizeLong();
+    v1::HullVersion* const version = to.piece_hulls->Add();
+    EncodeVersion(store_id_, *hulls_of_pieces_[row - placements], version);
+    bytes += version->ByteSizeLong();
   }
   return row;
+}
+
+// Returns about what it takes.
+size_t PlacementTable::EncodePlacement(size_t row, const RowFields& to) const {
+  size_t bytes = 0;
+  const bool is_name = row < named_.size();
+  const size_t i = is_name ? 0 : row - named_.size();
+  if (is_name || !is_packed_) {
+    v1::HullVersion* const version = to.hulls->Add();
+    const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
+    const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
+    if (known) EncodeHull(*hull, version);
+    bytes += version->ByteSizeLong();
+  }
+  if (is_name || problem(i).ok()) return bytes;
+  v1::PlacementProblem* const encoded = to.problems->Add();
+  EncodeProblem(i, encoded);
+  return bytes + kEntryBytes + encoded->ByteSizeLong();
 }
 
 void PlacementTable::EncodeHull(size_t k, v1::HullVersion* version) const {

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/query/body/placed_body.h"
+#include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
 #include "core/query/terms/pose.h"
 #include "core/query/terms/query_options.h"
@@ -39,9 +40,6 @@ class PlacementTable {
       const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
-  // Bodies are no hulls for this table: placements that name one have a problem.
-  void TakeHullsAlone() { takes_bodies_ = false; }
-
   // Resolves every hull and body once, all at one revision of the store, for queries that answer
   // with `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
@@ -60,11 +58,15 @@ class PlacementTable {
   size_t MemoryBytes() const;
   // Of a body, an empty hull stands in.
   std::span<const PlacedHull> placed() const { return placed_; }
-  // Whether a placement is a body; then bodies() holds every placement, hulls too. Otherwise it is
-  // empty.
+  // Whether a placement is a body, or was one; then bodies() holds every placement, hulls too.
+  // Otherwise it is empty.
   bool has_bodies() const { return !bodies_.empty(); }
   std::span<const PlacedBody> bodies() const { return bodies_; }
   bool is_body(size_t i) const { return has_bodies() && !bodies_[i].body().is_hull(); }
+  // A box about a placement, world frame: BoundingBox.
+  Box BoxOf(size_t i) const {
+    return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed_[i]);
+  }
   // A hull, or the hull of a piece, for what it is made of alone: its pose means nothing.
   PlacedHull HullOfPiece(size_t i, uint32_t piece) const {
     const auto pieces = bodies_[i].body().pieces();
@@ -80,8 +82,7 @@ class PlacementTable {
   // name that one's points.
   bool query_hull_changed(size_t i) const;
 
-  // The same as Resolve for a few of hull_ids(), by index; the others stay as they are. Requires a
-  // table of hulls alone.
+  // The same as Resolve for a few of hull_ids(), by index, each once; the others stay as they are.
   absl::Status ResolveSome(Registry& registry, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
@@ -103,12 +104,16 @@ class PlacementTable {
 
   // The store's revision of the last Resolve.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
-  // A version per placement, or per hull that packed placements name, and the problems: the rows of
-  // a table, from row `first` on, as many as fill a message. Returns where the next message goes
-  // on, which is table_rows() after the last.
-  size_t EncodeHulls(size_t first, google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls,
-                     google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems) const;
-  size_t table_rows() const { return named_.size() + entries_.size(); }
+  // A version per placement, or per hull that packed placements name, and the problems; then, where
+  // certificates are wanted, the hulls of pieces: the rows of a table, from row `first` on, as many
+  // as fill a message. Returns where the next message goes on, which is table_rows() after the
+  // last.
+  template <typename Message>
+  size_t EncodeHulls(size_t first, Message* message) const {
+    return EncodeRows(first, {message->mutable_hulls(), message->mutable_placement_problems(),
+                              message->mutable_piece_hulls()});
+  }
+  size_t table_rows() const { return named_.size() + entries_.size() + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
   // Requires that the placement is not answerable.
   void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
@@ -122,6 +127,13 @@ class PlacementTable {
     Pose pose;
   };
 
+  // Where the rows go.
+  struct RowFields {
+    google::protobuf::RepeatedPtrField<v1::HullVersion>* hulls;
+    google::protobuf::RepeatedPtrField<v1::PlacementProblem>* problems;
+    google::protobuf::RepeatedPtrField<v1::HullVersion>* piece_hulls;
+  };
+
   PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
@@ -129,8 +141,12 @@ class PlacementTable {
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
   PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
-  void Take(const Registry& registry, Resolved resolved, bool canonical);
+  void Take(const Registry& registry, Resolved resolved, const QueryOptions& options);
   void TakeBodies();
+  void TakeBody(size_t k);
+  void TakeHullsOfPieces();
+  size_t EncodeRows(size_t first, const RowFields& to) const;
+  size_t EncodePlacement(size_t row, const RowFields& to) const;
   size_t BodyBytes() const;
   PlacedBody PlaceBody(size_t i) const;
   void SortByHull();
@@ -158,7 +174,6 @@ class PlacementTable {
   uint64_t store_revision_ = 0;
   std::vector<PlacedHull> placed_;
 
-  bool takes_bodies_ = true;
   // The caller's.
   std::string prefix_;
   // Where any of hulls_ is a body: of each what is asked; parallel to ids_. Those of hulls are
@@ -166,6 +181,8 @@ class PlacementTable {
   std::vector<const QueryBody*> query_bodies_;
   std::vector<std::unique_ptr<const QueryBody>> bodies_of_hulls_;
   std::vector<PlacedBody> bodies_;
+  // Where certificates are wanted: the hulls of all pieces, each once. They belong to hulls_.
+  std::vector<const HullRecord*> hulls_of_pieces_;
 };
 
 // Placements that move, each with its new pose.

@@ -8,8 +8,9 @@
 #include "server/wire/decode.h"
 
 namespace hulld::server {
+namespace {
 
-const OptionNames kFieldNames = {
+constexpr OptionNames kFieldNames = {
     .tolerance = "tolerance",
     .max_error = "wanted.max_error",
     .clearance = "wanted.clearance",
@@ -18,6 +19,8 @@ const OptionNames kFieldNames = {
     .witness = "wanted.witness",
     .textbook = "METHOD_TEXTBOOK_SAT",
 };
+
+}  // namespace
 
 absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wanted& wanted,
                                               double tolerance, const Limits& limits,
@@ -47,10 +50,6 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
 
 absl::Status ValidateForBodies(const QueryOptions& options) {
   return ValidateBodyOptions(options, kFieldNames);
-}
-
-absl::Status ValidateForBodiesAmongMany(const QueryOptions& options) {
-  return ValidateOptionsAmongMany(options, kFieldNames);
 }
 
 bool IsQuickToRelate(const QueryHull& hull) {
@@ -86,6 +85,16 @@ absl::Status NameProofLimit(const absl::Status& status) {
   if (status.code() != absl::StatusCode::kResourceExhausted) return status;
   return WithReason(status, v1::ERROR_REASON_PROOF_TOO_LARGE,
                     {{"limit", uint64_t{Config::kMaxPieceCertificates}}});
+}
+
+absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit) {
+  return WithReason(
+      absl::ResourceExhaustedError(absl::StrCat(
+          "the certificates of ", certificates,
+          " pairs of pieces, and what else is told of the bodies, take more than the ", limit,
+          " bytes of a reply; ask about bodies of fewer pieces, or without "
+          "certificates")),
+      v1::ERROR_REASON_PROOF_TOO_LARGE, {{"limit", limit}});
 }
 
 }  // namespace hulld::server

@@ -10,9 +10,6 @@
 
 namespace hulld::server {
 
-// How errors name what is asked: as the messages that hold `wanted` do.
-extern const OptionNames kFieldNames;
-
 // The options of core for what a request wants; the query ends with `lifetime`, which must outlive
 // it. INVALID_ARGUMENT, naming the field: a number that stands for no method, a length that is
 // negative or NaN, or wishes that exclude each other.
@@ -20,10 +17,8 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
                                               double tolerance, const Limits& limits,
                                               const CallLifetime& lifetime);
 
-// OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone; and, for one of many
-// pairs, what only an answer about one pair has room for.
+// OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone.
 absl::Status ValidateForBodies(const QueryOptions& options);
-absl::Status ValidateForBodiesAmongMany(const QueryOptions& options);
 
 // Whether the relation of this hull and another such takes no longer than moving the bytes of the
 // question and of the answer does, so that one of gRPC's threads may find it.
@@ -41,6 +36,9 @@ absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& opti
 // The same of a question about bodies: RESOURCE_EXHAUSTED means that it would need too many
 // certificates.
 absl::Status NameProofLimit(const absl::Status& status);
+
+// RESOURCE_EXHAUSTED: certificates of so many pairs of pieces take more than `limit` bytes.
+absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);
 
 }  // namespace hulld::server
 

@@ -84,7 +84,6 @@ absl::Status SceneStream::Validate() {
   options_.groups = {request().groups().data(), static_cast<size_t>(request().groups_size())};
   if (request().has_movers()) options_.movers = request().movers();
   options_.query = *std::move(options);
-  options_.names = kFieldNames;
   return absl::OkStatus();
 }
 
@@ -113,8 +112,7 @@ size_t SceneStream::HeldBytes() const {
 bool SceneStream::QueueHead() {
   v1::FindCollisionsResponse head;
   if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
-  next_row_ =
-      table_.EncodeHulls(next_row_, head.mutable_hulls(), head.mutable_placement_problems());
+  next_row_ = table_.EncodeHulls(next_row_, &head);
   const size_t bytes = head.ByteSizeLong();
   Queue(std::move(head), bytes);
   return next_row_ < table_.table_rows();
@@ -123,7 +121,8 @@ bool SceneStream::QueueHead() {
 absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
   v1::FindCollisionsResponse reply;
   size_t reply_bytes = 0;
-  for (uint64_t step = 1; step % kStepsPerLook != 0 || Clock::now() < end; ++step) {
+  const uint64_t steps_per_look = table_.has_bodies() ? 1 : kStepsPerLook;
+  for (uint64_t step = 1; step % steps_per_look != 0 || Clock::now() < end; ++step) {
     if (piece.next == piece.end) break;
     const auto a = static_cast<uint32_t>(piece.next);
     if (!piece.has_candidates) {
@@ -138,8 +137,11 @@ absl::Status SceneStream::Advance(ScenePiece& piece, Clock::time_point end) {
       continue;
     }
     PlacedAnswer answer;
-    answer.answer = search_->Ask(a, *b, &answer.pieces);
+    answer.answer = search_->Ask(a, *b, &answer.of_body);
     if (absl::IsCancelled(answer.answer.status())) return answer.answer.status();
+    if (!answer.answer.ok()) {
+      answer.answer = NameLimit(table_, a, *b, answer.answer.status(), options_.query);
+    }
     piece.totals.set_candidates(piece.totals.candidates() + 1);
     if (answer.answer.ok()) piece.rungs.Add(answer.answer->rung);
     if (answer.answer.ok() && !search_->IsFound(*answer.answer)) continue;
@@ -170,11 +172,10 @@ void SceneStream::Deliver(ScenePiece& piece) {
   DeliverReplies(piece);
 }
 
-// The messages of the head hold no answers. A problem is named by its place among the columns,
-// which would change.
+// The messages of the head hold no answers.
 bool SceneStream::Join(const v1::FindCollisionsResponse& reply,
                        v1::FindCollisionsResponse* waiting) {
-  if (waiting->pairs_size() == 0 || reply.columns().pair_problems_size() > 0) return false;
+  if (waiting->pairs_size() == 0 || NamesRows(reply.columns())) return false;
   waiting->MergeFrom(reply);
   return true;
 }

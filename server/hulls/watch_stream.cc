@@ -9,7 +9,7 @@
 namespace hulld::server {
 namespace {
 
-// Whether its box has to be read from the store.
+// Whether its box has to be read from the store. A body has none, nor vertices of its own.
 bool WantsBox(const HullChange& change) {
   return change.record.vertex_count > 0 && !change.has_box && !change.damaged;
 }
@@ -32,12 +32,20 @@ v1::HullEventKind EncodeKind(ChangeKind kind) {
 
 void EncodeEvent(const HullChange& change, v1::HullEvent* event) {
   event->set_kind(EncodeKind(change.kind));
+  event->set_is_body(change.is_body);
   if (change.kind == ChangeKind::kDeleted) {
     event->mutable_hull()->set_hull_id(change.record.hull_id);
     event->mutable_hull()->set_revision(change.record.revision);
     return;
   }
-  EncodeRecord(change.record, event->mutable_hull());
+  if (change.is_body) {
+    event->mutable_hull()->set_hull_id(change.record.hull_id);
+    event->mutable_hull()->set_create_revision(change.record.create_revision);
+    event->mutable_hull()->set_revision(change.record.revision);
+    event->set_piece_count(change.piece_count);
+  } else {
+    EncodeRecord(change.record, event->mutable_hull());
+  }
   event->mutable_hull()->set_damaged(change.damaged);
   if (!change.has_box) return;
   EncodeVector(change.low, event->mutable_box_min());
@@ -69,14 +77,14 @@ absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {
   if (request().hull_id().empty()) {
     absl::StatusOr<std::string> prefix = PrefixToList(call().caller(), request().prefix());
     if (!prefix.ok()) return prefix.status();
-    return WatchTarget{*std::move(prefix), {}};
+    return WatchTarget{*std::move(prefix), {}, request().bodies()};
   }
   if (!request().prefix().empty()) {
     return absl::InvalidArgumentError("prefix and hull_id are both set; give one of them");
   }
   const absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
-  return WatchTarget{"", {request().hull_id()}};
+  return WatchTarget{"", {request().hull_id()}, request().bodies()};
 }
 
 absl::StatusOr<WatchStart> WatchStream::ReadStart() const {

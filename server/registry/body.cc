@@ -23,6 +23,17 @@ std::shared_ptr<const PieceBoxes> Body::BoxesOf(std::span<const BodyPiece> piece
   return boxes;
 }
 
+HullChange Body::Describe() const {
+  HullChange change;
+  change.record.hull_id = record().body_id;
+  change.record.create_revision = record().create_revision;
+  change.record.revision = record().revision;
+  change.is_body = true;
+  change.piece_count = pieces().size();
+  change.damaged = !damage_.ok();
+  return change;
+}
+
 std::string QuotedBody(const std::string& id) { return absl::StrCat("body \"", id, "\""); }
 
 absl::Status BodyExists(const std::string& id) {

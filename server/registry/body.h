@@ -40,6 +40,8 @@ class Body {
   const std::vector<StoredPiece>& pieces() const { return stored_->pieces; }
   // OK unless the store cannot give it back.
   const absl::Status& damage() const { return damage_; }
+  // As watches are told of it.
+  HullChange Describe() const;
 
   // Boxes about these pieces, which are those of this body, of hulls at these revisions.
   std::shared_ptr<const PieceBoxes> BoxesOf(std::span<const BodyPiece> pieces,

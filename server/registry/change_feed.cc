@@ -10,16 +10,29 @@
 namespace hulld::server {
 namespace {
 
-// A hull that changed.
+// A hull, or a body, that changed.
 struct Changed {
   std::string id;
-  // Null when it went.
+  // Both null when it went.
   std::shared_ptr<RegisteredHull> hull;
+  std::shared_ptr<const Body> body;
+  bool is_body = false;
   // Of the incarnation that is there, or that went.
   uint64_t create_revision = 0;
   // When the incarnation before that ended; 0 where all watches were told of that already.
   uint64_t former_end = 0;
+
+  bool went() const { return hull == nullptr && body == nullptr; }
 };
+
+HullChange DeletionOf(const std::string& id, uint64_t revision, bool is_body) {
+  HullChange change;
+  change.kind = ChangeKind::kDeleted;
+  change.record.hull_id = id;
+  change.record.revision = revision;
+  change.is_body = is_body;
+  return change;
+}
 
 // With its places in the order of revisions and by ID. About what two nodes of maps take.
 uint64_t BytesOf(const std::string& id) { return 2 * id.size() + sizeof(Changed) + 160; }
@@ -29,6 +42,8 @@ uint64_t BytesOf(const std::string& id) { return 2 * id.size() + sizeof(Changed)
 // What watches of one target were not told yet.
 struct WatchInterest {
   WatchTarget target;
+  // IDs beside those of the target (WatchAlso).
+  std::set<std::string> more_ids;
   std::set<std::shared_ptr<ChangeWatch>> watches;
   size_t armed = 0;
   // In due_.
@@ -64,73 +79,91 @@ ChangeFeed::~ChangeFeed() {
   thread_.join();
 }
 
-void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
-  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
-  revision_ = revision;
-}
-
 void ChangeFeed::Begin(uint64_t revision) { revision_ = deletions_begin_ = revision; }
 
 void ChangeFeed::NoteCreated(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
   const HullRecord& record = hull->committed.record;
-  Note(locked, record.hull_id, record.revision, record.create_revision, hull, Life::kBegan);
+  Note(locked, record.hull_id,
+       {record.revision, record.create_revision, Life::kBegan, false, hull});
 }
 
 void ChangeFeed::NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
   const HullRecord& record = hull->committed.record;
-  Note(locked, record.hull_id, record.revision, record.create_revision, hull, Life::kChanged);
+  Note(locked, record.hull_id,
+       {record.revision, record.create_revision, Life::kChanged, false, hull});
 }
 
 void ChangeFeed::NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
   const HullRecord& record = hull->committed.record;
-  Note(locked, record.hull_id, record.revision, record.create_revision, hull, Life::kReplaced);
+  Note(locked, record.hull_id,
+       {record.revision, record.create_revision, Life::kReplaced, false, hull});
 }
 
 void ChangeFeed::NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision) {
-  RememberDeletion(record.hull_id, revision);
-  Note(locked, record.hull_id, revision, record.create_revision, nullptr, Life::kEnded);
+  const State state = {revision, record.create_revision, Life::kEnded};
+  RememberDeletion(record.hull_id, state);
+  Note(locked, record.hull_id, state);
 }
 
-void ChangeFeed::Note(Locked& locked, const std::string& id, uint64_t revision,
-                      uint64_t create_revision, const std::shared_ptr<RegisteredHull>& hull,
-                      Life life) {
-  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
-  revision_ = revision;
+void ChangeFeed::NoteBodyPut(Locked& locked, const std::shared_ptr<const Body>& former,
+                             const std::shared_ptr<const Body>& body) {
+  const BodyRecord& record = body->record();
+  const Life life = former == nullptr                           ? Life::kBegan
+                    : record.create_revision == record.revision ? Life::kReplaced
+                                                                : Life::kChanged;
+  Note(locked, record.body_id,
+       {record.revision, record.create_revision, life, true, nullptr, body});
+}
+
+void ChangeFeed::NoteBodyDeleted(Locked& locked, const Body& body, uint64_t revision) {
+  const State state = {revision, body.record().create_revision, Life::kEnded, true};
+  RememberDeletion(body.record().body_id, state);
+  Note(locked, body.record().body_id, state);
+}
+
+void ChangeFeed::Note(Locked& locked, const std::string& id, const State& state) {
+  HULLD_CHECK(locked.Holds(order_) && state.revision > revision_);
+  revision_ = state.revision;
+  const auto note_for = [&](const Interests& interests) {
+    for (const auto& interest : interests) {
+      if (!state.is_body || interest->target.bodies) NoteFor(locked, interest, id, state);
+    }
+  };
   for (const auto& [length, count] : prefix_lengths_) {
     if (length > id.size()) break;
     const auto found = by_prefix_.find(std::string_view(id).substr(0, length));
-    if (found == by_prefix_.end()) continue;
-    NoteFor(locked, found->second, id, revision, create_revision, hull, life);
+    if (found != by_prefix_.end()) note_for(found->second);
   }
   const auto found = by_id_.find(id);
-  if (found == by_id_.end()) return;
-  for (const auto& interest : found->second) {
-    NoteFor(locked, interest, id, revision, create_revision, hull, life);
-  }
+  if (found != by_id_.end()) note_for(found->second);
 }
 
 void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& interest,
-                         const std::string& id, uint64_t revision, uint64_t create_revision,
-                         const std::shared_ptr<RegisteredHull>& hull, Life life) {
+                         const std::string& id, const State& state) {
+  const uint64_t revision = state.revision;
   auto& changes = interest->changes;
   const auto [place, is_new] = interest->revision_of.emplace(id, revision);
   if (is_new) {
-    changes.emplace_hint(changes.end(), revision, Changed{id, nullptr, 0, 0});
+    Changed changed;
+    changed.id = id;
+    changes.emplace_hint(changes.end(), revision, std::move(changed));
     Count(interest->bytes, interest->bytes + BytesOf(id));
     interest->bytes += BytesOf(id);
   } else {
     auto node = changes.extract(std::exchange(place->second, revision));
-    const bool was_deleted = node.mapped().hull == nullptr;
+    const bool was_deleted = node.mapped().went();
     if (was_deleted) --interest->deletions;
-    if (was_deleted && life == Life::kBegan) node.mapped().former_end = node.key();
+    if (was_deleted && state.life == Life::kBegan) node.mapped().former_end = node.key();
     node.key() = revision;
     changes.insert(changes.end(), std::move(node));
   }
   Changed& changed = changes.rbegin()->second;
-  changed.hull = hull;
-  changed.create_revision = create_revision;
-  if (life == Life::kReplaced) changed.former_end = revision;
-  if (life == Life::kEnded) ++interest->deletions;
+  changed.hull = state.hull;
+  changed.body = state.body;
+  changed.is_body = state.is_body;
+  changed.create_revision = state.create_revision;
+  if (state.life == Life::kReplaced) changed.former_end = revision;
+  if (state.life == Life::kEnded) ++interest->deletions;
 
   interest->last_revision = revision;
   interest->behind = interest->watches.size();
@@ -143,10 +176,10 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& i
   if (due_.size() == 1) locked.Afterwards([this] { wake_.notify_one(); });
 }
 
-void ChangeFeed::RememberDeletion(const std::string& id, uint64_t revision) {
-  deletions_.emplace_back(revision, id);
+void ChangeFeed::RememberDeletion(const std::string& id, const State& state) {
+  deletions_.push_back({state.revision, id, state.is_body});
   if (deletions_.size() <= kMostDeletions) return;
-  deletions_begin_ = deletions_.front().first;
+  deletions_begin_ = deletions_.front().revision;
   deletions_.pop_front();
 }
 
@@ -156,13 +189,11 @@ void ChangeFeed::Count(uint64_t before, uint64_t now) {
 }
 
 std::shared_ptr<WatchInterest> ChangeFeed::FindInterest(const WatchTarget& target) const {
-  if (target.ids.empty()) {
-    const auto found = by_prefix_.find(target.prefix);
-    return found == by_prefix_.end() ? nullptr : found->second;
-  }
-  // Only a single hull is likely to be watched by many.
-  const auto found = target.ids.size() == 1 ? by_id_.find(target.ids.front()) : by_id_.end();
-  if (found == by_id_.end()) return nullptr;
+  // Only a prefix and a single hull are likely to be watched by many.
+  if (target.varies || target.ids.size() > 1) return nullptr;
+  const auto& by_name = target.ids.empty() ? by_prefix_ : by_id_;
+  const auto found = by_name.find(target.ids.empty() ? target.prefix : target.ids.front());
+  if (found == by_name.end()) return nullptr;
   for (const auto& interest : found->second) {
     if (interest->target == target) return interest;
   }
@@ -171,25 +202,48 @@ std::shared_ptr<WatchInterest> ChangeFeed::FindInterest(const WatchTarget& targe
 
 void ChangeFeed::AddInterest(const std::shared_ptr<WatchInterest>& interest) {
   const WatchTarget& target = interest->target;
-  for (const std::string& id : target.ids) by_id_[id].push_back(interest);
+  for (const std::string& id : target.ids) AddId(id, interest);
   if (!target.ids.empty()) return;
-  by_prefix_.emplace(target.prefix, interest);
+  by_prefix_[target.prefix].push_back(interest);
   ++prefix_lengths_[target.prefix.size()];
 }
 
 void ChangeFeed::RemoveInterest(const std::shared_ptr<WatchInterest>& interest) {
   Forget(*interest);
   const WatchTarget& target = interest->target;
-  for (const std::string& id : target.ids) {
-    const auto found = by_id_.find(id);
-    HULLD_CHECK(found != by_id_.end());
-    std::erase(found->second, interest);
-    if (found->second.empty()) by_id_.erase(found);
-  }
+  for (const std::string& id : target.ids) RemoveId(id, interest);
+  for (const std::string& id : interest->more_ids) RemoveId(id, interest);
   if (!target.ids.empty()) return;
-  by_prefix_.erase(target.prefix);
+  const auto found = by_prefix_.find(target.prefix);
+  std::erase(found->second, interest);
+  if (found->second.empty()) by_prefix_.erase(found);
   const auto length = prefix_lengths_.find(target.prefix.size());
   if (--length->second == 0) prefix_lengths_.erase(length);
+}
+
+void ChangeFeed::AddId(const std::string& id, const std::shared_ptr<WatchInterest>& interest) {
+  by_id_[id].push_back(interest);
+}
+
+void ChangeFeed::RemoveId(const std::string& id, const std::shared_ptr<WatchInterest>& interest) {
+  const auto found = by_id_.find(id);
+  HULLD_CHECK(found != by_id_.end());
+  std::erase(found->second, interest);
+  if (found->second.empty()) by_id_.erase(found);
+}
+
+void ChangeFeed::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
+                           std::span<const std::string> dropped) {
+  const std::shared_ptr<WatchInterest> interest = watch.interest;
+  HULLD_CHECK(interest->target.varies);
+  for (const std::string& id : added) {
+    HULLD_CHECK(interest->more_ids.insert(id).second);
+    AddId(id, interest);
+  }
+  for (const std::string& id : dropped) {
+    HULLD_CHECK(interest->more_ids.erase(id) == 1);
+    RemoveId(id, interest);
+  }
 }
 
 std::shared_ptr<ChangeWatch> ChangeFeed::Open(const WatchTarget& target,
@@ -261,20 +315,16 @@ bool ChangeFeed::TakeDeletions(ChangeWatch& watch,
   const WatchTarget& target = watch.interest->target;
   auto next = std::upper_bound(
       deletions_.begin(), deletions_.end(), watch.last_deletion,
-      [](uint64_t revision, const auto& deletion) { return revision < deletion.first; });
+      [](uint64_t revision, const Deletion& deletion) { return revision < deletion.revision; });
   for (size_t looked_at = 0; next != deletions_.end(); ++next) {
-    const auto& [revision, id] = *next;
+    const auto& [revision, id, is_body] = *next;
     if (revision > watch.cursor) return false;
     if (looked_at++ == kMostPerPiece) return true;
     watch.last_deletion = revision;
     const bool is_watched =
         target.ids.empty() ? id.starts_with(target.prefix) : id == target.ids.front();
-    if (!is_watched || is_there(id)) continue;
-    HullChange change;
-    change.kind = ChangeKind::kDeleted;
-    change.record.hull_id = id;
-    change.record.revision = revision;
-    piece->changes.push_back(std::move(change));
+    if (!is_watched || (is_body && !target.bodies) || is_there(id)) continue;
+    piece->changes.push_back(DeletionOf(id, revision, is_body));
   }
   return false;
 }
@@ -292,16 +342,12 @@ void ChangeFeed::TakeChanges(ChangeWatch& watch, WatchPiece* piece) {
     const Changed& changed = next->second;
     const bool is_known = changed.create_revision <= before;
     const bool another_ended = changed.former_end > before;
-    if (changed.hull == nullptr) {
+    if (changed.went()) {
       if (watch.is_exact && !is_known && !another_ended) continue;
-      HullChange change;
-      change.kind = ChangeKind::kDeleted;
-      change.record.hull_id = changed.id;
-      change.record.revision = next->first;
-      piece->changes.push_back(std::move(change));
+      piece->changes.push_back(DeletionOf(changed.id, next->first, changed.is_body));
       continue;
     }
-    HullChange change = changed.hull->Describe();
+    HullChange change = changed.is_body ? changed.body->Describe() : changed.hull->Describe();
     if (watch.is_exact) {
       change.kind = is_known        ? ChangeKind::kChanged
                     : another_ended ? ChangeKind::kReplaced

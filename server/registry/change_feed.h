@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "server/process/synchronization.h"
+#include "server/registry/body.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/registry_types.h"
@@ -61,8 +63,9 @@ struct ChangeWatch {
   bool is_nudged = false;
 };
 
-// Tells watches which hulls changed. Guarded by its owner's mutex (the registry's), which
-// `Locked` shows; its thread takes that mutex, too.
+// Tells watches which hulls, and which bodies, changed. Guarded by its owner's mutex (the
+// registry's), which `Locked` shows; its thread takes that mutex, too. An ID is that of a hull or
+// of a body; watches of hulls alone are not told of what the ID is while it is a body's.
 //
 // What changed is kept once for all watches of the same target, their interest: each hull at its
 // last change only, in the order of revisions. A watch is a cursor in that order. So a change costs
@@ -105,15 +108,22 @@ class ChangeFeed {
   void NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
+  // The same of a body. former: what it takes the place of, if anything.
+  void NoteBodyPut(Locked& locked, const std::shared_ptr<const Body>& former,
+                   const std::shared_ptr<const Body>& body);
+  void NoteBodyDeleted(Locked& locked, const Body& body, uint64_t revision);
 
   // Starts at the stage kChanges, with what is committed from now on.
   std::shared_ptr<ChangeWatch> Open(const WatchTarget& target, std::function<void()> on_ready);
   // Nothing is to be told any more. An on_ready that is due by then still comes.
   void Close(const std::shared_ptr<ChangeWatch>& watch);
 
+  // What changes of `added` from now on is told, too, and what changes of `dropped` no more.
+  // Requires a target that varies; what is dropped was added, once. Cost: a hash for each ID.
+  void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
+                 std::span<const std::string> dropped);
+
   static const WatchTarget& TargetOf(const ChangeWatch& watch);
-  // What is not watched was given this revision: watches that wait are told that it moved on.
-  void NoteOther(const Locked& locked, uint64_t revision);
   // Whether all that went after this revision is remembered.
   bool Remembers(uint64_t revision) const { return revision >= deletions_begin_; }
   // Moves a watch back to where everything is told, and says so.
@@ -141,16 +151,33 @@ class ChangeFeed {
   };
   using Interests = std::vector<std::shared_ptr<WatchInterest>>;
   enum class Life { kBegan, kChanged, kReplaced, kEnded };
+  // What is committed now of an ID.
+  struct State {
+    // Of the change.
+    uint64_t revision;
+    // Of the incarnation that is there, or that went.
+    uint64_t create_revision;
+    Life life;
+    bool is_body = false;
+    // One of them, or none when it went.
+    std::shared_ptr<RegisteredHull> hull = nullptr;
+    std::shared_ptr<const Body> body = nullptr;
+  };
+  struct Deletion {
+    uint64_t revision;
+    std::string id;
+    bool is_body;
+  };
 
-  void Note(Locked& locked, const std::string& id, uint64_t revision, uint64_t create_revision,
-            const std::shared_ptr<RegisteredHull>& hull, Life life);
+  void Note(Locked& locked, const std::string& id, const State& state);
   void NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& interest,
-               const std::string& id, uint64_t revision, uint64_t create_revision,
-               const std::shared_ptr<RegisteredHull>& hull, Life life);
-  void RememberDeletion(const std::string& id, uint64_t revision);
+               const std::string& id, const State& state);
+  void RememberDeletion(const std::string& id, const State& state);
   std::shared_ptr<WatchInterest> FindInterest(const WatchTarget& target) const;
   void AddInterest(const std::shared_ptr<WatchInterest>& interest);
   void RemoveInterest(const std::shared_ptr<WatchInterest>& interest);
+  void AddId(const std::string& id, const std::shared_ptr<WatchInterest>& interest);
+  void RemoveId(const std::string& id, const std::shared_ptr<WatchInterest>& interest);
   void MoveCursor(ChangeWatch& watch, uint64_t revision);
   void Forget(WatchInterest& interest);
   void Count(uint64_t before, uint64_t now);
@@ -165,12 +192,12 @@ class ChangeFeed {
   // The rest is guarded by order_.
   uint64_t revision_ = 0;
   // In the order of revisions. What went up to deletions_begin_ is not remembered.
-  std::deque<std::pair<uint64_t, std::string>> deletions_;
+  std::deque<Deletion> deletions_;
   uint64_t deletions_begin_ = 0;
 
   // By a prefix, and by an ID: the interests in it.
-  std::unordered_map<std::string, std::shared_ptr<WatchInterest>, Hash, std::equal_to<>> by_prefix_;
-  // How many of by_prefix_ are of each length.
+  std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_prefix_;
+  // How many interests in prefixes are of each length.
   std::map<size_t, size_t> prefix_lengths_;
   std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_id_;
   std::set<std::shared_ptr<ChangeWatch>> watches_;

@@ -198,6 +198,10 @@ class Registry {
   // What is to be told next; may be nothing. UNAVAILABLE once EndWatches was called. Requires that
   // the watch does not wait. Cost: O(kMostPerPiece).
   absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch);
+  // What changes of `added` from now on is told, too, and what changes of `dropped`, which were
+  // added before, no more. Requires a target that varies. Cost: a hash for each ID.
+  void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
+                 std::span<const std::string> dropped);
   // The watch waits no more than until its on_ready is called, although nothing changed.
   void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch);
   // An on_ready that is due by then still comes.
@@ -235,6 +239,8 @@ class Registry {
 
   absl::Status NoSuchHull(const std::string& id) const;
   absl::Status LoadBodies();
+  // The committed body; null when there is none.
+  std::shared_ptr<const Body> FindBody(const std::string& id) const;
   void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                      std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
   absl::Status CheckBody(Locked& locked, const std::string& id,
@@ -242,7 +248,6 @@ class Registry {
   void DeleteBodyLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
                         const Reply<uint64_t>& done);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
-  void ForgetBody(const std::string& id);
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);

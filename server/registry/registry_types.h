@@ -182,6 +182,10 @@ struct WatchTarget {
   // The second form where `ids` holds any.
   std::string prefix;
   std::vector<std::string> ids;
+  // Bodies, too.
+  bool bodies = false;
+  // IDs come and go later (Registry::WatchAlso), so that no other watch shares what is kept.
+  bool varies = false;
 
   bool operator==(const WatchTarget&) const = default;
 };
@@ -189,11 +193,14 @@ struct WatchTarget {
 // What became of a hull, as v1::HullEventKind says.
 enum class ChangeKind { kPresent, kCreated, kChanged, kReplaced, kDeleted };
 
-// All that happened to a hull since a watch was told of it, as one change.
+// All that happened to a hull, or to a body, since a watch was told of it, as one change.
 struct HullChange {
   ChangeKind kind = ChangeKind::kPresent;
-  // kDeleted: the ID alone, and in `revision` that of the deletion.
+  // kDeleted: the ID alone, and in `revision` that of the deletion. Of a body, ID and revisions.
   HullRecord record;
+  bool is_body = false;
+  // Of a body.
+  uint64_t piece_count = 0;
   // The store cannot read it.
   bool damaged = false;
   // Whether `low` and `high` are the corners of its bounding box. Not so for a hull without

@@ -1,6 +1,8 @@
 // Watches: what is there, then what changes.
 #include <absl/status/status.h>
 
+#include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "server/contract/error_info.h"
@@ -36,7 +38,10 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
   WatchPiece piece;
   piece.anew = std::exchange(watch.anew, false);
   piece.revision = watch.after_revision;
-  const auto is_there = [this](const std::string& id) { return hulls_.IsVisible(id); };
+  const bool tells_bodies = feed_.TargetOf(watch).bodies;
+  const auto is_there = [this, tells_bodies](const std::string& id) {
+    return hulls_.IsVisible(id) || (tells_bodies && FindBody(id) != nullptr);
+  };
   switch (watch.stage) {
     case ChangeWatch::Stage::kDeletions:
       if (!feed_.TakeDeletions(watch, is_there, &piece)) watch.stage = ChangeWatch::Stage::kPresent;
@@ -57,18 +62,52 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = feed_.TargetOf(watch);
   const std::string& prefix = target.ids.empty() ? target.prefix : target.ids.front();
-  const HullTable::Entries& all = hulls_.entries();
-  auto next = watch.last_id.empty() ? all.lower_bound(prefix) : all.upper_bound(watch.last_id);
-  for (size_t looked_at = 0; next != all.end() && next->first.starts_with(prefix); ++next) {
-    if (!target.ids.empty() && next->first != prefix) break;
-    if (looked_at++ == ChangeFeed::kMostPerPiece) return;
-    watch.last_id = next->first;
-    const HullTable::Entry& hull = next->second;
-    const bool is_new = hull.revision() > watch.after_revision;
-    if (is_new && hull.visible()) piece->changes.push_back(hull.Describe(next->first));
+  const auto is_watched = [&](const std::string& id) {
+    return target.ids.empty() ? id.starts_with(prefix) : id == prefix;
+  };
+  const auto begin_of = [&](const auto& all) {
+    return watch.last_id.empty() ? all.lower_bound(prefix) : all.upper_bound(watch.last_id);
+  };
+  auto hull = begin_of(hulls_.entries());
+  const auto hulls_end = hulls_.entries().end();
+  auto body = target.bodies ? begin_of(bodies_) : bodies_.end();
+  for (size_t looked_at = 0;; ++looked_at) {
+    const bool has_hull = hull != hulls_end && is_watched(hull->first);
+    const bool has_body = body != bodies_.end() && is_watched(body->first);
+    if (!has_hull && !has_body) break;
+    if (looked_at == ChangeFeed::kMostPerPiece) return;
+    if (!has_body || (has_hull && hull->first < body->first)) {
+      watch.last_id = hull->first;
+      const HullTable::Entry& entry = hull->second;
+      const bool is_new = entry.revision() > watch.after_revision;
+      if (is_new && entry.visible()) piece->changes.push_back(entry.Describe(hull->first));
+      ++hull;
+    } else {
+      watch.last_id = body->first;
+      const auto& committed = body->second.committed;
+      const bool is_new =
+          committed != nullptr && committed->record().revision > watch.after_revision;
+      if (is_new) piece->changes.push_back(committed->Describe());
+      ++body;
+    }
   }
   watch.stage = ChangeWatch::Stage::kChanges;
   watch.synced_at = revision_;
+}
+
+void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
+                         std::span<const std::string> dropped) {
+  // Others pass in between.
+  const auto in_slices = [this](std::span<const std::string> ids, const auto& take) {
+    while (!ids.empty()) {
+      const size_t count = std::min<size_t>(ids.size(), kMostLookupsPerHold);
+      const std::lock_guard lock(mutex_);
+      take(ids.first(count));
+      ids = ids.subspan(count);
+    }
+  };
+  in_slices(added, [&](std::span<const std::string> ids) { feed_.WatchAlso(watch, ids, {}); });
+  in_slices(dropped, [&](std::span<const std::string> ids) { feed_.WatchAlso(watch, {}, ids); });
 }
 
 void Registry::NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) {

@@ -126,6 +126,8 @@ struct Config {
   // for the same clients. One of SEPARATED takes some 50 bytes, one of TOUCHING some 350.
   static constexpr uint64_t kMaxPieceCertificates = 1 << 13;
   static constexpr size_t kMaxProofBytes = (size_t{4} << 20) - (1 << 14);
+  // The same of one row among many, which may come last in a message that is nearly full.
+  static constexpr size_t kMaxRowProofBytes = kMaxProofBytes - kReplyMessageBytes;
   // Length of hull IDs and writer IDs.
   static constexpr size_t kMaxIdCharacters = 256;
 };

@@ -85,6 +85,10 @@ size_t FullMessageBytes(const v1::Wanted& wanted) {
   return wanted.axis() ? Config::kReplyMessageBytes / 4 : Config::kReplyMessageBytes;
 }
 
+bool NamesRows(const v1::AnswerColumns& columns) {
+  return columns.pair_problems_size() > 0 || columns.piece_proofs_size() > 0;
+}
+
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   const size_t bytes = AddRow(v1::RELATION_UNSPECIFIED, v1::RUNG_UNSPECIFIED, wanted, columns);
   return bytes + AddNumbers(nullptr, wanted, columns);

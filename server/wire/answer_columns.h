@@ -24,6 +24,9 @@ size_t FullMessageBytes(const v1::Wanted& wanted);
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
+// Whether something in the columns names a row, so that they cannot follow the rows of others.
+bool NamesRows(const v1::AnswerColumns& columns);
+
 // No answer; the reply gives the cause elsewhere, with the placement.
 size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns);
 

@@ -185,6 +185,14 @@ void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull
   }
 }
 
+void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, const Hull& b,
+                            v1::PieceCertificate* message) {
+  message->set_piece_a(certificate.pieces.a);
+  message->set_piece_b(certificate.pieces.b);
+  message->set_relation(EncodeRelation(certificate.relation));
+  EncodeCertificate(certificate.certificate, a, b, message->mutable_certificate());
+}
+
 void EncodeSeparation(const Separation& separation, v1::Separation* message) {
   message->set_value(separation.value);
   message->set_bound(separation.bound);

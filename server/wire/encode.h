@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/hull/hull.h"
+#include "core/query/body/piece_certification.h"
 #include "core/query/collision.h"
 #include "google/protobuf/duration.pb.h"
 #include "hulld/v1/collision.pb.h"
@@ -37,6 +38,9 @@ void EncodeAnalysis(const Analysis& analysis, const Hull& a, const Hull& b, v1::
 // a, b: the hulls whose vertices the pairs name.
 void EncodeCertificate(const Certificate& certificate, const Hull& a, const Hull& b,
                        v1::Certificate* message);
+// a, b: the hulls of its pieces.
+void EncodePieceCertificate(const PieceCertificate& certificate, const Hull& a, const Hull& b,
+                            v1::PieceCertificate* message);
 void EncodeSeparation(const Separation& separation, v1::Separation* message);
 void EncodeWitness(const Witness& witness, v1::Witness* message);
 

@@ -1,5 +1,6 @@
 #include <absl/strings/str_cat.h>
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <unordered_map>
@@ -94,6 +95,8 @@ class BatchRun {
     first_ = begin;
     placement_problems_.clear();
     head_.Clear();
+    versions_.clear();
+    piece_hulls_.clear();
     size_t next = begin;
     absl::Status status =
         client_.BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {
@@ -109,6 +112,10 @@ class BatchRun {
                     size_t* next) {
     if (part.has_header()) *head_.mutable_header() = part.header();
     head_.mutable_hulls()->MergeFrom(part.hulls());
+    for (const v1::HullVersion& hull : part.piece_hulls()) {
+      piece_hulls_.push_back(hull);
+      versions_[hull.hull_id()] = &piece_hulls_.back();
+    }
     for (const v1::PlacementProblem& problem : part.placement_problems()) {
       placement_problems_[problem.placement()] = problem.message();
     }
@@ -162,10 +169,7 @@ class BatchRun {
     if (a == nullptr || b == nullptr || row.certificate == nullptr) {
       return absl::InternalError("the answers lack the hulls or the certificates they are about");
     }
-    const size_t global = first_ + pair;
-    auto verification = checker_.Check({scene_.PlacementOf(pairs_[2 * global]),
-                                        scene_.PlacementOf(pairs_[2 * global + 1]), row.relation,
-                                        *row.certificate, *a, *b});
+    auto verification = CheckRow(row, first_ + pair, *a, *b);
     if (!verification.ok()) return verification;
     if (verification->verdict == Verdict::kInvalid) {
       ++invalid_;
@@ -173,6 +177,22 @@ class BatchRun {
       ++unchecked_;
     }
     return verification;
+  }
+
+  // pair: among those of all calls.
+  absl::StatusOr<Verification> CheckRow(const AnswerRow& row, size_t pair, const v1::HullVersion& a,
+                                        const v1::HullVersion& b) {
+    const v1::Placement at_a = scene_.PlacementOf(pairs_[2 * pair]);
+    const v1::Placement at_b = scene_.PlacementOf(pairs_[2 * pair + 1]);
+    if (row.proof == nullptr) {
+      return checker_.Check(CheckedAnswer{at_a, at_b, row.relation, *row.certificate, a, b});
+    }
+    const auto [piece_a, piece_b] = row.pieces.value_or(std::pair(-1, -1));
+    const auto index = [](int32_t piece) {
+      return piece < 0 ? std::nullopt : std::optional(static_cast<uint32_t>(piece));
+    };
+    return checker_.Check(CheckedBodies{at_a, at_b, row.relation, a, b, row.proof->certificates(),
+                                        versions_, index(piece_a), index(piece_b)});
   }
 
   // The hull of a placement of the request; null where the answer lacks it.
@@ -257,6 +277,9 @@ class BatchRun {
   double tolerance_ = 0;
   // The header and the hulls of the call that runs.
   v1::BatchCheckCollisionsResponse head_;
+  // The hulls of the pieces of bodies, and where each is.
+  std::deque<v1::HullVersion> piece_hulls_;
+  HullVersions versions_;
   const v1::BatchCheckCollisionsRequest* request_ = nullptr;
   // Its first pair.
   size_t first_ = 0;
@@ -281,9 +304,7 @@ ExitCode Batch(const Invocation& run, const BatchArguments& arguments) {
 }  // namespace
 
 BodyForm FormFor(const QueryWishes& wishes) {
-  const bool about_hulls =
-      wishes.verify || wishes.wanted.certificate() || wishes.method == v1::METHOD_TEXTBOOK_SAT;
-  return about_hulls ? BodyForm::kPieces : BodyForm::kWhole;
+  return wishes.method == v1::METHOD_TEXTBOOK_SAT ? BodyForm::kPieces : BodyForm::kWhole;
 }
 
 ExitCode AnswerPairs(const Invocation& run, const std::string& file, const Scene& scene,

@@ -43,7 +43,8 @@ void Sort(const ListArguments& arguments, v1::ListHullsResponse* response) {
   if (arguments.reverse) std::reverse(begin, end);
 }
 
-void PrintCount(const Invocation& run, const v1::ListHullsResponse& response) {
+// bodies: how many there are beside the hulls, of which names alone do not tell.
+void PrintCount(const Invocation& run, const v1::ListHullsResponse& response, uint64_t bodies) {
   uint64_t vertices = 0;
   uint64_t points = 0;
   for (const v1::HullInfo& hull : response.hulls()) {
@@ -52,17 +53,22 @@ void PrintCount(const Invocation& run, const v1::ListHullsResponse& response) {
   }
   const auto hulls = static_cast<uint64_t>(response.hulls_size());
   if (run.json()) {
-    run.out
-        << JsonObject().Add("hulls", hulls).Add("vertices", vertices).Add("points", points).Close()
-        << "\n";
+    run.out << JsonObject()
+                   .Add("hulls", hulls)
+                   .Add("vertices", vertices)
+                   .Add("points", points)
+                   .Add("bodies", bodies)
+                   .Close()
+            << "\n";
   } else if (run.names()) {
     run.out << hulls << "\n";
   } else {
-    Table()
-        .Row({"hulls", std::to_string(hulls)})
+    Table table;
+    table.Row({"hulls", std::to_string(hulls)})
         .Row({"vertices", std::to_string(vertices)})
-        .Row({"points", std::to_string(points)})
-        .Print(run.out);
+        .Row({"points", std::to_string(points)});
+    if (bodies > 0) table.Row({"bodies", std::to_string(bodies)});
+    table.Print(run.out);
   }
 }
 
@@ -102,7 +108,13 @@ ExitCode List(const Invocation& run, const ListArguments& arguments) {
     cut = true;
   }
   if (arguments.count) {
-    PrintCount(run, *response);
+    uint64_t bodies = 0;
+    if (!run.names()) {
+      const auto listed = run.MakeClient().ListAllBodies(arguments.prefix);
+      if (!listed.ok()) return run.Fail(listed.status());
+      bodies = static_cast<uint64_t>(listed->bodies_size());
+    }
+    PrintCount(run, *response, bodies);
   } else if (run.json()) {
     run.out << MessageJson(*response) << "\n";
   } else if (run.names()) {
@@ -134,7 +146,8 @@ void AddListCommand(Command program, Invocation* invocation) {
   command.AddNumber("--limit", 1, 1000000000, "Stop after N hulls (default: all)",
                     [arguments](uint64_t number) { arguments->limit = number; });
   command.AddFlag("--count", &arguments->count,
-                  "Only how many there are, with how many vertices and points");
+                  "Only how many there are, with how many vertices and points, and how many "
+                  "bodies");
   command.SetExamples({{"Those of one cell", "hullctl list cell-3/"},
                        {"The ten largest", "hullctl list --sort vertices --limit 10"},
                        {"How many there are", "hullctl list --count"},

@@ -12,6 +12,7 @@
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/commands/commands.h"
+#include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/scene/scene_file.h"
 
@@ -44,8 +45,13 @@ std::string EventText(const v1::HullEvent& event) {
   const v1::HullInfo& hull = event.hull();
   std::string text =
       absl::StrCat(KindText(event.kind()), "\t", hull.hull_id(), "\t", hull.revision());
+  if (event.is_body()) text += "\tbody";
   if (event.kind() == v1::HULL_EVENT_KIND_DELETED) return text;
   if (hull.damaged()) return text + "\tdamaged";
+  if (event.is_body()) {
+    return absl::StrCat(text, " of ", event.piece_count(),
+                        event.piece_count() == 1 ? " piece" : " pieces");
+  }
   absl::StrAppend(&text, "\t", hull.vertex_count(), " of ", hull.counts().received(), " points");
   if (!event.has_box_min()) return text;
   return absl::StrCat(text, "\t", CornerText(event.box_min()), " to ", CornerText(event.box_max()));
@@ -96,6 +102,7 @@ ExitCode TellAll(const Invocation& run, std::unique_ptr<Watch> watch, const Tell
 ExitCode WatchHulls(const Invocation& run, const WatchOptions& options) {
   v1::WatchHullsRequest request;
   (options.exact ? request.mutable_hull_id() : request.mutable_prefix())->assign(options.prefix);
+  request.set_bodies(true);
   uint64_t events = 0;
   const auto tell = [&](const v1::WatchHullsResponse& message) {
     if (!run.json()) Print(message, run);
@@ -124,11 +131,21 @@ v1::CollisionWatchOpen OpenOf(const Scene& scene) {
   return open;
 }
 
+// The pieces of bodies that decided; empty where none did.
+std::string PiecesOf(const Scene& scene, const v1::CollisionEvent& event) {
+  if (!event.has_piece_a() && !event.has_piece_b()) return "";
+  const auto index = [](bool has, const v1::DecidingPiece& piece) {
+    return has ? static_cast<int32_t>(piece.index()) : -1;
+  };
+  const std::pair pieces(index(event.has_piece_a(), event.piece_a()),
+                         index(event.has_piece_b(), event.piece_b()));
+  return PiecesText(pieces, scene.NamesOfPieces(event.placement_a(), event.placement_b(), pieces));
+}
+
 ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
   const auto source = ByteSource::Open(options.scene);
   if (!source.ok()) return run.FailUsage(source.status());
-  // A watch takes hulls alone.
-  const auto scene = ReadScene(source->get(), BodyForm::kPieces);
+  const auto scene = ReadScene(source->get());
   if (!scene.ok()) return run.FailUsage(scene.status());
   if (absl::Status rest = RefuseUpdates(source->get(), "watch"); !rest.ok()) {
     return run.FailUsage(rest);
@@ -150,6 +167,8 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
       if (event.kind() != v1::COLLISION_EVENT_KIND_LOST) {
         run.out << "\t" << event.revision_a() << "\t" << event.revision_b();
       }
+      const auto pieces = PiecesOf(*scene, event);
+      if (!pieces.empty()) run.out << "\t" << pieces;
       run.out << "\n";
     }
     const bool was_synced = std::exchange(is_synced, is_synced || message.synced());
@@ -179,12 +198,14 @@ void AddWatchCommand(Command program, Invocation* invocation) {
   command.AddNumber("--events", 1, kAnyNumber, "End after N events, or a few more at once",
                     [options](uint64_t number) { options->events = number; });
   command.SetDetails(
-      "Prints a line for each event: what happened, name, revision, vertices and points, box.\n"
-      "First come all hulls (PRESENT) and a line '# synced'; then what is CREATED, CHANGED,\n"
-      "REPLACED and DELETED, the last state of each hull where many changes come at once.\n"
+      "Prints a line for each event: what happened, name, revision, vertices and points, box;\n"
+      "of a body, how many pieces it has. First come all hulls and bodies (PRESENT) and a line\n"
+      "'# synced'; then what is CREATED, CHANGED, REPLACED and DELETED, the last state of each\n"
+      "where many changes come at once.\n"
       "With --scene: what happened (ENTER, TOUCH, EXIT, with a clearance NEAR and FAR, LOST\n"
-      "when a hull goes), the two placements, and the revisions of their hulls. FILE is as in\n"
-      "'hullctl scene' and 'hullctl batch'; poses stay, hulls grow.\n"
+      "when a hull goes), the two placements, and the revisions of their hulls or bodies; of a\n"
+      "body, the piece that decided. FILE is as in 'hullctl scene' and 'hullctl batch'; poses\n"
+      "stay, hulls grow and bodies are put anew.\n"
       "A watch that loses the server looks for it during --timeout, and goes on where it was.\n"
       "With --output json each message of the contract is one line. Ctrl-C ends it.");
   command.SetExamples(

@@ -95,6 +95,21 @@ std::optional<v1::PutBodyRequest> Extended(const v1::GetBodyResponse& body, cons
   return request;
 }
 
+// FAILED_PRECONDITION: the server would refuse the body with the parts.
+absl::Status CheckPieces(const Client& client, const v1::GetBodyResponse& body,
+                         const std::string& id, const std::vector<NamedPart>& parts) {
+  const auto request = Extended(body, id, parts);
+  if (!request.has_value()) return absl::OkStatus();
+  const auto status = client.GetStatus();
+  if (!status.ok()) return status.status();
+  const auto pieces = static_cast<uint64_t>(request->pieces_size());
+  const uint64_t limit = status->limits().max_pieces_per_body();
+  if (pieces <= limit) return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(
+      "body ", Quoted(id), " would have ", pieces, " pieces; the limit is ", limit,
+      " (--max-pieces-per-body); make several bodies of the parts; nothing was changed"));
+}
+
 // Makes the body of the parts, and says what became of it.
 ExitCode JoinParts(const Invocation& run, const Client& client, const v1::GetBodyResponse& found,
                    const std::string& id, const std::vector<NamedPart>& parts) {
@@ -138,6 +153,9 @@ ExitCode AppendParts(const Invocation& run, const std::string& body_id,
   const Client client = run.MakeClient();
   const auto body = FindBody(client, body_id, create);
   if (!body.ok()) return run.Fail(body.status());
+  if (absl::Status fits = CheckPieces(client, *body, body_id, *parts); !fits.ok()) {
+    return run.Fail(fits);
+  }
   ProgressBar bar(run.err, run.shows_progress, "parts", parts->size());
   Table table;
   table.Row({"HULL", "TRIANGLES", "POINTS", "VERTICES", "VOLUME OF THE HULL"});

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "client/hullctl/printing/answer_text.h"
@@ -42,6 +43,12 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
   if (columns.axes_size() > 0) row.axis = &columns.axes(i);
   if (columns.analyses_size() > 0) row.analysis = &columns.analyses(i);
   if (columns.certificates_size() > 0) row.certificate = &columns.certificates(i);
+  const auto proof = std::lower_bound(
+      columns.piece_proofs().begin(), columns.piece_proofs().end(), static_cast<uint64_t>(i),
+      [](const v1::PieceProof& of, uint64_t number) { return of.row() < number; });
+  const bool is_proven =
+      proof != columns.piece_proofs().end() && proof->row() == static_cast<uint64_t>(i);
+  if (is_proven) row.proof = &*proof;
   if (columns.separations_size() > 0) {
     row.separation.emplace();
     row.separation->set_value(columns.separations(i));
@@ -59,6 +66,15 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i) {
   return row;
 }
 
+std::string PiecesText(std::pair<int32_t, int32_t> pieces,
+                       const std::array<std::string, 2>& piece_names) {
+  const auto name = [](int32_t piece, const std::string& known) {
+    return piece < 0 ? "-" : known.empty() ? std::to_string(piece) : known;
+  };
+  return absl::StrCat("pieces ", name(pieces.first, piece_names[0]), " ",
+                      name(pieces.second, piece_names[1]));
+}
+
 std::string RowText(const AnswerRow& row, const Painter& paint,
                     const std::array<std::string, 2>& piece_names) {
   std::vector<std::string> cells = {PaintedRelation(row.relation, paint)};
@@ -68,20 +84,19 @@ std::string RowText(const AnswerRow& row, const Painter& paint,
     cells.push_back(DirectionText(row.witness->point_b()));
   }
   if (row.within_clearance) cells.emplace_back(*row.within_clearance ? "within" : "beyond");
-  if (row.pieces) {
-    const auto name = [](int32_t piece, const std::string& known) {
-      return piece < 0 ? "-" : known.empty() ? std::to_string(piece) : known;
-    };
-    cells.push_back(absl::StrCat("pieces ", name(row.pieces->first, piece_names[0]), " ",
-                                 name(row.pieces->second, piece_names[1])));
-  }
+  if (row.pieces) cells.push_back(PiecesText(*row.pieces, piece_names));
   if (row.axis != nullptr) {
     const bool found = row.axis->kind() != v1::AXIS_KIND_UNSPECIFIED;
     cells.push_back(found ? absl::StrCat(AxisKindText(row.axis->kind()), " ",
                                          DirectionText(row.axis->direction()))
                           : "no axis");
   }
-  if (row.certificate != nullptr) cells.push_back(CertificateText(*row.certificate));
+  if (row.proof != nullptr) {
+    const int count = row.proof->certificates_size();
+    cells.push_back(absl::StrCat(count, " certificate", count == 1 ? "" : "s", " of pieces"));
+  } else if (row.certificate != nullptr) {
+    cells.push_back(CertificateText(*row.certificate));
+  }
   if (row.analysis != nullptr) {
     cells.push_back(DurationText(row.analysis->time()));
     cells.push_back(absl::StrCat(row.analysis->axes_tested(), " axes"));
@@ -102,7 +117,11 @@ void AddRow(const AnswerRow& row, JsonObject* object) {
     object->AddJson("pieces", absl::StrCat("[", row.pieces->first, ",", row.pieces->second, "]"));
   }
   if (row.axis != nullptr) object->AddJson("axis", MessageJson(*row.axis));
-  if (row.certificate != nullptr) object->AddJson("certificate", MessageJson(*row.certificate));
+  if (row.proof != nullptr) {
+    object->AddJson("pieceProof", MessageJson(*row.proof));
+  } else if (row.certificate != nullptr) {
+    object->AddJson("certificate", MessageJson(*row.certificate));
+  }
   if (row.analysis != nullptr) object->AddJson("analysis", MessageJson(*row.analysis));
 }
 

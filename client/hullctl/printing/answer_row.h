@@ -21,6 +21,8 @@ struct AnswerRow {
   const v1::Axis* axis = nullptr;
   const v1::Analysis* analysis = nullptr;
   const v1::Certificate* certificate = nullptr;
+  // Of a pair with a body, instead of the certificate.
+  const v1::PieceProof* proof = nullptr;
   std::optional<v1::Separation> separation;
   std::optional<v1::Witness> witness;
   std::optional<bool> within_clearance;
@@ -39,6 +41,11 @@ AnswerRow RowAt(const v1::AnswerColumns& columns, int i);
 // indices where those are empty.
 std::string RowText(const AnswerRow& row, const Painter& paint,
                     const std::array<std::string, 2>& piece_names = {});
+
+// Which pieces of bodies decided, as in "pieces leg 3": by their names, or by their indices where
+// those are empty, "-" for -1.
+std::string PiecesText(std::pair<int32_t, int32_t> pieces,
+                       const std::array<std::string, 2>& piece_names);
 
 // Adds a member for each field that there is.
 void AddRow(const AnswerRow& row, JsonObject* object);

@@ -78,6 +78,7 @@ class RobotCheck {
   void TellOfFailure(uint64_t waypoint, size_t pair, const std::string& problem);
   void TakeOfMany(uint64_t waypoint, size_t pair, const AnswerRow& row, bool collides);
   void PrintRow(uint64_t waypoint, const char* event, size_t pair, const AnswerRow& row);
+  std::string TextOf(size_t pair, const AnswerRow& row) const;
   void PrintHead();
   void PrintTotals();
   std::string PlaceOf(uint64_t waypoint) const;
@@ -91,6 +92,8 @@ class RobotCheck {
   const Client client_;
   TemporaryHulls temporary_;
   ProgressBar bar_;
+  // What stands around the robot, if anything.
+  Scene scene_;
   Cast cast_;
   std::vector<uint32_t> pairs_;
   // Pairs of links with shapes that are not asked about, and why.
@@ -127,12 +130,13 @@ absl::Status RobotCheck::AddScene() {
   if (arguments_.scene.empty()) return absl::OkStatus();
   const auto source = ByteSource::Open(arguments_.scene);
   if (!source.ok()) return source.status();
-  const auto scene = ReadScene(source->get(), BodyForm::kPieces);
+  auto scene = ReadScene(source->get());
   if (!scene.ok()) return scene.status();
-  for (uint32_t i = 0; i < scene->size(); ++i) {
-    cast_.names.push_back(scene->NameOf(i));
-    cast_.fixed_hulls.push_back(*scene->HullOf(i));
-    const Pose7 pose = NumbersOf(scene->PlacementOf(i).pose());
+  scene_ = *std::move(scene);
+  for (uint32_t i = 0; i < scene_.size(); ++i) {
+    cast_.names.push_back(scene_.NameOf(i));
+    cast_.fixed_hulls.push_back(*scene_.HullOf(i));
+    const Pose7 pose = NumbersOf(scene_.PlacementOf(i).pose());
     cast_.fixed_poses.insert(cast_.fixed_poses.end(), pose.begin(), pose.end());
   }
   return absl::OkStatus();
@@ -306,7 +310,21 @@ void RobotCheck::PrintRow(uint64_t waypoint, const char* event, size_t pair, con
   }
   if (*event != '\0') run_.out << waypoint + 1 << "\t" << event << "\t";
   run_.out << NameOf(pair, 0) << "\t" << NameOf(pair, 1) << "\t"
-           << (run_.names() ? RelationText(row.relation) : RowText(row, run_.paint)) << "\n";
+           << (run_.names() ? RelationText(row.relation) : TextOf(pair, row)) << "\n";
+}
+
+// With the piece of what stands around that decided, where that is a body.
+std::string RobotCheck::TextOf(size_t pair, const AnswerRow& row) const {
+  const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
+  const uint32_t b = pairs_[2 * pair + 1];
+  AnswerRow shown = row;
+  const int32_t piece = row.pieces.value_or(std::pair(-1, -1)).second;
+  if (b < robot_parts || piece < 0) {
+    shown.pieces.reset();
+    return RowText(shown, run_.paint);
+  }
+  const uint32_t placement = b - robot_parts;
+  return RowText(shown, run_.paint, scene_.NamesOfPieces(placement, placement, {-1, piece}));
 }
 
 void RobotCheck::Take(uint64_t waypoint, size_t pair, const AnswerRow& row,
@@ -462,8 +480,9 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
           "Where the robot stands: [w,x,y,z,]x,y,z (default: the origin)")
       .ValueName("POSE");
   command
-      .AddText("--scene", &arguments->scene,
-               "What stands around it, as for 'hullctl scene'; its hulls are on the server")
+      .AddText(
+          "--scene", &arguments->scene,
+          "What stands around it, as for 'hullctl scene'; its hulls and bodies are on the server")
       .ValueName("FILE")
       .Completes(ValueKind::kFile);
   command

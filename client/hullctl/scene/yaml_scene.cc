@@ -582,8 +582,6 @@ absl::StatusOr<SceneDescription> ReadYamlScene(const std::string& path) {
 
 absl::StatusOr<Scene> ToScene(const SceneDescription& description, const std::string& name,
                               BodyForm form) {
-  // Certificates are about hulls.
-  if (description.wanted.certificate()) form = BodyForm::kPieces;
   Scene scene;
   for (const BodyDefinition& body : description.bodies) {
     std::vector<std::string>& names = scene.piece_names.emplace_back();

@@ -130,6 +130,7 @@ absl::Status AddHulls(const Client& client, const std::string& id_or_prefix, Vie
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
   const auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
+  // The page draws hulls.
   absl::StatusOr<Scene> file = ReadScene(source->get(), BodyForm::kPieces);
   if (!file.ok()) return file.status();
   for (uint32_t i = 0; i < file->size(); ++i) {

@@ -33,6 +33,7 @@ from hulld.answers.collisions import (
     HullSize,
     HullVersion,
     Method,
+    PieceCertificate,
     Problem,
     Relation,
     Rung,
@@ -98,6 +99,7 @@ from hulld.geometry.poses import ORTHOGONALITY_TOLERANCE, Pose, PoseLike, PosesL
 from hulld.local_server import Local, LocalServer, local
 from hulld.programs import find_program
 from hulld.retry import RetryPolicy
+from hulld.verification import VerificationError, Verifier
 from hulld.watches import CollisionWatch, HullWatch
 
 __version__ = "0.1.0"
@@ -164,6 +166,7 @@ __all__ = [
     "NotFoundError",
     "Opened",
     "PermissionDeniedError",
+    "PieceCertificate",
     "Placement",
     "PlacementLike",
     "Placements",
@@ -190,6 +193,8 @@ __all__ = [
     "UnauthenticatedError",
     "UnavailableError",
     "UnimplementedError",
+    "VerificationError",
+    "Verifier",
     "VertexPair",
     "Witness",
     "__version__",

@@ -328,16 +328,17 @@ class Client:
         prefix: str = "",
         *,
         hull_id: str | None = None,
+        bodies: bool = False,
         after: Header | None = None,
         timeout: float | None = None,
     ) -> HullWatch:
         """Tells of hulls as they come, change and go: those whose IDs start with `prefix`, or one
-        by its ID. after: resumes another watch of the same, at its `position`. timeout: how long to
-        look for a server that was lost.
+        by its ID. bodies: tells of bodies, too. after: resumes another watch of the same, at its
+        `position`. timeout: how long to look for a server that was lost.
         """
 
         def request(position: Header | None) -> Call[HullChanges]:
-            return requests.watch_hulls(prefix, hull_id, position)
+            return requests.watch_hulls(prefix, hull_id, bodies, position)
 
         return HullWatch(
             lambda call: self._start(call, None),

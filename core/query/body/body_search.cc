@@ -101,16 +101,6 @@ absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames&
   return ValidateOptions(options, names);
 }
 
-absl::Status ValidateOptionsAmongMany(const QueryOptions& options, const OptionNames& names) {
-  if (options.want_certificate) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(names.certificate,
-                     " of bodies is for a pair that is asked about alone, as CheckCollision does; "
-                     "ask so, or leave it out"));
-  }
-  return ValidateBodyOptions(options, names);
-}
-
 void BodySearch::PlacedLeaf::Enter(uint32_t leaf) {
   if (node == leaf) return;
   node = leaf;
@@ -289,7 +279,7 @@ absl::StatusOr<BodyAnswer> BodySearch::TakeLeast() const {
   const PlacedPiece b(*b_, decided_->b);
   absl::StatusOr<Answer> answer = CheckCollision(a.placed(), b.placed(), OfDecidingPair(*options_));
   if (!answer.ok()) return answer.status();
-  BodyAnswer result = {*std::move(answer), decided_, {}};
+  BodyAnswer result = {{decided_, {}}, *std::move(answer)};
   // The signs of separations are exact, so that of the least one is the strongest relation.
   HULLD_CHECK(result.answer.relation == relation_);
   result.answer.rung = rung_;

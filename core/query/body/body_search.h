@@ -20,14 +20,18 @@
 
 namespace hulld {
 
-struct BodyAnswer {
-  // Of the bodies. Axis, witness points and analysis are those of the named pair.
-  Answer answer;
+// What an answer about bodies has beside one about hulls.
+struct PiecesAnswer {
   // The pair that decided. None where the relation alone shows that no pair collides, nor is within
   // the clearance; where either body holds no points, too.
   std::optional<PiecePair> pieces;
   // When wanted, what proves the relation (PieceCertification), and Answer::certificate is none.
   std::vector<PieceCertificate> certificates;
+};
+
+struct BodyAnswer : PiecesAnswer {
+  // Of the bodies. Axis, witness points and analysis are those of the pair that decided.
+  Answer answer;
 };
 
 // What a search looked at.
@@ -141,10 +145,6 @@ class BodySearch {
 
 // OK, or INVALID_ARGUMENT: ValidateOptions; the textbook method, which is for pairs of hulls.
 absl::Status ValidateBodyOptions(const QueryOptions& options, const OptionNames& names = {});
-
-// The same for bodies in one of many pairs, whose answers hold no certificates of pieces:
-// INVALID_ARGUMENT also for a wanted certificate.
-absl::Status ValidateOptionsAmongMany(const QueryOptions& options, const OptionNames& names = {});
 
 // A whole search. INVALID_ARGUMENT: ValidateBodyOptions. CANCELLED, RESOURCE_EXHAUSTED:
 // BodySearch::Advance.

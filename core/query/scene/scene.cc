@@ -209,23 +209,20 @@ bool SceneSearch::IsFound(const Answer& answer) const {
 }
 
 absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
-                                            std::optional<PiecePair>* pieces) const {
+                                            PiecesAnswer* of_body) const {
   if (!IsBody(a) && !IsBody(b)) return CheckCollision(placements_[a], placements_[b], options);
-  if (absl::Status s = ValidateOptionsAmongMany(options, options_->names); !s.ok()) return s;
-  absl::StatusOr<BodyAnswer> answer =
-      CheckBodies(options_->bodies[a], options_->bodies[b], options);
-  if (!answer.ok()) return answer.status();
-  if (pieces != nullptr) *pieces = answer->pieces;
-  return std::move(answer->answer);
+  absl::StatusOr<BodyAnswer> found = CheckBodies(options_->bodies[a], options_->bodies[b], options);
+  if (!found.ok()) return found.status();
+  if (of_body != nullptr) *of_body = PiecesAnswer(*std::move(found));
+  return std::move(found->answer);
 }
 
-absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b,
-                                        std::optional<PiecePair>* pieces) const {
-  absl::StatusOr<Answer> answer = AskWith(a, b, first_look_, pieces);
+absl::StatusOr<Answer> SceneSearch::Ask(uint32_t a, uint32_t b, PiecesAnswer* of_body) const {
+  absl::StatusOr<Answer> answer = AskWith(a, b, first_look_, of_body);
   if (!options_->query.WantsDetails() || !answer.ok() || !IsFound(*answer)) return answer;
   QueryOptions options = options_->query;
   options.threads = 1;
-  return AskWith(a, b, options, pieces);
+  return AskWith(a, b, options, of_body);
 }
 
 void SceneCandidates::Start(const SceneSearch& scene, uint32_t a) {

@@ -44,8 +44,6 @@ struct SceneOptions {
   std::optional<uint32_t> movers;
   // OpenMP threads.
   int threads = 1;
-  // How errors name what is asked.
-  OptionNames names;
 };
 
 // A found pair, a < b, or one that could not be answered.
@@ -79,12 +77,10 @@ class SceneSearch {
   // Placements that have candidates of their own: all, or the movers.
   uint32_t size() const { return size_; }
 
-  // The answer of a candidate, and what else is wanted of it if it is found. pieces: where not
-  // null, becomes the pair that decided of a candidate with a body (BodyAnswer::pieces). CANCELLED:
-  // should_stop said so. INVALID_ARGUMENT: a candidate with a body, and what
-  // ValidateOptionsAmongMany refuses.
-  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b,
-                             std::optional<PiecePair>* pieces = nullptr) const;
+  // The answer of a candidate, and what else is wanted of it if it is found. of_body: where not
+  // null, takes what an answer about a body has beside that. CANCELLED: should_stop said so.
+  // INVALID_ARGUMENT, RESOURCE_EXHAUSTED: a candidate with a body, as in CheckBodies.
+  absl::StatusOr<Answer> Ask(uint32_t a, uint32_t b, PiecesAnswer* of_body = nullptr) const;
   // Whether the answer makes a pair found: it is not SEPARATED, or within the clearance.
   bool IsFound(const Answer& answer) const;
 
@@ -105,7 +101,7 @@ class SceneSearch {
     return !options_->bodies.empty() && !options_->bodies[placement].body().is_hull();
   }
   absl::StatusOr<Answer> AskWith(uint32_t a, uint32_t b, const QueryOptions& options,
-                                 std::optional<PiecePair>* pieces) const;
+                                 PiecesAnswer* of_body) const;
   uint64_t CountPairs() const;
 
   std::span<const PlacedHull> placements_;

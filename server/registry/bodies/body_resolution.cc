@@ -98,9 +98,8 @@ absl::StatusOr<Resolved> RefreshHulls(Registry& registry, std::span<const std::s
 }
 
 // The bodies among the IDs; empty where there are none.
-Bodies BodiesAmong(const Registry& registry, std::span<const std::string> ids,
-                   const PlacedLookup& lookup) {
-  if (!lookup.takes_bodies || !registry.has_bodies()) return {};
+Bodies BodiesAmong(const Registry& registry, std::span<const std::string> ids) {
+  if (!registry.has_bodies()) return {};
   Bodies bodies = registry.FindBodies(ids).bodies;
   if (std::ranges::all_of(bodies, [](const auto& body) { return body == nullptr; })) return {};
   return bodies;
@@ -159,14 +158,14 @@ absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::
 absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
-  Bodies bodies = BodiesAmong(registry, ids, lookup);
+  Bodies bodies = BodiesAmong(registry, ids);
   absl::StatusOr<Resolved> hulls;
   while (true) {
     known.SetBodies(ids, std::move(bodies));
     const auto hull_ids = known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids;
     hulls = RefreshHulls(registry, hull_ids, known.hulls_, lookup, should_stop);
     if (!hulls.ok()) return hulls;
-    bodies = BodiesAmong(registry, ids, lookup);
+    bodies = BodiesAmong(registry, ids);
     if (bodies == known.bodies_) break;
   }
   if (!known.has_bodies()) return hulls;
@@ -186,7 +185,7 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
 
 std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                          const PlacedLookup& lookup) {
-  if (!BodiesAmong(registry, ids, lookup).empty()) return std::nullopt;
+  if (!BodiesAmong(registry, ids).empty()) return std::nullopt;
   std::optional<Resolved> resolved =
       registry.TryResolve(ids, lookup.canonical ? ReadPlan() : lookup.plan);
   if (!resolved.has_value() || !lookup.canonical) return resolved;

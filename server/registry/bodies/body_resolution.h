@@ -37,8 +37,6 @@ struct PlacedLookup {
   bool canonical = false;
   // What IDs must start with, those of pieces too; it is the caller's.
   std::string prefix;
-  // Otherwise an ID of a body is that of no hull.
-  bool takes_bodies = true;
   ReadPlan plan;
 };
 

@@ -167,12 +167,15 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
   committer_.Submit(
       locked, std::move(change),
       [this, id, revision, finish = std::move(finish)](Locked& later, const absl::Status& status) {
-        if (status.ok()) {
-          Publish(revision);
-          feed_.NoteOther(later, revision);
-        }
+        const std::shared_ptr<const Body> former = bodies_.at(id).committed;
+        if (status.ok()) Publish(revision);
         finish(later, status);
         RegisteredBody& body = bodies_.at(id);
+        if (status.ok() && body.committed != nullptr) {
+          feed_.NoteBodyPut(later, former, body.committed);
+        } else if (status.ok()) {
+          feed_.NoteBodyDeleted(later, *former, revision);
+        }
         body.in_flight = false;
         std::deque<std::function<void(Locked&)>> waiting = std::exchange(body.waiting, {});
         // Nothing was there before a creation that was refused, nor is after a deletion.
@@ -182,6 +185,11 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
         }
         for (const auto& next : waiting) next(later);
       });
+}
+
+std::shared_ptr<const Body> Registry::FindBody(const std::string& id) const {
+  const auto found = bodies_.find(id);
+  return found == bodies_.end() ? nullptr : found->second.committed;
 }
 
 BodyPage Registry::ListBodies(const std::string& prefix, const std::string& after,
@@ -210,8 +218,7 @@ FoundBodies Registry::FindBodies(std::span<const std::string> ids) const {
       locked.Unlock();
       locked.Lock();
     }
-    const auto body = bodies_.find(id);
-    found.bodies.push_back(body == bodies_.end() ? nullptr : body->second.committed);
+    found.bodies.push_back(FindBody(id));
     locked.NoteLookup();
   }
   found.store_revision = revision_;

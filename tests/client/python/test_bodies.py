@@ -117,3 +117,38 @@ def test_wrong_pieces_are_refused_before_they_are_sent(either: Any, name: str, c
     with pytest.raises(TypeError, match="is one ID"):
         either.put_body(f"{name}/body", cube)
     assert list(either.list_bodies(f"{name}/")) == []
+
+
+def test_watches_tell_of_bodies_that_change(either: Any, name: str, cube: str) -> None:
+    body = f"{name}/body"
+    either.put_body(body, [cube])
+    with either.watch_hulls(f"{name}/", bodies=True) as watch:
+        events = {}
+        changes = next(watch)
+        while not changes.synced:
+            events |= {event.hull.hull_id: event for event in changes.events}
+            changes = next(watch)
+        events |= {event.hull.hull_id: event for event in changes.events}
+        assert events[body].is_body and events[body].piece_count == 1
+        assert events[body].box is None and not events[cube].is_body
+        made = either.put_body(body, [cube, cube])
+        changes = next(watch)
+        while not changes.events:
+            changes = next(watch)
+        (event,) = changes.events
+        assert event.kind is hulld.HullEventKind.CHANGED and event.piece_count == 2
+        assert event.hull.revision == made.body.revision
+    with either.watch_collisions([body, (f"{name}/probe", (4.5, 0, 0))]) as watch:
+        changes = next(watch)
+        while not changes.synced:
+            changes = next(watch)
+        assert [hull.hull_id for hull in changes.piece_hulls] == [cube]
+        either.append_points(f"{name}/probe", CUBE, create=True)
+        either.put_body(body, [cube, (cube, (4, 0, 0))])
+        changes = next(watch)
+        while not changes.events:
+            changes = next(watch)
+        (contact,) = changes.events
+        assert contact.kind is hulld.CollisionEventKind.ENTER
+        assert contact.piece_a.index == 1 and contact.piece_a.hull.hull_id == cube
+        assert contact.piece_b is None

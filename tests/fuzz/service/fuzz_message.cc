@@ -243,6 +243,9 @@ class MessageFiller {
   std::string String(const FieldDescriptor& field) {
     const std::string& name = field.name();
     if (name == "hull_id") return FuzzHullId(in_);
+    // A hull can have the ID, too.
+    if (name == "body_id" && !in_.OneOf(8)) return in_.OneOf(2) ? "body/a" : "body/b";
+    if (name == "body_id") return FuzzHullId(in_);
     if (name == "prefix") {
       constexpr const char* kPrefixes[] = {"", "", "", "c", "cell-1", "cell-1/", "zz", "/"};
       return kPrefixes[in_.Below(std::size(kPrefixes))];

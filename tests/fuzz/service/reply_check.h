@@ -13,6 +13,10 @@
 
 namespace hulld::fuzz {
 
+inline bool IsCollision(v1::Relation relation) {
+  return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
+}
+
 // What the contract says of replies that end OK, whatever was asked. Each function returns what is
 // wrong with a reply, or nothing.
 

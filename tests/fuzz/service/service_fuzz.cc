@@ -31,7 +31,8 @@ server::Config SmallConfig() {
   config.limits.max_message_bytes = 64 << 10;
   config.limits.max_points_per_chunk = 64;
   config.limits.max_vertices_per_hull = 12;
-  config.limits.max_hulls = 7;
+  config.limits.max_hulls = 8;
+  config.limits.max_pieces_per_body = 5;
   config.limits.max_pairs_per_batch = 60;
   config.limits.max_textbook_axes = 100;
   return config;
@@ -123,6 +124,7 @@ void ServiceFuzz::Start() {
   server_ = *std::move(started);
   channel_ = grpc::CreateChannel(config.listen, grpc::InsecureChannelCredentials());
   hulls_ = v1::HullService::NewStub(channel_);
+  bodies_ = v1::BodyService::NewStub(channel_);
   collisions_ = v1::CollisionService::NewStub(channel_);
   status_ = v1::StatusService::NewStub(channel_);
   maintenance_ = v1::MaintenanceService::NewStub(channel_);
@@ -170,6 +172,21 @@ std::map<std::string, std::string> ServiceFuzz::Contents() {
     absl::StrAppend(&text, "writer at ", opened.opened().last_sequence(), " ",
                     stream->Finish().error_message());
   }
+  grpc::ClientContext listing;
+  v1::ListBodiesResponse bodies;
+  absl::StrAppend(&contents["bodies"], bodies_->ListBodies(&listing, {}, &bodies).error_message());
+  for (const v1::BodyInfo& body : bodies.bodies()) {
+    grpc::ClientContext get;
+    v1::GetBodyRequest request;
+    v1::GetBodyResponse response;
+    request.set_body_id(body.body_id());
+    std::string& text = contents["body " + body.body_id()];
+    text = bodies_->GetBody(&get, request, &response).error_message();
+    for (const v1::Placement& piece : response.pieces()) {
+      absl::StrAppend(&text, piece.SerializeAsString());
+    }
+    absl::StrAppend(&text, body.SerializeAsString());
+  }
   return contents;
 }
 
@@ -214,6 +231,18 @@ std::string ServiceFuzz::Prepare() {
     v1::DeleteHullResponse response;
     request.set_hull_id(hull_id);
     const grpc::Status status = hulls_->DeleteHull(&deletion, request, &response);
+    if (!status.ok()) return "cannot delete: " + status.error_message();
+  }
+  grpc::ClientContext listing;
+  v1::ListBodiesResponse bodies;
+  const grpc::Status listed = bodies_->ListBodies(&listing, {}, &bodies);
+  if (!listed.ok()) return "bodies cannot be listed: " + listed.error_message();
+  for (const v1::BodyInfo& body : bodies.bodies()) {
+    grpc::ClientContext deletion;
+    v1::DeleteBodyRequest request;
+    v1::DeleteBodyResponse response;
+    request.set_body_id(body.body_id());
+    const grpc::Status status = bodies_->DeleteBody(&deletion, request, &response);
     if (!status.ok()) return "cannot delete: " + status.error_message();
   }
   for (const KnownHull& hull : FirstHulls()) {

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 
+#include "hulld/v1/body.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/maintenance.grpc.pb.h"
@@ -32,7 +33,8 @@ class ServiceFuzz {
   // bytes that are no message. Runs it on the server with a few hulls as they are at first. What is
   // wrong with any reply by the contract, or nothing: each call ends with a status that its
   // contract lists, replies are consistent (reply_check.h), certificates prove what they are for,
-  // answers from a stream or a scene are those of a batch, hulls that the program cannot name stay
+  // answers from a stream or a scene are those of a batch, those about a body follow from those
+  // about its pieces, hulls that the program cannot name stay
   // as they were, the others are as acknowledged, and no call outlives the program. After some
   // programs a durable store is opened again, itself or a backup of it: every hull, its mesh and
   // its writer's sequence are then as before.
@@ -62,6 +64,7 @@ class ServiceFuzz {
   std::unique_ptr<server::Server> server_;
   std::shared_ptr<grpc::Channel> channel_;
   std::unique_ptr<v1::HullService::Stub> hulls_;
+  std::unique_ptr<v1::BodyService::Stub> bodies_;
   std::unique_ptr<v1::CollisionService::Stub> collisions_;
   std::unique_ptr<v1::StatusService::Stub> status_;
   std::unique_ptr<v1::MaintenanceService::Stub> maintenance_;

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/packed_placements.h"
 #include "server/contract/rpc.h"
 #include "tests/fuzz/byte_reader.h"
 #include "tests/fuzz/service/fuzz_message.h"
@@ -22,6 +23,12 @@
 #include "tests/fuzz/service/watch_check.h"
 
 namespace hulld::fuzz {
+
+// What replies tell of a hull, whichever call they answer.
+std::string Known(const v1::HullInfo& hull);
+
+// Whether a call can change a hull.
+bool ChangesHulls(server::Rpc rpc);
 
 // One run of one program: decodes and makes its calls, and checks what comes back.
 class ServiceProgram {
@@ -57,6 +64,11 @@ class ServiceProgram {
   void SaveBackup();
   void WatchHulls();
   void WatchCollisions();
+  void PutBody();
+  void GetBody();
+  void ListBodies();
+  void DeleteBody();
+  void AskAboutBody();
   void SendRaw();
 
   MessageHints Hints() const { return {revision_, 1, 0}; }
@@ -83,7 +95,17 @@ class ServiceProgram {
   template <typename Stub, typename Request, typename Response>
   bool Call(server::Rpc rpc, Stub& stub,
             grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
-            const Request& request, Response* response);
+            const Request& request, Response* response) {
+    grpc::ClientContext context;
+    CallManner manner;
+    Hurry(context, manner);
+    const bool ok = Ended(rpc, manner, (stub.*method)(&context, request, response));
+    if constexpr (requires { request.hull_id(); }) {
+      if (!ok && manner.hurried && ChangesHulls(rpc)) Doubt(request.hull_id());
+    }
+    if (ok) SeeHeader(response->header());
+    return ok;
+  }
   // One server stream; `parts` holds all of it and true comes back when it was read to an OK end.
   template <typename Stub, typename Request, typename Response>
   bool ReadStream(server::Rpc rpc, Stub& stub,
@@ -99,6 +121,12 @@ class ServiceProgram {
   void CompareSceneWithBatch(const v1::FindCollisionsRequest& request,
                              std::span<const v1::FindCollisionsResponse> parts);
 
+  // One that is there, mostly.
+  std::string AnyHull();
+  // Whether a body's relation is the strongest of its pieces', and its certificates prove it.
+  void CompareWithPieces(const v1::CheckCollisionRequest& request,
+                         const v1::CheckCollisionResponse& response);
+
   // One WatchHulls call; true when all was told that is to be.
   bool WatchHullsOnce(const v1::WatchHullsRequest& request, bool then_change,
                       HullWatchCheck* check);
@@ -112,7 +140,15 @@ class ServiceProgram {
   v1::WatchCollisionsRequest NextWatchMessage(bool first, size_t placements);
   // The same request in its other form, now and then.
   template <typename Request>
-  std::optional<Request> MaybePacked(const Request& request);
+  std::optional<Request> MaybePacked(const Request& request) {
+    if (request.placements().empty() || request.has_packed_placements() || !in_.OneOf(3)) {
+      return std::nullopt;
+    }
+    Request packed = request;
+    *packed.mutable_packed_placements() = PackPlacements(request.placements());
+    packed.clear_placements();
+    return packed;
+  }
 
   ServiceFuzz& service_;
   ByteReader in_;
@@ -122,6 +158,8 @@ class ServiceProgram {
   // What the server has acknowledged of each hull, and of which that is not all.
   std::map<std::string, v1::HullInfo> hulls_;
   std::set<std::string> doubtful_;
+  // Those of the bodies whose last change was acknowledged.
+  std::map<std::string, v1::PutBodyRequest> bodies_;
   // A change of any hull may have happened.
   bool all_doubtful_ = false;
   // Streams that nobody reads; they end with the program.

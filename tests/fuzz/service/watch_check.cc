@@ -10,10 +10,6 @@
 namespace hulld::fuzz {
 namespace {
 
-bool IsColliding(v1::Relation relation) {
-  return relation == v1::RELATION_TOUCHING || relation == v1::RELATION_OVERLAPPING;
-}
-
 // The kind of event that leads from one state to another, as the contract has it.
 v1::CollisionEventKind KindOf(v1::Relation before, bool was_near, v1::Relation after,
                               bool is_near) {
@@ -23,9 +19,13 @@ v1::CollisionEventKind KindOf(v1::Relation before, bool was_near, v1::Relation a
   }
   if (after == v1::RELATION_TOUCHING && before != after) return v1::COLLISION_EVENT_KIND_TOUCH;
   if (after != v1::RELATION_SEPARATED) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
-  if (IsColliding(before)) return v1::COLLISION_EVENT_KIND_EXIT;
+  if (IsCollision(before)) return v1::COLLISION_EVENT_KIND_EXIT;
   if (is_near == was_near) return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
   return is_near ? v1::COLLISION_EVENT_KIND_NEAR : v1::COLLISION_EVENT_KIND_FAR;
+}
+
+bool IsThere(const v1::HullEvent& event) {
+  return event.kind() != v1::HULL_EVENT_KIND_DELETED && !event.hull().damaged();
 }
 
 }  // namespace
@@ -39,6 +39,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   if (response.anew()) {
     if (request_.after_revision() == 0) return "a watch from the start starts anew";
     hulls_.clear();
+    bodies_.clear();
     is_synced_ = false;
     is_anew_ = true;
   } else if (response.header().revision() < header_.revision()) {
@@ -58,6 +59,17 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
     }
     if (is_there) last_id = hull.hull_id();
     if (!is_there) last_revision = hull.revision();
+    if (event.is_body() && !request_.bodies()) return "a body is told of where nobody asked";
+    if (event.is_body() != (event.piece_count() > 0) && IsThere(event)) {
+      return "a body without pieces, or a hull with some";
+    }
+    if (event.is_body()) {
+      // What was a hull is one no more.
+      hulls_.erase(hull.hull_id());
+      if (IsThere(event)) bodies_.insert(hull.hull_id());
+      if (!IsThere(event)) bodies_.erase(hull.hull_id());
+      continue;
+    }
     if (std::string finding = TakeEvent(event); !finding.empty()) {
       return absl::StrCat("watched hull ", hull.hull_id(), ": ", finding);
     }
@@ -70,7 +82,8 @@ std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
   const v1::HullInfo& hull = event.hull();
   if (!Watches(hull.hull_id())) return "it is not watched";
   const bool is_resumed = request_.after_revision() > 0 && !is_anew_;
-  const bool was_known = hulls_.count(hull.hull_id()) > 0;
+  const bool was_body = bodies_.erase(hull.hull_id()) > 0;
+  const bool was_known = was_body || hulls_.count(hull.hull_id()) > 0;
   if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {
     if (!is_resumed && !was_known) return "it is gone, and was never there";
     hulls_.erase(hull.hull_id());
@@ -162,7 +175,7 @@ std::string CollisionWatchCheck::TakeEvent(const v1::CollisionEvent& event) {
 std::map<std::pair<uint32_t, uint32_t>, v1::Relation> CollisionWatchCheck::Colliding() const {
   std::map<Pair, v1::Relation> colliding;
   for (const auto& [pair, state] : told_) {
-    if (!IsColliding(state.relation)) continue;
+    if (!IsCollision(state.relation)) continue;
     colliding[std::minmax(pair.first, pair.second)] = state.relation;
   }
   return colliding;

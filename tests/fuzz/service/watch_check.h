@@ -33,6 +33,8 @@ class HullWatchCheck {
 
   const v1::WatchHullsRequest request_;
   std::map<std::string, v1::HullInfo> hulls_;
+  // Those that were told of.
+  std::set<std::string> bodies_;
   v1::ResponseHeader header_;
   bool is_synced_ = false;
   bool is_anew_ = false;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -189,6 +191,203 @@ TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
   ASSERT_TRUE(fits.ok()) << fits.status();
   EXPECT_EQ(fits->piece_certificates_size(), 8100);
   EXPECT_LT(fits->ByteSizeLong(), size_t{4} << 20);
+}
+
+// Rows of a batch, a stream or a scene, checked as single answers are.
+class BodyProofs : public BodyCertificates {
+ protected:
+  // Whether every row is answered and proven. `placement_of`: by index among the call's; `pairs`:
+  // of the rows. Hulls, pieces' too, are those of the whole call. Returns how many rows had
+  // certificates of pieces.
+  int ExpectProven(const std::vector<v1::Placement>& placements, const std::vector<uint32_t>& pairs,
+                   const std::vector<v1::HullVersion>& hulls,
+                   const std::vector<v1::HullVersion>& piece_hulls,
+                   const v1::AnswerColumns& columns) const {
+    const Client client = MakeClient();
+    AnswerChecker checker(client);
+    HullVersions versions;
+    for (const v1::HullVersion& hull : piece_hulls) {
+      EXPECT_TRUE(versions.emplace(hull.hull_id(), &hull).second) << "told twice";
+    }
+    EXPECT_EQ(static_cast<size_t>(columns.relations_size()), pairs.size() / 2);
+    EXPECT_EQ(columns.certificates_size(), columns.relations_size());
+    int proofs = 0;
+    for (int row = 0; row < columns.relations_size(); ++row) {
+      const uint32_t a = pairs[2 * static_cast<size_t>(row)];
+      const uint32_t b = pairs[2 * static_cast<size_t>(row) + 1];
+      const v1::PieceProof* proof = nullptr;
+      for (const v1::PieceProof& one : columns.piece_proofs()) {
+        if (one.row() == static_cast<uint64_t>(row)) proof = &one;
+      }
+      const auto piece = [&](int side) {
+        const int32_t index = columns.pieces(2 * row + side);
+        return index < 0 ? std::nullopt : std::optional(static_cast<uint32_t>(index));
+      };
+      const absl::StatusOr<Verification> verified =
+          proof == nullptr
+              ? checker.Check(CheckedAnswer{placements[a], placements[b], columns.relations(row),
+                                            columns.certificates(row), hulls[a], hulls[b]})
+              : checker.Check(CheckedBodies{placements[a], placements[b], columns.relations(row),
+                                            hulls[a], hulls[b], proof->certificates(), versions,
+                                            piece(0), piece(1)});
+      EXPECT_TRUE(verified.ok()) << verified.status();
+      if (!verified.ok()) return 0;
+      EXPECT_EQ(verified->verdict, Verdict::kValid) << "row " << row << ": " << verified->reason;
+      if (proof != nullptr) ++proofs;
+    }
+    return proofs;
+  }
+
+  // Proofs name rows of their own message.
+  template <typename Message>
+  static void Append(const Message& part, Message* all) {
+    const int rows = all->columns().relations_size();
+    const int proofs = all->columns().piece_proofs_size();
+    all->MergeFrom(part);
+    for (int i = proofs; i < all->columns().piece_proofs_size(); ++i) {
+      v1::PieceProof* const proof = all->mutable_columns()->mutable_piece_proofs(i);
+      EXPECT_LT(proof->row(), static_cast<uint64_t>(part.columns().relations_size()));
+      proof->set_row(proof->row() + static_cast<uint64_t>(rows));
+    }
+  }
+  template <typename Message>
+  static std::vector<v1::HullVersion> HullsOf(const Message& message) {
+    return {message.hulls().begin(), message.hulls().end()};
+  }
+  template <typename Message>
+  static std::vector<v1::HullVersion> PieceHullsOf(const Message& message) {
+    return {message.piece_hulls().begin(), message.piece_hulls().end()};
+  }
+  // Two rows, a row that is turned, and two cubes that are no bodies.
+  std::vector<v1::Placement> Cell() {
+    PutRows(5);
+    Put("probe", Cube());
+    return {PlacementOf("row"), PlacementOf("row", 0, 1, 0),
+            Turned(PlacementOf("row", 0.8, 0.8, 0.8)), PlacementOf("probe", 4.5, 0.5, 0),
+            PlacementOf("probe", 5.5, 0.5, 0)};
+  }
+};
+
+TEST_F(BodyProofs, OfBatchesAreChecked) {
+  const std::vector<v1::Placement> cell = Cell();
+  v1::BatchCheckCollisionsRequest request;
+  for (const v1::Placement& placement : cell) *request.add_placements() = placement;
+  std::vector<uint32_t> pairs;
+  for (uint32_t b = 0; b < cell.size(); ++b) {
+    for (uint32_t a = 0; a < b; ++a) pairs.insert(pairs.end(), {a, b});
+  }
+  request.mutable_pairs()->Assign(pairs.begin(), pairs.end());
+  request.mutable_wanted()->set_certificate(true);
+  request.mutable_wanted()->set_separation(true);
+  v1::BatchCheckCollisionsResponse all;
+  const absl::Status status =
+      MakeClient().BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {
+        Append(part, &all);
+        return absl::OkStatus();
+      });
+  ASSERT_TRUE(status.ok()) << status;
+  ASSERT_EQ(all.columns().pair_problems_size(), 0);
+  ASSERT_EQ(all.piece_hulls_size(), 1);
+  EXPECT_EQ(all.piece_hulls(0).hull_id(), "cube");
+  // All but the pair of probes.
+  EXPECT_EQ(ExpectProven(cell, pairs, HullsOf(all), PieceHullsOf(all), all.columns()), 9);
+  EXPECT_TRUE(all.columns().certificates(0).pairs().empty());
+  // Nothing of it where no certificate is wanted.
+  request.mutable_wanted()->set_certificate(false);
+  v1::BatchCheckCollisionsResponse plain;
+  ASSERT_TRUE(MakeClient()
+                  .BatchCheckCollisions(request,
+                                        [&](const v1::BatchCheckCollisionsResponse& part) {
+                                          plain.MergeFrom(part);
+                                          return absl::OkStatus();
+                                        })
+                  .ok());
+  EXPECT_EQ(plain.piece_hulls_size() + plain.columns().piece_proofs_size(), 0);
+}
+
+TEST_F(BodyProofs, OfScenesAreChecked) {
+  const std::vector<v1::Placement> cell = Cell();
+  v1::FindCollisionsRequest request;
+  for (const v1::Placement& placement : cell) *request.add_placements() = placement;
+  request.mutable_wanted()->set_certificate(true);
+  request.mutable_wanted()->set_clearance(0.5);
+  v1::FindCollisionsResponse all;
+  const absl::Status status =
+      MakeClient().FindCollisions(request, [&](const v1::FindCollisionsResponse& part) {
+        Append(part, &all);
+        return absl::OkStatus();
+      });
+  ASSERT_TRUE(status.ok()) << status;
+  const std::vector<uint32_t> pairs(all.pairs().begin(), all.pairs().end());
+  EXPECT_GE(ExpectProven(cell, pairs, HullsOf(all), PieceHullsOf(all), all.columns()), 3);
+}
+
+TEST_F(BodyProofs, OfStreamsAreCheckedAfterEachUpdate) {
+  std::vector<v1::Placement> cell = Cell();
+  v1::CollisionStreamOpen open;
+  for (const v1::Placement& placement : cell) *open.add_placements() = placement;
+  const std::vector<uint32_t> pairs = {0, 1, 0, 2, 0, 3, 3, 4};
+  open.mutable_pairs()->Assign(pairs.begin(), pairs.end());
+  open.mutable_wanted()->set_certificate(true);
+  const auto stream = MakeClient().OpenCollisionStream();
+  auto answer = stream->Open(open);
+  ASSERT_TRUE(answer.ok()) << answer.status();
+  EXPECT_EQ(ExpectProven(cell, pairs, HullsOf(*answer), PieceHullsOf(*answer), answer->columns()),
+            3);
+  // Another piece, which the stream hears of when it refreshes.
+  Put("other", Cube());
+  ASSERT_TRUE(PutBody("row", {PlacementOf("other", 0.5, 0, 0), PlacementOf("cube", 9, 9, 9)}).ok());
+  v1::CollisionStreamUpdate update;
+  update.set_refresh_hulls(true);
+  answer = stream->Update(update);
+  ASSERT_TRUE(answer.ok()) << answer.status();
+  EXPECT_EQ(answer->piece_hulls_size(), 2);
+  const std::vector<uint32_t> changed = {0, 1, 0, 2, 0, 3};
+  EXPECT_EQ(ExpectProven(cell, changed, HullsOf(*answer), PieceHullsOf(*answer), answer->columns()),
+            3);
+  EXPECT_TRUE(stream->Close().ok());
+}
+
+TEST_F(BodyProofs, ARowThatIsTooLargeHasAProblemAndTheOthersAnswers) {
+  Put("cube", Cube());
+  ASSERT_TRUE(PutBody("heap", std::vector<v1::Placement>(100, PlacementOf("cube"))).ok());
+  ASSERT_TRUE(PutBody("less", std::vector<v1::Placement>(80, PlacementOf("cube"))).ok());
+  v1::BatchCheckCollisionsRequest request;
+  *request.add_placements() = PlacementOf("heap");
+  // 10000 pairs touch, 8000 do, which take some bytes more where all six pairs are distinct.
+  *request.add_placements() = PlacementOf("heap", 1, 0, 0);
+  *request.add_placements() = PlacementOf("less", 1, 0, 0);
+  *request.add_placements() = PlacementOf("cube", 1, 0, 0);
+  *request.add_placements() = PlacementOf("less", 0.5, 0, 0);
+  for (const uint32_t b : {1u, 2u, 3u, 4u}) {
+    request.add_pairs(0);
+    request.add_pairs(b);
+  }
+  request.mutable_wanted()->set_certificate(true);
+  std::vector<v1::Relation> relations;
+  std::vector<v1::ErrorReason> problems;
+  size_t largest = 0;
+  const absl::Status status =
+      MakeClient().BatchCheckCollisions(request, [&](const v1::BatchCheckCollisionsResponse& part) {
+        largest = std::max(largest, part.ByteSizeLong());
+        for (const int relation : part.columns().relations()) {
+          relations.push_back(static_cast<v1::Relation>(relation));
+        }
+        for (const v1::PairProblem& problem : part.columns().pair_problems()) {
+          EXPECT_EQ(part.columns().relations(static_cast<int>(problem.row())),
+                    v1::RELATION_UNSPECIFIED);
+          EXPECT_THAT(problem.message(), HasSubstr("fewer pieces"));
+          problems.push_back(problem.reason());
+        }
+        return absl::OkStatus();
+      });
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_LT(largest, size_t{4} << 20);
+  ASSERT_EQ(relations.size(), 4u);
+  EXPECT_EQ(relations[0], v1::RELATION_UNSPECIFIED);
+  EXPECT_EQ(relations[2], v1::RELATION_TOUCHING);
+  EXPECT_EQ(relations[3], v1::RELATION_OVERLAPPING);
+  EXPECT_EQ(problems.front(), v1::ERROR_REASON_PROOF_TOO_LARGE);
 }
 
 }  // namespace

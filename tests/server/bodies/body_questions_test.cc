@@ -178,10 +178,11 @@ TEST_F(BodyQuestions, BatchesTakeBoth) {
   ASSERT_TRUE(apart.ok()) << apart.status();
   EXPECT_NEAR(apart->columns().separations(0), 1.5, 1e-10);
   EXPECT_GE(apart->columns().pieces(0), 0);
-  // What is for single questions is a problem of the pair.
-  packed.mutable_wanted()->set_certificate(true);
+  // What is for hulls alone is a problem of the pair.
+  packed.clear_wanted();
+  packed.set_method(v1::METHOD_TEXTBOOK_SAT);
   EXPECT_THAT(Batch(packed)->columns().pair_problems(0).message(),
-              HasSubstr("wanted.certificate of bodies is for a pair that is asked about alone"));
+              HasSubstr("METHOD_TEXTBOOK_SAT is for pairs of hulls, not of bodies"));
 }
 
 TEST_F(BodyQuestions, WithoutBodiesThereIsNoColumnOfPieces) {
@@ -215,25 +216,6 @@ TEST_F(BodyQuestions, ScenesTakeBoth) {
   EXPECT_THAT(all.columns().pieces(), ElementsAre(1, -1, 0, 1));
   EXPECT_EQ(all.totals().overlapping(), 2u);
   EXPECT_EQ(all.totals().pairs(), 6u);
-}
-
-// A problem of a pair names the field that the caller set.
-TEST_F(BodyQuestions, ScenesNameTheWishThatBodiesCannotHave) {
-  PutPair("pair");
-  v1::FindCollisionsRequest request;
-  *request.add_placements() = PlacementOf("pair");
-  *request.add_placements() = PlacementOf("cube", 0.5, 0, 0);
-  request.mutable_wanted()->set_certificate(true);
-  v1::FindCollisionsResponse all;
-  const absl::Status status =
-      MakeClient().FindCollisions(request, [&](const v1::FindCollisionsResponse& part) {
-        all.MergeFrom(part);
-        return absl::OkStatus();
-      });
-  ASSERT_TRUE(status.ok()) << status;
-  ASSERT_EQ(all.columns().pair_problems_size(), 1);
-  EXPECT_THAT(all.columns().pair_problems(0).message(),
-              testing::StartsWith("wanted.certificate of bodies is for a pair"));
 }
 
 TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
@@ -274,22 +256,6 @@ TEST_F(BodyQuestions, StreamsMoveAndRefreshBodies) {
   ASSERT_EQ(relations.size(), 4u);
   EXPECT_EQ(relations.back(), v1::RELATION_UNSPECIFIED);
   EXPECT_TRUE(stream->Close().ok());
-}
-
-TEST_F(BodyQuestions, WatchesTakeHullsAlone) {
-  PutPair("pair");
-  v1::WatchCollisionsRequest open;
-  *open.mutable_open()->add_placements() = PlacementOf("pair");
-  *open.mutable_open()->add_placements() = PlacementOf("cube");
-  grpc::ClientContext context;
-  const auto watch = collisions_->WatchCollisions(&context);
-  ASSERT_TRUE(watch->Write(open));
-  v1::WatchCollisionsResponse response;
-  ASSERT_TRUE(watch->Read(&response));
-  ASSERT_EQ(response.placement_problems_size(), 1);
-  EXPECT_THAT(response.placement_problems(0).message(), HasSubstr("is a body, not a hull"));
-  context.TryCancel();
-  watch->Finish();
 }
 
 TEST_F(BodyQuestions, ALongQuestionEndsAtItsDeadline) {

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <condition_variable>
+#include <future>
 #include <mutex>
+#include <span>
 
 #include "tests/server/harness/store_fixture.h"
 
@@ -17,7 +19,8 @@ using ::testing::IsEmpty;
 
 std::string Text(const HullChange& change) {
   static const char* const kNames[] = {"present", "created", "changed", "replaced", "deleted"};
-  return std::string(kNames[static_cast<int>(change.kind)]) + " " + change.record.hull_id;
+  return std::string(kNames[static_cast<int>(change.kind)]) + (change.is_body ? " body " : " ") +
+         change.record.hull_id;
 }
 
 // A watch that is told what there is when it asks.
@@ -74,6 +77,9 @@ class Watcher {
     return registry_.TakeChanges(*watch_).status();
   }
   uint64_t revision() const { return revision_; }
+  void Also(std::span<const std::string> added, std::span<const std::string> dropped) {
+    registry_.WatchAlso(*watch_, added, dropped);
+  }
 
  private:
   void AwaitTurn() {
@@ -121,6 +127,19 @@ class ChangeFeedTest : public ::testing::Test {
     replacement.builder = std::make_shared<HullBuilder>();
     ASSERT_TRUE(replacement.builder->Add(CubeCorners(0, 7)).ok());
     ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
+  }
+  // Of one piece, whose hull need not exist.
+  void PutBody(const std::string& id) {
+    std::promise<absl::Status> done;
+    registry().PutBody({{id, 0, 0}, {"piece"}, {{0, Pose()}}}, std::nullopt,
+                       [&done](const auto& put) { done.set_value(put.status()); });
+    ASSERT_TRUE(done.get_future().get().ok());
+  }
+  void DeleteBody(const std::string& id) {
+    std::promise<absl::Status> done;
+    registry().DeleteBody(id, std::nullopt,
+                          [&done](const auto& deleted) { done.set_value(deleted.status()); });
+    ASSERT_TRUE(done.get_future().get().ok());
   }
 
   std::unique_ptr<MemoryRegistry> hulls_ =
@@ -217,6 +236,62 @@ TEST_F(ChangeFeedTest, TellsOnlyWhatIsWatched) {
   EXPECT_THAT(two.All(), ElementsAre("created a/b", "created ab"));
   Watcher late(registry(), Hull("a/b"), kFromTheStart);
   EXPECT_THAT(late.All(), ElementsAre("present a/b", "synced"));
+}
+
+TEST_F(ChangeFeedTest, TellsOfBodiesWhereTheyAreAskedFor) {
+  ASSERT_TRUE(hulls_->Create("b").ok());
+  PutBody("a");
+  PutBody("c");
+  ASSERT_TRUE(hulls_->Create("d").ok());
+  Watcher hulls(registry(), Prefix(""), kFromTheStart);
+  Watcher both(registry(), {"", {}, true}, kFromTheStart);
+  Watcher one(registry(), {"", {"c"}, true}, kFromTheStart);
+  EXPECT_THAT(hulls.All(), ElementsAre("present b", "present d", "synced"));
+  EXPECT_THAT(both.All(),
+              ElementsAre("present body a", "present b", "present body c", "present d", "synced"));
+  EXPECT_THAT(one.All(), ElementsAre("present body c", "synced"));
+  const WatchStart resume = Resume();
+  PutBody("c");
+  DeleteBody("a");
+  EXPECT_THAT(hulls.All(), IsEmpty());
+  EXPECT_THAT(both.All(), ElementsAre("changed body c", "deleted body a"));
+  EXPECT_THAT(one.All(), ElementsAre("changed body c"));
+  // What came and went is not told; what is a hull where a body was is another incarnation.
+  PutBody("e");
+  DeleteBody("e");
+  DeleteBody("c");
+  ASSERT_TRUE(hulls_->Create("c").ok());
+  EXPECT_THAT(hulls.All(), ElementsAre("created c"));
+  EXPECT_THAT(both.All(), ElementsAre("replaced c"));
+  EXPECT_THAT(one.All(), ElementsAre("replaced c"));
+  // And the other way round.
+  ASSERT_TRUE(hulls_->Delete("d").ok());
+  PutBody("d");
+  EXPECT_THAT(hulls.All(), ElementsAre("deleted d"));
+  EXPECT_THAT(both.All(), ElementsAre("replaced body d"));
+  Watcher resumed_hulls(registry(), Prefix(""), resume);
+  Watcher resumed_both(registry(), {"", {}, true}, resume);
+  EXPECT_THAT(resumed_hulls.All(), ElementsAre("deleted d", "present c", "synced"));
+  EXPECT_THAT(resumed_both.All(), ElementsAre("deleted body a", "deleted body e", "present c",
+                                              "present body d", "synced"));
+}
+
+TEST_F(ChangeFeedTest, WhatIsWatchedAlsoComesAndGoes) {
+  for (const char* const id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Create(id).ok());
+  WatchTarget target = Hull("a");
+  target.varies = true;
+  Watcher watch(registry(), target, {});
+  // It does not share what is kept with those that watch the same at first.
+  Watcher other(registry(), Hull("a"), {});
+  const std::vector<std::string> b = {"b"};
+  watch.Also(b, {});
+  for (const char* const id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Put(id, CubeCorners(0, 1)).ok());
+  EXPECT_THAT(watch.All(), ElementsAre("changed a", "changed b"));
+  EXPECT_THAT(other.All(), ElementsAre("changed a"));
+  const std::vector<std::string> c = {"c"};
+  watch.Also(c, b);
+  for (const char* const id : {"a", "b", "c"}) ASSERT_TRUE(hulls_->Put(id, CubeCorners(0, 2)).ok());
+  EXPECT_THAT(watch.All(), ElementsAre("changed a", "changed c"));
 }
 
 TEST_F(ChangeFeedTest, ResumesWithWhatChangedAndWhatWent) {

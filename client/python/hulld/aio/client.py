@@ -284,13 +284,14 @@ class AsyncClient:
         prefix: str = "",
         *,
         hull_id: str | None = None,
+        bodies: bool = False,
         after: Header | None = None,
         timeout: float | None = None,
     ) -> AsyncHullWatch:
         """As Client.watch_hulls."""
 
         def request(position: Header | None) -> Call[HullChanges]:
-            return requests.watch_hulls(prefix, hull_id, position)
+            return requests.watch_hulls(prefix, hull_id, bodies, position)
 
         return AsyncHullWatch(
             lambda call: self._start(call, None),

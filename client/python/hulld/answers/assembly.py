@@ -37,6 +37,7 @@ class BatchAssembly:
             frame.known_hulls(),
             frame.placement_problems,
             frame.header,
+            frame.known_piece_hulls(),
         )
 
 
@@ -62,6 +63,7 @@ class SceneAssembly:
             frame.placement_problems,
             frame.totals,
             frame.header,
+            frame.known_piece_hulls(),
         )
 
 
@@ -98,4 +100,5 @@ class StepAssembly:
             frame.known_hulls(),
             frame.placement_problems,
             frame.header,
+            frame.known_piece_hulls(),
         )

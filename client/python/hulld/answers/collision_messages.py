@@ -26,6 +26,7 @@ from hulld.answers.collisions import (
     Feature,
     HullSize,
     HullVersion,
+    PieceCertificate,
     Problem,
     Relation,
     Rung,
@@ -98,6 +99,18 @@ def _certificate_of(message: Any) -> Certificate:
     return Certificate(None, pairs)
 
 
+def _piece_certificates_of(messages: Iterable[Any]) -> tuple[PieceCertificate, ...]:
+    return tuple(
+        PieceCertificate(
+            message.piece_a,
+            message.piece_b,
+            enum_or_zero(Relation, message.relation),
+            _certificate_of(message.certificate),
+        )
+        for message in messages
+    )
+
+
 def _analysis_of(message: Any) -> Analysis:
     def size(part: Any) -> HullSize:
         return HullSize(part.vertices, part.edges, part.facets)
@@ -135,6 +148,8 @@ def decode_collision(
         header_of(message.header),
         part("piece_a", _piece_of),
         part("piece_b", _piece_of),
+        _piece_certificates_of(message.piece_certificates),
+        {hull.hull_id: version_of(hull) for hull in message.piece_hulls},
         question,
         viewer,
     )
@@ -160,6 +175,7 @@ class ColumnReader:
     within_clearance: list[Unsigned] = field(default_factory=list)
     pieces: list[Unsigned] = field(default_factory=list)
     problems: dict[int, Problem] = field(default_factory=dict)
+    piece_proofs: dict[int, tuple[PieceCertificate, ...]] = field(default_factory=dict)
     rows: int = 0
 
     def read(self, data: memoryview) -> None:
@@ -196,6 +212,9 @@ class ColumnReader:
             elif number == 11:
                 problem = collision_pb2.PairProblem.FromString(bytes(value))
                 self.problems[first + problem.row] = _problem_of(problem)
+            elif number == 13:
+                of_row = collision_pb2.PieceProof.FromString(bytes(value))
+                self.piece_proofs[first + of_row.row] = _piece_certificates_of(of_row.certificates)
 
     def finish(self) -> Answers:
         """ValueError: the columns do not fit each other."""
@@ -261,6 +280,7 @@ class ColumnReader:
             messages(wanted.certificate, self.certificates, "certificates"),
             self.problems,
             deciding(),
+            self.piece_proofs,
         )
 
 
@@ -275,6 +295,7 @@ class Frame:
     placement_problems: dict[int, Problem] = field(default_factory=dict)
     pairs: list[Unsigned] = field(default_factory=list)
     totals: SceneTotals | None = None
+    piece_hulls: list[HullVersion] = field(default_factory=list)
     #: Fields that are numbers, by number, of the last message.
     numbers: dict[int, int] = field(default_factory=dict)
 
@@ -286,6 +307,7 @@ class Frame:
         hulls: int,
         problems: int,
         columns: int,
+        piece_hulls: int,
         pairs: int | None = None,
         totals: int | None = None,
     ) -> None:
@@ -303,6 +325,9 @@ class Frame:
             elif number == hulls:
                 version = collision_pb2.HullVersion.FromString(bytes(value))
                 self.hulls.append(version_of(version) if version.hull_id else None)
+            elif number == piece_hulls:
+                of_piece = collision_pb2.HullVersion.FromString(bytes(value))
+                self.piece_hulls.append(version_of(of_piece))
             elif number == problems:
                 problem = collision_pb2.PlacementProblem.FromString(bytes(value))
                 self.placement_problems[problem.placement] = _problem_of(problem)
@@ -319,14 +344,14 @@ class Frame:
                 )
 
     def read_batch(self, data: bytes) -> None:
-        self.read(data, header=1, hulls=2, problems=3, columns=16)
+        self.read(data, header=1, hulls=2, problems=3, columns=16, piece_hulls=17)
 
     def read_scene(self, data: bytes) -> None:
-        self.read(data, header=1, hulls=2, problems=3, columns=5, pairs=4, totals=6)
+        self.read(data, header=1, hulls=2, problems=3, columns=5, piece_hulls=7, pairs=4, totals=6)
 
     def read_stream(self, data: bytes) -> tuple[int, bool]:
         """Returns which message of the client this answers, and whether nothing follows."""
-        self.read(data, header=3, hulls=4, problems=5, columns=7, pairs=6)
+        self.read(data, header=3, hulls=4, problems=5, columns=7, piece_hulls=8, pairs=6)
         return self.numbers.get(1, 0), bool(self.numbers.get(2, 0))
 
     def indices(self) -> npt.NDArray[np.uint32]:
@@ -335,6 +360,9 @@ class Frame:
 
     def known_hulls(self) -> Mapping[str, HullVersion]:
         return {version.hull_id: version for version in self.hulls if version is not None}
+
+    def known_piece_hulls(self) -> Mapping[str, HullVersion]:
+        return {version.hull_id: version for version in self.piece_hulls}
 
 
 def new_frame(wanted: Wanted) -> Frame:
@@ -350,6 +378,7 @@ def decode_batch_part(data: bytes, wanted: Wanted) -> BatchPart:
         frame.header,
         tuple(frame.hulls),
         frame.placement_problems,
+        tuple(frame.piece_hulls),
     )
 
 
@@ -363,6 +392,7 @@ def decode_scene_part(data: bytes, wanted: Wanted) -> ScenePart:
         tuple(frame.hulls),
         frame.placement_problems,
         frame.totals,
+        tuple(frame.piece_hulls),
     )
 
 
@@ -375,6 +405,7 @@ def decode_collision_changes(data: bytes) -> CollisionChanges:
         tuple(version_of(hull) for hull in message.hulls),
         {problem.placement: _problem_of(problem) for problem in message.placement_problems},
         tuple(_events_of(message.events)),
+        tuple(version_of(hull) for hull in message.piece_hulls),
     )
 
 
@@ -386,4 +417,6 @@ def _events_of(events: Iterable[Any]) -> Iterable[CollisionEvent]:
             enum_or_zero(Relation, event.relation),
             (event.revision_a, event.revision_b),
             event.within_clearance if event.HasField("within_clearance") else None,
+            _piece_of(event.piece_a) if event.HasField("piece_a") else None,
+            _piece_of(event.piece_b) if event.HasField("piece_b") else None,
         )

@@ -155,6 +155,17 @@ class Certificate:
 
 
 @dataclass(frozen=True)
+class PieceCertificate:
+    """What proves the relation of a piece of A and a piece of B, by index, 0 for a hull; as of two
+    hulls, each where the pose of the placement and its pose in the body lead together."""
+
+    piece_a: int
+    piece_b: int
+    relation: Relation
+    certificate: Certificate
+
+
+@dataclass(frozen=True)
 class HullSize:
     """Sizes of a hull."""
 
@@ -195,7 +206,8 @@ class Collision:
     clearance; None where no clearance was wanted. hull_a, hull_b: the hulls or bodies that the
     answer is about, and their revisions. piece_a, piece_b: of a body, the piece that decided; axis,
     analysis and witness are those of its hull. None of a hull, and where no pair of pieces decided
-    alone.
+    alone. piece_certificates: with a body, in place of the certificate, what the relation follows
+    from; piece_hulls: then the hulls of all pieces, by ID.
     """
 
     relation: Relation
@@ -211,6 +223,8 @@ class Collision:
     header: Header
     piece_a: DecidingPiece | None = None
     piece_b: DecidingPiece | None = None
+    piece_certificates: Sequence[PieceCertificate] = ()
+    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
     _question: tuple[Placement, Placement] | None = field(default=None, repr=False, compare=False)
     _viewer: Viewer | None = field(default=None, repr=False, compare=False)
 
@@ -262,7 +276,8 @@ class Answers:
     none; within_clearance (m, bool); axes, analyses, certificates, None in rows that have none.
     What was not wanted is None. problems: by row, why it has no answer although both its placements
     could. pieces: m x 2, of bodies the pieces that decided, by index; -1 for a hull, and where no
-    pair of pieces decided alone; None where no placement is a body.
+    pair of pieces decided alone; None where no placement is a body. piece_proofs: by row, of a pair
+    with a body, the certificates of pairs of pieces; its entry of `certificates` is None.
     """
 
     relations: npt.NDArray[np.uint8]
@@ -277,6 +292,7 @@ class Answers:
     certificates: Sequence[Certificate | None] | None
     problems: Mapping[int, Problem]
     pieces: npt.NDArray[np.int32] | None = None
+    piece_proofs: Mapping[int, Sequence[PieceCertificate]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.relations)
@@ -297,14 +313,15 @@ class Answers:
 
 @dataclass(frozen=True)
 class BatchPart:
-    """Answers to the pairs from `first_pair` on. The first parts also hold header, hulls and
-    placement_problems, as in Batch."""
+    """Answers to the pairs from `first_pair` on. The first parts also hold header, hulls,
+    placement_problems and piece_hulls, as in Batch."""
 
     first_pair: int
     answers: Answers
     header: Header | None
     hulls: Sequence[HullVersion | None]
     placement_problems: Mapping[int, Problem]
+    piece_hulls: Sequence[HullVersion] = ()
 
 
 @dataclass(frozen=True)
@@ -313,7 +330,8 @@ class Batch:
 
     pairs: m x 2, as asked. answers: row i answers pairs[i]. hulls: by ID, the revision that the
     answers are about; IDs without a hull are missing. placement_problems: by index of the
-    placement, why no pair with it has an answer.
+    placement, why no pair with it has an answer. piece_hulls: where certificates were wanted, the
+    hulls of the pieces of all bodies, by ID.
     """
 
     pairs: npt.NDArray[np.uint32]
@@ -321,6 +339,7 @@ class Batch:
     hulls: Mapping[str, HullVersion]
     placement_problems: Mapping[int, Problem]
     header: Header
+    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
     def problem(self, row: int) -> Problem | None:
         """Why pairs[row] has no answer; None where it has one."""
@@ -348,8 +367,8 @@ class SceneTotals:
 @dataclass(frozen=True)
 class ScenePart:
     """Pairs that were found, k x 2, the lower index first, ascending, and their answers. The first
-    parts hold no pairs but header, hulls and placement_problems, as in Scene; the last one holds
-    the totals."""
+    parts hold no pairs but header, hulls, placement_problems and piece_hulls, as in Scene; the last
+    one holds the totals."""
 
     pairs: npt.NDArray[np.uint32]
     answers: Answers
@@ -357,6 +376,7 @@ class ScenePart:
     hulls: Sequence[HullVersion | None]
     placement_problems: Mapping[int, Problem]
     totals: SceneTotals | None
+    piece_hulls: Sequence[HullVersion] = ()
 
 
 @dataclass(frozen=True)
@@ -370,6 +390,7 @@ class Scene:
     placement_problems: Mapping[int, Problem]
     totals: SceneTotals
     header: Header
+    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -378,8 +399,8 @@ class StreamAnswer:
 
     update: the message, 0 being the one that opened the stream. rows: which pairs are answered, as
     positions in the pairs of the stream, ascending; row i of `answers` is about pairs[rows[i]].
-    pairs: the same as k x 2 indices of placements. hulls, placement_problems: as in Batch, where
-    the hulls were resolved for this message; empty otherwise.
+    pairs: the same as k x 2 indices of placements. hulls, placement_problems, piece_hulls: as in
+    Batch, where the hulls were resolved for this message; empty otherwise.
     """
 
     update: int
@@ -389,6 +410,7 @@ class StreamAnswer:
     hulls: Mapping[str, HullVersion]
     placement_problems: Mapping[int, Problem]
     header: Header
+    piece_hulls: Mapping[str, HullVersion] = field(default_factory=dict)
 
 
 class CollisionEventKind(IntEnum):
@@ -411,13 +433,16 @@ class CollisionEventKind(IntEnum):
 
 @dataclass(frozen=True)
 class CollisionEvent:
-    """placements: the pair, as indices. revisions: of the hulls that this is about; 0 when LOST."""
+    """placements: the pair, as indices. revisions: of the hulls or bodies that this is about; 0
+    when LOST. piece_a, piece_b: of a body, the piece that decided, as in Collision."""
 
     kind: CollisionEventKind
     placements: tuple[int, int]
     relation: Relation
     revisions: tuple[int, int]
     within_clearance: bool | None
+    piece_a: DecidingPiece | None = None
+    piece_b: DecidingPiece | None = None
 
 
 @dataclass(frozen=True)
@@ -427,7 +452,8 @@ class CollisionChanges:
     header: once synced, every change of a watched hull up to this revision is taken into account.
     update: the last update that these events take into account, 0 being the opening. synced: all
     pairs have been told of as they are with that update's poses. hulls: those that are new to the
-    watch, or changed. placement_problems: those that begin.
+    watch, or changed. placement_problems: those that begin. piece_hulls: the hulls of the pieces of
+    bodies, as `hulls`.
     """
 
     header: Header
@@ -436,3 +462,4 @@ class CollisionChanges:
     hulls: Sequence[HullVersion]
     placement_problems: Mapping[int, Problem]
     events: Sequence[CollisionEvent]
+    piece_hulls: Sequence[HullVersion] = ()

@@ -232,7 +232,7 @@ class HullEventKind(IntEnum):
     #: There is this hull. The only kind besides DELETED until `synced`.
     PRESENT = 1
     CREATED = 2
-    #: Its vertices changed; it is the same incarnation.
+    #: Its vertices changed, or a body was put anew; it is the same incarnation.
     CHANGED = 3
     #: It is a new incarnation: it was replaced, or deleted and created again.
     REPLACED = 4
@@ -242,11 +242,14 @@ class HullEventKind(IntEnum):
 @dataclass(frozen=True)
 class HullEvent:
     """hull: as of its revision; DELETED: only hull_id, and in revision that of the deletion. box:
-    as in Hull."""
+    as in Hull. is_body: it is about a body, of which `hull` holds ID, revisions and whether it is
+    damaged, and piece_count how many pieces it has."""
 
     kind: HullEventKind
     hull: HullInfo
     box: npt.NDArray[np.float64] | None
+    is_body: bool = False
+    piece_count: int = 0
 
 
 @dataclass(frozen=True)
@@ -335,7 +338,13 @@ def decode_hull(data: bytes, with_facets: bool, viewer: Viewer | None) -> Hull:
 def decode_changes(data: bytes) -> HullChanges:
     message = hull_pb2.WatchHullsResponse.FromString(data)
     events = tuple(
-        HullEvent(enum_or_zero(HullEventKind, event.kind), info_of(event.hull), _box_of(event))
+        HullEvent(
+            enum_or_zero(HullEventKind, event.kind),
+            info_of(event.hull),
+            _box_of(event),
+            event.is_body,
+            event.piece_count,
+        )
         for event in message.events
     )
     return HullChanges(header_of(message.header), events, message.synced, message.anew)

@@ -16,22 +16,10 @@ from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
 from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo, MeshPart
 from hulld.answers.status import ServerStatus
 from hulld.calls.wanted import Wanted
-from hulld.geometry.placements import (
-    PlacementLike,
-    Placements,
-    PlacementsLike,
-    as_placement,
-)
+from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, as_placement
 from hulld.geometry.poses import PoseLike, pack_pose
 from hulld.notebook import Viewer
-from hulld.v1 import (
-    body_pb2,
-    collision_pb2,
-    geometry_pb2,
-    hull_pb2,
-    maintenance_pb2,
-    status_pb2,
-)
+from hulld.v1 import body_pb2, collision_pb2, geometry_pb2, hull_pb2, maintenance_pb2, status_pb2
 from hulld.wire import MessageWriter
 
 T = TypeVar("T")
@@ -175,10 +163,7 @@ def put_body(body_id: str, pieces: PlacementsLike, if_revision: int | None) -> C
 def get_body(body_id: str) -> Call[Body]:
     request = body_pb2.GetBodyRequest(body_id=body_id)
     return Call(
-        method_path("BodyService", "GetBody"),
-        request.SerializeToString(),
-        bodies.decode_body,
-        True,
+        method_path("BodyService", "GetBody"), request.SerializeToString(), bodies.decode_body, True
     )
 
 
@@ -204,10 +189,13 @@ def delete_body(body_id: str, if_revision: int | None) -> Call[Header]:
     )
 
 
-def watch_hulls(prefix: str, hull_id: str | None, after: Header | None) -> Call[HullChanges]:
+def watch_hulls(
+    prefix: str, hull_id: str | None, with_bodies: bool, after: Header | None
+) -> Call[HullChanges]:
     request = hull_pb2.WatchHullsRequest(
         prefix=prefix,
         hull_id=hull_id or "",
+        bodies=with_bodies,
         after_revision=after.revision if after else 0,
         store_id=after.store_id if after else "",
     )

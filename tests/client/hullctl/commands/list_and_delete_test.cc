@@ -40,7 +40,10 @@ TEST_F(ListAndDelete, ListsAreSortedAndCut) {
 TEST_F(ListAndDelete, CountsAreOfAll) {
   EXPECT_EQ(Ask({"list", "--count"}).out, "hulls     3\nvertices  30\npoints    30\n");
   EXPECT_EQ(AskJson({"list", "arm/", "--count"}).out,
-            "{\"hulls\":\"2\",\"vertices\":\"28\",\"points\":\"28\"}\n");
+            "{\"hulls\":\"2\",\"vertices\":\"28\",\"points\":\"28\",\"bodies\":\"0\"}\n");
+  ASSERT_EQ(Ask({"body", "put", "arm/body", "box"}).code, 0);
+  EXPECT_EQ(Ask({"list", "--count"}).out, "hulls     3\nvertices  30\npoints    30\nbodies    1\n");
+  EXPECT_EQ(Ask({"list", "b", "--count"}).out, "hulls     1\nvertices  2\npoints    2\n");
 }
 
 TEST_F(ListAndDelete, SeveralAreDeletedOnlyWhenItIsSaid) {

@@ -41,6 +41,19 @@ TEST_F(HullctlWatch, TellsWhatIsThere) {
                                     "\\{.*\"synced\":true.*\\}\n"));
 }
 
+TEST_F(HullctlWatch, TellsOfBodies) {
+  Put("a/cube", server::Cube());
+  ASSERT_EQ(Ask({"body", "put", "a/body", "a/cube", "a/cube@3,0,0"}).code, 0);
+  Ran ran = Ask({"watch", "a/", "--until-synced"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out,
+            "PRESENT\ta/body\t3\tbody of 2 pieces\n"
+            "PRESENT\ta/cube\t2\t8 of 8 points\t0 0 0 to 1 1 1\n"
+            "# synced at revision 3\n");
+  ran = Ask({"watch", "a/body", "--exact", "--until-synced", "--output", "name"});
+  EXPECT_THAT(ran.out, HasSubstr("a/body\n"));
+}
+
 // Points that change the hull come until the command has ended.
 class Growth {
  public:

@@ -90,6 +90,16 @@ TEST_F(HullctlParts, SplitMakesABodyOfTheParts) {
   EXPECT_THAT(ran.out, HasSubstr("{\"bodyId\":\"j\",\"pieces\":\"2\",\"added\":\"2\","));
 }
 
+TEST_F(HullctlParts, SplitChangesNothingWhereTheServerWouldRefuseTheBody) {
+  server::Config config = TestConfig();
+  config.limits.max_pieces_per_body = 1;
+  Restart(config);
+  Ran ran = Ask({"append", "l", bracket_.path(), "--split", "names", "--create"});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_THAT(ran.err, HasSubstr("would have 2 pieces; the limit is 1 (--max-pieces-per-body)"));
+  EXPECT_EQ(Ask({"list", "--output", "name"}).out, "");
+}
+
 TEST_F(HullctlParts, SplitChangesNothingWhereAHullHasTheName) {
   Put("l", server::Cube());
   const std::string before = Ask({"list"}).out;

@@ -99,6 +99,16 @@ TEST_F(HullctlRobot, ASceneStandsAround) {
   EXPECT_THAT(ran.err, HasSubstr("hull \"nowhere\" not found"));
 }
 
+TEST_F(HullctlRobot, ABodyStandsAround) {
+  Put("cube", server::Cube());
+  ASSERT_EQ(Ask({"body", "put", "stand", "cube@9,9,9", "cube@0,0,0.5"}).code, 0);
+  const TempFile scene("cell.yaml", "place:\n  stand: {id: stand}\n");
+  const Ran ran = Robot({"--scene", scene.path(), "--base", "0,0,0"});
+  EXPECT_THAT(ran.out, HasSubstr("a\tstand\tTOUCHING\t0"));
+  EXPECT_THAT(ran.out, HasSubstr("\tpieces - 1\n"));
+  EXPECT_THAT(ran.out, Not(HasSubstr("pieces - -")));
+}
+
 TEST_F(HullctlRobot, AcmWritesWhatCheckReads) {
   const Ran ran = Ask({"robot", "acm", urdf_.path(), "--samples", "500", "--seed", "7"});
   EXPECT_EQ(ran.code, 0) << ran.err;

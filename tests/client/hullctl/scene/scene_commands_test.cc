@@ -184,14 +184,24 @@ TEST_F(HullctlSceneBodies, CheckNamesBodiesAndThePiecesThatDecided) {
   EXPECT_THAT(Ask({"stream", cell_.path()}).out, HasSubstr("0\tell\tprobe\tOVERLAPPING"));
 }
 
-TEST_F(HullctlSceneBodies, QuestionsAboutHullsAloneTakePieces) {
+TEST_F(HullctlSceneBodies, BatchesProveBodiesAndWatchesTellOfThem) {
   ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
   Ran ran = Ask({"batch", cell_.path(), "--verify"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("ell/cube\tprobe\tOVERLAPPING"));
+  EXPECT_THAT(ran.out, HasSubstr("ell\tprobe\tOVERLAPPING"));
+  EXPECT_THAT(ran.out, HasSubstr("\tpieces cube -\t1 certificate of pieces\tvalid\n"));
+  EXPECT_THAT(AskJson({"batch", cell_.path(), "--certificate"}).out, HasSubstr("\"pieceProofs\":"));
   ran = Ask({"watch", "--scene", cell_.path(), "--until-synced"});
   EXPECT_EQ(ran.code, 0) << ran.err;
-  EXPECT_THAT(ran.out, HasSubstr("ENTER\tell/cube\tprobe\t"));
+  EXPECT_THAT(ran.out, HasSubstr("ENTER\tell\tprobe\t"));
+  EXPECT_THAT(ran.out, HasSubstr("\tpieces cube -\n"));
+}
+
+TEST_F(HullctlSceneBodies, TheTextbookTakesPieces) {
+  ASSERT_EQ(Ask({"scene", "apply", cell_.path()}).code, 0);
+  const Ran ran = Ask({"batch", cell_.path(), "--textbook"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("ell/cube\tprobe\tOVERLAPPING"));
 }
 
 TEST_F(HullctlSceneBodies, PruneAndDeleteRemoveBodiesBeforeHulls) {

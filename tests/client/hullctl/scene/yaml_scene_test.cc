@@ -98,14 +98,6 @@ TEST(YamlScene, BodiesArePutAsTheyAreWritten) {
   EXPECT_EQ(request.pieces(2).pose().rotation().z(), 1);
 }
 
-TEST(YamlScene, CertificatesAreAskedOfPieces) {
-  const auto scene = ToScene(Parse("hulls: {h: {box: [1, 1, 1]}}\nbodies: {b: [{hull: h}]}\n"
-                                   "place: {b: {body: b}}\nask: {certificate: true}"),
-                             "cell.yaml", BodyForm::kWhole);
-  ASSERT_TRUE(scene.ok()) << scene.status();
-  EXPECT_THAT(scene->names, ElementsAre("b/h"));
-}
-
 TEST(YamlScene, BodiesBecomeTheirPieces) {
   const auto scene = ToScene(Parse(kCell), "cell.yaml", BodyForm::kPieces);
   ASSERT_TRUE(scene.ok()) << scene.status();

@@ -291,12 +291,6 @@ TEST(BodySearch, RefusesWhatIsForPairsOfHulls) {
       std::string(
           CheckBodies(cube.Placed(Pose()), cube.Placed(Pose()), options).status().message()),
       HasSubstr("not of bodies"));
-  options = QueryOptions();
-  options.want_certificate = true;
-  EXPECT_TRUE(ValidateBodyOptions(options).ok());
-  const absl::Status among_many = ValidateOptionsAmongMany(options);
-  EXPECT_TRUE(absl::IsInvalidArgument(among_many));
-  EXPECT_THAT(std::string(among_many.message()), HasSubstr("asked about alone"));
 }
 
 TEST(BodySearch, CoordinatesBeyondTheRangeOfBoxesAreAskedAboutAllTheSame) {

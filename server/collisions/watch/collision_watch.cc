@@ -1,15 +1,18 @@
-#include "server/collisions/collision_watch.h"
+#include "server/collisions/watch/collision_watch.h"
 
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
 #include <numeric>
+#include <set>
 #include <utility>
 
+#include "server/collisions/placed_answer.h"
 #include "server/collisions/query_settings.h"
 #include "server/collisions/scene_groups.h"
 #include "server/contract/status_map.h"
+#include "server/registry/bodies/body_resolution.h"
 #include "server/settings/config.h"
 #include "server/wire/encode.h"
 
@@ -156,10 +159,12 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
   if (!valid.ok()) return valid;
   options_ = *std::move(options);
   table_ = *std::move(table);
-  table_.TakeHullsAlone();
   pairs_ = WatchedPairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
   if (absl::Status s = WatchHulls(); !s.ok()) return s;
+  std::vector<size_t> all_hulls(table_.hull_ids().size());
+  std::iota(all_hulls.begin(), all_hulls.end(), size_t{0});
+  FollowPieces(all_hulls);
 
   // It is worth the wait, as each hull is asked about again and again.
   const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
@@ -167,8 +172,8 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
       table_.Resolve(registry_, options_, {kExpectedRounds * per_hull, true});
   if (!resolved.ok()) return resolved;
   revision_ = table_.store_revision();
-  for (size_t k = 0; k < table_.hull_ids().size(); ++k) {
-    if (table_.hull(k).ok()) hulls_to_tell_.push_back(k);
+  for (const size_t k : all_hulls) {
+    if (table_.hull(k).ok()) TellOf(k);
   }
   std::vector<uint32_t> all(table_.size());
   std::iota(all.begin(), all.end(), 0);
@@ -183,6 +188,7 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
 // twice, and none is missed.
 absl::Status CollisionWatch::WatchHulls() {
   WatchTarget target;
+  target.bodies = target.varies = true;
   for (size_t k = 0; k < table_.hull_ids().size(); ++k) {
     const std::string& id = table_.hull_ids()[k];
     if (!hulls_of_.contains(id)) target.ids.push_back(id);
@@ -196,6 +202,38 @@ absl::Status CollisionWatch::WatchHulls() {
   watch_ = *std::move(watch);
   Locked([this] { are_hulls_due_ = true; });
   return absl::OkStatus();
+}
+
+// From now on changes of the hulls of pieces are noticed, of those of the table's that are bodies.
+// A body that changes after this is noticed itself: then it is followed, and resolved, once more.
+void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
+  if (!registry_.has_bodies() && pieces_.MemoryBytes() == 0) return;
+  std::vector<std::string> ids;
+  ids.reserve(hulls.size());
+  for (const size_t k : hulls) ids.push_back(table_.hull_ids()[k]);
+  const FoundBodies found = registry_.FindBodies(ids);
+  FollowedPieces::Difference difference;
+  for (size_t n = 0; n < hulls.size(); ++n) {
+    const std::shared_ptr<const Body>& body = found.bodies[n];
+    const bool is_asked = body != nullptr && CheckPiecePrefix(*body, call().caller().prefix).ok();
+    pieces_.Set(hulls[n], is_asked ? body->hull_ids() : std::vector<std::string>(), &difference);
+  }
+  // Those are watched all the while.
+  const auto is_placed = [this](const std::string& id) { return hulls_of_.contains(id); };
+  std::erase_if(difference.added, is_placed);
+  std::erase_if(difference.dropped, is_placed);
+  if (difference.added.empty() && difference.dropped.empty()) return;
+  registry_.WatchAlso(*watch_, difference.added, difference.dropped);
+}
+
+// The client is to hear of a hull, or of a body and the hulls of its pieces.
+void CollisionWatch::TellOf(size_t hull) {
+  hulls_to_tell_.push_back(hull);
+  const HullView& view = *table_.hull(hull);
+  if (view.body == nullptr) return;
+  for (const HullView& of_piece : view.body->hulls) {
+    if (pieces_.IsNews(of_piece.record)) piece_hulls_to_tell_.push_back(of_piece.record);
+  }
 }
 
 absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update) {
@@ -227,19 +265,27 @@ void CollisionWatch::TakeChanges() {
   Tell();
 }
 
-absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
-  std::vector<size_t> hulls;
+// Hulls and bodies of the table, each once.
+std::vector<size_t> CollisionWatch::ConcernedBy(const WatchPiece& piece) const {
   if (piece.anew) {
     // Which of them changed is not known.
-    hulls.resize(table_.hull_ids().size());
-    std::iota(hulls.begin(), hulls.end(), size_t{0});
+    std::vector<size_t> all(table_.hull_ids().size());
+    std::iota(all.begin(), all.end(), size_t{0});
+    return all;
   }
-  for (size_t n = 0; n < piece.changes.size() && !piece.anew; ++n) {
-    const HullChange& change = piece.changes[n];
+  std::set<size_t> hulls;
+  for (const HullChange& change : piece.changes) {
     const auto [begin, end] = hulls_of_.equal_range(change.record.hull_id);
-    for (auto hull = begin; hull != end; ++hull) hulls.push_back(hull->second);
+    for (auto hull = begin; hull != end; ++hull) hulls.insert(hull->second);
+    hulls.merge(pieces_.BodiesOf(change.record.hull_id));
   }
+  return {hulls.begin(), hulls.end()};
+}
+
+absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
+  const std::vector<size_t> hulls = ConcernedBy(piece);
   if (hulls.empty() && piece.revision <= revision_) return absl::OkStatus();
+  FollowPieces(hulls);
   if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
   revision_ = std::max(revision_, piece.revision);
   std::vector<uint32_t> changed;
@@ -251,7 +297,7 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
     }
     if (!table_.hull_changed(placements.front())) continue;
     const bool is_there = table_.hull(k).ok();
-    if (is_there) hulls_to_tell_.push_back(k);
+    if (is_there) TellOf(k);
     for (const uint32_t i : placements) {
       changed.push_back(i);
       if (!is_there) problems_to_tell_.push_back(i);
@@ -262,11 +308,11 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
 }
 
 absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
-  if (absl::Status s = pairs_.AskAbout(changed, table_.placed()); !s.ok()) return s;
-  charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
+  if (absl::Status s = pairs_.AskAbout(changed, table_); !s.ok()) return s;
+  charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + pieces_.MemoryBytes());
   if (absl::Status s = registry_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   call().AddPairs(pairs_.asked().size());
-  next_hull_ = next_problem_ = next_pair_ = 0;
+  next_hull_ = next_piece_hull_ = next_problem_ = next_pair_ = 0;
   is_telling_ = true;
   return absl::OkStatus();
 }
@@ -280,7 +326,7 @@ void CollisionWatch::Tell() {
     const absl::Status status = TellPair(pairs_.pair(asked[next_pair_++]));
     if (!status.ok()) return EndWork(status);
     is_full = reply_bytes_ >= Config::kReplyMessageBytes;
-    if (next_pair_ % kPairsPerLook != 0) continue;
+    if (!table_.has_bodies() && next_pair_ % kPairsPerLook != 0) continue;
     if (call().ShouldStop()) return EndWork(call().StopStatus());
     if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { Tell(); });
   }
@@ -289,6 +335,7 @@ void CollisionWatch::Tell() {
   if (is_told) {
     pairs_.EndAsking();
     hulls_to_tell_.clear();
+    piece_hulls_to_tell_.clear();
     problems_to_tell_.clear();
     if (answers_message_) call().EndMessage();
   }
@@ -306,11 +353,16 @@ void CollisionWatch::Tell() {
 
 // False when the message is full before all is told.
 bool CollisionWatch::TellHulls() {
-  while (next_hull_ < hulls_to_tell_.size() || next_problem_ < problems_to_tell_.size()) {
+  while (next_hull_ < hulls_to_tell_.size() || next_piece_hull_ < piece_hulls_to_tell_.size() ||
+         next_problem_ < problems_to_tell_.size()) {
     if (reply_bytes_ >= Config::kReplyMessageBytes) return false;
     if (next_hull_ < hulls_to_tell_.size()) {
       v1::HullVersion* const version = reply_.add_hulls();
       table_.EncodeHull(hulls_to_tell_[next_hull_++], version);
+      reply_bytes_ += kEntryBytes + version->ByteSizeLong();
+    } else if (next_piece_hull_ < piece_hulls_to_tell_.size()) {
+      v1::HullVersion* const version = reply_.add_piece_hulls();
+      EncodeVersion(registry_.store().id(), piece_hulls_to_tell_[next_piece_hull_++], version);
       reply_bytes_ += kEntryBytes + version->ByteSizeLong();
     } else {
       v1::PlacementProblem* const problem = reply_.add_placement_problems();
@@ -323,13 +375,12 @@ bool CollisionWatch::TellHulls() {
 
 absl::Status CollisionWatch::TellPair(WatchedPair& pair) {
   if (!table_.is_answerable(pair.a) || !table_.is_answerable(pair.b)) {
-    if (pair.is_told()) AddEvent(v1::COLLISION_EVENT_KIND_LOST, pair);
+    if (pair.is_told()) AddEvent(v1::COLLISION_EVENT_KIND_LOST, pair, std::nullopt);
     pair.relation = v1::RELATION_SEPARATED;
     pair.is_within_clearance = false;
     return absl::OkStatus();
   }
-  const absl::StatusOr<Answer> answer =
-      CheckCollision(table_.placed()[pair.a], table_.placed()[pair.b], options_, &pair.cache);
+  const auto [answer, of_body] = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
   if (!answer.ok()) return answer.status();
   rungs_.Add(answer->rung);
   const v1::Relation relation = EncodeRelation(answer->relation);
@@ -337,22 +388,30 @@ absl::Status CollisionWatch::TellPair(WatchedPair& pair) {
   const v1::CollisionEventKind kind = KindOf(pair, relation, is_within);
   pair.relation = relation;
   pair.is_within_clearance = is_within;
-  if (kind != v1::COLLISION_EVENT_KIND_UNSPECIFIED) AddEvent(kind, pair);
+  if (kind != v1::COLLISION_EVENT_KIND_UNSPECIFIED) AddEvent(kind, pair, of_body.pieces);
   return absl::OkStatus();
 }
 
-void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair) {
+void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair,
+                              const std::optional<PiecePair>& pieces) {
   v1::CollisionEvent* const event = reply_.add_events();
   event->set_kind(kind);
   event->set_placement_a(pair.a);
   event->set_placement_b(pair.b);
   if (kind != v1::COLLISION_EVENT_KIND_LOST) {
-    const auto revision_of = [this](uint32_t placement) {
-      return table_.hull(*table_.hull_of(placement))->record.revision;
-    };
+    const HullView& a = *table_.hull(*table_.hull_of(pair.a));
+    const HullView& b = *table_.hull(*table_.hull_of(pair.b));
     event->set_relation(pair.relation);
-    event->set_revision_a(revision_of(pair.a));
-    event->set_revision_b(revision_of(pair.b));
+    event->set_revision_a(a.record.revision);
+    event->set_revision_b(b.record.revision);
+    const auto encode_piece = [this](const HullView& view, uint32_t piece,
+                                     v1::DecidingPiece* message) {
+      message->set_index(piece);
+      EncodeVersion(registry_.store().id(), view.body->hull_of(piece).record,
+                    message->mutable_hull());
+    };
+    if (pieces && a.body != nullptr) encode_piece(a, pieces->a, event->mutable_piece_a());
+    if (pieces && b.body != nullptr) encode_piece(b, pieces->b, event->mutable_piece_b());
     if (options_.clearance.has_value()) event->set_within_clearance(pair.is_within_clearance);
   }
   reply_bytes_ += kEntryBytes + event->ByteSizeLong();

@@ -1,4 +1,4 @@
-#include "server/collisions/watched_pairs.h"
+#include "server/collisions/watch/watched_pairs.h"
 
 #include <absl/strings/str_cat.h>
 
@@ -69,10 +69,10 @@ void WatchedPairs::Ask(uint32_t number) {
 }
 
 absl::Status WatchedPairs::AskAbout(std::span<const uint32_t> changed,
-                                    std::span<const PlacedHull> placed) {
+                                    const PlacementTable& table) {
   for (const uint32_t placement : changed) {
     for (const uint32_t number : pairs_of_[placement]) Ask(number);
-    if (is_scene_) boxes_[placement] = BoundingBox(placed[placement]);
+    if (is_scene_) boxes_[placement] = table.BoxOf(placement);
   }
   return is_scene_ ? AskAboutNeighbours(changed) : absl::OkStatus();
 }

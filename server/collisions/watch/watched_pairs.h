@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_WATCHED_PAIRS_H_
-#define HULLD_SERVER_COLLISIONS_WATCHED_PAIRS_H_
+#ifndef HULLD_SERVER_COLLISIONS_WATCH_WATCHED_PAIRS_H_
+#define HULLD_SERVER_COLLISIONS_WATCH_WATCHED_PAIRS_H_
 
 #include <absl/status/status.h>
 
@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "core/query/box_tree.h"
-#include "core/query/placed/placed_hull.h"
 #include "core/query/terms/pair_cache.h"
 #include "hulld/v1/collision.pb.h"
+#include "server/collisions/placement_table.h"
 
 namespace hulld::server {
 
@@ -45,7 +45,7 @@ class WatchedPairs {
   // The pairs that these placements, which moved or changed, have or come to have are to be asked
   // about; each placement once. RESOURCE_EXHAUSTED: more than max_pairs. Cost: O(n) a placement, or
   // O(n log n) for all of them together, beyond what it finds.
-  absl::Status AskAbout(std::span<const uint32_t> changed, std::span<const PlacedHull> placed);
+  absl::Status AskAbout(std::span<const uint32_t> changed, const PlacementTable& table);
   // The points that the caches of these pairs name are no more.
   void ForgetPoints(uint32_t placement);
 
@@ -86,4 +86,4 @@ class WatchedPairs {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_WATCHED_PAIRS_H_
+#endif  // HULLD_SERVER_COLLISIONS_WATCH_WATCHED_PAIRS_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_COLLISION_WATCH_H_
-#define HULLD_SERVER_COLLISIONS_COLLISION_WATCH_H_
+#ifndef HULLD_SERVER_COLLISIONS_WATCH_COLLISION_WATCH_H_
+#define HULLD_SERVER_COLLISIONS_WATCH_COLLISION_WATCH_H_
 
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -15,7 +17,8 @@
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
 #include "server/collisions/placement_table.h"
-#include "server/collisions/watched_pairs.h"
+#include "server/collisions/watch/followed_pieces.h"
+#include "server/collisions/watch/watched_pairs.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"
@@ -23,10 +26,10 @@
 namespace hulld::server {
 
 // One WatchCollisions call. It works in rounds: each takes up one message of the client, or the
-// hulls that the registry says have changed, asks about the pairs that are concerned, and tells how
-// they are other than before. A round begins when the one before is told and its replies are
-// written. Meanwhile messages wait in gRPC's window, and changes in the registry, where the last
-// state of each hull wins; so a client that reads slowly costs a message of memory.
+// hulls and bodies that the registry says have changed, asks about the pairs that are concerned,
+// and tells how they are other than before. A round begins when the one before is told and its
+// replies are written. Meanwhile messages wait in gRPC's window, and changes in the registry, where
+// the last state of each hull wins; so a client that reads slowly costs a message of memory.
 //
 // The mutex guards which work is under way. What the work itself uses belongs to the one task that
 // runs.
@@ -64,6 +67,9 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status HandleMessage();
   absl::Status HandleOpen(const v1::CollisionWatchOpen& open);
   absl::Status WatchHulls();
+  void FollowPieces(std::span<const size_t> hulls);
+  std::vector<size_t> ConcernedBy(const WatchPiece& piece) const;
+  void TellOf(size_t hull);
   absl::Status HandleUpdate(const v1::CollisionWatchUpdate& update);
   void TakeChanges();
   absl::Status HandleChanges(const WatchPiece& piece);
@@ -71,7 +77,8 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   void Tell();
   bool TellHulls();
   absl::Status TellPair(WatchedPair& pair);
-  void AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair);
+  void AddEvent(v1::CollisionEventKind kind, const WatchedPair& pair,
+                const std::optional<PiecePair>& pieces);
   // The task ends; `error`, if there is one, ends the call.
   void EndWork(const absl::Status& error);
 
@@ -99,6 +106,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   WatchedPairs pairs_;
   // The hulls of each ID, as indices into the table's.
   std::unordered_multimap<std::string, size_t> hulls_of_;
+  FollowedPieces pieces_;
   uint64_t messages_ = 0;
   // Every change of a hull up to this one is taken into account.
   uint64_t revision_ = 0;
@@ -107,8 +115,10 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   bool is_telling_ = false;
   bool answers_message_ = false;
   std::vector<size_t> hulls_to_tell_;
+  std::vector<HullRecord> piece_hulls_to_tell_;
   std::vector<uint32_t> problems_to_tell_;
   size_t next_hull_ = 0;
+  size_t next_piece_hull_ = 0;
   size_t next_problem_ = 0;
   size_t next_pair_ = 0;
   RungCounts rungs_;
@@ -119,4 +129,4 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_COLLISION_WATCH_H_
+#endif  // HULLD_SERVER_COLLISIONS_WATCH_COLLISION_WATCH_H_

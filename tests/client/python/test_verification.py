@@ -1,0 +1,123 @@
+"""Certificates, checked in Python by exact arithmetic."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hulld
+from conftest import CUBE
+
+TURN = hulld.Pose((0.3, -0.7, 0.2, 0.9), (17.25, -4.125, 1e6))
+
+
+@pytest.fixture
+def cube(client: hulld.Client, name: str) -> str:
+    client.append_points(f"{name}/cube", CUBE, create=True)
+    return f"{name}/cube"
+
+
+@pytest.fixture
+def row(client: hulld.Client, name: str, cube: str) -> str:
+    """Five cubes, two apart."""
+    client.put_body(f"{name}/row", [(cube, (2.0 * i, 0, 0)) for i in range(5)])
+    return f"{name}/row"
+
+
+@pytest.mark.parametrize(
+    ("x", "relation"),
+    [
+        (0.5, hulld.Relation.OVERLAPPING),
+        (1.0, hulld.Relation.TOUCHING),
+        (1.5, hulld.Relation.SEPARATED),
+    ],
+)
+def test_hulls_are_proven(
+    client: hulld.Client, cube: str, x: float, relation: hulld.Relation
+) -> None:
+    verifier = hulld.Verifier(client)
+    answer = client.check_collision(cube, (cube, (x, 0, 0)), certificate=True)
+    assert answer.relation is relation
+    verifier.check(cube, (cube, (x, 0, 0)), answer)
+    for other in set(hulld.Relation) - {relation}:
+        with pytest.raises(hulld.VerificationError):
+            verifier.check(cube, (cube, (x, 0, 0)), dataclasses.replace(answer, relation=other))
+    # Of another question it proves nothing.
+    with pytest.raises(hulld.VerificationError):
+        verifier.check(cube, (cube, (9 if x <= 1 else 0.5, 0, 0)), answer)
+    with pytest.raises(hulld.VerificationError, match="no certificate"):
+        verifier.check(cube, cube, client.check_collision(cube, cube))
+
+
+def test_random_poses_are_proven(client: hulld.Client, cube: str) -> None:
+    rng = np.random.default_rng(3)
+    poses = np.hstack([rng.normal(size=(30, 4)), rng.uniform(-1.2, 1.2, size=(30, 3))])
+    placements = hulld.Placements(cube, poses)
+    found = client.check_collisions(placements, certificate=True)
+    verifier = hulld.Verifier(client)
+    for row_number in range(len(found.pairs)):
+        verifier.check_row(placements, found, row_number)
+    assert len(set(found.answers.relations.tolist())) > 1
+
+
+def test_poses_compose_exactly(client: hulld.Client, name: str, cube: str) -> None:
+    client.put_body(f"{name}/left", [(cube, (0.25, 0.2, 0.3))])
+    client.put_body(f"{name}/right", [(cube, (1.25, 0.2, 0.3))])
+    left, right = (f"{name}/left", TURN), (f"{name}/right", TURN)
+    answer = client.check_collision(left, right, certificate=True)
+    assert answer.relation is hulld.Relation.TOUCHING
+    hulld.Verifier(client).check(left, right, answer)
+
+
+def test_bodies_are_proven(client: hulld.Client, row: str, cube: str) -> None:
+    verifier = hulld.Verifier(client)
+    for pose, relation, certificates in [
+        ((3.5, 0.5, 0), hulld.Relation.OVERLAPPING, 1),
+        ((0, 1, 0), hulld.Relation.TOUCHING, 5),
+        ((0, 9, 0), hulld.Relation.SEPARATED, 0),
+    ]:
+        answer = client.check_collision(row, (row, pose), certificate=True)
+        assert answer.relation is relation and answer.certificate is None
+        assert len(answer.piece_certificates) == certificates
+        assert set(answer.piece_hulls) == {cube}
+        verifier.check(row, (row, pose), answer)
+    touching = client.check_collision(row, (row, (0, 1, 0)), certificate=True)
+    short = dataclasses.replace(touching, piece_certificates=touching.piece_certificates[:-1])
+    with pytest.raises(hulld.VerificationError, match="pieces 4 of A and 4 of B have no"):
+        verifier.check(row, (row, (0, 1, 0)), short)
+    wrong = dataclasses.replace(touching, relation=hulld.Relation.SEPARATED)
+    with pytest.raises(hulld.VerificationError, match="are TOUCHING, the bodies SEPARATED"):
+        verifier.check(row, (row, (0, 1, 0)), wrong)
+
+
+def test_batches_scenes_and_streams_are_proven(client: hulld.Client, row: str, cube: str) -> None:
+    placements = hulld.Placements.of([row, (row, (0, 1, 0)), (row, TURN), (cube, (4.5, 0.5, 0))])
+    verifier = hulld.Verifier(client)
+    batch = client.check_collisions(placements, certificate=True)
+    assert sorted(batch.answers.piece_proofs) == [0, 1, 2, 3, 4, 5]
+    for number in range(6):
+        verifier.check_row(placements, batch, number)
+    parts = list(client.iter_check_collisions(placements, certificate=True))
+    assert [hull.hull_id for part in parts for hull in part.piece_hulls] == [cube]
+    scene = client.find_collisions(placements, certificate=True)
+    assert scene.pairs.tolist() == [[0, 1], [0, 3], [1, 3]]
+    for number in range(len(scene.pairs)):
+        verifier.check_row(placements, scene, number)
+    with client.stream_collisions(placements, certificate=True) as stream:
+        step = stream.opened
+        for number in range(len(step.pairs)):
+            verifier.check_row(placements, step, number)
+        assert set(step.piece_hulls) == {cube}
+
+
+def test_what_changed_since_is_said(client: hulld.Client, row: str, cube: str) -> None:
+    verifier = hulld.Verifier(client)
+    answer = client.check_collision(row, cube, certificate=True)
+    client.put_body(row, [cube])
+    with pytest.raises(hulld.VerificationError, match="the answer is from revision") as raised:
+        verifier.check(row, cube, answer)
+    assert raised.value.moved
+    again = client.check_collision(row, cube, certificate=True)
+    verifier.check(row, cube, again)
