@@ -120,6 +120,24 @@ IntegerVector ToInteger(const WideVector<kWords>& v) {
 }
 inline const IntegerVector& ToInteger(const IntegerVector& v) { return v; }
 
+// The same number in words. False, and `wide` unset, where they are too few.
+template <int kWords>
+bool ToWide(const Integer& a, WideInteger<kWords>& wide) {
+  const auto& limbs = a.backend();
+  static_assert(sizeof(*limbs.limbs()) == sizeof(uint64_t));
+  if (limbs.size() > kWords) return false;
+  wide = 0;
+  for (unsigned i = 0; i < limbs.size(); ++i) wide.word(static_cast<int>(i)) = limbs.limbs()[i];
+  // Its sign would take the highest bit.
+  if (wide.is_negative()) return false;
+  if (limbs.sign()) wide = -wide;
+  return true;
+}
+template <int kWords>
+bool ToWide(const IntegerVector& v, WideVector<kWords>& wide) {
+  return ToWide(v.x, wide.x) && ToWide(v.y, wide.y) && ToWide(v.z, wide.z);
+}
+
 // The number of bits of the largest component; 0 for the zero vector.
 unsigned BitLength(const IntegerVector& v);
 

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <numeric>
 
 #include "core/numeric/exponent_limits.h"
 #include "core/query/exact/exact_frame.h"
+#include "core/query/exact/wide_pair.h"
 #include "core/query/terms/pose.h"
 
 namespace hulld {
@@ -77,7 +79,48 @@ IntegerVector ScaledTranslation(const PlacedHull& placed, const Integer& norm, i
 
 }  // namespace
 
-ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
+// Each answers what the farthest candidates are, ascending; none where the direction is too wide.
+class ExactPair::Narrow {
+ public:
+  virtual ~Narrow() = default;
+  virtual std::vector<uint32_t> FeatureA(const IntegerVector& n,
+                                         std::span<const uint32_t> candidates) const = 0;
+  virtual std::vector<uint32_t> FeatureB(const IntegerVector& n,
+                                         std::span<const uint32_t> candidates) const = 0;
+  virtual size_t MemoryBytes() const = 0;
+};
+
+template <int kWords>
+class ExactPair::NarrowOf : public Narrow {
+ public:
+  NarrowOf(const FloatPair& filter, const SmallFrame& frame) : pair_(filter, frame) {}
+
+  std::vector<uint32_t> FeatureA(const IntegerVector& n,
+                                 std::span<const uint32_t> candidates) const override {
+    typename WidePair<kWords>::Direction wide;
+    if (!ToWide(n, wide)) return {};
+    return pair_.FeatureA(wide, candidates);
+  }
+  std::vector<uint32_t> FeatureB(const IntegerVector& n,
+                                 std::span<const uint32_t> candidates) const override {
+    typename WidePair<kWords>::Direction wide;
+    if (!ToWide(n, wide)) return {};
+    return pair_.FeatureB(wide, candidates);
+  }
+  size_t MemoryBytes() const override { return sizeof(*this); }
+
+  static std::unique_ptr<Narrow> Make(const FloatPair& filter, const SmallFrame& frame) {
+    if (!WidePair<kWords>::Fits(frame)) return nullptr;
+    return std::make_unique<NarrowOf>(filter, frame);
+  }
+
+ private:
+  WidePair<kWords> pair_;
+};
+
+ExactPair::~ExactPair() = default;
+
+ExactPair::ExactPair(const FloatPair& filter, bool with_narrow) : filter_(&filter) {
   const IntegerRotation R_A = RotationOf(filter.a());
   const IntegerRotation R_B = RotationOf(filter.b());
   a_ = {&filter.a().query_hull(), {}, {}, {}};
@@ -99,6 +142,13 @@ ExactPair::ExactPair(const FloatPair& filter) : filter_(&filter) {
   norm_ = factor_a * R_A.norm_squared;
   a_.shift = {0, 0, 0};
   b_.shift = ScaledTranslation(filter.b(), norm_, common) - TranslationA();
+
+  SmallFrame frame;
+  if (!with_narrow || !FindSmallFrame(filter, frame)) return;
+  narrow_ = NarrowOf<1>::Make(filter, frame);
+  if (narrow_ == nullptr) narrow_ = NarrowOf<2>::Make(filter, frame);
+  if (narrow_ == nullptr) narrow_ = NarrowOf<3>::Make(filter, frame);
+  if (narrow_ == nullptr) narrow_ = NarrowOf<5>::Make(filter, frame);
 }
 
 IntegerVector ExactPair::TranslationA() const {
@@ -121,7 +171,7 @@ void ExactPair::CacheAllVertices() {
 }
 
 size_t ExactPair::MemoryBytes() const {
-  size_t bytes = 0;
+  size_t bytes = narrow_ == nullptr ? 0 : narrow_->MemoryBytes();
   for (const Side* const side : {&a_, &b_}) {
     // A node of a map has a pointer beside the value, and a bucket is one.
     bytes += side->vertices.size() * (sizeof(*side->vertices.begin()) + sizeof(void*)) +
@@ -153,20 +203,38 @@ std::vector<uint32_t> ExactPair::Farthest(Side& side, std::span<const uint32_t> 
   return farthest;
 }
 
+std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n,
+                                          std::span<const uint32_t> candidates) {
+  if (narrow_ != nullptr && candidates.size() > 1) {
+    std::vector<uint32_t> feature = narrow_->FeatureA(n, candidates);
+    if (!feature.empty()) return feature;
+  }
+  return Farthest(a_, candidates, n);
+}
+
+std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n,
+                                          std::span<const uint32_t> candidates) {
+  if (narrow_ != nullptr && candidates.size() > 1) {
+    std::vector<uint32_t> feature = narrow_->FeatureB(n, candidates);
+    if (!feature.empty()) return feature;
+  }
+  return Farthest(b_, candidates, -n);
+}
+
 std::vector<uint32_t> ExactPair::FeatureA(const IntegerVector& n) {
-  if (!filter_->usable() || IsZero(n)) return Farthest(a_, AllOf(a_), n);
+  if (!filter_->usable() || IsZero(n)) return FeatureA(n, AllOf(a_));
   const Vector n_W = ToScaledDoubles(n);
   CandidateBuffer buffer;
-  return Farthest(
-      a_, filter_->CandidatesA(n_W, kScaledDoublesError * LargestComponent(n_W), buffer), n);
+  return FeatureA(n,
+                  filter_->CandidatesA(n_W, kScaledDoublesError * LargestComponent(n_W), buffer));
 }
 
 std::vector<uint32_t> ExactPair::FeatureB(const IntegerVector& n) {
-  if (!filter_->usable() || IsZero(n)) return Farthest(b_, AllOf(b_), -n);
+  if (!filter_->usable() || IsZero(n)) return FeatureB(n, AllOf(b_));
   const Vector n_W = ToScaledDoubles(n);
   CandidateBuffer buffer;
-  return Farthest(
-      b_, filter_->CandidatesB(n_W, kScaledDoublesError * LargestComponent(n_W), buffer), -n);
+  return FeatureB(n,
+                  filter_->CandidatesB(n_W, kScaledDoublesError * LargestComponent(n_W), buffer));
 }
 
 IntegerVector ExactPair::SumOfInnerVertices(const Side& side) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -24,11 +25,17 @@ using ExactCorner = MinkowskiVertex<IntegerVector>;
 // + N_A N_B (T_B - T_A) for B; or by N_A alone where N_A = N_B. Degree 5 in the input; some 280
 // bits at a common exponent. For a piece of a body, whose pose is a product, R and N are the
 // products of two, and N T is an integer all the same: degree 9. The floating-point pair, where it
-// is usable, narrows down which vertices can be farthest, so that only these are multiplied out.
+// is usable, narrows down which vertices can be farthest, so that only these are multiplied out; in
+// integers of a fixed width where these hold the pair's numbers.
 class ExactPair {
  public:
-  // Makes the pair for the hulls and poses of `filter`, which must outlive it.
-  explicit ExactPair(const FloatPair& filter);
+  // Makes the pair for the hulls and poses of `filter`, which must outlive it. with_narrow: whether
+  // the farthest vertices are found in integers of a fixed width where these hold the pair's
+  // numbers; they are the same vertices.
+  explicit ExactPair(const FloatPair& filter, bool with_narrow = true);
+  ~ExactPair();
+  ExactPair(const ExactPair&) = delete;
+  ExactPair& operator=(const ExactPair&) = delete;
 
   // What a search asks of its pair: this one, or WidePair.
   using Number = Integer;
@@ -66,10 +73,10 @@ class ExactPair {
   uint32_t FarthestB(const IntegerVector& n) { return FeatureB(n).front(); }
   // The same when it is known to be among `candidates`, ascending.
   uint32_t FarthestA(const IntegerVector& n, std::span<const uint32_t> candidates) {
-    return Farthest(a_, candidates, n).front();
+    return FeatureA(n, candidates).front();
   }
   uint32_t FarthestB(const IntegerVector& n, std::span<const uint32_t> candidates) {
-    return Farthest(b_, candidates, -n).front();
+    return FeatureB(n, candidates).front();
   }
 
   // The vertex of A - B farthest along n: of the lowest such vertex of A, and of B.
@@ -88,6 +95,13 @@ class ExactPair {
     std::unordered_map<uint32_t, IntegerVector> vertices;
   };
 
+  // The same pair in integers of a fixed width.
+  class Narrow;
+  template <int kWords>
+  class NarrowOf;
+
+  std::vector<uint32_t> FeatureA(const IntegerVector& n, std::span<const uint32_t> candidates);
+  std::vector<uint32_t> FeatureB(const IntegerVector& n, std::span<const uint32_t> candidates);
   static IntegerVector ToWorld(const Side& side, const IntegerVector& own);
   static const IntegerVector& Vertex(Side& side, uint32_t i);
   static IntegerVector SumOfInnerVertices(const Side& side);
@@ -100,6 +114,8 @@ class ExactPair {
   Integer norm_;
   Side a_;
   Side b_;
+  // Null where no width holds its numbers, or not asked for.
+  std::unique_ptr<Narrow> narrow_;
 };
 
 }  // namespace hulld

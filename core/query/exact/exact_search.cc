@@ -196,7 +196,8 @@ template <int kWords>
 [[gnu::noinline]] absl::StatusOr<ExactSearchResult> SearchAny(
     const FloatPair& pair, const FloatSearchResult* end, bool with_axis,
     const std::function<bool()>& should_stop) {
-  ExactPair exact(pair);
+  // Where a fixed width holds its numbers, the search is one in that width.
+  ExactPair exact(pair, /*with_narrow=*/false);
   return Search<ExactPair>(exact, with_axis, should_stop).Run(end);
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "core/base/check.h"
 #include "core/hull/hull.h"
@@ -92,6 +93,15 @@ class WidePair {
     return b_.Farthest(-n, candidates);
   }
 
+  // All of the candidates farthest along n, or against it. Keeps no vertices, so that several
+  // threads may ask at once.
+  std::vector<uint32_t> FeatureA(const Direction& n, std::span<const uint32_t> candidates) const {
+    return a_.Feature(n, candidates);
+  }
+  std::vector<uint32_t> FeatureB(const Direction& n, std::span<const uint32_t> candidates) const {
+    return b_.Feature(-n, candidates);
+  }
+
   // A positive multiple of a point in the relative interior of A - B (see ExactPair).
   Coordinates CenterDifference() const {
     Coordinates difference;
@@ -169,6 +179,22 @@ class WidePair {
       if (Sign(value - largest) <= 0) return;
       best = i;
       largest = value;
+    }
+
+    std::vector<uint32_t> Feature(const Direction& n, std::span<const uint32_t> candidates) const {
+      std::vector<uint32_t> farthest;
+      WideInteger<3 * kWords> largest(0);
+      for (const uint32_t i : candidates) {
+        const auto value = Dot(n, MakeVertex(i));
+        const int order = farthest.empty() ? 1 : Sign(value - largest);
+        if (order < 0) continue;
+        if (order > 0) {
+          farthest.clear();
+          largest = value;
+        }
+        farthest.push_back(i);
+      }
+      return farthest;
     }
 
     WideInteger<1> InnerCount() const {

@@ -159,5 +159,27 @@ TEST(WideInteger, WideOfTakesNegativeNumbers) {
   EXPECT_EQ(ToInteger(WideOf(-(Int128{7} << 100))), -(Integer(7) << 100));
 }
 
+TEST(WideInteger, IntegersConvertWhereTheyFit) {
+  const uint64_t seed = 11;
+  std::mt19937_64 random(seed);
+  for (int i = 0; i < 2000; ++i) {
+    const int bits = static_cast<int>(random() % 200);
+    Integer a = 0;
+    for (int k = 0; k < 4; ++k) a = (a << 64) + random();
+    a >>= 256 - bits;
+    if (i % 2 == 0) a = -a;
+    WideInteger<2> wide;
+    const bool fits = a.is_zero() || msb(Integer(abs(a))) < 127;
+    ASSERT_EQ(ToWide(a, wide), fits) << a << " seed " << seed;
+    if (fits) {
+      ASSERT_EQ(ToInteger(wide), a) << "seed " << seed;
+    }
+  }
+  // The least number of two words has no opposite there, and is left out.
+  WideInteger<2> wide;
+  EXPECT_FALSE(ToWide(Integer(-(Integer(1) << 127)), wide));
+  EXPECT_TRUE(ToWide(Integer((Integer(1) << 127) - 1), wide));
+}
+
 }  // namespace
 }  // namespace hulld
