@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
-#define HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_SCENE_GROUPS_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_SCENE_GROUPS_H_
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
@@ -57,4 +57,4 @@ std::vector<GroupPair> IgnoredGroups(const Scene& scene) {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_SCENE_GROUPS_H_
