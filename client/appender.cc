@@ -56,7 +56,7 @@ absl::StatusOr<v1::AppendOpened> Appender::Connect() {
   auto request = std::make_shared<v1::AppendPointsRequest>();
   *request->mutable_open() = open_;
   connection_->Write(std::move(request));
-  const Deadline deadline = std::chrono::system_clock::now() + timeout_;
+  const Deadline deadline = std::chrono::steady_clock::now() + timeout_;
   if (!connection_->WaitForEvent(false, deadline)) {
     connection_ = nullptr;
     return absl::DeadlineExceededError(
@@ -75,7 +75,7 @@ absl::StatusOr<v1::AppendOpened> Appender::Connect() {
 }
 
 absl::Status Appender::OpenFirst() {
-  const Deadline deadline = std::chrono::system_clock::now() + timeout_;
+  const Deadline deadline = retry_.Now() + timeout_;
   absl::Status status = CallWithRetries(retry_, deadline, [this] {
     absl::StatusOr<v1::AppendOpened> opened = Connect();
     if (!opened.ok()) return opened.status();
@@ -149,12 +149,12 @@ absl::Status Appender::Append(v1::PointBlock points) {
 }
 
 absl::Status Appender::PumpUntil(size_t chunks, size_t bytes) {
-  Deadline deadline = std::chrono::system_clock::now() + timeout_;
+  Deadline deadline = std::chrono::steady_clock::now() + timeout_;
   for (;;) {
     v1::AppendPointsResponse response;
     while (connection_->TakeResponse(&response)) {
       if (absl::Status status = TakeResponse(response); !status.ok()) return status;
-      deadline = std::chrono::system_clock::now() + timeout_;
+      deadline = std::chrono::steady_clock::now() + timeout_;
     }
     if (unacknowledged_.empty()) return absl::OkStatus();
     if (connection_->ended()) {
@@ -167,7 +167,7 @@ absl::Status Appender::PumpUntil(size_t chunks, size_t bytes) {
       if (status.ok())
         status = absl::InternalError("the server ended the stream before its last ack");
       if (status = Reconnect(std::move(status)); !status.ok()) return status;
-      deadline = std::chrono::system_clock::now() + timeout_;
+      deadline = std::chrono::steady_clock::now() + timeout_;
       continue;
     }
     const bool to_write = written_ < unacknowledged_.size();
@@ -222,7 +222,7 @@ void Appender::DropAcknowledged(uint64_t sequence, bool recovered) {
 absl::Status Appender::Finish() {
   if (!failed_.ok()) return failed_;
   if (absl::Status status = PumpUntil(0, 0); !status.ok()) return status;
-  const Deadline deadline = std::chrono::system_clock::now() + timeout_;
+  const Deadline deadline = std::chrono::steady_clock::now() + timeout_;
   if (!connection_->ended()) connection_->WritesDone();
   while (!connection_->ended()) {
     v1::AppendPointsResponse ignored;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
+#include "client/server_address.h"
 
 namespace hulld {
 namespace {
@@ -118,9 +119,7 @@ Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
       status_(v1::StatusService::NewStub(channel_)),
       maintenance_(v1::MaintenanceService::NewStub(channel_)) {}
 
-Deadline Client::NextDeadline() const {
-  return std::chrono::system_clock::now() + options_.timeout;
-}
+Deadline Client::NextDeadline() const { return options_.retry.Now() + options_.timeout; }
 
 template <typename Response, typename Request, typename Stub>
 absl::StatusOr<Response> Client::Call(Stub* stub,
@@ -131,7 +130,7 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
   Response response;
   const auto attempt = [&] {
     grpc::ClientContext context;
-    context.set_deadline(deadline);
+    context.set_deadline(options_.retry.ForCall(deadline));
     response.Clear();
     return FromGrpcStatus((stub->*method)(&context, request, &response), context);
   };
@@ -228,7 +227,7 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(
   absl::Status status = CallWithRetries(options_.retry, deadline, [&] {
     mesh = HullMesh();
     grpc::ClientContext context;
-    context.set_deadline(deadline);
+    context.set_deadline(options_.retry.ForCall(deadline));
     const auto reader = hulls_->GetHullMesh(&context, request);
     absl::Status part_status;
     v1::GetHullMeshResponse part;
@@ -311,7 +310,7 @@ absl::Status Client::Receive(const Start& start,
   absl::Status receiver_status;
   const auto attempt = [&] {
     grpc::ClientContext context;
-    context.set_deadline(deadline);
+    context.set_deadline(options_.retry.ForCall(deadline));
     const auto reader = start(&context);
     Response response;
     while (receiver_status.ok() && reader->Read(&response)) {
@@ -362,7 +361,7 @@ absl::StatusOr<v1::GetStatusResponse> Client::GetStatus() const {
 absl::Status Client::CheckHealth() const {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;
-  context.set_deadline(NextDeadline());
+  context.set_deadline(options_.retry.ForCall(NextDeadline()));
   // An empty HealthCheckRequest asks for the server as a whole.
   const grpc::Slice empty;
   const grpc::ByteBuffer request(&empty, 1);

@@ -30,7 +30,7 @@ namespace hulld {
 inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
 
 struct ClientOptions {
-  // HOST:PORT, or any other target name of gRPC.
+  // HOST:PORT, or several servers over one store: see server_address.h.
   std::string server = kDefaultServer;
   // Deadline of each call, its retries included. An append stream may last longer: there it bounds
   // the wait for the next acknowledgement.

@@ -1,7 +1,6 @@
 #include "client/connection_security.h"
 
 #include <absl/strings/str_cat.h>
-#include <arpa/inet.h>
 #include <grpcpp/create_channel.h>
 #include <grpcpp/security/credentials.h>
 #include <grpcpp/support/client_interceptor.h>
@@ -14,8 +13,14 @@
 #include <utility>
 #include <vector>
 
+#include "client/server_address.h"
+
 namespace hulld {
 namespace {
+
+// In turn, and only to those that report that they serve.
+constexpr char kSpreadCalls[] =
+    R"({"loadBalancingConfig": [{"round_robin": {}}], "healthCheckConfig": {"serviceName": ""}})";
 
 using grpc::experimental::ClientInterceptorFactoryInterface;
 using grpc::experimental::ClientRpcInfo;
@@ -63,19 +68,14 @@ bool IsToken(const std::string& token) {
 
 }  // namespace
 
-bool IsLoopback(const std::string& server) {
-  if (server.starts_with("unix:") || server.starts_with("[::1]:")) return true;
-  const std::string host = server.substr(0, server.rfind(':'));
-  if (host == "localhost") return true;
-  // An address, not a name that begins like one.
-  in_addr address;
-  return host.starts_with("127.") && inet_pton(AF_INET, host.c_str(), &address) == 1;
-}
-
 absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::string& server) {
   if (security.certificate.empty() != security.key.empty()) {
     return absl::InvalidArgumentError(
         "a client certificate and its key belong together; give both or neither");
+  }
+  if (security.tls && security.server_name.empty() && TargetName(server) != server) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "several addresses have certificates for one name: say which, with --server-name"));
   }
   if (security.token.empty()) return absl::OkStatus();
   if (!IsToken(security.token)) {
@@ -91,6 +91,7 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
                                            const ConnectionSecurity& security,
                                            const grpc::ChannelArguments& given) {
   grpc::ChannelArguments arguments = given;
+  if (NamesSeveral(server)) arguments.SetServiceConfigJSON(kSpreadCalls);
   std::shared_ptr<grpc::ChannelCredentials> credentials;
   if (security.tls) {
     credentials = grpc::SslCredentials({security.authorities, security.key, security.certificate});
@@ -102,8 +103,8 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
   if (IsToken(security.token) && MaySendToken(security, server)) {
     interceptors.push_back(std::make_unique<TokenSenderFactory>(security.token));
   }
-  return grpc::experimental::CreateCustomChannelWithInterceptors(server, credentials, arguments,
-                                                                 std::move(interceptors));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(
+      TargetName(server), credentials, arguments, std::move(interceptors));
 }
 
 absl::StatusOr<std::string> ReadTokenFile(const std::string& path) {

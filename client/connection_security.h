@@ -29,13 +29,11 @@ struct ConnectionSecurity {
   bool allow_plaintext_token = false;
 };
 
-// Whether gRPC's target name stays on this machine.
-bool IsLoopback(const std::string& server);
-
 // INVALID_ARGUMENT: what is missing, or that the token would be readable on its way to `server`.
 absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::string& server);
 
-// A channel to `server`. A token that ValidateSecurity objects to is not sent.
+// A channel to `server` (see server_address.h). A token that ValidateSecurity objects to is not
+// sent.
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
                                            const ConnectionSecurity& security,
                                            const grpc::ChannelArguments& arguments);

@@ -6,11 +6,13 @@
 
 #include <atomic>
 #include <cstdio>
+#include <iostream>
 #include <string>
 #include <vector>
 
 #include "server/admin/doctor.h"
 #include "server/config_check.h"
+#include "server/migration/migrate.h"
 #include "server/process/heap.h"
 #include "server/process/log.h"
 #include "server/server.h"
@@ -123,9 +125,8 @@ int Run(const Config& config) {
   spdlog::info("{} received: draining for at most {} ms; once more ends at once",
                received == SIGTERM ? "SIGTERM" : "SIGINT", config.drain_timeout.count());
   pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
-  (*server)->BeginDrain();
-  if (!(*server)->WaitIdle(config.drain_timeout)) {
-    spdlog::warn("the drain timeout passed; cancelling the calls that still run");
+  if (!(*server)->Drain(config.drain_timeout)) {
+    spdlog::warn("the drain timeout passed; cancelled the calls that still ran");
   }
   return 0;
 }
@@ -145,6 +146,9 @@ int Check(const CommandLine& command_line) {
 int Main(const std::vector<std::string>& arguments) {
   if (!arguments.empty() && arguments.front() == "doctor") {
     return RunDoctor({arguments.begin() + 1, arguments.end()});
+  }
+  if (!arguments.empty() && arguments.front() == "migrate") {
+    return RunMigrate({arguments.begin() + 1, arguments.end()}, std::cout, std::cerr);
   }
   const absl::StatusOr<CommandLine> command_line = ParseCommandLine(arguments, ProcessEnvironment);
   if (!command_line.ok()) {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <iterator>
 #include <limits>
+#include <thread>
 #include <utility>
 
 #include "server/access/secret_file.h"
@@ -113,6 +114,8 @@ void Server::AddSizesToMetrics() {
     advance(store.sync_failures, failures.sync);
     advance(store.read_failures, failures.read);
     store.cache_bytes.Set(static_cast<double>(cache.bytes));
+    store.cache_reading_bytes.Set(static_cast<double>(cache.reading_bytes));
+    store.cache_writing_bytes.Set(static_cast<double>(cache.writing_bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
     store.read_only.Set(registry_.Commits().failing ? 1 : 0);
     if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
@@ -205,6 +208,16 @@ void Server::BeginDrain() {
 
 bool Server::WaitIdle(std::chrono::milliseconds timeout) {
   return admission_.WaitIdle(std::chrono::steady_clock::now() + timeout);
+}
+
+bool Server::Drain(std::chrono::milliseconds timeout) {
+  BeginDrain();
+  std::thread closing([this, deadline = std::chrono::system_clock::now() + timeout] {
+    grpc_server_->Shutdown(deadline);
+  });
+  const bool is_idle = WaitIdle(timeout);
+  closing.join();
+  return is_idle;
 }
 
 Server::~Server() {

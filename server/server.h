@@ -66,6 +66,11 @@ class Server {
   // After BeginDrain: waits for the running calls; false when some still run at the end.
   bool WaitIdle(std::chrono::milliseconds timeout);
 
+  // The end: BeginDrain; stops listening; tells clients to make their next calls over another
+  // connection (HTTP/2's GOAWAY), so that those that know other servers go there; waits for the
+  // running calls, and cancels them after `timeout`. Returns whether none was cancelled.
+  bool Drain(std::chrono::milliseconds timeout);
+
  private:
   Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store);
 

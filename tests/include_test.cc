@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -88,6 +89,7 @@ constexpr std::string_view kRooms[] = {
     "server/registry",
     "server/registry/bodies",
     "server/access",
+    "server/migration",
     "server/call",
     "server/wire",
     "server/hulls",
@@ -157,6 +159,83 @@ TEST(Includes, NoRoomIsCrowded) {
     }
     for (const auto& [folder, count] : files) EXPECT_LE(count, kMostFiles) << folder;
   }
+}
+
+// What follows a call of hulld_add_test in a CMakeLists.txt, word by word.
+struct TestProgram {
+  fs::path folder;
+  std::vector<std::string> words;
+
+  const std::string& name() const { return words.front(); }
+  bool Has(const std::string& word) const {
+    return std::find(words.begin(), words.end(), word) != words.end();
+  }
+};
+
+std::vector<TestProgram> TestPrograms() {
+  std::vector<TestProgram> programs;
+  const fs::path tests = fs::path(HULLD_SOURCE_DIR) / "tests";
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(tests)) {
+    if (entry.path().filename() != "CMakeLists.txt") continue;
+    std::ifstream file(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    const std::string call = "\nhulld_add_test(";
+    for (size_t at = ("\n" + text).find(call); at != std::string::npos;) {
+      // The text lacks the first line break, hence the difference of one.
+      const size_t begin = at + call.size() - 1;
+      const size_t end = text.find(')', begin);
+      std::istringstream words(text.substr(begin, end - begin));
+      programs.push_back(
+          {entry.path().parent_path(), {std::istream_iterator<std::string>(words), {}}});
+      at = ("\n" + text).find(call, end);
+    }
+  }
+  return programs;
+}
+
+// Whether a source of a test starts threads: itself, by a team of core's, or by what it opens.
+bool RunsThreads(const fs::path& source) {
+  constexpr std::string_view kHeaders[] = {
+      "atomic",
+      "future",
+      "thread",
+      "core/query/batch.h",
+      "core/query/scene/scene.h",
+      "tests/server/harness/kept_store.h",
+      "tests/server/harness/store_fixture.h",
+      "tests/server/store/postgres/postgres_fixture.h",
+  };
+  std::ifstream file(source);
+  for (std::string line; std::getline(file, line);) {
+    const std::optional<std::string> header = HeaderOf(line);
+    if (!header.has_value()) continue;
+    if (std::find(std::begin(kHeaders), std::end(kHeaders), *header) != std::end(kHeaders)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+// ThreadSanitizer looks at every test program that runs threads and can be looked at.
+TEST(Programs, ThatRunThreadsAreThoseOfThePresetTsan) {
+  // gRPC is not instrumented.
+  const std::string grpc[] = {"hulld_test_server", "hulld_client", "hulld_fake", "hulld_history",
+                              "hullctl_commands"};
+  int marked = 0;
+  for (const TestProgram& program : TestPrograms()) {
+    const std::string folder = program.folder.string();
+    // The readers of files run on one thread, whatever feeds them.
+    if (folder.find("/tests/client") != folder.npos) continue;
+    const bool uses_grpc = std::any_of(std::begin(grpc), std::end(grpc),
+                                       [&](const auto& library) { return program.Has(library); });
+    const bool runs_threads =
+        std::any_of(program.words.begin(), program.words.end(), [&](const std::string& word) {
+          return word.ends_with(".cc") && RunsThreads(program.folder / word);
+        });
+    EXPECT_EQ(program.Has("THREADS"), runs_threads && !uses_grpc) << program.name();
+    marked += program.Has("THREADS") ? 1 : 0;
+  }
+  EXPECT_GE(marked, 5);
 }
 
 TEST(Includes, CoreUsesNoOtherLibrary) {

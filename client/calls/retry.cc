@@ -24,7 +24,7 @@ bool WaitBeforeRetry(const RetryPolicy& policy, int failures, Deadline deadline,
   const std::chrono::milliseconds asked =
       RetryHintOf(status).value_or(std::chrono::milliseconds(0));
   const std::chrono::milliseconds backoff = std::max(BackoffAfter(policy, failures), asked);
-  if (std::chrono::system_clock::now() + backoff >= deadline) return false;
+  if (policy.Now() + backoff >= deadline) return false;
   if (policy.wait) {
     policy.wait(backoff);
   } else {

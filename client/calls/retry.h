@@ -8,7 +8,8 @@
 
 namespace hulld {
 
-using Deadline = std::chrono::system_clock::time_point;
+// By the monotonic clock: setting the time of day neither ends nor prolongs a wait.
+using Deadline = std::chrono::steady_clock::time_point;
 
 // When a call that is safe to repeat is repeated: after UNAVAILABLE, which says that the server was
 // not reached or is draining, and when the server is overloaded and says when to retry.
@@ -18,8 +19,16 @@ struct RetryPolicy {
   int max_attempts = 4;
   std::chrono::milliseconds initial_backoff{100};
   std::chrono::milliseconds max_backoff{2000};
-  // Replaces the wait, for tests. Empty: sleeps.
+  // Replace the wait and the clock, for tests. Empty: sleeps, and the monotonic clock.
   std::function<void(std::chrono::milliseconds)> wait;
+  std::function<Deadline()> now;
+
+  Deadline Now() const { return now ? now() : std::chrono::steady_clock::now(); }
+  // The deadline of a call, as gRPC wants it.
+  std::chrono::system_clock::time_point ForCall(Deadline deadline) const {
+    return std::chrono::system_clock::now() +
+           std::chrono::duration_cast<std::chrono::system_clock::duration>(deadline - Now());
+  }
 };
 
 // The wait after `failures` >= 1 failed attempts.

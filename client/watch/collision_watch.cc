@@ -94,7 +94,7 @@ absl::StatusOr<v1::WatchCollisionsResponse> CollisionWatch::Next() {
     const absl::Status status = Close(*call_);
     call_.reset();
     // From the first failure: there may have been hours of quiet before it.
-    if (failures == 0) deadline = std::chrono::system_clock::now() + patience_;
+    if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }

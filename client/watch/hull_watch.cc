@@ -39,7 +39,7 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
     }
     const absl::Status status = Close();
     // From the first failure: there may have been hours of quiet before it.
-    if (failures == 0) deadline = std::chrono::system_clock::now() + patience_;
+    if (failures == 0) deadline = retry.Now() + patience_;
     if (!MayRetry(status) || !WaitBeforeRetry(retry, ++failures, deadline, status)) return status;
   }
 }

@@ -19,8 +19,12 @@ inline constexpr int kAboveAllExponents = 1024;
 // What underflow adds to the bounds of Orient2d and Orient3d. A product that underflows errs by at
 // most 2^-1075; sums never err by underflow. 2x2: two products. 3x3 with differences of at most D:
 // six products times D, and three products: (6 D + 3) 2^-1075 and roundings of these, less than (D
-// + 1) times this. Proven.
+// + 1) times this. So are 18 2^-1075 more where D < 1 and the nine components, too, are products
+// that may have underflowed, each times two products of two. Proven.
 inline constexpr double kUnderflowError = 0x1p-1070;
+
+// Differences of doubles up to this in magnitude do not overflow. Proven.
+inline constexpr double kLargestDifferenceable = 0x1p1022;
 
 // A permanent of Orient3d below this has not overflowed, nor has the bound made of it. Proven.
 inline constexpr double kPermanentMax = 0x1p1000;

@@ -10,12 +10,14 @@ namespace hulld {
 
 // Sign of det[b-a, c-a, d-a]: +1 when d lies on the side that the normal (b-a) x (c-a) points to, 0
 // when the four points are coplanar, -1 otherwise. Exact for all finite input: a floating-point
-// filter with a proven bound decides almost always; of the rest, integers of fixed size decide what
-// they can hold, 60 bits a coordinate on one scale; expansions what is left within the exponent
-// range of kExpansionMin and kExpansionMax, where a power of two brings all points whose exponents
-// lie no further apart; integers of any size everything else. Cost: ~10 ns; ~30 ns in fixed size;
-// ~1 us by expansions; by integers some us, growing with the spread of exponents. Source: Shewchuk
-// 1997, Adaptive Precision Floating-Point Arithmetic.
+// filter with a proven bound decides almost always. Of the rest, the same filter decides where
+// points lie close together, seen from one of these, and at extreme magnitudes, where a power of
+// two brings them into range; integers of fixed size decide what they can hold, 60 bits a
+// coordinate on one scale; expansions what is left within the exponent range of kExpansionMin and
+// kExpansionMax, where a power of two brings all points whose exponents lie no further apart;
+// integers of any size everything else. Cost: ~10 ns; ~30 ns from the nearest point or in fixed
+// size; ~1 us by expansions; by integers some us, growing with the spread of exponents. Source:
+// Shewchuk 1997, Adaptive Precision Floating-Point Arithmetic.
 int Orient3d(const Vector& a, const Vector& b, const Vector& c, const Vector& d);
 
 // The coordinates that a projection onto a coordinate plane keeps, first and second.
@@ -36,6 +38,7 @@ CoordinatePlane ProjectionOf(const Vector& a, const Vector& b, const Vector& c);
 // reached.
 struct OrientationCounts {
   uint64_t filter = 0;
+  uint64_t nearest_filter = 0;
   uint64_t fixed_point = 0;
   uint64_t expansion = 0;
   uint64_t integer = 0;

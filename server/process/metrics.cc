@@ -75,6 +75,12 @@ StoreMetrics AddStore(prometheus::Registry& registry) {
                 "Bytes that count against the limit, estimated: hulls in memory, points on their "
                 "way to them, streams.")
           .Add({}),
+      AddGauges(registry, "hulld_cache_reading_bytes",
+                "What readers have of these: versions that they asked for, and long answers.")
+          .Add({}),
+      AddGauges(registry, "hulld_cache_writing_bytes",
+                "What writers have of these: hulls that grow, points on their way, streams.")
+          .Add({}),
       AddGauges(registry, "hulld_cache_limit_bytes", "Bytes that may count (--memory-limit).")
           .Add({}),
       AddHistograms(registry, "hulld_snapshot_duration_seconds",

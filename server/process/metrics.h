@@ -43,8 +43,11 @@ struct StoreMetrics {
   prometheus::Counter& cache_hits;
   prometheus::Counter& cache_misses;
   prometheus::Counter& cache_evictions;
-  // hulld_cache_bytes: what counts against the limit; hulld_cache_limit_bytes: --memory-limit.
+  // hulld_cache_bytes: what counts against the limit, and hulld_cache_reading_bytes and
+  // hulld_cache_writing_bytes, its parts; hulld_cache_limit_bytes: --memory-limit.
   prometheus::Gauge& cache_bytes;
+  prometheus::Gauge& cache_reading_bytes;
+  prometheus::Gauge& cache_writing_bytes;
   prometheus::Gauge& cache_limit_bytes;
   // hulld_snapshot_duration_seconds: making the canonical snapshot of a version.
   prometheus::Histogram& snapshot_seconds;

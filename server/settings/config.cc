@@ -48,7 +48,7 @@ class Parser {
     app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
     app_.footer(
         "Precedence: flag, environment variable, file, default.\n"
-        "'hulld doctor --help' tells how to audit a store.");
+        "'hulld doctor --help' tells how to audit a store, 'hulld migrate --help' how to move one.");
   }
 
   // The arguments that stand for the variables that are set.

@@ -169,6 +169,12 @@ absl::Status RocksDbStore::ReadMeta() {
         "--data-dir ", options_.data_dir, " was written in format ", **format,
         "; this hulld knows format ", kStoreFormat, " at most; run the hulld that wrote it"));
   }
+  const absl::StatusOr<std::optional<std::string>> mark = ReadMigrationMark();
+  if (absl::IsUnavailable(mark.status())) return mark.status();
+  // A damaged mark is one.
+  if (!options_.migrating && (!mark.ok() || mark->has_value())) {
+    return Prefixed(absl::StrCat("--data-dir ", options_.data_dir, ": "), UnfinishedMigration());
+  }
   absl::StatusOr<std::optional<std::string>> id = Read(kStoreIdKey);
   if (!id.ok()) return Prefixed("the store's ID: ", id.status());
   if (!id->has_value()) return absl::DataLossError("the store's ID is missing");

@@ -131,6 +131,22 @@ absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, VertexAssembly* as
                    });
 }
 
+absl::StatusOr<std::vector<WriterSequence>> RocksDbStore::LoadWriters(const StoredHull& hull) {
+  const uint64_t incarnation = hull.record.create_revision;
+  const std::string begin = IncarnationKey(kWriterPrefix, incarnation);
+  std::vector<WriterSequence> writers;
+  const absl::Status status = ScanRange(
+      begin, IncarnationKey(kWriterPrefix, incarnation + 1),
+      [&](std::string_view key, std::string_view sealed) -> absl::Status {
+        const absl::StatusOr<uint64_t> sequence = UnsealSequence(hull.record.hull_id, key, sealed);
+        if (!sequence.ok()) return sequence.status();
+        writers.push_back({std::string(key.substr(begin.size())), *sequence});
+        return absl::OkStatus();
+      });
+  if (!status.ok()) return status;
+  return writers;
+}
+
 absl::StatusOr<uint64_t> RocksDbStore::LoadSequence(const HullRecord& hull,
                                                     const std::string& writer_id) {
   const absl::StatusOr<std::optional<uint64_t>> sequence =

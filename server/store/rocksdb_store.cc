@@ -144,13 +144,19 @@ std::optional<StoreDisk> RocksDbStore::disk() const {
   db_->GetIntProperty(rocksdb::DB::Properties::kIsWriteStopped, &is_stopped);
   db_->GetIntProperty(rocksdb::DB::Properties::kActualDelayedWriteRate, &delayed_rate);
   disk.is_stalled = is_stopped != 0 || delayed_rate != 0;
+  disk.stalls = former_stalls_ + CountStalls();
+  return disk;
+}
+
+uint64_t RocksDbStore::CountStalls() const {
+  uint64_t stalls = 0;
   std::map<std::string, std::string> statistics;
   db_->GetMapProperty(rocksdb::DB::Properties::kCFStats, &statistics);
   for (const char* const name : {"io_stalls.total_slowdown", "io_stalls.total_stop"}) {
     const auto found = statistics.find(name);
-    if (found != statistics.end()) disk.stalls += std::strtoull(found->second.c_str(), nullptr, 10);
+    if (found != statistics.end()) stalls += std::strtoull(found->second.c_str(), nullptr, 10);
   }
-  return disk;
+  return stalls;
 }
 
 absl::Status RocksDbStore::Recover() {
@@ -183,6 +189,7 @@ absl::Status RocksDbStore::Probe() {
 absl::Status RocksDbStore::Reopen() {
   const std::unique_lock lock(db_mutex_);
   const std::lock_guard log_lock(log_mutex_);
+  if (db_ != nullptr) former_stalls_ += CountStalls();
   db_ = nullptr;
   absl::Status opened;
   if (const rocksdb::Status cut = files_->CutUncommitted(); !cut.ok()) {

@@ -23,6 +23,7 @@
 #include "server/store/log_file_system.h"
 #include "server/store/sealed_hull.h"
 #include "server/store/store.h"
+#include "server/store/store_keys.h"
 
 namespace hulld::server {
 
@@ -38,6 +39,8 @@ struct RocksDbOptions {
   // Opens a store whose log is damaged as it was before the first damaged record: what was
   // acknowledged after that is lost, and the store takes a new ID.
   bool cut_log = false;
+  // Opens a store that a migration has not finished, too.
+  bool migrating = false;
   // Null: the file system.
   rocksdb::Env* env = nullptr;
 };
@@ -66,6 +69,7 @@ class RocksDbStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
+  absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;
   absl::Status Commit(std::span<const Change* const> changes) override;
   absl::Status Recover() override;
   StoreFailures failures() const override {
@@ -78,6 +82,11 @@ class RocksDbStore : public Store {
 
   // Hard links in <data-dir>/hulld-scratch/copy-..., in the layout of a data directory.
   absl::StatusOr<std::string> MakeCopy() override;
+
+  // For a migration: writes what it copies, on disk before this returns; and the value of its mark
+  // (kMigrationKey), if that is there.
+  absl::Status Import(rocksdb::WriteBatch* batch) { return WriteMeta(batch); }
+  absl::StatusOr<std::optional<std::string>> ReadMigrationMark() { return Read(kMigrationKey); }
 
   const std::string& data_dir() const { return options_.data_dir; }
   // RocksDB's own, for tests that damage what is kept.
@@ -109,6 +118,8 @@ class RocksDbStore : public Store {
   absl::Status DropLostIncarnations();
   absl::Status LoadBase(const StoredHull& hull, VertexAssembly* assembly);
   absl::Status LoadDeltas(const StoredHull& hull, VertexAssembly* assembly);
+  // Stalls of the database that is open.
+  uint64_t CountStalls() const;
   absl::Status Probe();
   absl::Status Reopen();
   absl::Status SyncLog();
@@ -125,6 +136,8 @@ class RocksDbStore : public Store {
   // Shared while db_ is used, exclusive in Reopen.
   mutable std::shared_mutex db_mutex_;
   std::unique_ptr<rocksdb::DB> db_;
+  // Of the databases that were open here before this one, which each count their own.
+  uint64_t former_stalls_ = 0;
 
   // Held while the log is written or synced.
   std::mutex log_mutex_;

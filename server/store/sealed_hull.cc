@@ -17,6 +17,14 @@ absl::StatusOr<StoredHull> UnsealStoredHull(const std::string& hull_id, std::str
   return hull;
 }
 
+absl::StatusOr<uint64_t> UnsealSequence(const std::string& hull_id, std::string_view key,
+                                        std::string_view sealed) {
+  const absl::StatusOr<std::string_view> value = Unseal(key, sealed);
+  absl::StatusOr<uint64_t> sequence = value.ok() ? DecodeNumber(*value) : value.status();
+  if (sequence.ok()) return sequence;
+  return DamagedHull(hull_id, absl::StrCat("a writer's sequence: ", sequence.status().message()));
+}
+
 absl::StatusOr<StoredBody> UnsealStoredBody(const std::string& body_id, std::string_view sealed) {
   const absl::StatusOr<std::string_view> value = Unseal(BodyKey(body_id), sealed);
   absl::StatusOr<StoredBody> body = value.ok() ? DecodeStoredBody(body_id, *value) : value.status();

@@ -22,6 +22,10 @@ absl::StatusOr<StoredHull> UnsealStoredHull(const std::string& hull_id, std::str
 // The same for a body.
 absl::StatusOr<StoredBody> UnsealStoredBody(const std::string& body_id, std::string_view sealed);
 
+// The sequence of a writer of the hull; key: as WriterKey makes it. DATA_LOSS, as for the record.
+absl::StatusOr<uint64_t> UnsealSequence(const std::string& hull_id, std::string_view key,
+                                        std::string_view sealed);
+
 // Puts the vertices of a hull together: first the parts of its base in their order, then its
 // deltas.
 class VertexAssembly {

@@ -28,6 +28,8 @@ enum class Durability {
 struct WriterSequence {
   std::string writer_id;
   uint64_t sequence = 0;
+
+  friend bool operator==(const WriterSequence&, const WriterSequence&) = default;
 };
 
 // What a change means for the vertices that are kept of its hull.
@@ -82,7 +84,8 @@ struct StoreDisk {
   uint64_t log_bytes = 0;
   // What the disk has left for it; none where that is not known.
   std::optional<uint64_t> free_bytes;
-  // How often changes were slowed down or stopped since it was opened, and whether they are.
+  // How often changes were slowed down or stopped since the store was opened, which never goes
+  // back, and whether they are.
   uint64_t stalls = 0;
   bool is_stalled = false;
 };
@@ -111,6 +114,13 @@ class Store {
   // The writer's last committed sequence; 0 when there is none.
   virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                                 const std::string& writer_id) = 0;
+
+  // Every writer of the hull, in byte order of the IDs; as many as are there. FAILED_PRECONDITION:
+  // nothing is kept.
+  virtual absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) {
+    (void)hull;
+    return absl::FailedPreconditionError("this store keeps no writers to read back");
+  }
 
   // Keeps changes, all or none, before anyone can see them: one call at a time, in the order in
   // which they take effect. An error refuses them all, and what is kept is as before, also for a

@@ -59,6 +59,12 @@ absl::Status OpenError(const rocksdb::Status& status, const std::string& data_di
       absl::StrCat("cannot open the store in --data-dir ", data_dir, ": ", cause));
 }
 
+absl::Status UnfinishedMigration() {
+  return absl::FailedPreconditionError(
+      "a migration has not copied all of its source there yet; run 'hulld migrate' again, which "
+      "goes on where it ended");
+}
+
 absl::Status DamagedHull(const std::string& hull_id, const std::string& finding) {
   return WithReason(
       absl::DataLossError(absl::StrCat("hull \"", hull_id, "\" is damaged in the store (", finding,

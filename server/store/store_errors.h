@@ -23,6 +23,9 @@ absl::Status CannotBeRead(const std::string& data_dir);
 // The database could not be opened. FAILED_PRECONDITION: another process has it open; DATA_LOSS: it
 // is damaged; NOT_FOUND: read_only, and there is none; else UNAVAILABLE.
 absl::Status OpenError(const rocksdb::Status& status, const std::string& data_dir, bool read_only);
+// FAILED_PRECONDITION: a migration has not copied all of its source there yet, so nobody is served
+// from it.
+absl::Status UnfinishedMigration();
 // DATA_LOSS: what is kept of this hull is damaged. finding: what is wrong with it.
 absl::Status DamagedHull(const std::string& hull_id, const std::string& finding);
 absl::Status DamagedBody(const std::string& body_id, const std::string& finding);

@@ -22,6 +22,8 @@ namespace hulld::server {
 //   m/relaxed                            while --durability=relaxed has it open; without a value
 //   m/lost                               while vertices or writers of hulls that ended with a
 //                                        damaged record may be there; without a value
+//   m/migration                          while a migration fills the store: the revision of its
+//                                        source, and that store's ID
 //   h<hull ID>                           a StoredHull
 //   w<incarnation><writer ID>            the writer's last committed sequence
 //   b<incarnation><revision><part>       vertices of a base, in parts
@@ -39,6 +41,7 @@ inline constexpr char kStoreIdKey[] = "m/store_id";
 inline constexpr char kRevisionKey[] = "m/revision";
 inline constexpr char kRelaxedKey[] = "m/relaxed";
 inline constexpr char kLostKey[] = "m/lost";
+inline constexpr char kMigrationKey[] = "m/migration";
 inline constexpr char kHullPrefix = 'h';
 inline constexpr char kWriterPrefix = 'w';
 inline constexpr char kBasePrefix = 'b';

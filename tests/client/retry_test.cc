@@ -20,7 +20,7 @@ RetryPolicy Recording(std::vector<milliseconds>* waits, int max_attempts) {
   return policy;
 }
 
-Deadline Far() { return std::chrono::system_clock::now() + std::chrono::hours(1); }
+Deadline Far() { return std::chrono::steady_clock::now() + std::chrono::hours(1); }
 
 TEST(Retry, UnavailableIsTriedAgainWithDoublingWaitsUpToACap) {
   std::vector<milliseconds> waits;
@@ -67,13 +67,34 @@ TEST(Retry, OtherErrorsAreNotTriedAgain) {
 TEST(Retry, AWaitThatWouldPassTheDeadlineIsNotBegun) {
   std::vector<milliseconds> waits;
   int attempts = 0;
-  const Deadline past = std::chrono::system_clock::now();
+  const Deadline past = std::chrono::steady_clock::now();
   EXPECT_TRUE(absl::IsUnavailable(CallWithRetries(Recording(&waits, 4), past, [&] {
     ++attempts;
     return absl::UnavailableError("");
   })));
   EXPECT_EQ(attempts, 1);
   EXPECT_THAT(waits, IsEmpty());
+}
+
+TEST(Retry, TimeIsThatOfTheClockThatIsGiven) {
+  Deadline now;
+  std::vector<milliseconds> waits;
+  RetryPolicy policy = Recording(&waits, 100);
+  policy.now = [&now] { return now; };
+  policy.wait = [&](milliseconds wait) {
+    waits.push_back(wait);
+    now += wait;
+  };
+  const Deadline deadline = now + milliseconds(800);
+  EXPECT_TRUE(absl::IsUnavailable(
+      CallWithRetries(policy, deadline, [] { return absl::UnavailableError(""); })));
+  // The third would end at the deadline or later, once 700 ms have passed.
+  EXPECT_THAT(waits, ElementsAre(milliseconds(100), milliseconds(200), milliseconds(400)));
+  // Calls are ended by the time of day, which gRPC asks for: at the same moment.
+  const auto before = std::chrono::system_clock::now();
+  const auto moment = policy.ForCall(now + std::chrono::hours(1)) - std::chrono::hours(1);
+  const auto after = std::chrono::system_clock::now();
+  EXPECT_TRUE(before <= moment && moment <= after);
 }
 
 TEST(Retry, AServerThatSaysWhenIsAskedAgainThenAtTheEarliest) {

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include "client/client.h"
@@ -36,20 +36,28 @@ class Watches : public server::ServerTest {
     Restart(config_);
     options_.server = server_->address();
     // The client waits once it has lost the server: time for another one to start.
-    options_.retry.wait = [this](std::chrono::milliseconds) {
+    options_.retry.wait = [this](std::chrono::milliseconds wait) {
       ++waits_;
-      if (loser_.joinable()) loser_.join();
-      if (server_ != nullptr) return;
+      now_ += wait;
+      if (server_ != nullptr || !comes_again_) return;
       Restart(config_);
       if (meanwhile_) meanwhile_();
     };
     client_ = std::make_unique<Client>(options_);
   }
   ~Watches() override {
-    if (loser_.joinable()) loser_.join();
     client_.reset();
     server_.reset();
     std::filesystem::remove_all(directory_);
+  }
+  // Has `options_` go by a clock that moves when this moves it, and while the client waits; with a
+  // patience of 2 s.
+  void UseOwnClock() {
+    options_.timeout = std::chrono::seconds(2);
+    options_.retry.now = [this] {
+      ++clock_readings_;
+      return now_;
+    };
   }
   // Ends the server; the next one is started by the watch that misses it.
   void Lose(std::function<void()> meanwhile) {
@@ -90,10 +98,12 @@ class Watches : public server::ServerTest {
   server::Config config_;
   ClientOptions options_;
   std::unique_ptr<Client> client_;
-  // Ends the server, later.
-  std::thread loser_;
   std::function<void()> meanwhile_;
+  // Whether a server that is missed is started again.
+  bool comes_again_ = true;
   int waits_ = 0;
+  Deadline now_;
+  int clock_readings_ = 0;
 };
 
 TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
@@ -116,33 +126,53 @@ TEST_F(Watches, OfHullsGoOnWhereTheyWere) {
   EXPECT_GT(waits_, 0);
 }
 
-// The patience is for a server that is gone, not for one that has nothing to tell.
+// The patience is for a server that is gone, not for one that has nothing to tell: it begins with
+// the first failure, so that while all is well nobody looks at the clock.
 TEST_F(Watches, QuietForLongGoOn) {
-  options_.timeout = std::chrono::seconds(2);
+  UseOwnClock();
   const Client client(options_);
   Put("a", server::Cube());
-  const auto lose_later = [&] {
-    loser_ = std::thread([this] {
-      std::this_thread::sleep_for(options_.timeout + std::chrono::milliseconds(100));
-      TearDown();
-    });
-  };
   const auto hulls = client.WatchHulls({});
   auto hull_message = hulls->Next();
   while (hull_message.ok() && !hull_message->synced()) hull_message = hulls->Next();
-  lose_later();
+  EXPECT_EQ(clock_readings_, 0);
+  now_ += std::chrono::hours(1);
+  Lose([] {});
   hull_message = hulls->Next();
   EXPECT_TRUE(hull_message.ok()) << hull_message.status();
+  EXPECT_GT(std::exchange(clock_readings_, 0), 0);
 
   v1::CollisionWatchOpen open;
   *open.add_placements() = server::PlacementOf("a", 0);
   *open.add_placements() = server::PlacementOf("a", 0.5);
   const auto pairs = client.WatchCollisions(open);
   EXPECT_THAT(Events(Round(*pairs)), ElementsAre("ENTER 0 1"));
-  lose_later();
+  EXPECT_EQ(clock_readings_, 0);
+  now_ += std::chrono::hours(1);
+  Lose([] {});
   const auto pair_message = pairs->Next();
   EXPECT_TRUE(pair_message.ok()) << pair_message.status();
-  EXPECT_GT(waits_, 1);
+  EXPECT_GT(clock_readings_, 0);
+}
+
+TEST_F(Watches, OfAServerThatStaysAwayEndWithThePatience) {
+  UseOwnClock();
+  const Client client(options_);
+  Put("a", server::Cube());
+  const auto hulls = client.WatchHulls({});
+  v1::CollisionWatchOpen open;
+  for (const double x : {0., 0.5}) *open.add_placements() = server::PlacementOf("a", x);
+  const auto pairs = client.WatchCollisions(open);
+  auto hull_message = hulls->Next();
+  while (hull_message.ok() && !hull_message->synced()) hull_message = hulls->Next();
+  EXPECT_THAT(Events(Round(*pairs)), ElementsAre("ENTER 0 1"));
+  comes_again_ = false;
+  TearDown();
+  // Waits of 100, 200, 400 and 800 ms fit, one of 1600 more does not.
+  EXPECT_TRUE(absl::IsUnavailable(hulls->Next().status()));
+  EXPECT_EQ(std::exchange(waits_, 0), 4);
+  EXPECT_TRUE(absl::IsUnavailable(pairs->Next().status()));
+  EXPECT_EQ(waits_, 4);
 }
 
 // Cubes of side 1 along x, as placements one by one and packed.

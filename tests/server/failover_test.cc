@@ -8,7 +8,10 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "client/appender.h"
+#include "client/client.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "tests/server/harness/hulld_process.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
@@ -28,9 +31,10 @@ class Failover : public ::testing::Test {
     conninfo_ = cluster.WriteConninfo(cluster.MakeDatabase());
   }
 
-  std::unique_ptr<Process> Start(const std::vector<std::string>& options = {}) const {
+  std::unique_ptr<Process> Start(const std::vector<std::string>& options = {},
+                                 const std::string& address = "127.0.0.1:0") const {
     std::vector<std::string> arguments = {
-        "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file", conninfo_};
+        "--listen", address, "--store", "postgres", "--postgres-conninfo-file", conninfo_};
     arguments.insert(arguments.end(), options.begin(), options.end());
     return std::make_unique<Process>(arguments);
   }
@@ -68,6 +72,41 @@ TEST_F(Failover, TheNextServerTakesOverWhenTheActiveOneIsKilled) {
   EXPECT_EQ(Received(*stub), 8);
   Put(*stub, {9, 9, 9});
   EXPECT_EQ(Received(*stub), 9);
+}
+
+// One writer and one reader, who were told of both servers and never learn which one serves.
+TEST_F(Failover, ClientsThatKnowBothServersGoOn) {
+  const std::string addresses[] = {UnusedAddress(), UnusedAddress()};
+  std::unique_ptr<Process> active = Start({}, addresses[0]);
+  EXPECT_NE(active->ReadLineWith("listening on "), "");
+  std::unique_ptr<Process> next = Start({}, addresses[1]);
+  EXPECT_NE(next->ReadLineWith("another hulld is active over this database"), "");
+
+  ClientOptions options;
+  options.server = absl::StrCat(addresses[0], ",", addresses[1]);
+  options.timeout = std::chrono::minutes(2);
+  options.retry.max_attempts = 10000;
+  options.retry.max_backoff = std::chrono::milliseconds(20);
+  const Client client(options);
+  AppendOptions append;
+  append.create_if_absent = true;
+  auto appender = client.OpenAppend("h", append);
+  ASSERT_TRUE(appender.ok()) << appender.status();
+  constexpr int kPoints = 40;
+  for (int i = 0; i < kPoints; ++i) {
+    v1::PointBlock point;
+    for (const double x : {1., 1. * i, 1. * i * i}) point.add_xyz(x);
+    ASSERT_TRUE((*appender)->Append(point).ok());
+    if (i != kPoints / 2) continue;
+    ASSERT_TRUE(client.GetHull("h").ok());
+    active->Signal(SIGKILL);
+  }
+  const absl::Status finished = (*appender)->Finish();
+  EXPECT_TRUE(finished.ok()) << finished;
+  const auto hull = client.GetHull("h");
+  ASSERT_TRUE(hull.ok()) << hull.status();
+  EXPECT_EQ(hull->hull().counts().received(), kPoints);
+  EXPECT_GE((*appender)->totals().reconnects, 1);
 }
 
 // It may run again at any later time: then it changes nothing, and ends.

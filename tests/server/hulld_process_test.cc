@@ -2,6 +2,7 @@
 
 #include "tests/server/harness/hulld_process.h"
 
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -11,9 +12,12 @@
 #include <fstream>
 #include <iterator>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "client/appender.h"
+#include "client/client.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
@@ -116,6 +120,45 @@ TEST(HulldProgram, AnIdleStreamDoesNotOutliveTheDrainTimeout) {
   EXPECT_FALSE(stream->Finish().ok());
   EXPECT_NE(hulld.ReadLineWith("the drain timeout passed"), "");
   EXPECT_EQ(hulld.Wait(), 0);
+}
+
+// Calls of a client that knows both never fail meanwhile, and soon reach the other one alone.
+TEST(HulldProgram, ClientsOfADrainingServerGoToAnother) {
+  Process draining({"--store", "memory", "--listen", "127.0.0.1:0", "--drain-timeout", "600"});
+  Process other({"--store", "memory", "--listen", "127.0.0.1:0"});
+  const std::string address = AddressIn(draining.ReadLineWith("listening on "));
+  ClientOptions options;
+  options.server = absl::StrCat(address, ",", AddressIn(other.ReadLineWith("listening on ")));
+  const Client client(options);
+  const auto answering_store = [&client] {
+    const auto status = client.GetStatus();
+    if (!status.ok()) throw std::runtime_error(status.status().ToString());
+    return status->header().store_id();
+  };
+  const std::string first = answering_store();
+  std::string second = first;
+  while (second == first) second = answering_store();
+
+  // Holds the drain up until it has been seen.
+  ClientOptions options_of_writer;
+  options_of_writer.server = address;
+  const Client writer(options_of_writer);
+  const std::string leaving = writer.GetStatus()->header().store_id();
+  AppendOptions append;
+  append.create_if_absent = true;
+  auto stream = writer.OpenAppend("h", append);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  draining.Signal(SIGTERM);
+  for (int in_turn = 0; in_turn < 20;) {
+    in_turn = answering_store() == leaving ? 0 : in_turn + 1;
+  }
+  // What runs goes on.
+  v1::PointBlock point;
+  for (const double x : {1, 2, 3}) point.add_xyz(x);
+  EXPECT_TRUE((*stream)->Append(point).ok());
+  EXPECT_TRUE((*stream)->Finish().ok());
+  stream->reset();
+  EXPECT_EQ(draining.Wait(), 0);
 }
 
 }  // namespace

@@ -53,22 +53,6 @@ absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text)
       absl::StrCat(Quoted(text), " is not a time from 1ms to 24h, such as 500ms, 30s or 2m"));
 }
 
-absl::Status ValidateServer(const std::string& server) {
-  if (server.rfind("unix:", 0) == 0 || server.find(":///") != std::string::npos) {
-    return absl::OkStatus();
-  }
-  const size_t colon = server.rfind(':');
-  uint64_t port = 0;
-  const bool port_ok = colon != std::string::npos && colon > 0 &&
-                       ParseUnsigned(std::string_view(server).substr(colon + 1), &port) &&
-                       port > 0 && port < 65536;
-  const bool host_ok =
-      server.find('/') == std::string::npos && (server.find(':') == colon || server[0] == '[');
-  if (port_ok && host_ok) return absl::OkStatus();
-  return absl::InvalidArgumentError(
-      absl::StrCat(Quoted(server), " is not HOST:PORT, such as 127.0.0.1:50551"));
-}
-
 absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text) {
   absl::StatusOr<std::vector<double>> numbers = ParseNumbers(text);
   if (!numbers.ok()) return numbers.status();

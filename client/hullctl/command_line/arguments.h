@@ -16,9 +16,6 @@ namespace hulld {
 // "30s", "500ms", "2m"; a number alone is seconds. Positive, at most a day.
 absl::StatusOr<std::chrono::milliseconds> ParseDuration(const std::string& text);
 
-// HOST:PORT, [IPV6]:PORT, or one of gRPC's own schemes such as unix:PATH and dns:///NAME.
-absl::Status ValidateServer(const std::string& server);
-
 // "x,y,z".
 absl::StatusOr<std::array<double, 3>> ParseTriple(const std::string& text);
 

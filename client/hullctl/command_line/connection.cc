@@ -10,6 +10,7 @@
 
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/context/context_file.h"
+#include "client/server_address.h"
 
 namespace hulld {
 namespace {

@@ -25,8 +25,8 @@ absl::StatusOr<bool> ConfirmDeletion(const Invocation& run, const std::vector<st
   const bool is_terminal = isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0;
   if (!is_terminal) {
     return absl::InvalidArgumentError(
-        absl::StrCat("this would delete ", ids.size(), " ", many, " (", Naming(ids),
-                     "); say --yes if that is meant, as nobody can be asked here"));
+        absl::StrCat("this would delete ", ids.size(), " ", ids.size() == 1 ? one : many, " (",
+                     Naming(ids), "); say --yes if that is meant, as nobody can be asked here"));
   }
   run.err << "Delete " << ids.size() << " " << (ids.size() == 1 ? one : many) << " (" << Naming(ids)
           << ")? [y/N] " << std::flush;

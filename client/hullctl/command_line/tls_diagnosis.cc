@@ -120,6 +120,9 @@ std::string ExplainRefusal(SSL* ssl, const ConnectionSecurity& security) {
 
 std::string DiagnoseTls(const std::string& server, const ConnectionSecurity& security) {
   if (server.find('/') != std::string::npos || server.rfind("unix:", 0) == 0) return "";
+  if (const size_t comma = server.find(','); comma != std::string::npos) {
+    return DiagnoseTls(server.substr(0, comma), security);
+  }
   ERR_clear_error();
   const Owned<SSL_CTX> context = MakeContext(security);
   const Owned<SSL> ssl(SSL_new(context.get()));

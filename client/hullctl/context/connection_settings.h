@@ -31,7 +31,8 @@ struct ConnectionSetting {
 
 inline constexpr ConnectionSetting kConnectionSettings[] = {
     {"server", "HULLCTL_SERVER", SettingKind::kText, "HOST:PORT",
-     "Where hulld listens (default 127.0.0.1:50551)"},
+     "Where hulld listens, or several over one store: ADDRESS:PORT,ADDRESS:PORT or "
+     "dns:///NAME:PORT (default 127.0.0.1:50551)"},
     {"tls", "HULLCTL_TLS", SettingKind::kFlag, nullptr,
      "Encrypt, and trust the authorities of the system; the next four imply it"},
     {"ca-cert", "HULLCTL_CA_CERT", SettingKind::kFile, "FILE",

@@ -14,12 +14,10 @@
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
 #include "client/hullctl/printing/table.h"
+#include "client/point_messages.h"
 
 namespace hulld {
 namespace {
-
-// About a MiB a message.
-constexpr size_t kPointsPerMessage = 40000;
 
 struct NamedPart {
   std::string hull_id;
@@ -48,15 +46,13 @@ absl::StatusOr<AppendTotals> Send(const Client& client, const NamedPart& named, 
   options.create_if_absent = create;
   auto stream = client.OpenAppend(named.hull_id, options);
   if (!stream.ok()) return stream.status();
-  const auto& vertices = named.part.mesh.vertices;
-  for (size_t begin = 0; begin < vertices.size(); begin += kPointsPerMessage) {
-    const size_t end = std::min(begin + kPointsPerMessage, vertices.size());
-    v1::PointBlock block;
-    for (size_t i = begin; i < end; ++i) {
-      for (const double x : vertices[i]) block.add_xyz(x);
-    }
-    if (absl::Status sent = (*stream)->Append(std::move(block)); !sent.ok()) return sent;
+  std::vector<double> xyz;
+  for (const auto& vertex : named.part.mesh.vertices) {
+    xyz.insert(xyz.end(), vertex.begin(), vertex.end());
   }
+  const absl::Status sent = SendInMessages(
+      xyz, [&](v1::PointBlock points) { return (*stream)->Append(std::move(points)); });
+  if (!sent.ok()) return sent;
   if (absl::Status finished = (*stream)->Finish(); !finished.ok()) return finished;
   return (*stream)->totals();
 }

@@ -8,6 +8,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/hull_segment.h"
+#include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
 
@@ -53,19 +54,6 @@ absl::StatusOr<ShapeHull> HullOf(const CollisionShape& shape, const PackagePaths
   const auto file = ResolveFile(paths, shape.mesh);
   if (!file.ok()) return file.status();
   return MeshHull(shape, *file);
-}
-
-// In messages of about a MiB.
-absl::Status SendPoints(const std::vector<double>& xyz, const Client::PointSink& sink) {
-  constexpr size_t kNumbers = 3 * 40000;
-  for (size_t begin = 0; begin < xyz.size(); begin += kNumbers) {
-    const size_t end = std::min(begin + kNumbers, xyz.size());
-    v1::PointBlock points;
-    points.mutable_xyz()->Add(xyz.begin() + static_cast<ptrdiff_t>(begin),
-                              xyz.begin() + static_cast<ptrdiff_t>(end));
-    if (absl::Status sent = sink(points); !sent.ok()) return sent;
-  }
-  return absl::OkStatus();
 }
 
 }  // namespace
@@ -144,7 +132,7 @@ absl::Status RegisterHulls(const RobotArguments& arguments, const Client& client
   for (RobotPart& part : model->parts) {
     const std::string segment = UniqueHullSegment(part.name, &taken);
     const auto feed = [&part](const Client::PointSink& sink) {
-      return SendPoints(part.hull.xyz, sink);
+      return SendInMessages(part.hull.xyz, sink);
     };
     if (arguments.prefix.empty()) {
       auto id = temporary->Add(segment, feed);

@@ -15,7 +15,9 @@ namespace {
 
 constexpr char kYamlHelp[] =
     "A scene in YAML:\n"
-    "  prefix: cell-3/            # in front of the names of hulls, on the server\n"
+    "  prefix: cell-3/            # in front of the names of hulls, on the server; with a / at "
+    "its\n"
+    "                             # end, all that is under it is the scene's\n"
     "  scale: mm                  # of files that say none: mm, cm, m, in, ft or a factor\n"
     "  hulls:\n"
     "    bracket: {file: bracket.stl, scale: cm}    # the hull of the file's points\n"
@@ -38,13 +40,31 @@ constexpr char kYamlHelp[] =
     "tolerance. Coordinates of files become metres by `scale`, rounded once. Files stand beside\n"
     "the scene file.\n";
 
+// Where it was listed: only as it was then.
 absl::StatusOr<v1::ResponseHeader> Delete(const Client& client, const Kept& kept) {
   if (kept.is_body) {
-    const auto deleted = client.DeleteBody(kept.id);
+    const auto deleted = client.DeleteBody(kept.id, kept.revision);
     return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
   }
-  const auto deleted = client.DeleteHull(kept.id);
+  const auto deleted = client.DeleteHull(kept.id, kept.revision);
   return deleted.ok() ? deleted->header() : absl::StatusOr<v1::ResponseHeader>(deleted.status());
+}
+
+// OK: a person at the terminal says that these are to be deleted, or there is none.
+// INVALID_ARGUMENT: there is no terminal, or the answer was no; `unless` says what then was not.
+absl::Status Confirm(const Invocation& run, const std::vector<Kept>& doomed,
+                     const std::string& unless) {
+  if (doomed.empty()) return absl::OkStatus();
+  std::vector<std::string> ids;
+  for (const Kept& kept : doomed) ids.push_back(kept.id);
+  const bool has_body = doomed.front().is_body;
+  const bool has_hull = !doomed.back().is_body;
+  const auto meant = ConfirmDeletion(run, ids, has_body ? "body" : "hull",
+                                     has_body && has_hull ? "bodies and hulls"
+                                     : has_body           ? "bodies"
+                                                          : "hulls");
+  if (!meant.ok()) return meant.status();
+  return *meant ? absl::OkStatus() : absl::InvalidArgumentError(unless);
 }
 
 struct SyncArguments {
@@ -61,22 +81,29 @@ class SceneSync {
   SceneSync(const Invocation& run, const SceneDescription& scene)
       : run_(run), scene_(scene), client_(run.MakeClient()) {}
 
-  // Tells what differs, and changes it where `changes` says so. `prune`: removes strangers.
-  ExitCode Run(bool changes, bool prune) {
+  // Tells what differs, and changes it where `changes` says so. `prune`: removes strangers, after a
+  // question unless `yes`. What becomes a stranger meanwhile, or changes, stays.
+  ExitCode Run(bool changes, bool prune, bool yes) {
+    const auto strangers = Strangers(client_, scene_);
+    if (!strangers.ok()) return run_.Fail(strangers.status());
+    if (prune && changes && !yes) {
+      const absl::Status meant = Confirm(run_, *strangers, "nothing was changed");
+      if (!meant.ok()) return run_.FailUsage(meant);
+    }
     for (const HullDefinition& hull : scene_.hulls) {
       const auto xyz = PointsOf(hull);
       if (!xyz.ok()) return run_.FailUsage(xyz.status());
       const absl::Status taken =
-          Take({hull.hull_id, false}, Compare(client_, hull.hull_id, *xyz), changes,
+          Take({hull.hull_id, false, {}}, Compare(client_, hull.hull_id, *xyz), changes,
                [&] { return PutHull(client_, hull.hull_id, *xyz); });
       if (!taken.ok()) return run_.Fail(taken);
     }
     for (const BodyDefinition& body : scene_.bodies) {
-      const absl::Status taken = Take({body.body_id, true}, CompareBody(client_, body), changes,
+      const absl::Status taken = Take({body.body_id, true, {}}, CompareBody(client_, body), changes,
                                       [&] { return client_.PutBody(BodyRequest(body)).status(); });
       if (!taken.ok()) return run_.Fail(taken);
     }
-    const absl::Status told = TellStrangers(changes, prune);
+    const absl::Status told = TakeStrangers(*strangers, changes, prune);
     if (!told.ok()) return run_.Fail(told);
     if (!run_.json() && !run_.names()) {
       run_.out << "# " << same_hulls_ << " hulls";
@@ -106,10 +133,8 @@ class SceneSync {
     return absl::OkStatus();
   }
 
-  absl::Status TellStrangers(bool changes, bool prune) {
-    const auto strangers = Strangers(client_, scene_);
-    if (!strangers.ok()) return strangers.status();
-    for (const Kept& stranger : *strangers) {
+  absl::Status TakeStrangers(const std::vector<Kept>& strangers, bool changes, bool prune) {
+    for (const Kept& stranger : strangers) {
       if (prune && changes) {
         const absl::Status deleted = Delete(client_, stranger).status();
         if (!deleted.ok() && !absl::IsNotFound(deleted)) return deleted;
@@ -149,14 +174,20 @@ class SceneSync {
 ExitCode ApplyScene(const Invocation& run, const SyncArguments& arguments) {
   const auto scene = ReadYamlScene(arguments.file);
   if (!scene.ok()) return run.FailUsage(scene.status());
-  return SceneSync(run, *scene).Run(!arguments.dry_run, arguments.prune);
+  if (arguments.prune && !OwnsItsPrefix(*scene)) {
+    return run.FailUsage(absl::InvalidArgumentError(absl::StrCat(
+        arguments.file, ": --prune needs a scene whose prefix ends with \"/\", as in prefix: ",
+        scene->prefix.empty() ? "cell-3" : scene->prefix,
+        "/; what begins with another may be another scene's, as cell-3 begins cell-30/arm")));
+  }
+  return SceneSync(run, *scene).Run(!arguments.dry_run, arguments.prune, arguments.yes);
 }
 
 ExitCode DiffScene(const Invocation& run, const SyncArguments& arguments) {
   const auto scene = ReadYamlScene(arguments.file);
   if (!scene.ok()) return run.FailUsage(scene.status());
   SceneSync sync(run, *scene);
-  const ExitCode code = sync.Run(/*changes=*/false, /*prune=*/false);
+  const ExitCode code = sync.Run(/*changes=*/false, /*prune=*/false, /*yes=*/false);
   if (code != ExitCode::kDone) return code;
   return sync.found_differences() ? ExitCode::kRequestFailed : ExitCode::kDone;
 }
@@ -167,7 +198,7 @@ absl::StatusOr<std::vector<Kept>> DefinedAndThere(const Client& client,
   std::vector<Kept> kept;
   const auto take = [&kept](const std::string& id, bool is_body, const absl::Status& found) {
     // What is damaged can be deleted.
-    if (found.ok() || absl::IsDataLoss(found)) kept.push_back({id, is_body});
+    if (found.ok() || absl::IsDataLoss(found)) kept.push_back({id, is_body, std::nullopt});
     return absl::IsNotFound(found) || absl::IsDataLoss(found) ? absl::OkStatus() : found;
   };
   for (const BodyDefinition& body : scene.bodies) {
@@ -191,13 +222,9 @@ ExitCode DeleteScene(const Invocation& run, const SyncArguments& arguments) {
     if (!run.json() && !run.names()) run.out << "# nothing that the file defines is there\n";
     return ExitCode::kDone;
   }
-  std::vector<std::string> ids;
-  for (const Kept& kept : *doomed) ids.push_back(kept.id);
-  if (!arguments.yes && ids.size() > 1) {
-    const bool has_body = doomed->front().is_body;
-    const auto meant = ConfirmDeletion(run, ids, "hull", has_body ? "bodies and hulls" : "hulls");
-    if (!meant.ok()) return run.FailUsage(meant.status());
-    if (!*meant) return run.FailUsage(absl::InvalidArgumentError("nothing was deleted"));
+  if (!arguments.yes && doomed->size() > 1) {
+    const absl::Status meant = Confirm(run, *doomed, "nothing was deleted");
+    if (!meant.ok()) return run.FailUsage(meant);
   }
   for (const Kept& kept : *doomed) {
     const auto header = Delete(client, kept);
@@ -242,8 +269,11 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
        "arithmetic decides: each point is in it, and each vertex is one of the points; so is a "
        "body\n"
        "of the same hulls at the same poses. So it may be run again, and goes on where it was\n"
-       "interrupted. What is under the prefix and not in the file is told (?), and deleted with\n"
-       "--prune.\n",
+       "interrupted. Where the prefix ends with /, what is under it and not in the file is told "
+       "(?),\n"
+       "and deleted with --prune, after a question on the terminal. What changed since it was "
+       "listed\n"
+       "stays, and the exit code is 1.\n",
        "hullctl scene apply cell.yaml --dry-run"},
       {"diff", "Tell how the server's hulls and bodies differ from a scene file", DiffScene,
        "Prints what 'hullctl scene apply' would do, and changes nothing. Exit code 1 when there "
@@ -264,7 +294,7 @@ void AddSceneSyncCommands(Command scene, const std::string* scene_file, Invocati
       command.AddFlag("--prune", &arguments->prune,
                       "Delete what is under the prefix and the file does not define");
     }
-    if (declared.act == DeleteScene) {
+    if (declared.act != DiffScene) {
       command.AddFlag("--yes", &arguments->yes, "Delete without asking");
     }
     command.SetDetails(absl::StrCat(declared.details, "\n", kYamlHelp));

@@ -14,12 +14,10 @@
 #include "client/formats/point_file.h"
 #include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/scene/yaml_scene.h"
+#include "client/point_messages.h"
 
 namespace hulld {
 namespace {
-
-// About a MiB a message.
-constexpr size_t kNumbersPerMessage = 3 * 40000;
 
 absl::StatusOr<std::vector<double>> ReadFile(const HullDefinition& hull) {
   const auto format = PointFormatOfPath(hull.file);
@@ -82,37 +80,33 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
   v1::ReplaceOpen open;
   open.set_hull_id(hull_id);
   open.set_create_if_absent(true);
-  return client
-      .ReplaceHull(open,
-                   [&xyz](const Client::PointSink& sink) {
-                     for (size_t begin = 0; begin < xyz.size(); begin += kNumbersPerMessage) {
-                       const size_t end = std::min(begin + kNumbersPerMessage, xyz.size());
-                       v1::PointBlock points;
-                       points.mutable_xyz()->Add(xyz.begin() + static_cast<ptrdiff_t>(begin),
-                                                 xyz.begin() + static_cast<ptrdiff_t>(end));
-                       if (absl::Status sent = sink(points); !sent.ok()) return sent;
-                     }
-                     return absl::OkStatus();
-                   })
-      .status();
+  const auto feed = [&xyz](const Client::PointSink& sink) { return SendInMessages(xyz, sink); };
+  return client.ReplaceHull(open, feed).status();
 }
+
+bool OwnsItsPrefix(const SceneDescription& scene) { return scene.prefix.ends_with('/'); }
 
 absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene) {
   std::vector<Kept> strangers;
-  if (scene.prefix.empty()) return strangers;
+  if (!OwnsItsPrefix(scene)) return strangers;
+  const auto add = [&strangers](const std::string& id, bool is_body, const auto& info) {
+    std::optional<uint64_t> revision;
+    if (!info.damaged()) revision = info.revision();
+    strangers.push_back({id, is_body, revision});
+  };
   std::set<std::string> defined_bodies;
   for (const BodyDefinition& body : scene.bodies) defined_bodies.insert(body.body_id);
   const auto bodies = client.ListAllBodies(scene.prefix);
   if (!bodies.ok()) return bodies.status();
   for (const v1::BodyInfo& body : bodies->bodies()) {
-    if (!defined_bodies.contains(body.body_id())) strangers.push_back({body.body_id(), true});
+    if (!defined_bodies.contains(body.body_id())) add(body.body_id(), true, body);
   }
   std::set<std::string> defined;
   for (const HullDefinition& hull : scene.hulls) defined.insert(hull.hull_id);
   const auto list = client.ListAllHulls(scene.prefix);
   if (!list.ok()) return list.status();
   for (const v1::HullInfo& hull : list->hulls()) {
-    if (!defined.contains(hull.hull_id())) strangers.push_back({hull.hull_id(), false});
+    if (!defined.contains(hull.hull_id())) add(hull.hull_id(), false, hull);
   }
   return strangers;
 }

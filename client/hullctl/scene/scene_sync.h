@@ -3,6 +3,8 @@
 
 #include <absl/status/statusor.h>
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,10 +37,17 @@ absl::Status PutHull(const Client& client, const std::string& hull_id,
 struct Kept {
   std::string id;
   bool is_body = false;
+  // When it was listed; none where it is damaged, or was not listed.
+  std::optional<uint64_t> revision;
 };
 
+// Whether all under the scene's prefix is the scene's: a prefix is the beginning of any IDs, and
+// only one that ends with "/" keeps them apart from those of others, as "cell-3" is the beginning
+// of "cell-30/arm".
+bool OwnsItsPrefix(const SceneDescription& scene);
+
 // What the server has under the scene's prefix that the scene does not define, bodies first. None
-// where it has no prefix.
+// where the scene does not own its prefix.
 absl::StatusOr<std::vector<Kept>> Strangers(const Client& client, const SceneDescription& scene);
 
 }  // namespace hulld

@@ -5,19 +5,17 @@
 #include <utility>
 
 #include "client/hullctl/printing/json.h"
+#include "client/point_messages.h"
 
 namespace hulld {
 namespace {
 
-// A hand makes one at a time.
-constexpr size_t kMostEdits = 64;
-
 absl::StatusOr<std::string> Append(const Client& client, const ViewEdit& edit) {
   const auto appender = client.OpenAppend(edit.hull_id);
   if (!appender.ok()) return appender.status();
-  v1::PointBlock block;
-  block.mutable_xyz()->Add(edit.points.begin(), edit.points.end());
-  if (absl::Status status = (*appender)->Append(std::move(block)); !status.ok()) return status;
+  const absl::Status sent = SendInMessages(
+      edit.points, [&](v1::PointBlock points) { return (*appender)->Append(std::move(points)); });
+  if (!sent.ok()) return sent;
   if (absl::Status status = (*appender)->Finish(); !status.ok()) return status;
   const AppendTotals& totals = (*appender)->totals();
   return absl::StrCat(edit.hull_id, ": ", totals.counts.received(), " appended, ",
@@ -41,11 +39,70 @@ std::string EditedMessage(const ViewEdit& edit, const absl::StatusOr<std::string
 
 }  // namespace
 
+bool EditQueue::Add(ViewEdit edit) {
+  const auto last = last_.find(edit.hull_id);
+  const bool joins = last != last_.end() && last->second->action == edit.action;
+  const size_t numbers = joins ? edit.points.size() : NumbersOf(edit);
+  if (numbers > kMostNumbers - numbers_) return false;
+  numbers_ += numbers;
+  if (joins) {
+    std::vector<double>& points = last->second->points;
+    points.insert(points.end(), edit.points.begin(), edit.points.end());
+    return true;
+  }
+  const std::string hull_id = edit.hull_id;
+  edits_.push_back(std::move(edit));
+  last_[hull_id] = std::prev(edits_.end());
+  return true;
+}
+
+ViewEdit EditQueue::Take() {
+  const auto last = last_.find(edits_.front().hull_id);
+  if (last->second == edits_.begin()) last_.erase(last);
+  ViewEdit edit = std::move(edits_.front());
+  edits_.pop_front();
+  numbers_ -= NumbersOf(edit);
+  return edit;
+}
+
 EditFeed::EditFeed(const Client& client, std::shared_ptr<PageChannel> page)
-    : worker_(kMostEdits, [&client, page = std::move(page)](const ViewEdit& edit) {
-        const bool is_delete = edit.action == ViewEdit::Action::kDelete;
-        const auto outcome = is_delete ? Delete(client, edit) : Append(client, edit);
-        return page->SendText(EditedMessage(edit, outcome));
-      }) {}
+    : client_(client), page_(std::move(page)), thread_([this] { Run(); }) {}
+
+EditFeed::~EditFeed() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void EditFeed::Ask(ViewEdit edit) {
+  ViewEdit refused{edit.action, edit.hull_id, {}};
+  {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.Add(std::move(edit))) {
+      changed_.notify_all();
+      return;
+    }
+  }
+  page_->SendText(
+      EditedMessage(refused, absl::ResourceExhaustedError(absl::StrCat(
+                                 refused.hull_id,
+                                 ": too much waits for the server already, so this was not done;"
+                                 " ask for it again once the server has answered"))));
+}
+
+void EditFeed::Run() {
+  while (true) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return !waiting_.empty() || ended_; });
+    if (waiting_.empty()) return;
+    const ViewEdit edit = waiting_.Take();
+    lock.unlock();
+    const bool is_delete = edit.action == ViewEdit::Action::kDelete;
+    page_->SendText(EditedMessage(edit, is_delete ? Delete(client_, edit) : Append(client_, edit)));
+  }
+}
 
 }  // namespace hulld

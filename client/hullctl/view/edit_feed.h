@@ -1,28 +1,74 @@
 #ifndef HULLD_CLIENT_HULLCTL_VIEW_EDIT_FEED_H_
 #define HULLD_CLIENT_HULLCTL_VIEW_EDIT_FEED_H_
 
+#include <condition_variable>
+#include <cstddef>
+#include <list>
 #include <memory>
-#include <utility>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <unordered_map>
 
 #include "client/client.h"
 #include "client/hullctl/view/bridge/bridge.h"
-#include "client/hullctl/view/ordered_worker.h"
 #include "client/hullctl/view/protocol.h"
 
 namespace hulld {
 
-// Changes hulls as one page asks, in its order, on a thread of its own, and tells the page how each
-// change ended; what became of the hull comes with the watch that follows it. Any thread may call
-// it. For `hullctl view --edit` alone.
+// Edits that wait. Those of one hull keep their order; one that is like the last that waits of its
+// hull joins it: points are appended together, and deleting twice is deleting once. Hulls take
+// turns in the order of their oldest edits. Not thread-safe.
+class EditQueue {
+ public:
+  // More than so many numbers of points do not wait, about 100 MB. A choice: a page sends 4 MiB at
+  // a time at most (BridgeOptions::max_message_bytes).
+  static constexpr size_t kMostNumbers = size_t{12} << 20;
+
+  // Whether it was taken: there is room for it.
+  [[nodiscard]] bool Add(ViewEdit edit);
+  bool empty() const { return edits_.empty(); }
+  // Requires that it is not empty.
+  ViewEdit Take();
+
+ private:
+  using Edits = std::list<ViewEdit>;
+
+  // What an edit counts, so that those without points count as well.
+  static size_t NumbersOf(const ViewEdit& edit) { return edit.points.size() + 64; }
+
+  Edits edits_;
+  // The last edit of each hull that has one.
+  std::unordered_map<std::string, Edits::iterator> last_;
+  size_t numbers_ = 0;
+};
+
+// Changes hulls as one page asks, each hull's changes in their order, on a thread of its own, and
+// tells the page how each change ended; what became of the hull comes with the watch that follows
+// it. Changes that wait may be made as one (EditQueue). Any thread may call it. For `hullctl view
+// --edit` alone.
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);
+  // Makes the changes that wait: who asked for them and closed the page meant them.
+  ~EditFeed();
+  EditFeed(const EditFeed&) = delete;
+  EditFeed& operator=(const EditFeed&) = delete;
 
-  void Ask(ViewEdit edit) { worker_.Ask(std::move(edit)); }
+  // Does not wait. The page is told where too much waits already to take this one.
+  void Ask(ViewEdit edit);
 
  private:
-  // Waits for the change that is under way; those behind it are dropped.
-  OrderedWorker<ViewEdit> worker_;
+  void Run();
+
+  const Client& client_;
+  const std::shared_ptr<PageChannel> page_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  // Guarded by the mutex.
+  EditQueue waiting_;
+  bool ended_ = false;
+  std::thread thread_;
 };
 
 }  // namespace hulld

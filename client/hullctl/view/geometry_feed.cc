@@ -31,8 +31,9 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const Geomet
 
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)
     : files_(std::make_shared<ShapeFiles>()),
-      worker_(kMostWishes, [&client, page = std::move(page)](const Order& order) {
-        return page->SendBinary(FrameFor(client, *order.files, order.wish));
+      page_(std::move(page)),
+      worker_(kMostWishes, [&client, this](const Order& order) {
+        return page_->SendBinary(FrameFor(client, *order.files, order.wish));
       }) {}
 
 void GeometryFeed::Show(const ShapeFiles& files) {
@@ -43,7 +44,10 @@ void GeometryFeed::Show(const ShapeFiles& files) {
 
 void GeometryFeed::Ask(const std::vector<GeometryWish>& wishes) {
   const std::lock_guard lock(mutex_);
-  for (const GeometryWish& wish : wishes) worker_.Ask({wish, files_});
+  for (const GeometryWish& wish : wishes) {
+    if (worker_.Ask({wish, files_})) continue;
+    page_->SendBinary(MissingFrame(wish, "too many shapes wait to be sent"));
+  }
 }
 
 }  // namespace hulld

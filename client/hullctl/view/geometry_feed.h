@@ -36,6 +36,7 @@ class GeometryFeed {
   std::mutex mutex_;
   // Guarded by the mutex.
   std::shared_ptr<const ShapeFiles> files_;
+  const std::shared_ptr<PageChannel> page_;
   // Waits for the shape that is under way.
   OrderedWorker<Order> worker_;
 };

@@ -16,8 +16,8 @@ namespace hulld {
 template <typename Work>
 class OrderedWorker {
  public:
-  // `most`: more than that many do not wait; they are dropped. `work` is done until it returns
-  // false, and nothing after that.
+  // `most`: more than that many do not wait. `work` is done until it returns false, and nothing
+  // after that.
   OrderedWorker(size_t most, std::function<bool(const Work&)> work)
       : most_(most), work_(std::move(work)), thread_([this] { Run(); }) {}
   // Waits for the work that is under way; what waits is dropped.
@@ -32,13 +32,15 @@ class OrderedWorker {
   OrderedWorker(const OrderedWorker&) = delete;
   OrderedWorker& operator=(const OrderedWorker&) = delete;
 
-  void Ask(Work work) {
+  // Whether it will be done: there was room for it.
+  [[nodiscard]] bool Ask(Work work) {
     {
       const std::lock_guard lock(mutex_);
-      if (waiting_.size() >= most_) return;
+      if (waiting_.size() >= most_) return false;
       waiting_.push_back(std::move(work));
     }
     changed_.notify_all();
+    return true;
   }
   // Drops what waits.
   void Forget() {

@@ -33,7 +33,8 @@ namespace hulld {
 //              now. While a question waits, the next one takes its place, its poses added. `answer`
 //              and `collisions` answer it.
 //   edit       {action: "append"|"delete", hullId, points}: changes a hull; `points` are three
-//              numbers each. Refused unless `hello` says that the page may. `edited` answers it.
+//              numbers each. Refused unless `hello` says that the page may. `edited` answers it;
+//              while edits of one hull wait, one answer may be that of several.
 //
 // The bridge to the page:
 //   hello      {server, version, up, edit, scenes: [{key, title}]}, first; edit: whether the page

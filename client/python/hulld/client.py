@@ -56,7 +56,9 @@ class Client:
     """A connection to hulld. Connects when first used; any thread may call it. A context manager,
     which closes it.
 
-    server: HOST:PORT, or any other target name of gRPC, as in "unix:/run/hulld.sock". timeout:
+    server: HOST:PORT; several over one store, among which calls go round, as in
+    "10.0.0.1:50551,10.0.0.2:50551" or "dns:///hulls.example:50551"; or any other target name of
+    gRPC, as in "unix:/run/hulld.sock". timeout:
     seconds for each call, its retries included; None: no bound. Each method takes one of its own.
     For appenders and collision streams it bounds each wait instead, for watches the search for a
     server that was lost. retry: how often calls that are safe to repeat are
@@ -92,9 +94,9 @@ class Client:
             (grpc.experimental.ChannelOptions.SingleThreadedUnaryStream, 1),
         ]
         self._channel = (
-            grpc.insecure_channel(server, options)
+            grpc.insecure_channel(self._connection.target, options)
             if credentials is None
-            else grpc.secure_channel(server, credentials, options)
+            else grpc.secure_channel(self._connection.target, credentials, options)
         )
         self._calls: dict[str, Any] = {}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+import json
 import os
 import pathlib
 import stat
@@ -12,6 +13,10 @@ from typing import Any, Union
 import grpc
 
 DEFAULT_SERVER = "127.0.0.1:50551"
+#: For several servers: in turn, and only to those that report that they serve.
+_SPREAD_CALLS = json.dumps(
+    {"loadBalancingConfig": [{"round_robin": {}}], "healthCheckConfig": {"serviceName": ""}}
+)
 #: The server cuts its replies at about 1 MiB. This bounds the memory that a faulty one can claim.
 _MAX_RECEIVE_BYTES = 64 << 20
 
@@ -49,6 +54,12 @@ class Connection:
     insecure: bool = False
 
     def __post_init__(self) -> None:
+        _ = self.target
+        if self.tls is not None and not self.tls.server_name and _is_list(self.server):
+            raise ValueError(
+                "several addresses have certificates for one name: say which, with "
+                "tls=hulld.Tls(server_name=...)"
+            )
         if self.token is None:
             return
         if not self.token or not all("!" <= character <= "~" for character in self.token):
@@ -58,6 +69,13 @@ class Connection:
                 f"the token would travel unencrypted to {self.server}, where everyone on the way "
                 "could read it; use tls=hulld.Tls(), or allow it with insecure=True"
             )
+
+    @property
+    def target(self) -> str:
+        """What gRPC calls the server. ValueError: a list of what is not addresses of one kind."""
+        if not _is_list(self.server):
+            return self.server
+        return f"ipv{_ip_version(self.server)}:{self.server}"
 
     def metadata(self) -> tuple[tuple[str, str], ...]:
         """What goes with each call."""
@@ -73,6 +91,8 @@ class Connection:
             ("grpc.initial_reconnect_backoff_ms", 50),
             ("grpc.max_reconnect_backoff_ms", 1000),
         ]
+        if _is_list(self.server) or self.server.startswith("dns:///"):
+            options.append(("grpc.service_config", _SPREAD_CALLS))
         if is_loopback(self.server):
             # Otherwise gRPC uses the proxy of the environment even for services on this machine.
             options.append(("grpc.enable_http_proxy", 0))
@@ -94,17 +114,49 @@ class Connection:
 
 
 def is_loopback(server: str) -> bool:
-    """Whether gRPC's target name stays on this machine."""
-    if server.startswith(("unix:", "[::1]:")):
-        return True
-    host = server.rpartition(":")[0]
-    if host == "localhost":
-        return True
-    # An address, not a name that begins like one.
+    """Whether every server that it names is on this machine. False for what only DNS can tell."""
+    return server.startswith("unix:") or all(
+        _is_loopback_host(one.rpartition(":")[0]) for one in server.split(",")
+    )
+
+
+def _is_list(server: str) -> bool:
+    return "," in server and not server.startswith("unix:") and ":///" not in server
+
+
+def _ip_version(servers: str) -> int:
+    versions = set()
+    for one in servers.split(","):
+        host, _, port = one.rpartition(":")
+        if not host or not port.isdecimal():
+            raise ValueError(
+                f"{one!r} is not ADDRESS:PORT; a list reads 10.0.0.1:50551,10.0.0.2:50551"
+            )
+        address = _address(host)
+        if address is None:
+            raise ValueError(
+                f"{host!r} is a name, and a list takes IP addresses; several servers may also "
+                "have one name in DNS, as in dns:///hulls.example:50551"
+            )
+        versions.add(address.version)
+    if len(versions) > 1:
+        raise ValueError(f"{servers!r} lists addresses of IPv4 and of IPv6; use one kind")
+    return versions.pop()
+
+
+def _address(host: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        return host.startswith("127.") and ipaddress.IPv4Address(host).is_loopback
+        if host.startswith("[") and host.endswith("]"):
+            return ipaddress.IPv6Address(host[1:-1])
+        return ipaddress.IPv4Address(host)
     except ValueError:
-        return False
+        return None
+
+
+def _is_loopback_host(host: str) -> bool:
+    # An address, not a name that begins like one.
+    address = _address(host)
+    return host == "localhost" or (address is not None and address.is_loopback)
 
 
 def read_token_file(path: PathLike) -> str:

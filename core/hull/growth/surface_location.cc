@@ -64,8 +64,9 @@ size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& 
   for (uint32_t k = 0; k < 3; ++k) {
     const uint32_t i = (first.value_or(0) + k) % 3;
     if (turns[i] > ray.bound) continue;
+    // The center comes last: seen from a corner, the other and the point may be near.
     if (turns[i] < -ray.bound ||
-        Orient3d(center, vertices[t.corners[i]], vertices[t.corners[(i + 1) % 3]], point) < 0) {
+        Orient3d(vertices[t.corners[i]], vertices[t.corners[(i + 1) % 3]], point, center) > 0) {
       return i;
     }
   }

@@ -12,13 +12,14 @@
 namespace hulld {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 // Cells along a side of a face, a power of two so that corners are exact. A choice: with it half of
 // the pairs of round hulls of 512 vertices a few percent apart are settled, and nearly all that are
 // deep in each other (observed: relation/ of tests/bench/queries/query_benchmark).
 constexpr uint32_t kCoarseSide = 2;
 constexpr uint32_t kFineSide = 8;
+// A word has a bit for each cell of a face.
+static_assert(kFineSide * kFineSide <= 64);
 uint32_t SideFor(size_t vertices) { return vertices < 24 ? kCoarseSide : kFineSide; }
 // With more cells than this along a side the gauge is made at every other corner.
 constexpr uint32_t kMostGaugedCells = 4;
@@ -43,7 +44,7 @@ float RoundedUp(double value) {
   if (!(static_cast<double>(rounded) < value)) return rounded;
   // Of positive numbers the next one has the next bits.
   return rounded > 0 ? std::bit_cast<float>(std::bit_cast<uint32_t>(rounded) + 1)
-                     : std::nextafter(rounded, kInfinity);
+                     : std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
 
 // A corner of a cell: its direction, and the first corner that has the same one, on another face
@@ -96,20 +97,26 @@ bool IsInTetrahedron(const std::array<Vector, 4>& t, const Vector& p) {
          turn * Orient3d(t[0], t[1], t[2], p) >= 0;
 }
 
+// 1 over the width of a hull along each axis.
+Vector PerWidth(const SupportMap& support) {
+  Vector per_width;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vector n = Vector::Unit(axis);
+    per_width[axis] = 1 / (support.Farthest(n).value + support.Farthest(Vector(-n)).value);
+  }
+  return per_width;
+}
+
 // Looks from a point o inside a hull along rays, by the hull's support points alone.
 class Lookout {
  public:
-  Lookout(std::span<const Vector> points, const Vector& o, const SupportMap& support)
+  Lookout(std::span<const Vector> points, const Vector& o, const SupportMap& support,
+          const Vector& per_width)
       : points_(points),
         o_(o),
         support_(support),
-        tilt_(std::min(kMostTilt, kTilt / std::sqrt(static_cast<double>(points.size())))) {
-    for (int axis = 0; axis < 3; ++axis) {
-      const Vector n = Vector::Unit(axis);
-      const double width = support.Farthest(n).value + support.Farthest(Vector(-n)).value;
-      per_width_[axis] = 1 / width;
-    }
-  }
+        tilt_(std::min(kMostTilt, kTilt / std::sqrt(static_cast<double>(points.size())))),
+        per_width_(per_width) {}
 
   // Whether o is in the hull: in a tetrahedron of its points, exactly. May say false of a point
   // near the boundary.
@@ -143,8 +150,10 @@ class Lookout {
   }
 
   // A value t, almost as large as possible, such that o + t d as rounded is in the hull; 0 when
-  // none was found. Requires o in the hull. Fast when the ray is near the last one.
+  // none was found. Requires o in the hull.
   double Reach(const Vector& d) {
+    // What was found for another ray may serve this one, but then t would depend on the order.
+    found_ = false;
     // Rays through corners and edges, as symmetric hulls have many, would have no portal of their
     // own: one beside them is looked for, on the other side if the first will not do.
     constexpr double kBeside = 0x1p-24;
@@ -270,7 +279,7 @@ class Lookout {
   const SupportMap& support_;
   // How far GuessPortal looks to the sides.
   const double tilt_;
-  Vector per_width_;
+  const Vector per_width_;
   // The portal: points of the hull and, relative to o, where they are; turning left seen from
   // outside.
   bool found_ = false;
@@ -295,61 +304,80 @@ CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const 
   half_ = 0.5 * side_;
   unit_ = std::ldexp(1.0, std::ilogb(radius));
   per_unit_ = 1 / unit_;
-  corners_.resize(size_t{6} * (side_ + 1) * (side_ + 1), {kInfinity, kUnknown});
-  AddSupports(center, radius, support);
-  AddGauges(points, center, max_abs, support);
+  making_ = std::make_unique<Making>();
+  making_->points = points;
+  making_->center = center;
+  making_->radius = radius;
+  making_->max_abs = max_abs;
+  making_->support = &support;
 }
 
-void CenterBounds::AddSupports(const Vector& center, double radius, const SupportMap& support) {
-  const double margin = kCenterMargin * radius;
-  const std::span<const CornerPlace> places = Corners(side_);
-  for (uint32_t i = 0; i < corners_.size(); ++i) {
-    const auto& [n, twin] = places[i];
-    if (twin != i) {
-      corners_[i].support = corners_[twin].support;
-      continue;
-    }
-    const double reach = support.Farthest(n).value - n.dot(center);
-    corners_[i].support = RoundedUp((reach + margin) * per_unit_);
-  }
-}
-
-void CenterBounds::AddGauges(std::span<const Vector> points, const Vector& center, double max_abs,
-                             const SupportMap& support) {
-  Lookout lookout(points, center, support);
-  if (!lookout.IsInside()) return;
-  const std::span<const CornerPlace> places = Corners(side_);
+void CenterBounds::MakeCell(uint32_t face, uint32_t i, uint32_t j) const {
+  const std::lock_guard lock(making_->mutex);
+  if (making_->corners.empty()) Begin();
   const uint32_t row = side_ + 1;
-  const uint32_t step = side_ > kMostGaugedCells ? 2 : 1;
-  double least = std::numeric_limits<double>::infinity();
-  for (uint32_t line = 0; line < 6 * row && least > 0; line += line % row == side_ ? 1 : step) {
-    for (uint32_t i = line * row; i <= line * row + side_ && least > 0; i += step) {
-      if (places[i].twin != i) {
-        corners_[i].gauge = corners_[places[i].twin].gauge;
-        continue;
-      }
-      const double t = lookout.Reach(places[i].direction);
-      least = std::min(least, t);
-      if (t > 0) corners_[i].gauge = RoundedUp((1 + kCenterMargin) * unit_ / t);
-    }
+  const auto first = static_cast<uint32_t>(CubeCell(face, row, i, j));
+  for (const uint32_t corner : {first, first + 1, first + row, first + row + 1}) {
+    MakeSupport(corner);
+    if (making_->largest_gauge < kInfinity) MakeGauge(corner);
   }
-  // All or none: only a centre that is surrounded is strictly inside, up to rounding.
-  if (!(least >= kCenterLeastRadius * max_abs)) {
-    for (Corner& corner : corners_) corner.gauge = kUnknown;
-    return;
+  making_->cells[face].fetch_or(uint64_t{1} << (i * side_ + j), std::memory_order_release);
+}
+
+// Makes room for the corners and finds the largest gauge: that of the cube's eight own corners, as
+// the gauge is convex on each face. It stays unknown unless the centre is certain to be inside.
+void CenterBounds::Begin() const {
+  making_->corners.resize(corner_count(), {kUnknown, kUnknown});
+  making_->per_width = PerWidth(*making_->support);
+  Lookout lookout(making_->points, making_->center, *making_->support, making_->per_width);
+  if (!lookout.IsInside()) return;
+  double least = kInfinity;
+  for (uint32_t octant = 0; octant < 8; ++octant) {
+    const auto sign = [octant](uint32_t axis) { return (octant >> axis & 1) == 0 ? 1.0 : -1.0; };
+    least = std::min(least, lookout.Reach(Vector(sign(0), sign(1), sign(2))));
+    // Only a centre that is surrounded is strictly inside, up to rounding.
+    if (!(least > 0 && least >= kCenterLeastRadius * making_->max_abs)) return;
   }
-  largest_gauge_ = (1 + kCenterMargin) / least;
-  if (step == 1) return;
-  for (uint32_t i = 0; i < corners_.size(); ++i) {
-    const uint32_t down = i / row % row % 2 * row;
-    const uint32_t right = i % row % 2;
-    if (down == 0 && right == 0) continue;
-    // The mean of the two or four around it, which are as far on either side.
-    const auto gauge = [&](uint32_t corner) { return double{corners_[corner].gauge}; };
-    const double sum = gauge(i - down - right) + gauge(i - down + right) + gauge(i + down - right) +
-                       gauge(i + down + right);
-    corners_[i].gauge = RoundedUp(0.25 * sum);
+  making_->largest_gauge = (1 + kCenterMargin) / least;
+}
+
+void CenterBounds::MakeSupport(uint32_t corner) const {
+  std::vector<Corner>& corners = making_->corners;
+  const auto& [n, twin] = Corners(side_)[corner];
+  if (std::isnan(corners[twin].support)) {
+    const double margin = kCenterMargin * making_->radius;
+    const double reach = making_->support->Farthest(n).value - n.dot(making_->center);
+    corners[twin].support = RoundedUp((reach + margin) * per_unit_);
   }
+  // A twin that is made already may be read by others.
+  if (std::isnan(corners[corner].support)) corners[corner].support = corners[twin].support;
+}
+
+// Requires a largest gauge that is known.
+float CenterBounds::MakeGauge(uint32_t corner) const {
+  std::vector<Corner>& corners = making_->corners;
+  float& gauge = corners[corner].gauge;
+  if (!std::isnan(gauge)) return gauge;
+  const uint32_t row = side_ + 1;
+  if (side_ > kMostGaugedCells) {
+    const uint32_t down = corner / row % row % 2 * row;
+    const uint32_t right = corner % row % 2;
+    if (down != 0 || right != 0) return gauge = MeanGauge(corner, down, right);
+  }
+  const auto& [d, twin] = Corners(side_)[corner];
+  if (!std::isnan(corners[twin].gauge)) return gauge = corners[twin].gauge;
+  Lookout lookout(making_->points, making_->center, *making_->support, making_->per_width);
+  const double t = lookout.Reach(d);
+  // Infinite where nothing was found.
+  gauge = RoundedUp(std::min((1 + kCenterMargin) / t, making_->largest_gauge) * unit_);
+  return corners[twin].gauge = gauge;
+}
+
+// The mean of the two or four around a corner, which are as far on either side.
+float CenterBounds::MeanGauge(uint32_t corner, uint32_t down, uint32_t right) const {
+  const double sum = double{MakeGauge(corner - down - right)} + MakeGauge(corner - down + right) +
+                     MakeGauge(corner + down - right) + MakeGauge(corner + down + right);
+  return RoundedUp(0.25 * sum);
 }
 
 }  // namespace hulld

@@ -2,10 +2,14 @@
 #define HULLD_CORE_QUERY_PLACED_CENTER_BOUNDS_H_
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -27,13 +31,18 @@ namespace hulld {
 // cells of a cube map; on a face of the cube a direction is the bilinear mean of the corners of its
 // cell, and the same mean of their values bounds its own. Where the hull is round, what is lost
 // shrinks with the square of a cell's width.
+//
+// A cell is made when a direction first leads into it: most hulls are looked at from few sides.
+// What it holds does not depend on when it is made. Readable by any thread.
 class CenterBounds {
  public:
   // None: every bound is unknown.
   CenterBounds() = default;
   // Of the hull of some points about a centre. None for one that is flat (`dimension` below 3). The
   // gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
-  // largest absolute coordinate. Cost: some support points for each of 54 or 486 corners.
+  // largest absolute coordinate. The points and the support map must outlive the bounds and stay in
+  // place. Cost: O(V) comparisons; of the first direction some 100 support points more, and of the
+  // first in each of 24 or 384 cells some 25.
   CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
                const SupportMap& support);
   CenterBounds(const Hull& hull, const SupportMap& support)
@@ -59,10 +68,14 @@ class CenterBounds {
   // Whether there are few corners or none. Then the bounds say little except about what is deep
   // inside, and the normals say nothing.
   bool coarse() const { return side_ < kLeastFineSide; }
-  // At least g(d) for all d with components of at most 1; infinite where unknown.
-  double largest_gauge() const { return largest_gauge_; }
+  // At least g(d) for all d with components of at most 1; infinite where unknown, as it is before
+  // the first direction.
+  double largest_gauge() const { return making_ == nullptr ? kInfinity : making_->largest_gauge; }
 
-  size_t MemoryBytes() const { return corners_.capacity() * sizeof(Corner); }
+  // With all cells. Bytes.
+  size_t MemoryBytes() const {
+    return making_ == nullptr ? 0 : sizeof(Making) + corner_count() * sizeof(Corner);
+  }
 
  private:
   // Cells along a side of a face. Observed: guessing a normal from fewer does not pay.
@@ -74,18 +87,46 @@ class CenterBounds {
     float gauge;
   };
 
-  void AddSupports(const Vector& center, double radius, const SupportMap& support);
-  void AddGauges(std::span<const Vector> points, const Vector& center, double max_abs,
-                 const SupportMap& support);
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-  // (side_ + 1)^2 corners for each of the six faces.
-  std::vector<Corner> corners_;
+  // What cells are made from, and those that are made.
+  struct Making {
+    std::span<const Vector> points;
+    Vector center;
+    double radius;
+    double max_abs;
+    const SupportMap* support;
+
+    // By face, a bit for each cell, by rows: whether its corners are made. Whoever sees a bit may
+    // read these corners, and the largest gauge.
+    std::array<std::atomic<uint64_t>, 6> cells = {};
+    // Held by whoever makes a cell.
+    std::mutex mutex;
+    // (side + 1)^2 for each of the six faces; none before the first cell is made.
+    std::vector<Corner> corners;
+    double largest_gauge = kInfinity;
+    // 1 over the hull's width along each axis.
+    Vector per_width;
+  };
+
+  size_t corner_count() const { return size_t{6} * (side_ + 1) * (side_ + 1); }
+  void NeedCell(uint32_t face, uint32_t i, uint32_t j) const {
+    const uint64_t made = making_->cells[face].load(std::memory_order_acquire);
+    if ((made >> (i * side_ + j) & 1) == 0) [[unlikely]]
+      MakeCell(face, i, j);
+  }
+  void MakeCell(uint32_t face, uint32_t i, uint32_t j) const;
+  void Begin() const;
+  void MakeSupport(uint32_t corner) const;
+  float MakeGauge(uint32_t corner) const;
+  float MeanGauge(uint32_t corner, uint32_t down, uint32_t right) const;
+
+  std::unique_ptr<Making> making_;
   uint32_t side_ = 0;
   double half_ = 0;
   // A power of two near the hull's radius.
   double unit_ = 1;
   double per_unit_ = 1;
-  double largest_gauge_ = std::numeric_limits<double>::infinity();
 };
 
 class CenterBounds::Place {
@@ -105,7 +146,7 @@ class CenterBounds::Place {
 
 inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   Place place;
-  if (corners_.empty()) return place;
+  if (making_ == nullptr) return place;
   const OnCube on_cube(n.x, n.y, n.z);
   // A direction turned into a hull's frame is at most sqrt(3) times longer or shorter.
   HULLD_DCHECK(IsFilterDirection(2 * on_cube.largest()) ||
@@ -122,7 +163,9 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   const uint32_t i = std::min(static_cast<uint32_t>(static_cast<int32_t>(u)), last);
   const uint32_t j = std::min(static_cast<uint32_t>(static_cast<int32_t>(v)), last);
   const uint32_t row = side_ + 1;
-  place.low = corners_.data() + CubeCell(CubeFace(place.axis, place.negative), row, i, j);
+  const uint32_t face = CubeFace(place.axis, place.negative);
+  NeedCell(face, i, j);
+  place.low = making_->corners.data() + CubeCell(face, row, i, j);
   place.high = place.low + row;
   // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
   place.s = std::clamp(u - i, 0.0, 1.0);
@@ -152,9 +195,7 @@ inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
 // The gradient of the gauge per unit, which on a face is the largest component times a function of
 // the others over it.
 inline PlainVector CenterBounds::NormalAt(const Place& place) const {
-  if (coarse() || !(largest_gauge_ < std::numeric_limits<double>::infinity())) {
-    return {0, 0, 0};
-  }
+  if (coarse() || !(largest_gauge() < kInfinity)) return {0, 0, 0};
   const double corner = place.low[0].gauge;
   const double along_low = place.low[1].gauge - corner;
   const double along_high = double{place.high[1].gauge} - place.high[0].gauge;

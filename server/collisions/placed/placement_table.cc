@@ -80,9 +80,9 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
   const auto hulls = static_cast<uint32_t>(packed.hull_ids_size());
   for (int i = 0; i < packed.hulls_size(); ++i) {
     if (packed.hulls(i) >= hulls) {
-      return absl::InvalidArgumentError(absl::StrCat("packed_placements.hulls[", i, "] is ",
-                                                     packed.hulls(i), ", but hull_ids holds ",
-                                                     hulls, "; indices start at 0"));
+      return absl::InvalidArgumentError(
+          absl::StrCat("packed_placements.hulls[", i, "] is ", packed.hulls(i),
+                       ", but packed_placements.hull_ids holds ", hulls, "; indices start at 0"));
     }
   }
   return absl::OkStatus();
@@ -445,6 +445,10 @@ absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>&
   return moves;
 }
 
+std::string ThereArePlacements(size_t count) {
+  return count == 1 ? "there is 1 placement" : absl::StrCat("there are ", count, " placements");
+}
+
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,
                            size_t placements, uint64_t max_pairs, const char* what) {
   if (pairs.size() % 2 != 0) {
@@ -458,8 +462,8 @@ absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pair
   }
   for (int i = 0; i < pairs.size(); ++i) {
     if (pairs[i] >= placements) {
-      return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", pairs[i],
-                                                     ", but placements holds ", placements,
+      return absl::InvalidArgumentError(absl::StrCat("pairs[", i, "] is ", pairs[i], ", but ",
+                                                     ThereArePlacements(placements),
                                                      "; indices start at 0"));
     }
   }

@@ -194,6 +194,10 @@ using Moves = std::vector<std::pair<uint32_t, Pose>>;
 absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
                                 const google::protobuf::RepeatedField<double>& poses, size_t count);
 
+// How errors say how many placements there are: packed or not, so that no field is named that the
+// caller did not send.
+std::string ThereArePlacements(size_t count);
+
 // INVALID_ARGUMENT: an odd number of indices, or one out of range. RESOURCE_EXHAUSTED: more than
 // max_pairs (--max-pairs-per-batch).
 absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pairs,

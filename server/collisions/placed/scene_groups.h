@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/query/scene/scene.h"
+#include "server/collisions/placement_table.h"
 
 // Which pairs of a scene are asked about. Scene: a message with the groups and movers of a
 // v1::FindCollisionsRequest.
@@ -36,7 +37,7 @@ absl::Status ValidateGroups(const Scene& scene, size_t placements) {
   }
   if (scene.movers() > placements) {
     return absl::InvalidArgumentError(
-        absl::StrCat("movers is ", scene.movers(), ", but placements holds ", placements));
+        absl::StrCat("movers is ", scene.movers(), ", but ", ThereArePlacements(placements)));
   }
   return absl::OkStatus();
 }

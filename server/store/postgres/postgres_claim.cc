@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/store/postgres/postgres_store.h"
+#include "server/store/store_errors.h"
 
 namespace hulld::server {
 namespace {
@@ -28,7 +29,13 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   if (format->count() != 1 || !absl::SimpleAtoi(std::string(format->at(0, 0)), &number)) {
     return absl::DataLossError("the row of hulld.store is missing");
   }
-  if (number <= kFormat) return true;
+  if (number <= kFormat) {
+    const absl::StatusOr<Rows> mark =
+        session.Run("SELECT to_regclass('hulld.migration') IS NOT NULL");
+    if (!mark.ok()) return mark.status();
+    if (options_.migrating || mark->at(0, 0) != "t") return true;
+    return UnfinishedMigration();
+  }
   return absl::FailedPreconditionError(absl::StrCat("it was written in format ", number,
                                                     "; this hulld knows format ", kFormat,
                                                     " at most; run the hulld that wrote it"));

@@ -26,6 +26,8 @@ constexpr std::chrono::milliseconds kLongestTurnPause{250};
 // own epoch as `written_in`, and store_fence refuses it when that is not the same. `relaxed`: with
 // synchronous_commit = off, from the start of a server until it ends in order.
 //
+// hulld.migration is there while a migration fills the store, and names its source.
+//
 // hulld.epochs tells what each epoch began with. The other tables hold what store_keys.h lists, by
 // the ID of the hull or body first; an incarnation is a create_revision. record, body, sequence and
 // vertices are sealed values. Coordinates do not compress, hence EXTERNAL.
@@ -136,7 +138,10 @@ constexpr char kPrepareReads[] = R"(
       ORDER BY revision;
     PREPARE hulld_sequence(text, bigint, text) AS
       SELECT sequence FROM hulld.writers
-      WHERE hull_id = $1 AND incarnation = $2 AND writer_id = $3;)";
+      WHERE hull_id = $1 AND incarnation = $2 AND writer_id = $3;
+    PREPARE hulld_writers(text, bigint) AS
+      SELECT writer_id, sequence FROM hulld.writers
+      WHERE hull_id = $1 AND incarnation = $2 ORDER BY writer_id;)";
 
 // Machine and process for an operator; the rest makes it unique.
 std::string OwnerName() {

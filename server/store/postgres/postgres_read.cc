@@ -103,12 +103,25 @@ absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
   const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
   if (!rows.ok()) return rows.status();
   if (rows->front().count() == 0) return 0;
-  const absl::StatusOr<std::string_view> value =
-      Unseal(WriterKey(incarnation, writer_id), rows->front().at(0, 0));
-  const absl::StatusOr<uint64_t> sequence = value.ok() ? DecodeNumber(*value) : value.status();
-  if (sequence.ok()) return sequence;
-  return DamagedHull(hull.hull_id,
-                     absl::StrCat("a writer's sequence: ", sequence.status().message()));
+  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), rows->front().at(0, 0));
+}
+
+absl::StatusOr<std::vector<WriterSequence>> PostgresStore::LoadWriters(const StoredHull& hull) {
+  const std::string& id = hull.record.hull_id;
+  const uint64_t incarnation = hull.record.create_revision;
+  std::vector<Statement> statements(1);
+  statements[0] = {.name = "hulld_writers", .parameters = {id, EncodeBigint(incarnation)}};
+  const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+  if (!rows.ok()) return rows.status();
+  std::vector<WriterSequence> writers;
+  for (int i = 0; i < rows->front().count(); ++i) {
+    const std::string writer_id(rows->front().at(i, 0));
+    const absl::StatusOr<uint64_t> sequence =
+        UnsealSequence(id, WriterKey(incarnation, writer_id), rows->front().at(i, 1));
+    if (!sequence.ok()) return sequence.status();
+    writers.push_back({writer_id, *sequence});
+  }
+  return writers;
 }
 
 }  // namespace hulld::server

@@ -30,6 +30,8 @@ struct PostgresOptions {
   std::string conninfo;
   // Takes the store from the server that is active, instead of waiting for its end.
   bool take_over = false;
+  // Opens a store that a migration has not finished, too.
+  bool migrating = false;
   // Asked while this waits for the active server; may be empty.
   std::function<bool()> should_stop;
   // How long nothing may come from the database while an answer is due. Longer than kLockTime.
@@ -78,6 +80,7 @@ class PostgresStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
+  absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;
   absl::Status Commit(std::span<const Change* const> changes) override;
   absl::Status Recover() override;
   StoreFailures failures() const override {

@@ -68,7 +68,8 @@ void CountSigns(benchmark::State& state, Build build, const std::vector<Vector>&
   const OrientationCounts before = ThreadOrientationCounts();
   benchmark::DoNotOptimize(build(points));
   const OrientationCounts after = ThreadOrientationCounts();
-  state.counters["filter_signs"] = static_cast<double>(after.filter - before.filter);
+  state.counters["filter_signs"] = static_cast<double>(after.filter + after.nearest_filter -
+                                                       before.filter - before.nearest_filter);
   state.counters["fixed_point_signs"] = static_cast<double>(after.fixed_point - before.fixed_point);
   state.counters["expansion_signs"] = static_cast<double>(after.expansion - before.expansion);
   state.counters["integer_signs"] = static_cast<double>(after.integer - before.integer);

@@ -122,6 +122,21 @@ def test_no_server_is_unavailable(connect: Any, tmp_path: Any) -> None:
     assert caught.value.reason is None and caught.value.request_id is None
 
 
+def test_calls_go_round_and_to_those_that_are_left(connect: Any, fake: FakeHulld) -> None:
+    with FakeHulld() as other:
+        client = connect(f"{fake.address},{other.address}", retry=QUICK, timeout=20)
+        while not (fake.calls and other.calls):
+            client.get_status()
+        before = len(fake.calls), len(other.calls)
+        for _ in range(20):
+            client.get_status()
+        assert (len(fake.calls) - before[0], len(other.calls) - before[1]) == (10, 10)
+    before = len(fake.calls), 0
+    for _ in range(20):
+        client.get_status()
+    assert len(fake.calls) - before[0] == 20
+
+
 def test_a_mesh_that_breaks_off_is_read_anew(caller: Any, fake: FakeHulld) -> None:
     fake.script = [lambda context: None, unavailable]
     assert caller.get_hull_mesh("a").vertices.tolist() == [[0, 0, 0], [1, 1, 1]]

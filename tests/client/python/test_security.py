@@ -155,6 +155,8 @@ def test_a_token_is_not_sent_where_all_can_read_it() -> None:
         ("[::1]:1", True),
         ("localhost:1", True),
         ("127.9.9.9:1", True),
+        ("127.0.0.1:1,127.0.0.1:2", True),
+        ("127.0.0.1:1,10.0.0.1:1", False),
         ("127.0.0.1.example:1", False),
         ("10.0.0.1:1", False),
         ("hulld.example:1", False),
@@ -162,6 +164,24 @@ def test_a_token_is_not_sent_where_all_can_read_it() -> None:
 )
 def test_only_this_machine_is_this_machine(server: str, here: bool) -> None:
     assert is_loopback(server) == here
+
+
+@pytest.mark.parametrize(
+    ("servers", "problem"),
+    [
+        ("a.example:1,b.example:1", "dns:///hulls.example:50551"),
+        ("10.0.0.1:1,[::1]:1", "use one kind"),
+        ("10.0.0.1:1,", "is not ADDRESS:PORT"),
+    ],
+)
+def test_lists_that_cannot_be_say_what_can(servers: str, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        hulld.Client(servers)
+
+
+def test_a_certificate_for_several_addresses_needs_a_name() -> None:
+    with pytest.raises(ValueError, match="server_name"):
+        hulld.Client("10.0.0.1:1,10.0.0.2:1", tls=hulld.Tls())
 
 
 def test_a_token_file_is_for_its_owner_alone(tmp_path: pathlib.Path) -> None:

@@ -273,8 +273,11 @@ std::vector<Extreme> MakeExtremes() {
   });
   add("sliver_blade", kAny, [](int n) { return Stretched(Sphere(n, 1), {1, 1e-12, 1e-24}); });
   add("mixed_1e60", kAny, [](int n) { return MixedMagnitudes(n, 60); });
-  add("mixed_1e300", kIntegers, [](int n) { return MixedMagnitudes(n, 300); });
-  add("mixed_nested_scales", kIntegers, NestedScales);
+  add("mixed_1e300", kAny, [](int n) { return MixedMagnitudes(n, 300); });
+  add("mixed_nested_scales", kAny, NestedScales);
+  add("mixed_tilted_plane", kIntegers, [](int n) {
+    return Stretched(PlaneWithRounding(n), {0x1p-900, 1, 0x1p900});
+  });
   add("mixed_tiny_clusters", kAny, TinyClusters);
   add("order_sorted", kAny, [](int n) { return SortedAlongX(Sphere(n, 1)); });
   add("order_both_ends", kAny, [](int n) { return FromBothEnds(SortedAlongX(Sphere(n, 1))); });

@@ -85,6 +85,7 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
   }
   const OrientationCounts after = ThreadOrientationCounts();
   EXPECT_GT(after.filter - before.filter, 1000u);
+  EXPECT_GT(after.nearest_filter - before.nearest_filter, 1000u);
   EXPECT_GT(after.fixed_point - before.fixed_point, 1000u);
   EXPECT_GT(after.expansion - before.expansion, 1000u);
   // A common power of two takes no integers.
@@ -122,6 +123,57 @@ TEST(Orient3d, ExactWhereAxesAreFarApart) {
   }
 }
 
+// Two or three of the points close together, whichever they are, and the others far off: the
+// determinant is far below what differences from a far point err by. No exact arithmetic is needed.
+TEST(Orient3d, NearPointsAreSeenFromOneOfThem) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const auto any = [&](double size) {
+    return Vector(size * unit(random), size * unit(random), size * unit(random));
+  };
+  const OrientationCounts before = ThreadOrientationCounts();
+  for (const double scale : {1.0, 0x1p-1000, 0x1p-500, 0x1p500, 0x1p900}) {
+    for (int i = 0; i < 200; ++i) {
+      // Clusters are a billionth wide.
+      const Vector middle = any(1);
+      const Vector far = any(1);
+      const Vector other = any(1);
+      Points p = {middle + any(1e-9), middle + any(1e-9), far, other};
+      if (i % 2 == 0) p[2] = middle + any(1e-9);
+      if (i % 2 == 1) p[3] = far + any(1e-9);
+      std::shuffle(p.begin(), p.end(), random);
+      for (Vector& v : p) v *= scale;
+      ExpectExact(p);
+    }
+  }
+  const OrientationCounts after = ThreadOrientationCounts();
+  EXPECT_GT(after.nearest_filter - before.nearest_filter, 1000u);
+  EXPECT_LT(after.fixed_point - before.fixed_point + after.expansion - before.expansion, 10u);
+  EXPECT_EQ(after.integer, before.integer);
+}
+
+// Rounding to zero what is far below the others does not lose a sign that is certain, nor makes
+// certain one that is not.
+TEST(Orient3d, MagnitudesFarApartTakeNoIntegersUnlessTheyCount) {
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  std::uniform_int_distribution<int> exponent(-1060, 1020);
+  const OrientationCounts before = ThreadOrientationCounts();
+  for (int i = 0; i < 1000; ++i) {
+    Points p;
+    for (Vector& v : p) {
+      for (int k = 0; k < 3; ++k) v[k] = std::ldexp(unit(random), exponent(random));
+    }
+    // In the plane of the others.
+    if (i % 8 == 0) p[3] = p[0] + (p[1] - p[0]) / 2 + (p[2] - p[0]) / 4;
+    ExpectExact(p);
+  }
+  const OrientationCounts after = ThreadOrientationCounts();
+  EXPECT_GT(after.nearest_filter - before.nearest_filter, 1000u);
+  EXPECT_LT(after.integer - before.integer, 1000u);
+  EXPECT_GT(after.integer - before.integer, 100u);
+}
+
 // Numbers that just fit into the integers of fixed size, and that just do not.
 TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
   const uint64_t seed = 7;
@@ -130,7 +182,7 @@ TEST(Orient3d, ExactAtTheEdgeOfFixedSize) {
   const double values[] = {0x1p60 - 0x1p8, -(0x1p60 - 0x1p8), 0x1p60, 1, -1, 0.5};
   const OrientationCounts before = ThreadOrientationCounts();
   for (const int scale : {-1070, -60, 0, 900}) {
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0; i < 8000; ++i) {
       Points p;
       for (Vector& v : p) {
         for (int k = 0; k < 3; ++k) v[k] = std::ldexp(values[pick(random)], scale);

@@ -383,7 +383,7 @@ TEST_F(BatchCall, MalformedBatchesFailWhole) {
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT, "pairs holds 1 indices");
   request.add_pairs(1);
   ExpectRefused(request, grpc::StatusCode::INVALID_ARGUMENT,
-                "pairs[1] is 1, but placements holds 1");
+                "pairs[1] is 1, but there is 1 placement");
   request.set_pairs(1, 0);
   EXPECT_TRUE(Run(request).status.ok());
   request.set_method(static_cast<v1::Method>(9));

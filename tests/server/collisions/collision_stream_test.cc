@@ -310,7 +310,7 @@ TEST_F(StreamCollisionsCall, ErrorsNameTheMessageAndTheField) {
   ExpectRefused({open, open}, kInvalid, "open came twice");
   ExpectRefused({Open({PlacementOf("cube")}, {0})}, kInvalid, "open: pairs holds 1 indices");
   ExpectRefused({Open({PlacementOf("cube")}, {0, 1})}, kInvalid,
-                "open: pairs[1] is 1, but placements holds 1");
+                "open: pairs[1] is 1, but there is 1 placement");
   auto negative = open;
   negative.mutable_open()->set_tolerance(-1);
   ExpectRefused({negative}, kInvalid, "open: tolerance is -1");

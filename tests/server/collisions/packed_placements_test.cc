@@ -190,14 +190,14 @@ TEST_F(Packed, ErrorsNameTheList) {
   packed->mutable_poses()->RemoveLast();
   packed->set_hulls(0, 1);
   EXPECT_THAT(BatchError(request),
-              HasSubstr("packed_placements.hulls[0] is 1, but hull_ids holds 1"));
+              HasSubstr("packed_placements.hulls[0] is 1, but packed_placements.hull_ids holds 1"));
   packed->set_hulls(0, 0);
   *request.add_placements() = PlacementOf("cube");
   EXPECT_THAT(BatchError(request), HasSubstr("both set"));
   request.clear_placements();
   request.add_pairs(0);
   request.add_pairs(1);
-  EXPECT_THAT(BatchError(request), HasSubstr("pairs[1] is 1, but placements holds 1"));
+  EXPECT_THAT(BatchError(request), HasSubstr("pairs[1] is 1, but there is 1 placement"));
 }
 
 TEST_F(Packed, HullsAndPlacementsAreLimited) {

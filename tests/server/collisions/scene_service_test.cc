@@ -208,7 +208,7 @@ TEST_F(FindCollisionsCall, ErrorsNameTheField) {
   ExpectRefused(request, "ignore_same_group needs groups");
   request = Row({0, 1});
   request.set_movers(3);
-  ExpectRefused(request, "movers is 3, but placements holds 2");
+  ExpectRefused(request, "movers is 3, but there are 2 placements");
   request = Row({0, 1});
   request.set_tolerance(-1);
   ExpectRefused(request, "tolerance is -1");

@@ -1,13 +1,16 @@
 #include "tests/server/harness/hulld_process.h"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
 #include <string_view>
+#include <utility>
 
 namespace hulld::server {
 namespace {
@@ -29,8 +32,11 @@ std::vector<char*> Environment() {
 
 }  // namespace
 
-Process::Process(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), HULLD_PROGRAM);
+Process::Process(std::vector<std::string> arguments)
+    : Process(HULLD_PROGRAM, std::move(arguments)) {}
+
+Process::Process(const std::string& program, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), program);
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) std::abort();
   std::vector<char*> argv;
@@ -41,8 +47,8 @@ Process::Process(std::vector<std::string> arguments) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  ended_ =
-      posix_spawn(&pid_, HULLD_PROGRAM, &actions, nullptr, argv.data(), Environment().data()) != 0;
+  ended_ = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(),
+                       Environment().data()) != 0;
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   errors_ = fdopen(ends[0], "r");
@@ -84,6 +90,20 @@ int Process::Wait() {
 std::string AddressIn(const std::string& line) {
   const size_t start = line.find("listening on ") + 13;
   return line.substr(start, line.find_first_of("\"\n", start) - start);
+}
+
+std::string UnusedAddress() {
+  const int descriptor = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  if (bind(descriptor, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
+      getsockname(descriptor, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+    std::abort();
+  }
+  close(descriptor);
+  return "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
 }
 
 }  // namespace hulld::server

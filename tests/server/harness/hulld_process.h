@@ -9,10 +9,12 @@
 
 namespace hulld::server {
 
-// A hulld whose standard error is read here; killed, if it still runs, with this.
+// A program, hulld, whose standard error is read here; killed, if it still runs, with this.
 class Process {
  public:
   explicit Process(std::vector<std::string> arguments);
+  // Another program than hulld, by its path.
+  Process(const std::string& program, std::vector<std::string> arguments);
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
   ~Process();
@@ -39,6 +41,9 @@ class Process {
 
 // The address in the line in which hulld says that it listens.
 std::string AddressIn(const std::string& line);
+
+// An address of this machine that nothing listens at.
+std::string UnusedAddress();
 
 }  // namespace hulld::server
 

@@ -243,6 +243,27 @@ TEST_F(Observation, TheStoreAndItsCacheReport) {
   EXPECT_GT(Metric("hulld_cache_limit_bytes"), Metric("hulld_cache_bytes"));
 }
 
+TEST_F(Observation, TheMemoryOfReadersAndOfWritersIsToldApart) {
+  Put("a", Cube());
+  EXPECT_EQ(Metric("hulld_cache_reading_bytes"), 0);
+  EXPECT_GT(Metric("hulld_cache_writing_bytes"), 0);
+  // A stream holds its placements and the versions of their hulls.
+  grpc::ClientContext context;
+  auto stream = collisions_->StreamCollisions(&context);
+  v1::StreamCollisionsRequest open;
+  for (const double x : {0., 9.}) *open.mutable_open()->add_placements() = PlacementOf("a", x);
+  for (const uint32_t i : {0, 1}) open.mutable_open()->add_pairs(i);
+  ASSERT_TRUE(stream->Write(open));
+  v1::StreamCollisionsResponse answer;
+  ASSERT_TRUE(stream->Read(&answer));
+  EXPECT_GT(Metric("hulld_cache_reading_bytes"), 0);
+  // In memory alone, no hull is at rest.
+  EXPECT_EQ(Metric("hulld_cache_bytes"),
+            Metric("hulld_cache_reading_bytes") + Metric("hulld_cache_writing_bytes"));
+  stream->WritesDone();
+  ASSERT_TRUE(stream->Finish().ok());
+}
+
 TEST_F(Observation, PairsOfBatchesScenesAndStreamsAreCountedByRung) {
   Put("a", Cube());
   grpc::ClientContext batch_context;

@@ -95,6 +95,31 @@ TEST_F(StoreFault, WhatCannotBeSyncedIsNotAcked) {
   ExpectRefusedThenWell(Fault::kSyncError, absl::StatusCode::kUnavailable, "syncing");
 }
 
+// Each database counts its own, from when it was opened.
+TEST_F(StoreFault, StallsAreCountedOnWhenTheDatabaseIsOpenedAnew) {
+  Start();
+  RocksDbStore& store = hulls_->store();
+  // One file that was not compacted is one too many.
+  const auto stall = [&store] {
+    EXPECT_TRUE(store.db()
+                    .SetOptions({{"level0_file_num_compaction_trigger", "1"},
+                                 {"level0_slowdown_writes_trigger", "1"}})
+                    .ok());
+    EXPECT_TRUE(store.db().Flush(rocksdb::FlushOptions()).ok());
+    return store.disk()->stalls;
+  };
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const uint64_t before = stall();
+  ASSERT_GT(before, 0);
+  files_->SetFault(Fault::kNoSpace);
+  EXPECT_FALSE(hulls_->Create("refused").ok());
+  files_->SetFault(Fault::kNone);
+  ASSERT_TRUE(hulls_->Create("accepted").ok());
+  const uint64_t after = store.disk()->stalls;
+  EXPECT_GE(after, before);
+  EXPECT_GT(stall(), after);
+}
+
 // As a process leaves the store that is killed now, or a machine whose power goes out: what was
 // refused with the words that nothing was changed must not be there. Where that cannot be had, the
 // answer says so.

@@ -85,9 +85,9 @@ class AsyncClient:
         if self._open_channel is None:
             options = self._connection.options()
             self._open_channel = (
-                grpc.aio.insecure_channel(self.server, options)
+                grpc.aio.insecure_channel(self._connection.target, options)
                 if self._credentials is None
-                else grpc.aio.secure_channel(self.server, self._credentials, options)
+                else grpc.aio.secure_channel(self._connection.target, self._credentials, options)
             )
         return self._open_channel
 

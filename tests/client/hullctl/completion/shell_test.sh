@@ -106,6 +106,14 @@ EOF
     expect "a no" "arm/left" "$(hullctl list arm/ --output name)"
     contains "a yes" "arm/left deleted" "$(on_terminal 'y\n' 'hullctl delete --prefix arm/')"
     expect "a yes" "" "$(hullctl list arm/ --output name)"
+    hullctl create cell/stray >/dev/null
+    printf 'prefix: cell/\nhulls:\n  table: {box: [1, 1, 1]}\n' >cell.yaml
+    contains "the question before a prune" "Delete 1 hull (cell/stray)? [y/N]" \
+      "$(on_terminal 'n\n' 'hullctl scene apply cell.yaml --prune')"
+    expect "a no to a prune" "cell/stray" "$(hullctl list cell/ --output name)"
+    contains "a yes to a prune" "cell/stray" "$(on_terminal 'y\n' 'hullctl scene apply cell.yaml --prune')"
+    expect "a yes to a prune" "cell/table" "$(hullctl list cell/ --output name)"
+    hullctl delete cell/table >/dev/null
     contains "colours" $'\e[1mHULL\e[0m' "$(on_terminal '' 'hullctl list')"
     expect "NO_COLOR" "0" "$(NO_COLOR=1 on_terminal '' 'hullctl list' | grep -c $'\e\\[1m')"
     expect "a pipe" "0" "$(hullctl list | grep -c $'\e')"

@@ -55,9 +55,39 @@ TEST_F(HullctlScene, ApplyMendsWhatDiffersAndPrunes) {
             "# 1 hulls are as the file has them\n");
   ran = Ask({"scene", "apply", cell_.path(), "--prune", "--dry-run"});
   EXPECT_THAT(ran.out, HasSubstr("- cell/stray\tto delete\n"));
+  // Without a terminal nobody can be asked.
+  ASSERT_EQ(Ask({"append", "cell/table", far.path()}).code, 0);
+  const std::string before = Ask({"list"}).out;
   ran = Ask({"scene", "apply", cell_.path(), "--prune"});
-  EXPECT_THAT(ran.out, HasSubstr("- cell/stray\tdeleted\n"));
+  EXPECT_EQ(ran.code, 2);
+  EXPECT_THAT(ran.err, HasSubstr("this would delete 1 hull (cell/stray); say --yes"));
+  EXPECT_EQ(Ask({"list"}).out, before);
+  ran = Ask({"scene", "apply", cell_.path(), "--prune", "--yes"});
+  EXPECT_EQ(ran.out,
+            "~ cell/table\treplaced\n- cell/stray\tdeleted\n"
+            "# 1 hulls are as the file has them\n");
   EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell/part\ncell/table\n");
+  // Where there is nothing to delete, there is nothing to ask.
+  EXPECT_EQ(Ask({"scene", "apply", cell_.path(), "--prune"}).code, 0);
+}
+
+// "cell-3" begins the names of another cell, too.
+TEST_F(HullctlScene, OnlyAPrefixThatEndsAPathOwnsWhatIsUnderIt) {
+  for (const char* id : {"cell-3/stray", "cell-30/stray", "cell-3stray"}) Put(id, server::Cube());
+  const std::string before = Ask({"list", "--output", "name"}).out;
+  for (const std::string prefix : {"prefix: cell-3\n", ""}) {
+    const TempFile scene("s.yaml", prefix + "hulls:\n  table: {box: [2, 2, 1]}\n");
+    Ran ran = Ask({"scene", "apply", scene.path(), "--prune", "--yes"});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_THAT(ran.err, HasSubstr("--prune needs a scene whose prefix ends with \"/\""));
+    EXPECT_EQ(Ask({"list", "--output", "name"}).out, before);
+    EXPECT_THAT(Ask({"scene", "diff", scene.path()}).out, testing::Not(HasSubstr("stray")));
+  }
+  const TempFile scene("s.yaml", "prefix: cell-3/\nhulls:\n  table: {box: [2, 2, 1]}\n");
+  EXPECT_EQ(Ask({"scene", "apply", scene.path(), "--prune", "--yes"}).out,
+            "+ cell-3/table\tcreated\n- cell-3/stray\tdeleted\n"
+            "# 0 hulls are as the file has them\n");
+  EXPECT_EQ(Ask({"list", "--output", "name"}).out, "cell-3/table\ncell-30/stray\ncell-3stray\n");
 }
 
 TEST_F(HullctlScene, CheckAnswersWhatTheFileAsks) {
@@ -181,9 +211,11 @@ TEST_F(HullctlSceneBodies, PruneAndDeleteRemoveBodiesBeforeHulls) {
   ASSERT_EQ(Ask({"create", "cell/a"}).code, 0);
   EXPECT_THAT(Ask({"scene", "diff", cell_.path()}).out,
               HasSubstr("? cell/stray\tbody not in the file\n? cell/a\tnot in the file\n"));
-  EXPECT_THAT(Ask({"scene", "apply", cell_.path(), "--prune"}).out,
+  Ran ran = Ask({"scene", "apply", cell_.path(), "--prune"});
+  EXPECT_THAT(ran.err, HasSubstr("would delete 2 bodies and hulls (cell/stray, cell/a)"));
+  EXPECT_THAT(Ask({"scene", "apply", cell_.path(), "--prune", "--yes"}).out,
               HasSubstr("- cell/stray\tbody deleted\n- cell/a\tdeleted\n"));
-  Ran ran = Ask({"scene", "delete", cell_.path()});
+  ran = Ask({"scene", "delete", cell_.path()});
   EXPECT_EQ(ran.code, 2);
   EXPECT_THAT(ran.err, HasSubstr("3 bodies and hulls (cell/ell, cell/bar, cell/cube)"));
   ran = Ask({"scene", "delete", cell_.path(), "--yes", "--output", "name"});

@@ -13,6 +13,7 @@
 #include "core/numeric/orientation.h"
 #include "core/query/placed/live_hull.h"
 #include "core/query/placed/query_hull.h"
+#include "tests/core/checks/extreme_clouds.h"
 #include "tests/core/checks/oracle_bridge.h"
 #include "tests/core/checks/point_sets.h"
 
@@ -111,7 +112,8 @@ TEST(HullCost, UndoingCostsWhatChanges) {
 // Exact signs of all stages that one thread has decided.
 uint64_t SignsSoFar() {
   const OrientationCounts counts = ThreadOrientationCounts();
-  return counts.filter + counts.fixed_point + counts.expansion + counts.integer;
+  return counts.filter + counts.nearest_filter + counts.fixed_point + counts.expansion +
+         counts.integer;
 }
 
 // Two polygons of n corners in parallel planes, which are tilted, exactly: n from -n/2 to n/2 on a
@@ -153,6 +155,27 @@ TEST(HullCost, FacetsOfManyCornersTakeNoQuadraticTime) {
   }
 }
 
+// What exact signs cost, and steps of walks, in units of about 10 ns.
+struct SignCost {
+  double all;
+  // By expansions and integers of any size: signs, not units.
+  uint64_t wide;
+};
+
+template <typename Build>
+SignCost CostOf(Build build) {
+  const OrientationCounts before = ThreadOrientationCounts();
+  const uint64_t steps = build().housekeeping_steps();
+  const OrientationCounts after = ThreadOrientationCounts();
+  const uint64_t expansion = after.expansion - before.expansion;
+  const uint64_t integer = after.integer - before.integer;
+  const uint64_t fast =
+      after.filter - before.filter +
+      3 * (after.nearest_filter + after.fixed_point - before.nearest_filter - before.fixed_point);
+  return {static_cast<double>(fast + 100 * expansion + 1000 * integer + steps),
+          expansion + integer};
+}
+
 HullBuilder BuiltAtOnce(const std::vector<Vector>& points) {
   HullBuilder builder;
   EXPECT_TRUE(builder.Add(points).ok());
@@ -163,6 +186,24 @@ HullBuilder BuiltOneByOne(std::span<const Vector> points) {
   HullBuilder builder;
   for (size_t i = 0; i < points.size(); ++i) EXPECT_TRUE(builder.Add(points.subspan(i, 1)).ok());
   return builder;
+}
+
+// Whatever the cloud, a block costs not much more than its points do one by one, and few signs take
+// expansions or integers of any size.
+TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
+  for (const Extreme& extreme : Extremes()) {
+    for (const int n : {1000, 5000}) {
+      if (extreme.needs == Arithmetic::kIntegers) continue;
+      if (extreme.facets_one_by_one != nullptr && n > 2000) continue;
+      const std::vector<Vector> points = extreme.make(n);
+      const SignCost block = CostOf([&] { return BuiltAtOnce(points); });
+      const SignCost one_by_one = CostOf([&] { return BuiltOneByOne(points); });
+      const auto count = static_cast<double>(points.size());
+      EXPECT_LE(block.all, 2 * one_by_one.all + 4 * count) << extreme.name << " " << n;
+      EXPECT_LE(static_cast<double>(block.wide), 0.5 * count) << extreme.name << " " << n;
+      EXPECT_LE(static_cast<double>(one_by_one.wide), count) << extreme.name << " " << n;
+    }
+  }
 }
 
 // What the server holds of a hull that grew and is asked about, at rest. Bytes for each vertex.

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/numeric/orientation.h"
@@ -109,6 +111,45 @@ TEST(CenterBounds, RoundHullsAreBoundedClosely) {
     n.normalize();
     EXPECT_LT(bounds.Along(n).support, 1.05);
     EXPECT_LT(bounds.Along(n).gauge, 1.2);
+  }
+}
+
+// Cells are made when they are first needed, by whichever thread: what they hold depends on
+// neither.
+TEST(CenterBounds, CellsAreTheSameInWhateverOrderTheyAreMade) {
+  const uint64_t seed = TestSeed(907);
+  Random random(seed);
+  for (const auto& [name, hull] : Solids(random)) {
+    const SupportMap support(hull);
+    std::vector<Vector> directions = Directions(random);
+    const CenterBounds forwards(hull, support);
+    std::vector<CenterBounds::Bounds> expected;
+    for (const Vector& n : directions) expected.push_back(forwards.Along(n));
+    const size_t bytes = forwards.MemoryBytes();
+    const CenterBounds shared(hull, support);
+    EXPECT_EQ(shared.MemoryBytes(), bytes) << name;
+    std::vector<std::vector<CenterBounds::Bounds>> found(4);
+    std::vector<std::thread> threads;
+    for (size_t t = 0; t < found.size(); ++t) {
+      threads.emplace_back([&, t] {
+        found[t].resize(directions.size());
+        for (size_t k = 0; k < directions.size(); ++k) {
+          const size_t i =
+              (t % 2 == 0 ? directions.size() - 1 - k : k + t * 40) % directions.size();
+          found[t][i] = shared.Along(directions[i]);
+        }
+      });
+    }
+    for (std::thread& thread : threads) thread.join();
+    const auto bits = [](double x) { return std::bit_cast<uint64_t>(x); };
+    for (const auto& of_thread : found) {
+      for (size_t i = 0; i < directions.size(); ++i) {
+        ASSERT_EQ(bits(of_thread[i].support), bits(expected[i].support))
+            << name << " seed " << seed;
+        ASSERT_EQ(bits(of_thread[i].gauge), bits(expected[i].gauge)) << name << " seed " << seed;
+      }
+    }
+    EXPECT_EQ(shared.largest_gauge(), forwards.largest_gauge()) << name;
   }
 }
 

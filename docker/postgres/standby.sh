@@ -1,0 +1,13 @@
+#!/bin/bash
+# Runs the standby of docker/compose.many.yaml: copies the primary at the first start, then follows
+# it. PRIMARY is its host name; the arguments go to postgres.
+set -euo pipefail
+if [[ ! -s $PGDATA/PG_VERSION ]]; then
+  until pg_basebackup --pgdata "$PGDATA" --write-recovery-conf --wal-method stream \
+    --checkpoint fast --dbname "host=$PRIMARY user=standby application_name=standby"; do
+    # What a copy that broke off left behind.
+    find "$PGDATA" -mindepth 1 -delete
+    sleep 1
+  done
+fi
+exec postgres "$@"

@@ -1,0 +1,195 @@
+#include "server/migration/migrate.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include "server/access/secret_file.h"
+#include "server/contract/status_map.h"
+#include "server/migration/migration.h"
+#include "server/process/log.h"
+#include "server/store/data_directory.h"
+#include "server/store/postgres/conninfo.h"
+#include "server/store/postgres/postgres_store.h"
+#include "server/store/postgres/session.h"
+#include "server/store/rocksdb_store.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr int kExitFailed = 1;
+constexpr int kExitRefused = 2;
+// Between two lines that say how far it is.
+constexpr std::chrono::seconds kPause{10};
+
+// One end of the copy, as options name it. One of the two is set.
+struct Place {
+  std::string data_dir;
+  std::string conninfo_file;
+
+  bool is_one() const { return data_dir.empty() != conninfo_file.empty(); }
+  std::string Describe() const {
+    return data_dir.empty() ? "PostgreSQL (" + conninfo_file + ")" : data_dir;
+  }
+};
+
+// What opening a store at a place says, in the words of this program.
+absl::Status Explain(const Place& place, const absl::Status& status) {
+  if (status.ok()) return status;
+  if (absl::IsCancelled(status)) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        place.Describe(), ": a hulld is active over this database; end every hulld that uses it"));
+  }
+  return Prefixed(absl::StrCat(place.Describe(), ": "), status);
+}
+
+absl::StatusOr<std::string> ReadConninfo(const Place& place, const char* option) {
+  return ReadSecretFile(place.conninfo_file, option);
+}
+
+// Opening a store that is not there would make one.
+absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data_dir) {
+  RocksDbOptions options;
+  options.data_dir = data_dir;
+  options.read_only = true;
+  if (!std::filesystem::exists(DatabaseDirectory(data_dir))) {
+    return absl::NotFoundError("there is no store of hulld");
+  }
+  if (absl::Status s = RocksDbStore::Open(options).status(); !s.ok()) return s;
+  options.read_only = false;
+  absl::StatusOr<std::unique_ptr<RocksDbStore>> store = RocksDbStore::Open(options);
+  if (!store.ok()) return store.status();
+  return *std::move(store);
+}
+
+absl::StatusOr<std::unique_ptr<Store>> OpenPostgresSource(const std::string& conninfo) {
+  PostgresOptions options;
+  options.conninfo = conninfo;
+  options.should_stop = [] { return true; };
+  const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
+  if (!parsed.ok()) return parsed.status();
+  {
+    const absl::StatusOr<std::unique_ptr<Session>> session =
+        Session::Open(*parsed, options.answer_time);
+    if (!session.ok()) return session.status();
+    const absl::StatusOr<Rows> there =
+        (*session)->Run("SELECT to_regclass('hulld.store') IS NOT NULL");
+    if (!there.ok()) return there.status();
+    if (there->at(0, 0) != "t") return absl::NotFoundError("there is no store of hulld");
+  }
+  absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
+  if (!store.ok()) return store.status();
+  return *std::move(store);
+}
+
+absl::StatusOr<std::unique_ptr<Store>> OpenSource(const Place& place) {
+  if (!place.data_dir.empty()) return OpenRocksDbSource(place.data_dir);
+  const auto conninfo = ReadConninfo(place, "--from-postgres-conninfo-file");
+  return conninfo.ok() ? OpenPostgresSource(*conninfo) : conninfo.status();
+}
+
+absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenTarget(const Place& place) {
+  if (!place.data_dir.empty()) return OpenRocksDbTarget(place.data_dir);
+  const auto conninfo = ReadConninfo(place, "--to-postgres-conninfo-file");
+  return conninfo.ok() ? OpenPostgresTarget(*conninfo) : conninfo.status();
+}
+
+// Says how far it is, now and then.
+class ProgressLines {
+ public:
+  explicit ProgressLines(std::ostream& err) : err_(err) {}
+
+  void SetPhase(const char* phase) { phase_ = phase; }
+  void Tell(uint64_t done, uint64_t all) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_) return;
+    next_ = now + kPause;
+    err_ << phase_ << " " << done << " of " << all << " hulls and bodies" << std::endl;
+  }
+
+ private:
+  std::ostream& err_;
+  const char* phase_ = "copied";
+  std::chrono::steady_clock::time_point next_ = std::chrono::steady_clock::now() + kPause;
+};
+
+std::string Describe(const MigrationCounts& counts) {
+  const auto count = [](uint64_t number, const char* one, const char* many) {
+    return absl::StrCat(number, " ", number == 1 ? one : many);
+  };
+  std::string text = absl::StrCat(count(counts.hulls, "hull", "hulls"), ", ",
+                                  count(counts.bodies, "body", "bodies"));
+  if (counts.resumed == 0) return text;
+  return absl::StrCat(text, "; ", counts.resumed, " of these were there from an earlier run");
+}
+
+absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ostream& err) {
+  const absl::StatusOr<std::unique_ptr<Store>> source = OpenSource(from);
+  if (!source.ok()) return Explain(from, source.status());
+  absl::StatusOr<std::unique_ptr<MigrationTarget>> target = OpenTarget(to);
+  if (!target.ok()) return Explain(to, target.status());
+  ProgressLines lines(err);
+  absl::StatusOr<Migration> migration =
+      Migration::Read(**source, [&lines](uint64_t done, uint64_t all) { lines.Tell(done, all); });
+  if (!migration.ok()) return Explain(from, migration.status());
+  const absl::StatusOr<MigrationCounts> counts = migration->CopyTo(**target);
+  if (!counts.ok()) return counts.status();
+  out << "copied store " << migration->source().store_id << " at revision "
+      << migration->source().revision << ": " << Describe(*counts) << std::endl;
+  // What is compared is what a server will open, nothing that is still in our memory.
+  target->reset();
+  target = OpenTarget(to);
+  if (!target.ok()) return Explain(to, target.status());
+  lines.SetPhase("compared");
+  if (absl::Status s = migration->Compare((*target)->store()); !s.ok()) return s;
+  if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
+  out << "compared: every record is the same; " << to.Describe() << " is store "
+      << (*target)->store().id() << " now\n";
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+int RunMigrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
+  CLI::App app(
+      "Copies a store to another place while no hulld has either open, and compares the two. The "
+      "source stays as it is.",
+      "hulld migrate");
+  Place from;
+  Place to;
+  app.add_option("--from-data-dir", from.data_dir, "The source: a directory of --store=rocksdb");
+  app.add_option("--from-postgres-conninfo-file", from.conninfo_file,
+                 "The source: a database of --store=postgres");
+  app.add_option("--to-data-dir", to.data_dir, "The destination: a directory, which is made");
+  app.add_option("--to-postgres-conninfo-file", to.conninfo_file,
+                 "The destination: an empty database");
+  app.footer(
+      "A run that was ended is gone on with by the same command. Revisions and writers' sequences "
+      "are\nkept; the copy is another store, with an ID of its own.\n"
+      "Exit status: 0 all is copied and the same, 1 it failed on its way and can be run again, 2 "
+      "it was\nrefused, and nothing was changed.");
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  try {
+    app.parse(std::move(reversed));
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, out, err) == 0 ? 0 : kExitRefused;
+  }
+  if (!from.is_one() || !to.is_one()) {
+    err << "hulld migrate: name one source (--from-data-dir or --from-postgres-conninfo-file) and "
+           "one destination (--to-data-dir or --to-postgres-conninfo-file)\n";
+    return kExitRefused;
+  }
+  SetUpLog("warn", "text");
+  const absl::Status status = Run(from, to, out, err);
+  if (status.ok()) return 0;
+  err << "hulld migrate: " << std::string(status.message()) << "\n";
+  const bool is_refused = absl::IsFailedPrecondition(status) || absl::IsInvalidArgument(status) ||
+                          absl::IsNotFound(status);
+  return is_refused ? kExitRefused : kExitFailed;
+}
+
+}  // namespace hulld::server

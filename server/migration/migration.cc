@@ -1,0 +1,256 @@
+#include "server/migration/migration.h"
+
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <bit>
+#include <memory>
+#include <optional>
+#include <utility>
+
+namespace hulld::server {
+namespace {
+
+// A transaction ends once it has so many vertices (24 MB), or changes of hulls and bodies. A
+// choice.
+constexpr size_t kMostVertices = 1'000'000;
+constexpr size_t kMostChanges = 1000;
+
+// Changes that go to the target together.
+class Batch {
+ public:
+  explicit Batch(MigrationTarget& target) : target_(target) {}
+
+  // All of one hull, or a body.
+  absl::Status Add(std::vector<Change> changes) {
+    for (Change& change : changes) {
+      vertices_ += change.vertices.size();
+      changes_.push_back(std::move(change));
+    }
+    return vertices_ >= kMostVertices || changes_.size() >= kMostChanges ? Flush()
+                                                                         : absl::OkStatus();
+  }
+  absl::Status Flush() {
+    if (changes_.empty()) return absl::OkStatus();
+    std::vector<const Change*> pointers;
+    for (const Change& change : changes_) pointers.push_back(&change);
+    absl::Status status = target_.Add(pointers);
+    changes_.clear();
+    vertices_ = 0;
+    return status;
+  }
+
+ private:
+  MigrationTarget& target_;
+  std::vector<Change> changes_;
+  size_t vertices_ = 0;
+};
+
+absl::Status Differs(const std::string& id, const std::string& what) {
+  return absl::DataLossError(absl::StrCat("\"", id, "\" is not the same in the copy: ", what));
+}
+
+const std::string& IdOf(const StoredHull& hull) { return hull.record.hull_id; }
+const std::string& IdOf(const StoredBody& body) { return body.record.body_id; }
+
+// Whether both have the same IDs, and of each pair the same. Both are in byte order of the IDs.
+template <typename Stored, typename Same>
+absl::Status CompareAll(const std::vector<Stored>& expected, const std::vector<Stored>& found,
+                        const Same& same) {
+  for (size_t i = 0; i < expected.size(); ++i) {
+    const std::string& id = IdOf(expected[i]);
+    if (i >= found.size() || id < IdOf(found[i])) return Differs(id, "it is missing");
+    if (IdOf(found[i]) < id) return Differs(IdOf(found[i]), "the source has none of this name");
+    if (absl::Status s = same(expected[i], found[i]); !s.ok()) return s;
+  }
+  if (found.size() <= expected.size()) return absl::OkStatus();
+  return Differs(IdOf(found[expected.size()]), "the source has none of this name");
+}
+
+bool HasSameBits(const Vector& a, const Vector& b) {
+  return std::equal(a.data(), a.data() + 3, b.data(), [](double x, double y) {
+    return std::bit_cast<uint64_t>(x) == std::bit_cast<uint64_t>(y);
+  });
+}
+
+// The greatest IDs of the hulls and of the bodies that a store has; the copied ones are all up to
+// there.
+struct LastCopied {
+  std::string hull_id;
+  std::string body_id;
+};
+
+absl::StatusOr<LastCopied> FindLastCopied(Store& store) {
+  LastCopied last;
+  absl::Status status =
+      store.ForEachHull([&](const std::string& id, const auto&) { last.hull_id = id; });
+  if (!status.ok()) return status;
+  status = store.ForEachBody([&](const std::string& id, const auto&) { last.body_id = id; });
+  if (!status.ok()) return status;
+  return last;
+}
+
+absl::StatusOr<std::vector<WriterSequence>> ReadWriters(Store& store, const StoredHull& hull) {
+  absl::StatusOr<std::vector<WriterSequence>> writers = store.LoadWriters(hull);
+  if (!writers.ok() || writers->size() == hull.writer_count) return writers;
+  return absl::DataLossError(absl::StrCat("hull \"", hull.record.hull_id, "\" has ",
+                                          writers->size(), " writers in store ", store.id(),
+                                          ", not ", hull.writer_count, " as its record says"));
+}
+
+}  // namespace
+
+Migration::Migration(Store& source, Progress progress)
+    : source_(&source), progress_(std::move(progress)), as_of_{source.id(), source.revision()} {}
+
+absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
+  Migration migration(source, std::move(progress));
+  absl::Status damage;
+  absl::Status read = source.ForEachHull([&](const std::string&, absl::StatusOr<StoredHull> hull) {
+    if (!hull.ok()) return damage.Update(hull.status());
+    migration.hulls_.push_back(*std::move(hull));
+  });
+  if (!read.ok()) return read;
+  read = source.ForEachBody([&](const std::string&, absl::StatusOr<StoredBody> body) {
+    if (!body.ok()) return damage.Update(body.status());
+    migration.bodies_.push_back(*std::move(body));
+  });
+  if (!read.ok()) return read;
+  if (!damage.ok()) return damage;
+  return migration;
+}
+
+// A target that a migration has begun to fill from this source, as it is now, is gone on with; one
+// that was filled from the source as it was before is begun anew.
+absl::Status Migration::Prepare(MigrationTarget& target) {
+  const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
+  if (!mark.ok()) return mark.status();
+  if (mark->has_value()) {
+    if (**mark == as_of_) return absl::OkStatus();
+    if ((*mark)->store_id == as_of_.store_id) return target.Begin(as_of_);
+    return absl::FailedPreconditionError(
+        absl::StrCat("the destination holds what a migration from store ", (*mark)->store_id,
+                     " has copied so far, and this is store ", as_of_.store_id,
+                     "; go on with that one, or name another destination"));
+  }
+  uint64_t held = 0;
+  const auto count = [&held](const auto&...) { ++held; };
+  absl::Status read = target.store().ForEachHull(count);
+  if (read.ok()) read = target.store().ForEachBody(count);
+  if (!read.ok()) return read;
+  if (held == 0 && target.store().revision() == 0) return target.Begin(as_of_);
+  return absl::FailedPreconditionError(absl::StrCat(
+      "the destination is not empty: it is store ", target.store().id(), " at revision ",
+      target.store().revision(), " with ", held, " hulls and bodies; name another destination"));
+}
+
+absl::StatusOr<MigrationCounts> Migration::CopyTo(MigrationTarget& target) {
+  MigrationCounts counts;
+  absl::Status status = Prepare(target);
+  if (status.ok()) status = CopyHulls(target, &counts);
+  if (status.ok()) status = CopyBodies(target, &counts);
+  if (!status.ok()) return status;
+  return counts;
+}
+
+absl::Status Migration::CopyHulls(MigrationTarget& target, MigrationCounts* counts) {
+  const absl::StatusOr<LastCopied> last = FindLastCopied(target.store());
+  if (!last.ok()) return last.status();
+  Batch batch(target);
+  for (const StoredHull& hull : hulls_) {
+    ++counts->hulls;
+    if (hull.record.hull_id <= last->hull_id) {
+      ++counts->resumed;
+      continue;
+    }
+    absl::StatusOr<std::vector<Change>> changes = ChangesOf(hull);
+    if (!changes.ok()) return changes.status();
+    if (absl::Status s = batch.Add(*std::move(changes)); !s.ok()) return s;
+    progress_(counts->hulls, all());
+  }
+  return batch.Flush();
+}
+
+absl::Status Migration::CopyBodies(MigrationTarget& target, MigrationCounts* counts) {
+  const absl::StatusOr<LastCopied> last = FindLastCopied(target.store());
+  if (!last.ok()) return last.status();
+  Batch batch(target);
+  for (const StoredBody& body : bodies_) {
+    ++counts->bodies;
+    if (body.record.body_id <= last->body_id) {
+      ++counts->resumed;
+      continue;
+    }
+    std::vector<Change> changes(1);
+    changes[0].body = std::make_shared<const StoredBody>(body);
+    changes[0].revision = body.record.revision;
+    if (absl::Status s = batch.Add(std::move(changes)); !s.ok()) return s;
+    progress_(counts->hulls + counts->bodies, all());
+  }
+  return batch.Flush();
+}
+
+// What a hull has become, as changes: all its vertices as one base, and each writer.
+absl::StatusOr<std::vector<Change>> Migration::ChangesOf(const StoredHull& hull) const {
+  absl::StatusOr<std::vector<Vector>> vertices = source_->LoadVertices(hull);
+  if (!vertices.ok()) return vertices.status();
+  absl::StatusOr<std::vector<WriterSequence>> writers = ReadWriters(*source_, hull);
+  if (!writers.ok()) return writers.status();
+  Change change;
+  change.hull = hull;
+  change.hull.layout = {};
+  change.revision = hull.record.revision;
+  if (!vertices->empty()) {
+    change.hull.layout.base_revision = hull.record.revision;
+    change.hull.layout.base_vertices = vertices->size();
+    change.vertex_change = VertexChange::kReplaced;
+    change.vertices = *std::move(vertices);
+  }
+  std::vector<Change> changes = {std::move(change)};
+  for (WriterSequence& writer : *writers) {
+    Change committed;
+    committed.hull = changes.front().hull;
+    committed.revision = hull.record.revision;
+    committed.writer = std::move(writer);
+    changes.push_back(std::move(committed));
+  }
+  return changes;
+}
+
+absl::Status Migration::Compare(Store& copy) const {
+  const absl::StatusOr<Migration> read = Read(copy, progress_);
+  if (!read.ok()) return read.status();
+  uint64_t done = 0;
+  absl::Status status =
+      CompareAll(hulls_, read->hulls_, [&](const StoredHull& hull, const StoredHull& other) {
+        progress_(++done, all());
+        return CompareHull(copy, hull, other);
+      });
+  if (!status.ok()) return status;
+  return CompareAll(bodies_, read->bodies_, [&](const StoredBody& body, const StoredBody& other) {
+    progress_(++done, all());
+    return EncodeStoredBody(body) == EncodeStoredBody(other)
+               ? absl::OkStatus()
+               : Differs(body.record.body_id, "its record or its pieces");
+  });
+}
+
+absl::Status Migration::CompareHull(Store& copy, const StoredHull& hull,
+                                    const StoredHull& other) const {
+  const std::string& id = hull.record.hull_id;
+  if (!(hull.record == other.record) || hull.writer_count != other.writer_count) {
+    return Differs(id, "its record");
+  }
+  const absl::StatusOr<std::vector<Vector>> vertices = source_->LoadVertices(hull);
+  if (!vertices.ok()) return vertices.status();
+  const absl::StatusOr<std::vector<Vector>> copied = copy.LoadVertices(other);
+  if (!copied.ok()) return copied.status();
+  if (!std::ranges::equal(*vertices, *copied, HasSameBits)) return Differs(id, "its vertices");
+  const absl::StatusOr<std::vector<WriterSequence>> writers = ReadWriters(*source_, hull);
+  if (!writers.ok()) return writers.status();
+  const absl::StatusOr<std::vector<WriterSequence>> copied_writers = ReadWriters(copy, other);
+  if (!copied_writers.ok()) return copied_writers.status();
+  return *writers == *copied_writers ? absl::OkStatus() : Differs(id, "its writers' sequences");
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,121 @@
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <utility>
+#include <vector>
+
+#include "server/migration/migration_target.h"
+#include "server/store/postgres/batch_statements.h"
+#include "server/store/postgres/conninfo.h"
+#include "server/store/postgres/parameters.h"
+#include "server/store/postgres/postgres_store.h"
+#include "server/store/postgres/session.h"
+
+namespace hulld::server {
+namespace {
+
+// How long nothing may come from the database while an answer is due.
+constexpr std::chrono::milliseconds kAnswerTime{30'000};
+
+// What is committed here is on disk, whatever the role has as its default. The fence: see
+// postgres_store.h. Requires that no row of the store is gone.
+constexpr char kPrepare[] = R"(
+    SET search_path = '';
+    SET synchronous_commit = on;
+    PREPARE migrate_fence(bigint) AS UPDATE hulld.store SET written_in = $1;
+    PREPARE migrate_finish(bigint) AS UPDATE hulld.store SET revision = $1;)";
+
+// The store has the claim, and is read; a session of its own writes, fenced by the epoch of that
+// claim.
+class PostgresTarget : public MigrationTarget {
+ public:
+  PostgresTarget(std::unique_ptr<PostgresStore> store, std::unique_ptr<Session> session)
+      : store_(std::move(store)), session_(std::move(session)) {}
+
+  Store& store() override { return *store_; }
+
+  absl::StatusOr<std::optional<MigrationSource>> ReadMark() override {
+    const absl::StatusOr<Rows> there =
+        session_->Run("SELECT to_regclass('hulld.migration') IS NOT NULL");
+    if (!there.ok()) return there.status();
+    if (there->at(0, 0) != "t") return std::nullopt;
+    const absl::StatusOr<std::vector<Rows>> rows =
+        session_->Ask(std::vector<Statement>{{.text = "SELECT store_id, revision FROM "
+                                                      "hulld.migration"}});
+    if (!rows.ok()) return rows.status();
+    if (rows->front().count() != 1) {
+      return absl::DataLossError("the row of hulld.migration is missing");
+    }
+    return MigrationSource{std::string(rows->front().at(0, 0)), rows->front().bigint(0, 1)};
+  }
+
+  absl::Status Begin(const MigrationSource& source) override {
+    std::vector<Statement> statements;
+    for (const char* text :
+         {"DELETE FROM hulld.hulls", "DELETE FROM hulld.bodies", "DELETE FROM hulld.writers",
+          "DELETE FROM hulld.bases", "DELETE FROM hulld.deltas",
+          "DROP TABLE IF EXISTS hulld.migration",
+          "CREATE TABLE hulld.migration (store_id text NOT NULL, revision bigint NOT NULL)",
+          "PREPARE migrate_begin(text, bigint) AS INSERT INTO hulld.migration VALUES ($1, $2)"}) {
+      statements.push_back({.text = text});
+    }
+    statements.push_back(
+        {.name = "migrate_begin", .parameters = {source.store_id, EncodeBigint(source.revision)}});
+    statements.push_back({.text = "DEALLOCATE migrate_begin"});
+    return Transact(std::move(statements));
+  }
+
+  absl::Status Add(std::span<const Change* const> changes) override {
+    return Transact(StatementsOf(changes));
+  }
+
+  absl::Status Finish(const MigrationSource& source) override {
+    std::vector<Statement> statements(2);
+    statements[0] = {.name = "migrate_finish", .parameters = {EncodeBigint(source.revision)}};
+    statements[1] = {.text = "DROP TABLE hulld.migration"};
+    return Transact(std::move(statements));
+  }
+
+ private:
+  absl::Status Transact(std::vector<Statement> statements) {
+    std::vector<Statement> all(2);
+    all[0] = {.text = "BEGIN"};
+    all[1] = {.name = "migrate_fence", .parameters = {EncodeBigint(store_->epoch())}};
+    std::ranges::move(statements, std::back_inserter(all));
+    all.push_back({.text = "COMMIT"});
+    const absl::Status status = session_->Ask(all).status();
+    if (status.ok()) return status;
+    if (ViolatedConstraint(status) == "store_fence") {
+      return absl::AbortedError(
+          "a server took the database over meanwhile; end it, and run this again");
+    }
+    return absl::Status(status.code(), absl::StrCat("the database: ", status.message()));
+  }
+
+  // Before the session: whose end must not wait for the claim's.
+  const std::unique_ptr<PostgresStore> store_;
+  const std::unique_ptr<Session> session_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo) {
+  const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
+  if (!parsed.ok()) return parsed.status();
+  PostgresOptions options;
+  options.conninfo = conninfo;
+  options.migrating = true;
+  options.should_stop = [] { return true; };
+  absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
+  if (!store.ok()) return store.status();
+  absl::StatusOr<std::unique_ptr<Session>> session = Session::Open(*parsed, kAnswerTime);
+  if (!session.ok()) return session.status();
+  const absl::Status prepared =
+      (*session)->Run(absl::StrCat(kPrepare, PrepareBatchStatements())).status();
+  if (!prepared.ok()) return prepared;
+  return std::make_unique<PostgresTarget>(*std::move(store), *std::move(session));
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,104 @@
+// What becomes of a page's edits while the server is slow.
+#include "client/hullctl/view/edit_feed.h"
+
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "tests/client/fake_hulld.h"
+
+namespace hulld {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A page that remembers what it is sent.
+class Page : public PageChannel {
+ public:
+  bool SendText(std::string json) override {
+    const std::lock_guard lock(mutex_);
+    told_.push_back(std::move(json));
+    changed_.notify_all();
+    return true;
+  }
+  bool SendBinary(std::string /*frame*/) override { return true; }
+
+  std::string WaitForTold(size_t index) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return told_.size() > index; });
+    return told_[index];
+  }
+  size_t told() {
+    const std::lock_guard lock(mutex_);
+    return told_.size();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::string> told_;
+};
+
+ViewEdit AppendOf(const std::string& hull_id, double x) {
+  return {ViewEdit::Action::kAppend, hull_id, {x, 0, 0}};
+}
+
+class EditFeedTest : public ::testing::Test {
+ protected:
+  EditFeedTest() {
+    hulld_.PutHull("h", {});
+    hulld_.PutHull("other", {});
+    // The first change waits for Release, and with it all behind it.
+    StreamScript hold;
+    hold.hold_acks = true;
+    hulld_.ScriptStreams({hold});
+    ClientOptions options;
+    options.server = hulld_.address();
+    client_ = std::make_unique<Client>(options);
+  }
+
+  FakeHulld hulld_;
+  std::unique_ptr<Client> client_;
+  const std::shared_ptr<Page> page_ = std::make_shared<Page>();
+};
+
+TEST_F(EditFeedTest, MakesEveryChangeInItsOrderHoweverManyWait) {
+  constexpr int kEdits = 500;
+  {
+    EditFeed feed(*client_, page_);
+    for (int i = 0; i < kEdits; ++i) {
+      feed.Ask(AppendOf("h", i));
+      feed.Ask(AppendOf("other", -i));
+    }
+    feed.Ask({ViewEdit::Action::kDelete, "other", {}});
+    hulld_.Release();
+  }
+  const std::vector<double> xyz = hulld_.hull("h").xyz;
+  ASSERT_EQ(xyz.size(), 3 * kEdits);
+  for (int i = 0; i < kEdits; ++i) EXPECT_EQ(xyz[3 * i], i);
+  EXPECT_EQ(hulld_.calls("DeleteHull"), 1);
+  // Each answer is one of the server's; a thousand changes took few calls.
+  EXPECT_LE(page_->told(), 5);
+  EXPECT_THAT(page_->WaitForTold(page_->told() - 1), HasSubstr("other is deleted"));
+}
+
+TEST_F(EditFeedTest, SaysWhatItHasNoRoomFor) {
+  EditFeed feed(*client_, page_);
+  const std::vector<double> many(size_t{3} << 20);
+  feed.Ask(AppendOf("h", 0));
+  for (int i = 0; i < 4; ++i) feed.Ask({ViewEdit::Action::kAppend, "other", many});
+  EXPECT_THAT(page_->WaitForTold(0), HasSubstr("too much waits"));
+  EXPECT_THAT(page_->WaitForTold(0), HasSubstr("\"done\":false"));
+  hulld_.Release();
+  EXPECT_THAT(page_->WaitForTold(1), HasSubstr("h: 1 appended"));
+  EXPECT_THAT(page_->WaitForTold(2),
+              HasSubstr(absl::StrCat("other: ", 3 * (many.size() / 3), " appended")));
+}
+
+}  // namespace
+}  // namespace hulld
