@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/query/scene/scene.h"
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 
 // Which pairs of a scene are asked about. Scene: a message with the groups and movers of a
 // v1::FindCollisionsRequest.
