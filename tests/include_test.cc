@@ -94,6 +94,8 @@ constexpr std::string_view kRooms[] = {
     "server/wire",
     "server/hulls",
     "server/bodies",
+    "server/collisions/placed",
+    "server/collisions/watch",
     "server/collisions",
     "server/admin",
     "server",

@@ -4,8 +4,8 @@
 #include <memory>
 #include <utility>
 
-#include "server/collisions/placed_answer.h"
-#include "server/collisions/query_settings.h"
+#include "server/collisions/placed/placed_answer.h"
+#include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
 #include "server/wire/answer_columns.h"
 

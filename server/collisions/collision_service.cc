@@ -20,7 +20,7 @@
 #include "server/collisions/batch_stream.h"
 #include "server/collisions/body_question.h"
 #include "server/collisions/collision_stream.h"
-#include "server/collisions/query_settings.h"
+#include "server/collisions/placed/query_settings.h"
 #include "server/collisions/scene_stream.h"
 #include "server/collisions/watch/collision_watch.h"
 #include "server/contract/error_info.h"

@@ -14,7 +14,7 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/registry.h"

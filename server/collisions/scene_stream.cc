@@ -4,8 +4,8 @@
 #include <memory>
 #include <utility>
 
-#include "server/collisions/query_settings.h"
-#include "server/collisions/scene_groups.h"
+#include "server/collisions/placed/query_settings.h"
+#include "server/collisions/placed/scene_groups.h"
 #include "server/wire/answer_columns.h"
 
 namespace hulld::server {

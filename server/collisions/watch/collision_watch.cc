@@ -8,9 +8,9 @@
 #include <set>
 #include <utility>
 
-#include "server/collisions/placed_answer.h"
-#include "server/collisions/query_settings.h"
-#include "server/collisions/scene_groups.h"
+#include "server/collisions/placed/placed_answer.h"
+#include "server/collisions/placed/query_settings.h"
+#include "server/collisions/placed/scene_groups.h"
 #include "server/contract/status_map.h"
 #include "server/registry/bodies/body_resolution.h"
 #include "server/settings/config.h"

@@ -16,7 +16,7 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/queued_stream.h"
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 #include "server/collisions/watch/followed_pieces.h"
 #include "server/collisions/watch/watched_pairs.h"
 #include "server/process/task_pool.h"

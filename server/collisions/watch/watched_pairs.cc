@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "server/collisions/scene_groups.h"
+#include "server/collisions/placed/scene_groups.h"
 #include "server/contract/limit_error.h"
 
 namespace hulld::server {

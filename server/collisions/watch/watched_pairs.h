@@ -14,7 +14,7 @@
 #include "core/query/box_tree.h"
 #include "core/query/terms/pair_cache.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 
 namespace hulld::server {
 

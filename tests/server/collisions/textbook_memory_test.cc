@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/hull/growth/hull_builder.h"
-#include "server/collisions/query_settings.h"
+#include "server/collisions/placed/query_settings.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {

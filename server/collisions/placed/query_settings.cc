@@ -1,4 +1,4 @@
-#include "server/collisions/query_settings.h"
+#include "server/collisions/placed/query_settings.h"
 
 #include <absl/strings/str_cat.h>
 

@@ -1,9 +1,9 @@
-#include "server/collisions/placed_answer.h"
+#include "server/collisions/placed/placed_answer.h"
 
 #include <utility>
 
 #include "core/query/collision.h"
-#include "server/collisions/query_settings.h"
+#include "server/collisions/placed/query_settings.h"
 #include "server/settings/config.h"
 #include "server/wire/answer_columns.h"
 #include "server/wire/encode.h"

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_PLACEMENT_TABLE_H_
-#define HULLD_SERVER_COLLISIONS_PLACEMENT_TABLE_H_
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_PLACEMENT_TABLE_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_PLACEMENT_TABLE_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -205,4 +205,4 @@ absl::Status ValidatePairs(const google::protobuf::RepeatedField<uint32_t>& pair
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_PLACEMENT_TABLE_H_
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_PLACEMENT_TABLE_H_

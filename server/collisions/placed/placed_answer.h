@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_PLACED_ANSWER_H_
-#define HULLD_SERVER_COLLISIONS_PLACED_ANSWER_H_
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_PLACED_ANSWER_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_PLACED_ANSWER_H_
 
 #include <absl/status/statusor.h>
 
@@ -12,7 +12,7 @@
 #include "core/query/terms/pair_cache.h"
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 
 namespace hulld::server {
 
@@ -48,4 +48,4 @@ size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_PLACED_ANSWER_H_
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_PLACED_ANSWER_H_

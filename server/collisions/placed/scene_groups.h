@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
-#define HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_SCENE_GROUPS_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_SCENE_GROUPS_H_
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/query/scene/scene.h"
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 
 // Which pairs of a scene are asked about. Scene: a message with the groups and movers of a
 // v1::FindCollisionsRequest.
@@ -58,4 +58,4 @@ std::vector<GroupPair> IgnoredGroups(const Scene& scene) {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_SCENE_GROUPS_H_
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_SCENE_GROUPS_H_

@@ -1,4 +1,4 @@
-#include "server/collisions/placement_table.h"
+#include "server/collisions/placed/placement_table.h"
 
 #include <absl/strings/str_cat.h>
 

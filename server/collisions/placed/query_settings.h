@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_COLLISIONS_QUERY_SETTINGS_H_
-#define HULLD_SERVER_COLLISIONS_QUERY_SETTINGS_H_
+#ifndef HULLD_SERVER_COLLISIONS_PLACED_QUERY_SETTINGS_H_
+#define HULLD_SERVER_COLLISIONS_PLACED_QUERY_SETTINGS_H_
 
 #include <absl/status/statusor.h>
 
@@ -42,4 +42,4 @@ absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_COLLISIONS_QUERY_SETTINGS_H_
+#endif  // HULLD_SERVER_COLLISIONS_PLACED_QUERY_SETTINGS_H_
