@@ -54,10 +54,10 @@ std::vector<Committer::Pending> Committer::WaitForBatch() {
   return std::exchange(queue_, {});
 }
 
-absl::Status Committer::Write(const std::vector<Pending>& batch) {
-  std::vector<const Change*> changes;
+absl::Status Committer::Write(std::vector<Pending>& batch) {
+  std::vector<Change*> changes;
   changes.reserve(batch.size());
-  for (const Pending& pending : batch) changes.push_back(&pending.change);
+  for (Pending& pending : batch) changes.push_back(&pending.change);
   absl::Status status;
   if (Statistics().failing) status = store_.Recover();
   const auto start = std::chrono::steady_clock::now();
@@ -94,7 +94,7 @@ void Committer::Settle(std::vector<Pending>& batch, const absl::Status& status) 
       locked.Unlock();
       locked.Lock();
     }
-    pending.done(locked, status);
+    pending.done(locked, status, pending.change);
     ++completed;
   }
   // Replies go out now; the changes themselves, which may be large, end without a lock.

@@ -41,10 +41,11 @@ struct CommitStatistics {
 // after `order`, and nothing is called under it. No lock is held while the store works.
 class Committer {
  public:
-  // Told whether a change is committed: OK, or why it was refused. Called once, on the committer's
+  // Told whether a change is committed: OK, or why it was refused; and the change, with the
+  // revisions that the store gave it if it is. Called once, on the committer's
   // thread, with `order` held: completions come in the order of submission, and no submission comes
   // between refusals of one batch. May submit the next change.
-  using Completion = std::function<void(Locked& order, const absl::Status&)>;
+  using Completion = std::function<void(Locked& order, const absl::Status&, const Change&)>;
 
   // Completions of kept changes within one hold of `order`; each takes about a microsecond.
   static constexpr size_t kMostPerHold = 128;
@@ -72,7 +73,7 @@ class Committer {
 
   void Run();
   std::vector<Pending> WaitForBatch();
-  absl::Status Write(const std::vector<Pending>& batch);
+  absl::Status Write(std::vector<Pending>& batch);
   void Settle(std::vector<Pending>& batch, const absl::Status& status);
 
   Store& store_;

@@ -55,6 +55,8 @@ struct RegisteredHull {
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                  MemoryBudget& budget);
 
+  // What the store keeps of it, as of its first change. Requires that nothing else was kept before.
+  void SetStored(const StoredHull& stored) { committed = head = stored; }
   // Whether most points of `live` are no vertices any more: preparing drops them, and keeps memory
   // bounded where points take each other in and nobody asks. It costs a part of what appending
   // those points did.
@@ -91,8 +93,11 @@ struct RegisteredHull {
   HullState state;
   const bool readable_from_store;
   StoredHull committed;
-  // With the changes in flight.
+  // With the changes in flight, whose revisions are not known: those in it are of `committed`.
   StoredHull head;
+  // Of `committed`, while chunks are in flight: what each of them builds on once those before it
+  // are committed. Written by their completions alone.
+  std::shared_ptr<HullRevisions> revisions;
   // The points of the hull in the order in which they came, with those of the changes in flight and
   // of the chunk that is being built.
   std::shared_ptr<LiveHull> live;

@@ -63,8 +63,8 @@ Registry::~Registry() {
 
 absl::Status Registry::Load() {
   const std::lock_guard lock(mutex_);
-  HULLD_CHECK(hulls_.empty() && assigned_revision_ == 0);
-  revision_ = assigned_revision_ = store_.revision();
+  HULLD_CHECK(hulls_.empty() && revision_ == 0);
+  revision_ = store_.revision();
   feed_.Begin(revision_);
   const absl::Status status =
       store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
@@ -110,7 +110,7 @@ absl::Status Registry::CheckHullCount() const {
 }
 
 void Registry::Publish(uint64_t revision) {
-  HULLD_CHECK(revision > revision_ && revision <= assigned_revision_);
+  HULLD_CHECK(revision > revision_);
   revision_ = revision;
 }
 
@@ -152,18 +152,18 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
   if (bodies_.contains(id)) return done(locked, BodyExists(id));
   if (absl::Status s = CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
-  change.revision = ++assigned_revision_;
+  change.begins = true;
   change.hull.record.hull_id = id;
-  change.hull.record.create_revision = change.hull.record.revision = change.revision;
   const HullPointer hull = hulls_.Insert(change.hull, HullState::Creating());
   ++creating_;
   Submit(locked, hull, std::move(change),
-         [this, hull, done](Locked& later, const absl::Status& status) {
+         [this, hull, done](Locked& later, const absl::Status& status, const Change& creation) {
            --creating_;
            if (!status.ok()) {
              Forget(later, hull, status);
              return done(later, status);
            }
+           hull->SetStored(creation.hull);
            Publish(hull->committed.record.revision);
            NoteChange(*hull);
            feed_.NoteCreated(later, hull);
@@ -192,21 +192,20 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
   }
   Change change;
   change.hull = committed;
-  change.revision = ++assigned_revision_;
   change.deleted = true;
   change.former_layout = committed.layout;
   hull->state.StartEnding();
-  Submit(
-      locked, hull, std::move(change),
-      [this, hull, done, revision = assigned_revision_](Locked& later, const absl::Status& status) {
-        if (!status.ok()) return Answer<uint64_t>(later, done, status);
-        Publish(revision);
-        vertex_count_ -= hull->committed.record.vertex_count;
-        NoteChange(*hull);
-        feed_.NoteDeleted(later, hull->committed.record, revision);
-        Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
-        Answer<uint64_t>(later, done, revision);
-      });
+  Submit(locked, hull, std::move(change),
+         [this, hull, done](Locked& later, const absl::Status& status, const Change& deletion) {
+           if (!status.ok()) return Answer<uint64_t>(later, done, status);
+           const uint64_t revision = deletion.revision;
+           Publish(revision);
+           vertex_count_ -= hull->committed.record.vertex_count;
+           NoteChange(*hull);
+           feed_.NoteDeleted(later, hull->committed.record, revision);
+           Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
+           Answer<uint64_t>(later, done, revision);
+         });
 }
 
 void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
@@ -260,10 +259,9 @@ absl::Status Registry::CheckReplacement(const RegisteredHull* former,
 // former: null when there is none. Takes the replacement's vertices.
 Change Registry::MakeChange(const RegisteredHull* former, Replacement& replacement) {
   Change change;
-  change.revision = ++assigned_revision_;
+  change.begins = true;
   HullRecord& record = change.hull.record;
   record.hull_id = replacement.hull_id;
-  record.create_revision = record.revision = change.revision;
   record.dimension = replacement.builder->dimension();
   record.vertex_count = replacement.builder->vertex_count();
   record.counts = replacement.counts;
@@ -271,7 +269,7 @@ Change Registry::MakeChange(const RegisteredHull* former, Replacement& replaceme
   if (!replacement.vertices.empty()) {
     change.vertex_change = VertexChange::kReplaced;
     change.vertices = std::move(replacement.vertices);
-    change.hull.layout = {record.revision, record.vertex_count, 0, 0};
+    change.hull.layout.base_vertices = record.vertex_count;
   }
   return change;
 }
@@ -294,15 +292,18 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
   hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
   hull->builder_bytes = hull->builder->MemoryBytes();
   Submit(locked, former == nullptr ? hull : former, std::move(change),
-         [this, hull, former, done](Locked& later, const absl::Status& status) {
-           Answer(later, done, FinishReplacement(later, former, hull, status));
+         [this, hull, former, done](Locked& later, const absl::Status& status,
+                                    const Change& replaced) {
+           Answer(later, done, FinishReplacement(later, former, hull, status, replaced));
          });
 }
 
 // hull: what takes the place of `former`, or of none, if the status allows.
 absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const HullPointer& former,
                                                           const HullPointer& hull,
-                                                          const absl::Status& status) {
+                                                          const absl::Status& status,
+                                                          const Change& change) {
+  if (status.ok()) hull->SetStored(change.hull);
   const HullRecord& record = hull->committed.record;
   if (former == nullptr) {
     --creating_;
@@ -334,24 +335,24 @@ void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
   HULLD_CHECK(hull->state.in_flight() > 0);
   const auto charge = std::make_shared<MemoryCharge>(memory_, MemoryUse::kWriting,
                                                      change.vertices.capacity() * sizeof(Vector));
-  committer_.Submit(
-      locked, std::move(change),
-      [this, hull, charge, finish = std::move(finish)](Locked& later, const absl::Status& status) {
-        charge->Set(0);
-        if (status.ok()) {
-          hull->state.Commit();
-        } else {
-          hull->state.Refuse();
-        }
-        finish(later, status);
-        // One that has come to rest may be dropped.
-        if (hull->state.quiet() && !hull->state.gone()) {
-          hull->NoteUse();
-          memory_.Evict(later);
-        }
-        Advance(later, hull);
-        hulls_.RestSome();
-      });
+  committer_.Submit(locked, std::move(change),
+                    [this, hull, charge, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, const Change& committed) {
+                      charge->Set(0);
+                      if (status.ok()) {
+                        hull->state.Commit();
+                      } else {
+                        hull->state.Refuse();
+                      }
+                      finish(later, status, committed);
+                      // One that has come to rest may be dropped.
+                      if (hull->state.quiet() && !hull->state.gone()) {
+                        hull->NoteUse();
+                        memory_.Evict(later);
+                      }
+                      Advance(later, hull);
+                      hulls_.RestSome();
+                    });
 }
 
 // Lets whatever waits for the hull go on. Called after each step of its state.

@@ -214,7 +214,7 @@ class Registry {
   HullPointer FindVisible(const std::string& id);
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   absl::Status CheckHullCount() const;
-  // The last revision that a change was given becomes visible.
+  // The revision that the store gave the last change becomes visible.
   void Publish(uint64_t revision);
 
   void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
@@ -231,7 +231,7 @@ class Registry {
                          const Reply<ReplaceResult>& done);
   absl::StatusOr<ReplaceResult> FinishReplacement(Locked& locked, const HullPointer& former,
                                                   const HullPointer& hull,
-                                                  const absl::Status& status);
+                                                  const absl::Status& status, const Change& change);
 
   absl::Status NoSuchHull(const std::string& id) const;
   absl::Status LoadBodies();
@@ -300,9 +300,8 @@ class Registry {
   // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
   // builder that a thread owns.
   mutable FairMutex mutex_;
-  // The last one that is committed and visible; the last one that a change was given.
+  // The last one that is committed and visible.
   uint64_t revision_ = 0;
-  uint64_t assigned_revision_ = 0;
   uint64_t vertex_count_ = 0;
   uint64_t last_watch_ = 0;
   HullTable hulls_;

@@ -293,6 +293,9 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   }
 
   built.counts = *added;
+  if (hull.state.in_flight() == 0) {
+    hull.revisions = std::make_shared<HullRevisions>(RevisionsOf(hull.committed));
+  }
   FillChange(hull, *added, change);
   RegisteredHull::Sequences& sequences = hull.writers[pending.session.writer_id];
   if (sequences.head == 0) ++change.hull.writer_count;
@@ -376,13 +379,13 @@ void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, 
   HullRecord& record = change.hull.record;
   VertexLayout& layout = change.hull.layout;
   record.counts += added;
-  change.revision = assigned_revision_;
-  if (added.outside == 0) return;
-  change.revision = record.revision = ++assigned_revision_;
+  change.before = hull.revisions;
+  change.takes_revision = added.outside > 0;
+  if (!change.takes_revision) return;
   record.vertex_count = hull.builder->vertex_count();
   record.dimension = hull.builder->dimension();
   if (change.vertex_change == VertexChange::kReplaced) {
-    layout = {record.revision, record.vertex_count, 0, 0};
+    layout = {.base_vertices = record.vertex_count};
   } else if (change.vertex_change == VertexChange::kAdded) {
     ++layout.delta_count;
     layout.delta_vertices += change.vertices.size();
@@ -391,18 +394,17 @@ void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, 
 
 void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
                            BuiltChunk built) {
-  const auto finish = [this, hull, after = built.change.hull, mark = built.mark,
-                       counts = built.counts, done = pending.done,
+  const auto finish = [this, hull, mark = built.mark, counts = built.counts, done = pending.done,
                        writer_id = pending.session.writer_id, sequence = pending.chunk.sequence](
-                          Locked& later, const absl::Status& status) {
+                          Locked& later, const absl::Status& status, const Change& change) {
     if (!status.ok()) {
       Revert(later, *hull);
       return AnswerChunk(later, done, sequence, status);
     }
-    CommitChunk(later, hull, after, mark, writer_id, sequence);
+    CommitChunk(later, hull, change.hull, mark, writer_id, sequence);
     hull->points_since_prepared += counts.outside;
     if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
-    const HullRecord& record = after.record;
+    const HullRecord& record = change.hull.record;
     AnswerChunk(later, done, sequence,
                 ChunkResult{revision_, false, record.revision, record.vertex_count, counts});
   };
@@ -415,6 +417,8 @@ void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const Stored
                            const LiveHull::Mark& mark, const std::string& writer_id,
                            uint64_t sequence) {
   const HullRecord before = std::exchange(hull->committed, after).record;
+  *hull->revisions = RevisionsOf(after);
+  SetRevisions(*hull->revisions, &hull->head);
   hull->SetCommittedMark(locked, mark);
   NoteChange(*hull);
   if (after.record.revision != before.revision) {

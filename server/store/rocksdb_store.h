@@ -66,7 +66,7 @@ class RocksDbStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
-  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   StoreFailures failures() const override {
     return {write_failures_.load(std::memory_order_relaxed),

@@ -104,13 +104,13 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   const auto [entry, is_new] = bodies_.try_emplace(id);
   if (is_new) ++body_count_;
   Change change;
-  change.revision = ++assigned_revision_;
-  // One that was damaged begins anew.
-  const uint64_t created = is_new ? 0 : entry->second.committed->record().create_revision;
-  body->SetRevisions(created == 0 ? change.revision : created, change.revision);
   change.body = body->stored();
+  uint64_t& created = change.body->record.create_revision;
+  created = is_new ? 0 : entry->second.committed->record().create_revision;
+  // One that was damaged begins anew.
+  change.begins = created == 0;
   SubmitBody(locked, std::move(change),
-             [this, body, is_new, done](Locked& later, const absl::Status& status) {
+             [this, body, is_new, done](Locked& later, const absl::Status& status, const Change&) {
                const BodyRecord& record = body->record();
                if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
                later.Discard(std::exchange(bodies_.at(record.body_id).committed, body));
@@ -146,42 +146,41 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
     return Answer<uint64_t>(locked, done, BodyMismatch(id, body->record().revision, *if_revision));
   }
   Change change;
-  change.revision = ++assigned_revision_;
   change.deleted = true;
   change.body = body->stored();
-  SubmitBody(
-      locked, std::move(change),
-      [this, id, done, revision = change.revision](Locked& later, const absl::Status& status) {
-        if (!status.ok()) return Answer<uint64_t>(later, done, status);
-        later.Discard(std::exchange(bodies_.at(id).committed, nullptr));
-        Answer<uint64_t>(later, done, revision);
-      });
+  SubmitBody(locked, std::move(change),
+             [this, id, done](Locked& later, const absl::Status& status, const Change& deletion) {
+               if (!status.ok()) return Answer<uint64_t>(later, done, status);
+               later.Discard(std::exchange(bodies_.at(id).committed, nullptr));
+               Answer<uint64_t>(later, done, deletion.revision);
+             });
 }
 
 // finish: called once the change is committed and visible, or refused, before what waits for the
 // body goes on.
 void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
-  const uint64_t revision = change.revision;
   HULLD_CHECK(!std::exchange(bodies_.at(id).in_flight, true));
-  committer_.Submit(
-      locked, std::move(change),
-      [this, id, revision, finish = std::move(finish)](Locked& later, const absl::Status& status) {
-        if (status.ok()) {
-          Publish(revision);
-          feed_.NoteOther(later, revision);
-        }
-        finish(later, status);
-        RegisteredBody& body = bodies_.at(id);
-        body.in_flight = false;
-        std::deque<std::function<void(Locked&)>> waiting = std::exchange(body.waiting, {});
-        // Nothing was there before a creation that was refused, nor is after a deletion.
-        if (body.committed == nullptr) {
-          bodies_.erase(id);
-          --body_count_;
-        }
-        for (const auto& next : waiting) next(later);
-      });
+  committer_.Submit(locked, std::move(change),
+                    [this, id, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, const Change& committed) {
+                      if (status.ok()) {
+                        Publish(committed.revision);
+                        feed_.NoteOther(later, committed.revision);
+                      }
+                      finish(later, status, committed);
+                      RegisteredBody& body = bodies_.at(id);
+                      body.in_flight = false;
+                      std::deque<std::function<void(Locked&)>> waiting =
+                          std::exchange(body.waiting, {});
+                      // Nothing was there before a creation that was refused, nor is after a
+                      // deletion.
+                      if (body.committed == nullptr) {
+                        bodies_.erase(id);
+                        --body_count_;
+                      }
+                      for (const auto& next : waiting) next(later);
+                    });
 }
 
 BodyPage Registry::ListBodies(const std::string& prefix, const std::string& after,

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/process/random_id.h"
+#include "server/store/change_revisions.h"
 #include "server/store/postgres/batch_statements.h"
 
 namespace hulld::server {
@@ -68,9 +69,8 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
 }
 
 // One transaction. Lost: it may have been committed. Other errors: it was not.
-absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t batch) {
-  uint64_t revision = 0;
-  for (const Change* change : changes) revision = std::max(revision, change->revision);
+absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t revision,
+                                    uint64_t batch) {
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   // First, so that a server that was superseded writes nothing.
@@ -146,10 +146,16 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
   return next->bigint(0, 0) >= batch;
 }
 
-absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
+absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   if (absl::Status s = ended(); !s.ok()) return s;
   if (!unknown_.ok()) return unknown_;
   const uint64_t batch = batch_ + 1;
+  const uint64_t revision = NumberChanges(changes, revision_);
+  const auto keep = [&] {
+    batch_ = batch;
+    revision_ = revision;
+    return absl::OkStatus();
+  };
   const Clock::time_point deadline = Clock::now() + options_.patience;
   while (true) {
     if (writer_ == nullptr) {
@@ -158,11 +164,8 @@ absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
       if (!session.ok()) return WriteFailed(Refused(session.status()));
       writer_ = *std::move(session);
     }
-    const absl::Status status = Attempt(changes, batch);
-    if (status.ok()) {
-      batch_ = batch;
-      return status;
-    }
+    const absl::Status status = Attempt(changes, revision, batch);
+    if (status.ok()) return keep();
     if (ViolatedConstraint(status) == "store_fence") {
       ++write_failures_;
       End(Superseded(""));
@@ -177,10 +180,7 @@ absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
     }
     spdlog::warn("the database was lost while it committed ({}); the batch was {}",
                  std::string(status.message()), *committed ? "committed" : "not committed");
-    if (*committed) {
-      batch_ = batch;
-      return absl::OkStatus();
-    }
+    if (*committed) return keep();
     if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
     if (Clock::now() >= deadline) return WriteFailed(Refused(status));
   }

@@ -78,7 +78,7 @@ class PostgresStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
-  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   StoreFailures failures() const override {
     return {.write = write_failures_.load(std::memory_order_relaxed),
@@ -121,7 +121,7 @@ class PostgresStore : public Store {
   absl::Status ended() const;
 
   // Committing. batch: its number.
-  absl::Status Attempt(std::span<const Change* const> changes, uint64_t batch);
+  absl::Status Attempt(std::span<const Change* const> changes, uint64_t revision, uint64_t batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
   absl::StatusOr<bool> OutcomeBeforeOthers(uint64_t batch);

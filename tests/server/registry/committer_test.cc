@@ -22,7 +22,7 @@ using ::testing::SizeIs;
 // Keeps the revisions of each batch. A test can hold the next commit, and decide how it ends.
 class GatedStore : public MemoryStore {
  public:
-  absl::Status Commit(std::span<const Change* const> changes) override {
+  absl::Status Commit(std::span<Change* const> changes) override {
     std::vector<uint64_t> batch;
     for (const Change* change : changes) batch.push_back(change->revision);
     Gate* gate = nullptr;
@@ -91,12 +91,13 @@ class CommitterTest : public ::testing::Test {
   }
   std::future<void> SubmitLocked(const Locked& locked, uint64_t revision) {
     const auto ended = std::make_shared<std::promise<void>>();
-    committer_.Submit(locked, ChangeOf(revision),
-                      [this, revision, ended](Locked& later, const absl::Status& status) {
-                        EXPECT_TRUE(later.Holds(order_));
-                        outcomes_.emplace_back(revision, status.code());
-                        later.Afterwards([ended] { ended->set_value(); });
-                      });
+    committer_.Submit(
+        locked, ChangeOf(revision),
+        [this, revision, ended](Locked& later, const absl::Status& status, const Change&) {
+          EXPECT_TRUE(later.Holds(order_));
+          outcomes_.emplace_back(revision, status.code());
+          later.Afterwards([ended] { ended->set_value(); });
+        });
     return ended->get_future();
   }
 
@@ -158,7 +159,7 @@ TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
     std::thread passer;
     {
       const Locked locked(order_);
-      committer_.Submit(locked, ChangeOf(2), [&](Locked&, const absl::Status&) {
+      committer_.Submit(locked, ChangeOf(2), [&](Locked&, const absl::Status&, const Change&) {
         passer = std::thread([&] {
           const std::lock_guard lock(order_);
           completed_by_then = outcomes_.size();
@@ -188,10 +189,11 @@ TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
   std::promise<std::future<void>> next;
   {
     const Locked locked(order_);
-    committer_.Submit(locked, ChangeOf(1), [&](Locked& later, const absl::Status& status) {
-      EXPECT_TRUE(absl::IsUnavailable(status));
-      next.set_value(SubmitLocked(later, 2));
-    });
+    committer_.Submit(locked, ChangeOf(1),
+                      [&](Locked& later, const absl::Status& status, const Change&) {
+                        EXPECT_TRUE(absl::IsUnavailable(status));
+                        next.set_value(SubmitLocked(later, 2));
+                      });
   }
   gate.outcome.set_value(absl::UnavailableError("no disk"));
   next.get_future().get().wait();
@@ -226,7 +228,8 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
     Committer committer(store, order);
     const Locked locked(order);
     for (uint64_t revision = 1; revision <= 3; ++revision) {
-      committer.Submit(locked, ChangeOf(revision), [&](Locked&, const absl::Status&) { ++ended; });
+      committer.Submit(locked, ChangeOf(revision),
+                       [&](Locked&, const absl::Status&, const Change&) { ++ended; });
     }
   }
   EXPECT_EQ(ended, 3);
@@ -240,7 +243,7 @@ TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
       {
         Committer committer(store, order);
         const Locked locked(another);
-        committer.Submit(locked, Change(), [](Locked&, const absl::Status&) {});
+        committer.Submit(locked, Change(), [](Locked&, const absl::Status&, const Change&) {});
       },
       "check failed");
 }
