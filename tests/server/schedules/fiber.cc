@@ -8,6 +8,7 @@
 
 #ifdef __SANITIZE_ADDRESS__
 #include <sanitizer/common_interface_defs.h>
+#include <sanitizer/lsan_interface.h>
 #endif
 
 namespace hulld::server {
@@ -23,11 +24,14 @@ void BeginSwitch(void** own, const void* bottom, size_t size) {
 void EndSwitch(void* own, const void** from_bottom, size_t* from_size) {
   __sanitizer_finish_switch_fiber(own, from_bottom, from_size);
 }
+// The search for leaks does not know mapped memory unless told.
+void KeepReferences(const void* bottom, size_t size) { __lsan_register_root_region(bottom, size); }
 #else
 constexpr size_t kStackBytes = size_t{1} << 18;
 
 void BeginSwitch(void**, const void*, size_t) {}
 void EndSwitch(void*, const void**, size_t*) {}
+void KeepReferences(const void*, size_t) {}
 #endif
 
 }  // namespace
@@ -66,6 +70,12 @@ void Fiber::Suspend() {
   BeginSwitch(&own, outside_bottom_, outside_size_);
   outside_ = std::move(outside_).resume();
   EndSwitch(own, &outside_bottom_, &outside_size_);
+}
+
+void Fiber::Abandon() {
+  HULLD_CHECK(!has_ended_);
+  KeepReferences(bottom_, size_);
+  KeepReferences(this, sizeof(*this));
 }
 
 // Never returns: the stack is used again.

@@ -10,8 +10,8 @@ namespace hulld::server {
 // A stack of its own that runs one task after another, each until it suspends itself. All fibers of
 // a thread run on that thread, one at a time. Cost of a switch: some 10 ns.
 //
-// AddressSanitizer is told of each switch. A fiber is never destroyed, but used again: the stack of
-// a task that hangs cannot be unwound.
+// AddressSanitizer is told of each switch. A fiber is never destroyed: the stack of a task that
+// hangs cannot be unwound. It is used again, or abandoned.
 class Fiber {
  public:
   Fiber();
@@ -25,6 +25,9 @@ class Fiber {
   bool Resume();
   // Within the task: goes back to who resumed.
   void Suspend();
+  // Not within a fiber: its task is never resumed. The fiber is not used again, and what its stack
+  // refers to does not count as leaked.
+  void Abandon();
 
  private:
   void Run();

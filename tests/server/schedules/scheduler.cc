@@ -62,6 +62,9 @@ Scheduler::Scheduler(uint64_t seed) : choices_(seed), random_(choices_.Next()) {
 }
 
 Scheduler::~Scheduler() {
+  for (const ThreadState& thread : threads_) {
+    if (thread.status != Status::kDone) thread.fiber->Abandon();
+  }
   if (current == this) current = nullptr;
 }
 
