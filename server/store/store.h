@@ -15,6 +15,7 @@
 #include "core/hull/hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
+#include "server/store/other_changes.h"
 
 namespace hulld::server {
 
@@ -66,6 +67,10 @@ struct Change {
   // The body after the change, or what is deleted if it is. Then nothing that says of a hull is
   // used.
   std::shared_ptr<StoredBody> body;
+
+  const std::string& id() const {
+    return body != nullptr ? body->record.body_id : hull.record.hull_id;
+  }
 };
 
 // A hull that a store holds: its ID, and the rest, or DATA_LOSS naming the hull when what is kept
@@ -138,6 +143,18 @@ class Store {
   // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
   // directory, which the caller removes. FAILED_PRECONDITION: nothing is kept.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
+
+  // Whether other servers may commit to the same store while this one is open. Then Commit leaves
+  // out, of the changes that it is given, all of an ID that is in what TakeOthers is about to give:
+  // they were made of what was not the last any more. LoadVertices and LoadSequence answer ABORTED
+  // where the hull was changed since. Follow finds out what others have committed by the time of
+  // the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
+  virtual bool is_shared() const { return false; }
+  virtual absl::Status Follow() { return absl::OkStatus(); }
+  // What Commit and Follow found, whether they failed or not, since this was called last.
+  virtual OtherChanges TakeOthers() { return {}; }
+  // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
+  virtual void OnOthers(std::function<void()> others) { (void)others; }
 
   // `ended` is called, on any thread, once nothing can be committed or read here any more because
   // another server took the store over; at once if that is so already. The process is to end then.

@@ -69,12 +69,13 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());
   const auto shared = std::make_shared<Body>(std::move(body), memory_);
-  Locked locked(mutex_);
-  // Counted by now. What waits for others is not counted twice.
-  if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
-    return Answer<PutBodyResult>(locked, done, s);
-  }
-  PutBodyLocked(locked, shared, if_revision, done);
+  WhenFresh(done, [=, this](Locked& locked) {
+    // Counted by now. What waits for others is not counted twice.
+    if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
+      return Answer<PutBodyResult>(locked, done, s);
+    }
+    PutBodyLocked(locked, shared, if_revision, done);
+  });
 }
 
 // Whether a body may be put. OK also where it takes the place of another.
@@ -110,7 +111,12 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   // One that was damaged begins anew.
   change.begins = created == 0;
   SubmitBody(locked, std::move(change),
-             [this, body, is_new, done](Locked& later, const absl::Status& status, const Change&) {
+             [=, this, is_new = is_new](Locked& later, const absl::Status& status, const Change&) {
+               if (Committer::IsSuperseded(status)) {
+                 return Again(later, [=, this](Locked& again) {
+                   PutBodyLocked(again, body, if_revision, done);
+                 });
+               }
                const BodyRecord& record = body->record();
                if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
                later.Discard(std::exchange(bodies_.at(record.body_id).committed, body));
@@ -121,8 +127,7 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
 
 void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
                           Reply<uint64_t> done) {
-  Locked locked(mutex_);
-  DeleteBodyLocked(locked, id, if_revision, done);
+  WhenFresh(done, [=, this](Locked& locked) { DeleteBodyLocked(locked, id, if_revision, done); });
 }
 
 void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
@@ -149,7 +154,12 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
   change.deleted = true;
   change.body = body->stored();
   SubmitBody(locked, std::move(change),
-             [this, id, done](Locked& later, const absl::Status& status, const Change& deletion) {
+             [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
+               if (Committer::IsSuperseded(status)) {
+                 return Again(later, [=, this](Locked& again) {
+                   DeleteBodyLocked(again, id, if_revision, done);
+                 });
+               }
                if (!status.ok()) return Answer<uint64_t>(later, done, status);
                later.Discard(std::exchange(bodies_.at(id).committed, nullptr));
                Answer<uint64_t>(later, done, deletion.revision);
@@ -163,7 +173,7 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
   HULLD_CHECK(!std::exchange(bodies_.at(id).in_flight, true));
   committer_.Submit(locked, std::move(change),
                     [this, id, finish = std::move(finish)](
-                        Locked& later, const absl::Status& status, const Change& committed) {
+                        Locked& later, const absl::Status& status, Change& committed) {
                       if (status.ok()) {
                         Publish(committed.revision);
                         feed_.NoteOther(later, committed.revision);
@@ -179,7 +189,13 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
                         bodies_.erase(id);
                         --body_count_;
                       }
-                      for (const auto& next : waiting) next(later);
+                      for (auto& next : waiting) {
+                        if (Committer::IsSuperseded(status)) {
+                          after_others_.push_back(std::move(next));
+                        } else {
+                          next(later);
+                        }
+                      }
                     });
 }
 

@@ -23,14 +23,16 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kFirstPause{10};
 constexpr std::chrono::milliseconds kLongestPause{500};
 
-absl::Status OutcomeUnknown(const absl::Status& cause) {
+}  // namespace
+
+absl::Status PostgresStore::OutcomeUnknown(const absl::Status& cause) {
   return absl::UnavailableError(absl::StrCat(
       "the database was lost while it committed (", cause.message(),
       "), and cannot be asked yet whether it did: nobody sees the change, but it may appear if the "
       "server is restarted; look whether it did before you repeat it"));
 }
 
-absl::Status Refused(const absl::Status& cause) {
+absl::Status PostgresStore::Refused(const absl::Status& cause) {
   absl::Status status(
       cause.code(),
       absl::StrCat(
@@ -41,8 +43,6 @@ absl::Status Refused(const absl::Status& cause) {
   return status;
 }
 
-}  // namespace
-
 PostgresStore::~PostgresStore() {
   {
     const std::lock_guard lock(mutex_);
@@ -51,6 +51,7 @@ PostgresStore::~PostgresStore() {
   wake_.notify_all();
   if (keeper_.joinable()) keeper_.join();
   if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
+  if (options_.shared) Leave();
   // Who waits need not wait until the database sees that the session is closed.
   if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
 }
@@ -147,6 +148,7 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
 }
 
 absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
+  if (options_.shared) return CommitShared(changes);
   if (absl::Status s = ended(); !s.ok()) return s;
   if (!unknown_.ok()) return unknown_;
   const uint64_t batch = batch_ + 1;

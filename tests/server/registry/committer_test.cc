@@ -1,12 +1,15 @@
 #include "server/registry/committer.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -73,6 +76,21 @@ class GatedStore : public MemoryStore {
   absl::Status recovery_;
   int recoveries_ = 0;
   std::vector<std::vector<uint64_t>> batches_;
+};
+
+// Another server changes some IDs at the next commit.
+class SharedStore : public GatedStore {
+ public:
+  bool is_shared() const override { return true; }
+  OtherChanges TakeOthers() override { return std::exchange(others, {}); }
+  absl::Status Follow() override {
+    ++follows;
+    return can_follow;
+  }
+
+  OtherChanges others;
+  std::atomic<int> follows = 0;
+  absl::Status can_follow;
 };
 
 class CommitterTest : public ::testing::Test {
@@ -233,6 +251,68 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
     }
   }
   EXPECT_EQ(ended, 3);
+}
+
+// Those of the batch and those that wait, the latest first, before Others is told; what is kept
+// follows.
+TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
+  SharedStore store;
+  FairMutex order;
+  std::vector<std::string> events;
+  std::promise<void> ended;
+  Committer committer(store, order);
+  committer.SetOthers([&](Locked& locked, const OtherChanges& others) {
+    EXPECT_TRUE(locked.Holds(order));
+    events.push_back(absl::StrCat("others at ", others.revision));
+  });
+  const auto submit = [&](const std::string& id, int number) {
+    const Locked locked(order);
+    Change change;
+    change.hull.record.hull_id = id;
+    committer.Submit(locked, std::move(change),
+                     [&, id, number](Locked&, const absl::Status& status, const Change&) {
+                       const char* how = status.ok()                       ? "kept"
+                                         : Committer::IsSuperseded(status) ? "superseded"
+                                                                           : "refused";
+                       events.push_back(absl::StrCat(id, number, " ", how));
+                       if (id == "last") ended.set_value();
+                     });
+  };
+  GatedStore::Gate first;
+  store.Close(first);
+  submit("a", 1);
+  first.entered.get_future().wait();
+  submit("a", 2);
+  submit("b", 1);
+  submit("a", 3);
+  store.others.revision = 7;
+  store.others.by_id["a"];
+  first.outcome.set_value(absl::OkStatus());
+  submit("last", 1);
+  ended.get_future().wait();
+  const std::lock_guard lock(order);
+  EXPECT_THAT(events, ElementsAre("a3 superseded", "a2 superseded", "a1 superseded", "others at 7",
+                                  "b1 kept", "last1 kept"));
+}
+
+TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
+  SharedStore store;
+  FairMutex order;
+  Committer committer(store, order);
+  committer.SetOthers([](Locked&, const OtherChanges&) {});
+  const auto follow = [&] {
+    std::promise<absl::Status> told;
+    {
+      const Locked locked(order);
+      committer.Follow(locked,
+                       [&](Locked&, const absl::Status& status) { told.set_value(status); });
+    }
+    return told.get_future().get();
+  };
+  EXPECT_TRUE(follow().ok());
+  EXPECT_EQ(store.follows, 1);
+  store.can_follow = absl::UnavailableError("no database");
+  EXPECT_TRUE(absl::IsUnavailable(follow()));
 }
 
 TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
