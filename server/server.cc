@@ -54,6 +54,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
     PostgresOptions options;
     options.conninfo = *std::move(conninfo);
     options.take_over = config.take_over;
+    options.shared = config.postgres_servers == "many";
     options.should_stop = std::move(should_stop);
     return PostgresStore::Open(std::move(options));
   }

@@ -144,6 +144,8 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
                               v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
   if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
+  const absl::Status fresh = registry_.AwaitOthers([&call] { return call.ShouldStop(); });
+  if (!fresh.ok()) return fresh;
   const FoundBodies found = registry_.FindBodies(std::span(&id, 1));
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
@@ -167,6 +169,8 @@ absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call&
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
+  const absl::Status fresh = registry_.AwaitOthers([&call] { return call.ShouldStop(); });
+  if (!fresh.ok()) return fresh;
   const BodyPage page =
       registry_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize));
   EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());

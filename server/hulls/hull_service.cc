@@ -135,6 +135,8 @@ absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& 
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
+  const absl::Status fresh = registry_.AwaitOthers([&call] { return call.ShouldStop(); });
+  if (!fresh.ok()) return fresh;
   const HullPage page = registry_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize));
   EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
   for (const ListedHull& hull : page.hulls) {

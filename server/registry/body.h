@@ -47,13 +47,8 @@ class Body {
   std::shared_ptr<const PieceBoxes> BoxesOf(std::span<const BodyPiece> pieces,
                                             std::vector<uint64_t> hull_revisions) const;
 
-  // For the registry, before others know it: the revisions that the change gives it.
-  void SetRevisions(uint64_t create_revision, uint64_t revision) {
-    stored_->record.create_revision = create_revision;
-    stored_->record.revision = revision;
-  }
-  // For the store.
-  std::shared_ptr<const StoredBody> stored() const { return stored_; }
+  // For the store, which gives it its revisions as it commits it, before others know it.
+  const std::shared_ptr<StoredBody>& stored() const { return stored_; }
 
  private:
   const std::shared_ptr<StoredBody> stored_;

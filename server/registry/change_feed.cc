@@ -93,6 +93,11 @@ void ChangeFeed::NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHul
        {record.revision, record.create_revision, Life::kChanged, false, hull});
 }
 
+void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
+  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
+  revision_ = revision;
+}
+
 void ChangeFeed::NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
   const HullRecord& record = hull->committed.record;
   Note(locked, record.hull_id,
@@ -121,12 +126,43 @@ void ChangeFeed::NoteBodyDeleted(Locked& locked, const Body& body, uint64_t revi
   Note(locked, body.record().body_id, state);
 }
 
+void ChangeFeed::NoteBecameBody(Locked& locked, const HullRecord& former,
+                                const std::shared_ptr<const Body>& body) {
+  const BodyRecord& record = body->record();
+  RememberDeletion(former.hull_id, {record.revision, former.create_revision, Life::kEnded});
+  Note(locked, record.body_id,
+       {record.revision, record.create_revision, Life::kReplaced, true, nullptr, body, true});
+}
+
+void ChangeFeed::NoteBecameHull(Locked& locked, const Body& former,
+                                const std::shared_ptr<RegisteredHull>& hull) {
+  const HullRecord& record = hull->committed.record;
+  RememberDeletion(record.hull_id,
+                   {record.revision, former.record().create_revision, Life::kEnded, true});
+  Note(locked, record.hull_id,
+       {record.revision, record.create_revision, Life::kReplaced, false, hull, nullptr, true});
+}
+
+// What a watch of hulls alone is told is of the hull that there is, or was.
+std::optional<ChangeFeed::State> ChangeFeed::AsToldTo(const WatchTarget& target,
+                                                      const State& state) {
+  if (target.bodies || (!state.is_body && !state.changes_kind)) return state;
+  if (!state.is_body) {
+    State begun = state;
+    begun.life = Life::kBegan;
+    return begun;
+  }
+  if (state.changes_kind) return State{state.revision, state.create_revision, Life::kEnded};
+  return std::nullopt;
+}
+
 void ChangeFeed::Note(Locked& locked, const std::string& id, const State& state) {
   HULLD_CHECK(locked.Holds(order_) && state.revision > revision_);
   revision_ = state.revision;
   const auto note_for = [&](const Interests& interests) {
     for (const auto& interest : interests) {
-      if (!state.is_body || interest->target.bodies) NoteFor(locked, interest, id, state);
+      const std::optional<State> told = AsToldTo(interest->target, state);
+      if (told.has_value()) NoteFor(locked, interest, id, *told);
     }
   };
   for (const auto& [length, count] : prefix_lengths_) {

@@ -112,6 +112,11 @@ class ChangeFeed {
   void NoteBodyPut(Locked& locked, const std::shared_ptr<const Body>& former,
                    const std::shared_ptr<const Body>& body);
   void NoteBodyDeleted(Locked& locked, const Body& body, uint64_t revision);
+  // Other servers made one of the other, by more than one change; told as one.
+  void NoteBecameBody(Locked& locked, const HullRecord& former,
+                      const std::shared_ptr<const Body>& body);
+  void NoteBecameHull(Locked& locked, const Body& former,
+                      const std::shared_ptr<RegisteredHull>& hull);
 
   // Starts at the stage kChanges, with what is committed from now on.
   std::shared_ptr<ChangeWatch> Open(const WatchTarget& target, std::function<void()> on_ready);
@@ -124,6 +129,8 @@ class ChangeFeed {
                  std::span<const std::string> dropped);
 
   static const WatchTarget& TargetOf(const ChangeWatch& watch);
+  // What cannot be told was given this revision: watches that wait are told that it moved on.
+  void NoteOther(const Locked& locked, uint64_t revision);
   // Whether all that went after this revision is remembered.
   bool Remembers(uint64_t revision) const { return revision >= deletions_begin_; }
   // Moves a watch back to where everything is told, and says so.
@@ -162,6 +169,8 @@ class ChangeFeed {
     // One of them, or none when it went.
     std::shared_ptr<RegisteredHull> hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
+    // What the ID was before was of the other kind, and ended by the same change.
+    bool changes_kind = false;
   };
   struct Deletion {
     uint64_t revision;
@@ -170,6 +179,7 @@ class ChangeFeed {
   };
 
   void Note(Locked& locked, const std::string& id, const State& state);
+  static std::optional<State> AsToldTo(const WatchTarget& target, const State& state);
   void NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& interest,
                const std::string& id, const State& state);
   void RememberDeletion(const std::string& id, const State& state);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -39,25 +40,47 @@ CommitStatistics Committer::Statistics() const {
   return statistics_;
 }
 
+void Committer::Follow(const Locked& locked, Follower follower) {
+  HULLD_CHECK(locked.Holds(order_));
+  {
+    const std::lock_guard lock(mutex_);
+    followers_.push_back(std::move(follower));
+  }
+  ready_.notify_one();
+}
+
+void Committer::FollowSoon() {
+  {
+    const std::lock_guard lock(mutex_);
+    followers_.push_back([](Locked&, const absl::Status&) {});
+  }
+  ready_.notify_one();
+}
+
 void Committer::Run() {
   while (true) {
-    std::vector<Pending> batch = WaitForBatch();
-    if (batch.empty()) return;
-    Settle(batch, Write(batch));
+    Round round = WaitForRound();
+    if (round.batch.empty() && round.followers.empty()) return;
+    absl::Status status;
+    if (!round.batch.empty()) status = Write(round.batch);
+    // A commit has followed the others, if it did not fail.
+    absl::Status followed;
+    if (round.batch.empty() || !status.ok()) followed = store_.Follow();
+    Settle(round, status, followed);
   }
 }
 
 // Empty: this is to end.
-std::vector<Committer::Pending> Committer::WaitForBatch() {
+Committer::Round Committer::WaitForRound() {
   std::unique_lock lock(mutex_);
-  ready_.wait(lock, [this] { return ending_ || !queue_.empty(); });
-  return std::exchange(queue_, {});
+  ready_.wait(lock, [this] { return ending_ || !queue_.empty() || !followers_.empty(); });
+  return {std::exchange(queue_, {}), std::exchange(followers_, {})};
 }
 
-absl::Status Committer::Write(const std::vector<Pending>& batch) {
-  std::vector<const Change*> changes;
+absl::Status Committer::Write(std::vector<Pending>& batch) {
+  std::vector<Change*> changes;
   changes.reserve(batch.size());
-  for (const Pending& pending : batch) changes.push_back(&pending.change);
+  for (Pending& pending : batch) changes.push_back(&pending.change);
   absl::Status status;
   if (Statistics().failing) status = store_.Recover();
   const auto start = std::chrono::steady_clock::now();
@@ -71,9 +94,11 @@ absl::Status Committer::Write(const std::vector<Pending>& batch) {
 }
 
 // Completes a batch that the store kept; or, if it refused the batch, that and all that waits.
-void Committer::Settle(std::vector<Pending>& batch, const absl::Status& status) {
+void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& followed) {
+  std::vector<Pending>& batch = round.batch;
   Locked locked(order_);
-  {
+  if (store_.is_shared()) TellOthers(locked, batch);
+  if (!batch.empty()) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {
       spdlog::error("changes refused: {}", std::string(status.message()));
@@ -89,16 +114,42 @@ void Committer::Settle(std::vector<Pending>& batch, const absl::Status& status) 
     }
   }
   size_t completed = 0;
-  for (const Pending& pending : batch) {
+  for (Pending& pending : batch) {
     if (status.ok() && completed > 0 && completed % kMostPerHold == 0) {
       locked.Unlock();
       locked.Lock();
     }
-    pending.done(locked, status);
+    pending.done(locked, status, pending.change);
     ++completed;
   }
+  for (const Follower& follower : round.followers) follower(locked, followed);
   // Replies go out now; the changes themselves, which may be large, end without a lock.
   locked.Unlock();
+}
+
+// Refuses what other servers superseded, of the batch and of what waits, and tells of them.
+void Committer::TellOthers(Locked& locked, std::vector<Pending>& batch) {
+  const OtherChanges others = store_.TakeOthers();
+  if (others.revision == 0) return;
+  std::vector<Pending> superseded;
+  const auto take_from = [&](std::vector<Pending>& pending) {
+    const auto [first, last] = std::ranges::stable_partition(
+        pending, [&](const Pending& each) { return !others.by_id.contains(each.change.id()); });
+    std::move(first, last, std::back_inserter(superseded));
+    pending.erase(first, last);
+  };
+  take_from(batch);
+  {
+    const std::lock_guard lock(mutex_);
+    take_from(queue_);
+  }
+  const absl::Status status = absl::AbortedError("another server changed it first");
+  for (auto it = superseded.rbegin(); it != superseded.rend(); ++it) {
+    it->done(locked, status, it->change);
+  }
+  others_(locked, others);
+  // Large ones end without a lock.
+  locked.Afterwards([ended = std::make_shared<std::vector<Pending>>(std::move(superseded))] {});
 }
 
 }  // namespace hulld::server

@@ -41,10 +41,22 @@ struct CommitStatistics {
 // after `order`, and nothing is called under it. No lock is held while the store works.
 class Committer {
  public:
-  // Told whether a change is committed: OK, or why it was refused. Called once, on the committer's
+  // Told whether a change is committed: OK, or why it was refused; and the change, with the
+  // revisions that the store gave it if it is. Called once, on the committer's
   // thread, with `order` held: completions come in the order of submission, and no submission comes
   // between refusals of one batch. May submit the next change.
-  using Completion = std::function<void(Locked& order, const absl::Status&)>;
+  using Completion = std::function<void(Locked& order, const absl::Status&, Change&)>;
+
+  // Whether a change is refused because another server changed the same ID before it (a store that
+  // is shared): what it was made of is not the last any more, and its submitter makes it anew.
+  static bool IsSuperseded(const absl::Status& status) { return absl::IsAborted(status); }
+  // Told what other servers committed, with `order` held: after the changes that this supersedes
+  // were refused, the latest first, and before those of the same batch that were kept complete, as
+  // they follow it. Nothing of these IDs is in flight then.
+  using Others = std::function<void(Locked& order, const OtherChanges& others)>;
+  // Told, with `order` held, once Others was told of all that other servers had committed when it
+  // was submitted, or why that could not be found out.
+  using Follower = std::function<void(Locked& order, const absl::Status&)>;
 
   // Completions of kept changes within one hold of `order`; each takes about a microsecond.
   static constexpr size_t kMostPerHold = 128;
@@ -60,6 +72,13 @@ class Committer {
   // `order`. Cost: O(1).
   void Submit(const Locked& locked, Change change, Completion done);
 
+  // For a store that is shared. Before the first change and the first follower.
+  void SetOthers(Others others) { others_ = std::move(others); }
+  // Requires that `locked` holds `order`. Cost: a question to the store, one for all who wait.
+  void Follow(const Locked& locked, Follower follower);
+  // Others is to be told soon, if there is anything to tell. Takes no lock but the queue's.
+  void FollowSoon();
+
   CommitStatistics Statistics() const;
   // Where each batch is timed and counted; set before the first change, and outlives this.
   void SetMetrics(StoreMetrics& metrics) { metrics_ = &metrics; }
@@ -70,19 +89,28 @@ class Committer {
     Completion done;
   };
 
+  // What is done at a time: either may be empty, and both are at the end.
+  struct Round {
+    std::vector<Pending> batch;
+    std::vector<Follower> followers;
+  };
+
   void Run();
-  std::vector<Pending> WaitForBatch();
-  absl::Status Write(const std::vector<Pending>& batch);
-  void Settle(std::vector<Pending>& batch, const absl::Status& status);
+  Round WaitForRound();
+  absl::Status Write(std::vector<Pending>& batch);
+  void Settle(Round& round, const absl::Status& status, const absl::Status& followed);
+  void TellOthers(Locked& locked, std::vector<Pending>& batch);
 
   Store& store_;
   FairMutex& order_;
   StoreMetrics* metrics_ = nullptr;
+  Others others_;
 
   mutable Mutex mutex_;
   // The rest is guarded by mutex_.
   ConditionVariable ready_;
   std::vector<Pending> queue_;
+  std::vector<Follower> followers_;
   CommitStatistics statistics_;
   bool ending_ = false;
   Thread thread_;

@@ -71,6 +71,16 @@ void HullState::Refuse() {
   HULLD_UNREACHABLE();  // nothing of it is in flight
 }
 
+void HullState::Supersede() {
+  HULLD_CHECK(life_ == Life::kPresent && in_flight_ == 0);
+  if (work_ == Work::kBuilding) work_ = Work::kReverting;
+}
+
+void HullState::Vanish() {
+  Supersede();
+  life_ = Life::kGone;
+}
+
 void HullState::Damage(const absl::Status& damage) {
   HULLD_CHECK(life_ == Life::kPresent && !damaged());
   HULLD_CHECK(!damage.ok());

@@ -19,13 +19,17 @@ namespace hulld::server {
 //   kIdle --Schedule--> kScheduled --StartBuilding--> kBuilding --Refuse--> kReverting
 //   kScheduled, kBuilding, kReverting --EndWork--> kIdle
 //
+// Where other servers change hulls, too, Supersede takes a hull that is present to another version,
+// and Vanish makes it gone; what a thread builds on it then is reverted.
+//
 // Beside them it counts the changes in flight (submitted to the store, neither committed nor
 // refused), and knows whether the hull is damaged. Readers take no part: they never touch the
 // builder, and find what is committed at any moment. Steps are legal only where these agree:
 //
 //   - Only a hull that is present and not damaged grows. A creation and an end are one change in
 //     flight; only chunks overlap, kMaxInFlight of them at most.
-//   - A hull ends only when it is quiet: idle, with nothing in flight. A hull that is gone is idle.
+//   - A hull ends here only when it is quiet: idle, with nothing in flight. What others do to it
+//     finds nothing in flight, but maybe a thread at work.
 class HullState {
  public:
   enum class Life {
@@ -88,6 +92,11 @@ class HullState {
   // The oldest change in flight is committed, or refused.
   void Commit();
   void Refuse();
+
+  // Another server changed the hull, or ended it. Requires that it is present, and that nothing is
+  // in flight.
+  void Supersede();
+  void Vanish();
 
   // The store cannot give back what it holds of the hull. damage: not OK.
   void Damage(const absl::Status& damage);

@@ -110,6 +110,27 @@ void RegisteredHull::DiscardAll(Locked& locked) {
   SetCommittedMark(locked, {});
 }
 
+void RegisteredHull::Requeue(PendingChunk chunk) {
+  const auto next = std::ranges::find_if(
+      chunks, [&](const PendingChunk& each) { return each.place > chunk.place; });
+  chunks.insert(next, std::move(chunk));
+}
+
+// What is in memory is read again where vertices changed.
+void RegisteredHull::Supersede(Locked& locked, const StoredHull& stored) {
+  state.Supersede();
+  DiscardBuilder(locked);
+  RevertLive(locked);
+  if (stored.record.revision != committed.record.revision) {
+    DiscardAll(locked);
+    has_box = false;
+  }
+  committed = head = stored;
+  writers.clear();
+  ++supersessions;
+  NoteUse();
+}
+
 void RegisteredHull::NoteUse() {
   CountParts();
   const bool is_for_writing = !readable_from_store || !state.quiet() || !chunks.empty();
@@ -164,6 +185,14 @@ const std::shared_ptr<const ServedHull>& EmptyServedHull() {
 }
 
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }
+
+absl::Status Gone(const std::string& id, const char* how) {
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          QuotedHull(id), " was ", how,
+          " while points were streamed into it; open the stream again and start anew")),
+      v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
+}
 
 absl::Status HullNotFound(const std::string& id) {
   return WithReason(absl::NotFoundError(absl::StrCat(QuotedHull(id), " not found")),

@@ -35,6 +35,8 @@ struct PendingChunk {
   Reply<ChunkResult> done;
   // Counts its points.
   MemoryCharge charge;
+  // Its place among the chunks of the hull.
+  uint64_t place = 0;
 };
 
 // One incarnation of a hull, guarded by the registry's mutex. The builder is used without it, by
@@ -55,6 +57,8 @@ struct RegisteredHull {
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                  MemoryBudget& budget);
 
+  // What the store keeps of it, as of its first change. Requires that nothing else was kept before.
+  void SetStored(const StoredHull& stored) { committed = head = stored; }
   // Whether most points of `live` are no vertices any more: preparing drops them, and keeps memory
   // bounded where points take each other in and nobody asks. It costs a part of what appending
   // those points did.
@@ -81,8 +85,12 @@ struct RegisteredHull {
   void DiscardServed(Locked& locked);
   // The points beyond what is committed were refused.
   void RevertLive(Locked& locked);
+  // A chunk waits again, before those that came after it.
+  void Requeue(PendingChunk chunk);
   // The hull is gone.
   void DiscardAll(Locked& locked);
+  // Another server made `stored` of the committed hull. Requires that nothing is in flight.
+  void Supersede(Locked& locked, const StoredHull& stored);
   // The committed hull, as watches are told of it.
   HullChange Describe() const;
   // The last sequence of a writer, chunks in flight included; 0 for a writer not in `writers`.
@@ -91,8 +99,11 @@ struct RegisteredHull {
   HullState state;
   const bool readable_from_store;
   StoredHull committed;
-  // With the changes in flight.
+  // With the changes in flight, whose revisions are not known: those in it are of `committed`.
   StoredHull head;
+  // Of `committed`, while chunks are in flight: what each of them builds on once those before it
+  // are committed. Written by their completions alone.
+  std::shared_ptr<HullRevisions> revisions;
   // The points of the hull in the order in which they came, with those of the changes in flight and
   // of the chunk that is being built.
   std::shared_ptr<LiveHull> live;
@@ -119,6 +130,8 @@ struct RegisteredHull {
   // Threads that read a writer's sequence from the store, without the mutex. What is committed
   // meanwhile is newer than what they read, so `writers` keeps it for them.
   int sequence_readers = 0;
+  // How often another server changed the hull: what was read before is not the last any more.
+  uint64_t supersessions = 0;
   // One per open session.
   std::map<uint64_t, std::function<void(const absl::Status&)>> watches;
 
@@ -130,6 +143,7 @@ struct RegisteredHull {
   // Told of each step of `state`, and when points were read from the store.
   ConditionVariable changed;
   std::list<PendingChunk> chunks;
+  uint64_t last_place = 0;
   // What waits until the hull is quiet; goes before chunks.
   std::list<std::function<void(Locked&)>> exclusive;
 
@@ -166,6 +180,8 @@ void Answer(Locked& locked, const Reply<T>& done, absl::StatusOr<T> result) {
 }
 
 std::string QuotedHull(const std::string& id);
+// FAILED_PRECONDITION: the hull of a session ended. how: "deleted".
+absl::Status Gone(const std::string& id, const char* how);
 absl::Status HullNotFound(const std::string& id);
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision);
 

@@ -26,14 +26,6 @@ uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
 }
 
-absl::Status Gone(const std::string& id, const char* how) {
-  return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(
-          QuotedHull(id), " was ", how,
-          " while points were streamed into it; open the stream again and start anew")),
-      v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
-}
-
 }  // namespace
 
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
@@ -46,9 +38,13 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
   preparers_.emplace(1, preparers);
+  if (!store.is_shared()) return;
+  committer_.SetOthers(
+      [this](Locked& locked, const OtherChanges& others) { TakeOver(locked, others); });
 }
 
 Registry::~Registry() {
+  store_.OnOthers(nullptr);
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -62,9 +58,9 @@ Registry::~Registry() {
 }
 
 absl::Status Registry::Load() {
-  const std::lock_guard lock(mutex_);
-  HULLD_CHECK(hulls_.empty() && assigned_revision_ == 0);
-  revision_ = assigned_revision_ = store_.revision();
+  Locked locked(mutex_);
+  HULLD_CHECK(hulls_.empty() && revision_ == 0);
+  revision_ = store_.revision();
   feed_.Begin(revision_);
   const absl::Status status =
       store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
@@ -82,7 +78,12 @@ absl::Status Registry::Load() {
     spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
   }
   if (!status.ok()) return status;
-  return LoadBodies();
+  if (absl::Status s = LoadBodies(); !s.ok() || !store_.is_shared()) return s;
+  // What was read was not of one moment.
+  const absl::Status followed = store_.Follow();
+  TakeOver(locked, store_.TakeOthers());
+  store_.OnOthers([this] { committer_.FollowSoon(); });
+  return followed;
 }
 
 Registry::HullPointer Registry::FindVisible(const std::string& id) {
@@ -110,25 +111,25 @@ absl::Status Registry::CheckHullCount() const {
 }
 
 void Registry::Publish(uint64_t revision) {
-  HULLD_CHECK(revision > revision_ && revision <= assigned_revision_);
+  HULLD_CHECK(revision > revision_);
   revision_ = revision;
 }
 
 void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
-  Locked locked(mutex_);
-  CreateLocked(locked, id, if_absent, done);
+  WhenFresh(done, [=, this](Locked& locked) { CreateLocked(locked, id, if_absent, done); });
 }
 
 void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                             const Reply<CreateResult>& done) {
   const HullPointer existing = hulls_.Find(id);
   if (existing == nullptr) {
-    return CreateNew(locked, id,
-                     [this, done](Locked& later, const absl::StatusOr<HullPointer>& hull) {
-                       if (!hull.ok()) return Answer<CreateResult>(later, done, hull.status());
-                       Answer<CreateResult>(
-                           later, done, CreateResult{revision_, (*hull)->committed.record, true});
-                     });
+    return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
+      if (Committer::IsSuperseded(hull.status())) {
+        return Again(later, [=, this](Locked& again) { CreateLocked(again, id, if_absent, done); });
+      }
+      if (!hull.ok()) return Answer<CreateResult>(later, done, hull.status());
+      Answer<CreateResult>(later, done, CreateResult{revision_, (*hull)->committed.record, true});
+    });
   }
   if (existing->state.changing_life()) {
     existing->exclusive.push_back(
@@ -152,18 +153,18 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
   if (bodies_.contains(id)) return done(locked, BodyExists(id));
   if (absl::Status s = CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
-  change.revision = ++assigned_revision_;
+  change.begins = true;
   change.hull.record.hull_id = id;
-  change.hull.record.create_revision = change.hull.record.revision = change.revision;
   const HullPointer hull = hulls_.Insert(change.hull, HullState::Creating());
   ++creating_;
   Submit(locked, hull, std::move(change),
-         [this, hull, done](Locked& later, const absl::Status& status) {
+         [this, hull, done](Locked& later, const absl::Status& status, const Change& creation) {
            --creating_;
            if (!status.ok()) {
              Forget(later, hull, status);
              return done(later, status);
            }
+           hull->SetStored(creation.hull);
            Publish(hull->committed.record.revision);
            NoteChange(*hull);
            feed_.NoteCreated(later, hull);
@@ -173,8 +174,7 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
 
 void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
                       Reply<uint64_t> done) {
-  Locked locked(mutex_);
-  DeleteLocked(locked, id, if_revision, done);
+  WhenFresh(done, [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
 }
 
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
@@ -192,21 +192,24 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
   }
   Change change;
   change.hull = committed;
-  change.revision = ++assigned_revision_;
   change.deleted = true;
   change.former_layout = committed.layout;
   hull->state.StartEnding();
-  Submit(
-      locked, hull, std::move(change),
-      [this, hull, done, revision = assigned_revision_](Locked& later, const absl::Status& status) {
-        if (!status.ok()) return Answer<uint64_t>(later, done, status);
-        Publish(revision);
-        vertex_count_ -= hull->committed.record.vertex_count;
-        NoteChange(*hull);
-        feed_.NoteDeleted(later, hull->committed.record, revision);
-        Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
-        Answer<uint64_t>(later, done, revision);
-      });
+  Submit(locked, hull, std::move(change),
+         [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
+           if (Committer::IsSuperseded(status)) {
+             return Again(later,
+                          [=, this](Locked& again) { DeleteLocked(again, id, if_revision, done); });
+           }
+           if (!status.ok()) return Answer<uint64_t>(later, done, status);
+           const uint64_t revision = deletion.revision;
+           Publish(revision);
+           vertex_count_ -= hull->committed.record.vertex_count;
+           NoteChange(*hull);
+           feed_.NoteDeleted(later, hull->committed.record, revision);
+           Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
+           Answer<uint64_t>(later, done, revision);
+         });
 }
 
 void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
@@ -216,8 +219,7 @@ void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
   replacement.live =
       std::make_shared<LiveHull>(std::move(vertices), replacement.builder->dimension());
   const auto shared = std::make_shared<Replacement>(std::move(replacement));
-  Locked locked(mutex_);
-  ReplaceLocked(locked, shared, done);
+  WhenFresh(done, [=, this](Locked& locked) { ReplaceLocked(locked, shared, done); });
 }
 
 void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
@@ -231,7 +233,7 @@ void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>&
   if (absl::Status s = CheckReplacement(former.get(), *replacement); !s.ok()) {
     return Answer<ReplaceResult>(locked, done, s);
   }
-  CommitReplacement(locked, former, *replacement, done);
+  CommitReplacement(locked, former, replacement, done);
 }
 
 // Whether the rules allow it. former: null when there is none.
@@ -260,10 +262,9 @@ absl::Status Registry::CheckReplacement(const RegisteredHull* former,
 // former: null when there is none. Takes the replacement's vertices.
 Change Registry::MakeChange(const RegisteredHull* former, Replacement& replacement) {
   Change change;
-  change.revision = ++assigned_revision_;
+  change.begins = true;
   HullRecord& record = change.hull.record;
   record.hull_id = replacement.hull_id;
-  record.create_revision = record.revision = change.revision;
   record.dimension = replacement.builder->dimension();
   record.vertex_count = replacement.builder->vertex_count();
   record.counts = replacement.counts;
@@ -271,15 +272,16 @@ Change Registry::MakeChange(const RegisteredHull* former, Replacement& replaceme
   if (!replacement.vertices.empty()) {
     change.vertex_change = VertexChange::kReplaced;
     change.vertices = std::move(replacement.vertices);
-    change.hull.layout = {record.revision, record.vertex_count, 0, 0};
+    change.hull.layout.base_vertices = record.vertex_count;
   }
   return change;
 }
 
 // former: null when there is none, else quiet. Takes the replacement's builder and points.
 void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
-                                 Replacement& replacement, const Reply<ReplaceResult>& done) {
-  Change change = MakeChange(former.get(), replacement);
+                                 const std::shared_ptr<Replacement>& replacement,
+                                 const Reply<ReplaceResult>& done) {
+  Change change = MakeChange(former.get(), *replacement);
   HullPointer hull;
   if (former == nullptr) {
     hull = hulls_.Insert(change.hull, HullState::Creating());
@@ -290,19 +292,36 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
                                             store_.keeps_hulls(), memory_);
     former->state.StartEnding();
   }
-  hull->SetLive(std::move(replacement.live));
-  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement.builder));
+  hull->SetLive(std::move(replacement->live));
+  hull->builder = std::make_unique<HullBuilder>(std::move(*replacement->builder));
   hull->builder_bytes = hull->builder->MemoryBytes();
   Submit(locked, former == nullptr ? hull : former, std::move(change),
-         [this, hull, former, done](Locked& later, const absl::Status& status) {
-           Answer(later, done, FinishReplacement(later, former, hull, status));
+         [=, this](Locked& later, const absl::Status& status, Change& replaced) {
+           const bool again = Committer::IsSuperseded(status);
+           if (again) TakeBack(*hull, replaced, *replacement);
+           absl::StatusOr<ReplaceResult> result =
+               FinishReplacement(later, former, hull, status, replaced);
+           if (!again) return Answer(later, done, std::move(result));
+           Again(later,
+                 [=, this](Locked& once_more) { ReplaceLocked(once_more, replacement, done); });
          });
+}
+
+// The replacement is to be submitted again.
+void Registry::TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement) {
+  *replacement.builder = std::move(*hull.builder);
+  replacement.live = hull.live;
+  if (change.vertex_change == VertexChange::kReplaced) {
+    replacement.vertices = std::move(change.vertices);
+  }
 }
 
 // hull: what takes the place of `former`, or of none, if the status allows.
 absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const HullPointer& former,
                                                           const HullPointer& hull,
-                                                          const absl::Status& status) {
+                                                          const absl::Status& status,
+                                                          const Change& change) {
+  if (status.ok()) hull->SetStored(change.hull);
   const HullRecord& record = hull->committed.record;
   if (former == nullptr) {
     --creating_;
@@ -334,24 +353,26 @@ void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
   HULLD_CHECK(hull->state.in_flight() > 0);
   const auto charge = std::make_shared<MemoryCharge>(memory_, MemoryUse::kWriting,
                                                      change.vertices.capacity() * sizeof(Vector));
-  committer_.Submit(
-      locked, std::move(change),
-      [this, hull, charge, finish = std::move(finish)](Locked& later, const absl::Status& status) {
-        charge->Set(0);
-        if (status.ok()) {
-          hull->state.Commit();
-        } else {
-          hull->state.Refuse();
-        }
-        finish(later, status);
-        // One that has come to rest may be dropped.
-        if (hull->state.quiet() && !hull->state.gone()) {
-          hull->NoteUse();
-          memory_.Evict(later);
-        }
-        Advance(later, hull);
-        hulls_.RestSome();
-      });
+  committer_.Submit(locked, std::move(change),
+                    [this, hull, charge, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, Change& committed) {
+                      charge->Set(0);
+                      if (status.ok()) {
+                        hull->state.Commit();
+                      } else {
+                        hull->state.Refuse();
+                      }
+                      finish(later, status, committed);
+                      // What other servers did comes first.
+                      if (Committer::IsSuperseded(status)) return AdvanceLater(hull);
+                      // One that has come to rest may be dropped.
+                      if (hull->state.quiet() && !hull->state.gone()) {
+                        hull->NoteUse();
+                        memory_.Evict(later);
+                      }
+                      Advance(later, hull);
+                      hulls_.RestSome();
+                    });
 }
 
 // Lets whatever waits for the hull go on. Called after each step of its state.
@@ -364,6 +385,8 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   }
   if (hull->chunks.empty()) return;
   if (hull->state.gone() || hull->state.damaged()) {
+    // Where a thread is at work, it comes here once it has ended.
+    if (hull->state.work() != HullState::Work::kIdle) return;
     // Replies come on other threads than the one that asks.
     writers_.Submit([this, hull] { RefuseChunks(hull); }, hull->chunks.front().session.client);
     return;

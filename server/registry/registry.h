@@ -66,6 +66,11 @@ struct PendingChunk;
 // hulls that would otherwise come to hold many points that are no vertices any more. The canonical
 // snapshot of a version is made by the first reader that needs it, without the mutex. Thread-safe.
 //
+// Where other servers commit to the same store, reads and changes first learn what those did, which
+// takes the place of what is known here; a change that another one preceded is refused by the
+// committer, and made anew of what there is by then, so callers do not hear of it
+// (registry_others.cc). A chunk is kept for that until it is committed.
+//
 // Lock order: first the mutex of the records; then that of the committer's queue, of the budget, of
 // a pool or within a LiveHull. None of the latter is held while another lock is taken. Callbacks
 // run without any. The committer completes each batch under the mutex of the records (its header
@@ -128,6 +133,12 @@ class Registry {
 
   // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
   HullPage List(const std::string& prefix, const std::string& after, size_t page_size) const;
+
+  // Where the store is shared, waits until all that other servers had committed by the time of the
+  // call is taken over: before what does not do so itself (List, FindBodies, ListBodies). Not for
+  // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
+  // question to the store, one for all who wait; nothing where it is not shared.
+  absl::Status AwaitOthers(const std::function<bool()>& should_stop);
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -218,7 +229,7 @@ class Registry {
   HullPointer FindVisible(const std::string& id);
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   absl::Status CheckHullCount() const;
-  // The last revision that a change was given becomes visible.
+  // The revision that the store gave the last change becomes visible.
   void Publish(uint64_t revision);
 
   void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
@@ -231,11 +242,13 @@ class Registry {
                      const Reply<ReplaceResult>& done);
   absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
   Change MakeChange(const RegisteredHull* former, Replacement& replacement);
-  void CommitReplacement(Locked& locked, const HullPointer& former, Replacement& replacement,
+  void CommitReplacement(Locked& locked, const HullPointer& former,
+                         const std::shared_ptr<Replacement>& replacement,
                          const Reply<ReplaceResult>& done);
   absl::StatusOr<ReplaceResult> FinishReplacement(Locked& locked, const HullPointer& former,
                                                   const HullPointer& hull,
-                                                  const absl::Status& status);
+                                                  const absl::Status& status, const Change& change);
+  static void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement);
 
   absl::Status NoSuchHull(const std::string& id) const;
   absl::Status LoadBodies();
@@ -248,6 +261,19 @@ class Registry {
   void DeleteBodyLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
                         const Reply<uint64_t>& done);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
+
+  // Other servers (registry_others.cc).
+  absl::Status AwaitOthers(Locked& locked, const std::function<bool()>& should_stop);
+  using Refusal = std::function<void(const absl::Status&)>;
+  void WhenFresh(Refusal refuse, std::function<void(Locked&)> next);
+  void Again(Locked& locked, std::function<void(Locked&)> task);
+  void AdvanceLater(const HullPointer& hull);
+  void TakeOver(Locked& locked, const OtherChanges& others);
+  void TakeOver(Locked& locked, const std::string& id, const OtherChange& other);
+  bool TakeOverVersion(Locked& locked, RegisteredHull& hull, const OtherChange& other,
+                       bool is_news);
+  HullPointer TakeOverHull(const std::string& id, const absl::StatusOr<StoredHull>& stored);
+  void TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other);
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
@@ -270,7 +296,7 @@ class Registry {
                                         BuiltChunk& built);
   absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
   void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
-  void SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
+  void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                    BuiltChunk built);
   void CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
                    const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
@@ -305,14 +331,15 @@ class Registry {
   // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
   // builder that a thread owns.
   mutable FairMutex mutex_;
-  // The last one that is committed and visible; the last one that a change was given.
+  // The last one that is committed and visible.
   uint64_t revision_ = 0;
-  uint64_t assigned_revision_ = 0;
   uint64_t vertex_count_ = 0;
   uint64_t last_watch_ = 0;
   HullTable hulls_;
   // No ID is in both.
   std::map<std::string, RegisteredBody> bodies_;
+  // What goes on once all that other servers did is taken over.
+  std::vector<std::function<void(Locked&)>> after_others_;
   // As many as bodies_ holds.
   std::atomic<size_t> body_count_ = 0;
   // Those of hulls_ whose creation is not committed yet.

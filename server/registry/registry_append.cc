@@ -45,6 +45,8 @@ absl::Status GoneWhileStreaming(const HullRecord& record) {
       v1::ERROR_REASON_HULL_GONE, {{"hull_id", record.hull_id}});
 }
 
+absl::Status Superseded() { return absl::AbortedError("another server changed the hull first"); }
+
 absl::Status TooManyWriters(const StoredHull& hull, uint64_t limit) {
   return LimitExceeded(
       absl::StrCat(QuotedHull(hull.record.hull_id), " was written by ", hull.writer_count,
@@ -87,7 +89,8 @@ void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
   const auto request = std::make_shared<OpenRequest>(OpenRequest{
       id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
   // The store may have to be read.
-  RunOpen(request);
+  if (!store_.is_shared()) return RunOpen(request);
+  WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
 }
 
 void Registry::RunOpen(const std::shared_ptr<OpenRequest>& request) {
@@ -111,6 +114,7 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
     return CreateNew(
         locked, request->hull_id,
         [this, request, refuse](Locked& later, const absl::StatusOr<HullPointer>& created) {
+          if (Committer::IsSuperseded(created.status())) return RunOpen(request);
           if (!created.ok()) return refuse(later, created.status());
           request->created_hull = true;
           OpenSession(later, *created, request, 0);
@@ -150,12 +154,21 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
   if (writer != hull.writers.end()) return writer->second.committed;
   if (!store_.keeps_hulls() || hull.committed.writer_count == 0) return 0;
   const HullRecord record = hull.committed.record;
+  const uint64_t supersessions = hull.supersessions;
   ++hull.sequence_readers;
   locked.Unlock();
   const absl::StatusOr<uint64_t> sequence = store_.LoadSequence(record, writer_id);
   locked.Lock();
   --hull.sequence_readers;
+  if (absl::IsAborted(sequence.status())) {
+    if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
+    // Who asks sees that.
+    if (hull.state.gone()) return 0;
+    return CommittedSequence(locked, hull, writer_id);
+  }
   if (!sequence.ok()) return sequence.status();
+  // Another server may have taken a chunk of the writer since.
+  if (hull.supersessions != supersessions) return CommittedSequence(locked, hull, writer_id);
   // What was committed meanwhile is newer, and still there.
   writer = hull.writers.find(writer_id);
   if (writer != hull.writers.end()) return writer->second.committed;
@@ -179,9 +192,9 @@ void Registry::Append(const AppendSession& session, Chunk chunk, std::function<b
                       std::function<void()> on_built, Reply<ChunkResult> done) {
   Locked locked(mutex_);
   const uint64_t bytes = chunk.points.capacity() * sizeof(Vector);
-  session.hull->chunks.push_back({session, std::move(chunk), std::move(should_stop),
-                                  std::move(on_built), std::move(done),
-                                  MemoryCharge(memory_, MemoryUse::kWriting, bytes)});
+  session.hull->chunks.push_back(
+      {session, std::move(chunk), std::move(should_stop), std::move(on_built), std::move(done),
+       MemoryCharge(memory_, MemoryUse::kWriting, bytes), ++session.hull->last_place});
   Advance(locked, session.hull);
 }
 
@@ -193,7 +206,7 @@ void Registry::RunNextChunk(const HullPointer& hull) {
   ApplyChunk(locked, hull, pending);
   pending.chunk.points = {};
   pending.charge.Set(0);
-  if (pending.on_built) locked.Afterwards(std::move(pending.on_built));
+  if (pending.on_built) locked.Afterwards(std::exchange(pending.on_built, nullptr));
   hull->state.EndWork();
   hull->NoteUse();
   memory_.Evict(locked);
@@ -216,7 +229,13 @@ void Registry::RefuseChunks(const HullPointer& hull) {
 // meanwhile.
 void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending) {
   const uint64_t sequence = pending.chunk.sequence;
-  const absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
+  absl::StatusOr<Verdict> verdict = CheckChunk(locked, *hull, pending);
+  // What is not committed now is compared by the store.
+  const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
+  if (!is_new && store_.is_shared()) {
+    const absl::Status fresh = AwaitOthers(locked, pending.should_stop);
+    verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
+  }
   if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
   if (*verdict == Verdict::kAlreadyApplied) {
     const HullRecord& record = hull->committed.record;
@@ -224,6 +243,11 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
                        ChunkResult{revision_, true, record.revision, record.vertex_count, {}});
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
+  if (Committer::IsSuperseded(built.status())) {
+    // Its turn comes again.
+    hull->Requeue(std::move(pending));
+    return;
+  }
   if (!built.ok()) return AnswerChunk(locked, pending.done, sequence, built.status());
   SubmitChunk(locked, hull, pending, *std::move(built));
 }
@@ -231,10 +255,12 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
 // What the rules say before anything is built. May release the mutex to ask the store.
 absl::StatusOr<Registry::Verdict> Registry::CheckChunk(Locked& locked, RegisteredHull& hull,
                                                        const PendingChunk& pending) {
+  if (hull.state.gone()) return GoneWhileStreaming(hull.committed.record);
   const Chunk& chunk = pending.chunk;
   const std::string& writer_id = pending.session.writer_id;
   const absl::StatusOr<uint64_t> committed = CommittedSequence(locked, hull, writer_id);
   if (!committed.ok()) return committed.status();
+  if (hull.state.gone()) return GoneWhileStreaming(hull.committed.record);
   if (chunk.sequence <= *committed) return Verdict::kAlreadyApplied;
   const uint64_t last = hull.HeadSequence(writer_id);
   if (chunk.sequence != last + 1) {
@@ -264,6 +290,7 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   if (hull.state.damaged()) return hull.state.damage();
   hull.state.StartBuilding();
   const absl::StatusOr<std::shared_ptr<LiveHull>> live = LiveForWriter(locked, hull);
+  if (Committer::IsSuperseded(live.status())) return live.status();
   if (!live.ok()) return WhyNotBuilt(hull, live.status());
   hull.live_is_ahead = true;
   BuiltChunk built;
@@ -276,7 +303,7 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
 
   locked.Unlock();
   const absl::StatusOr<PointCounts> added = AddPoints(pending, committed, **live, builder, built);
-  pending.chunk.points = {};
+  if (!store_.is_shared()) pending.chunk.points = {};
   const uint64_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
   locked.Lock();
 
@@ -284,6 +311,7 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   hull.builder_bytes = builder_bytes;
   if (hull.state.work() == HullState::Work::kReverting) {
     hull.DiscardBuilder(locked);
+    if (store_.is_shared()) return Superseded();
     return absl::UnavailableError("a change before it could not be stored");
   }
   if (!added.ok()) return WhyNotBuilt(hull, added.status());
@@ -293,6 +321,9 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   }
 
   built.counts = *added;
+  if (hull.state.in_flight() == 0) {
+    hull.revisions = std::make_shared<HullRevisions>(RevisionsOf(hull.committed));
+  }
   FillChange(hull, *added, change);
   RegisteredHull::Sequences& sequences = hull.writers[pending.session.writer_id];
   if (sequences.head == 0) ++change.hull.writer_count;
@@ -317,6 +348,11 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   locked.Unlock();
   absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
   locked.Lock();
+  if (absl::IsAborted(loaded.status())) {
+    if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
+    return Superseded();
+  }
+  if (hull.state.work() == HullState::Work::kReverting) return Superseded();
   if (hull.live != nullptr) return hull.live;
   if (!loaded.ok()) return loaded.status();
   hull.SetLive(*std::move(loaded));
@@ -376,33 +412,44 @@ void Registry::FillChange(const RegisteredHull& hull, const PointCounts& added, 
   HullRecord& record = change.hull.record;
   VertexLayout& layout = change.hull.layout;
   record.counts += added;
-  change.revision = assigned_revision_;
-  if (added.outside == 0) return;
-  change.revision = record.revision = ++assigned_revision_;
+  change.before = hull.revisions;
+  change.takes_revision = added.outside > 0;
+  if (!change.takes_revision) return;
   record.vertex_count = hull.builder->vertex_count();
   record.dimension = hull.builder->dimension();
   if (change.vertex_change == VertexChange::kReplaced) {
-    layout = {record.revision, record.vertex_count, 0, 0};
+    layout = {.base_vertices = record.vertex_count};
   } else if (change.vertex_change == VertexChange::kAdded) {
     ++layout.delta_count;
     layout.delta_vertices += change.vertices.size();
   }
 }
 
-void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, const PendingChunk& pending,
+void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
                            BuiltChunk built) {
-  const auto finish = [this, hull, after = built.change.hull, mark = built.mark,
-                       counts = built.counts, done = pending.done,
-                       writer_id = pending.session.writer_id, sequence = pending.chunk.sequence](
-                          Locked& later, const absl::Status& status) {
+  // Where another server may be first, the chunk is kept until that is decided.
+  std::shared_ptr<PendingChunk> kept;
+  const Reply<ChunkResult> done = pending.done;
+  const std::string writer_id = pending.session.writer_id;
+  const uint64_t sequence = pending.chunk.sequence;
+  if (store_.is_shared()) {
+    kept = std::make_shared<PendingChunk>(std::move(pending));
+    pending.on_built = std::exchange(kept->on_built, nullptr);
+  }
+  const auto finish = [=, this, mark = built.mark, counts = built.counts](
+                          Locked& later, const absl::Status& status, const Change& change) {
+    if (!status.ok()) Revert(later, *hull);
+    if (Committer::IsSuperseded(status)) {
+      hull->Requeue(std::move(*kept));
+      return;
+    }
     if (!status.ok()) {
-      Revert(later, *hull);
       return AnswerChunk(later, done, sequence, status);
     }
-    CommitChunk(later, hull, after, mark, writer_id, sequence);
+    CommitChunk(later, hull, change.hull, mark, writer_id, sequence);
     hull->points_since_prepared += counts.outside;
     if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
-    const HullRecord& record = after.record;
+    const HullRecord& record = change.hull.record;
     AnswerChunk(later, done, sequence,
                 ChunkResult{revision_, false, record.revision, record.vertex_count, counts});
   };
@@ -415,6 +462,8 @@ void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const Stored
                            const LiveHull::Mark& mark, const std::string& writer_id,
                            uint64_t sequence) {
   const HullRecord before = std::exchange(hull->committed, after).record;
+  *hull->revisions = RevisionsOf(after);
+  SetRevisions(*hull->revisions, &hull->head);
   hull->SetCommittedMark(locked, mark);
   NoteChange(*hull);
   if (after.record.revision != before.revision) {

@@ -137,6 +137,7 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
                                            const ReadPlan& plan) {
   known.Begin(ids);
   known.BeginLookup();
+  if (absl::Status s = AwaitOthers(should_stop); !s.ok()) return s;
   Resolved resolved;
   {
     Locked locked(mutex_);
@@ -151,6 +152,8 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
 
 std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
                                              const ReadPlan& plan) {
+  // It has to ask the store what others did.
+  if (store_.is_shared()) return std::nullopt;
   KnownHulls known;
   known.Begin(ids);
   Resolved resolved;
@@ -219,6 +222,10 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     locked.Lock();
     hull.loading = false;
     hull.changed.notify_all();
+    if (absl::IsAborted(loaded.status())) {
+      if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
+      continue;
+    }
     // A writer was faster. What was read, or not found, is of a state that was left since.
     const bool is_current = hull.committed.record.revision == stored.record.revision;
     if (hull.live != nullptr || hull.state.gone() || !is_current) continue;

@@ -150,6 +150,10 @@ class Parser {
         ->check(CLI::IsMember({"sync", "relaxed"}));
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
         "File of the connection string of --store postgres, which only hulld may read");
+    Add("postgres-servers", config_.postgres_servers,
+        "With --store postgres: one server at a time is active over a database, and others wait, or "
+        "many are at once, all with this setting")
+        ->check(CLI::IsMember({"one", "many"}));
     app_.add_flag(
             "--take-over", config_.take_over,
             "With --store postgres: take the store from the server that is active, which then "
@@ -287,6 +291,14 @@ absl::Status CheckStore(const Config& config) {
   }
   if (config.take_over && !is_postgres) {
     return absl::InvalidArgumentError("--take-over is for --store postgres");
+  }
+  const bool is_many = config.postgres_servers == "many";
+  if (is_many && !is_postgres) {
+    return absl::InvalidArgumentError("--postgres-servers many is for --store postgres");
+  }
+  if (is_many && config.take_over) {
+    return absl::InvalidArgumentError(
+        "--take-over is for --postgres-servers one; with many, servers are active together");
   }
   return absl::OkStatus();
 }

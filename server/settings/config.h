@@ -87,6 +87,8 @@ struct Config {
   // Whether this takes the store of "postgres" from the server that is active, instead of waiting;
   // on the command line alone, as servers that always did would take it from each other.
   bool take_over = false;
+  // Whether servers over one database of "postgres" are active together: "one" or "many".
+  std::string postgres_servers = "one";
   // What an acknowledged change survives: "sync" (on disk) or "relaxed" (written; synced within
   // kRelaxedSyncInterval).
   std::string durability = "sync";

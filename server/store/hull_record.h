@@ -44,6 +44,24 @@ struct StoredHull {
   friend bool operator==(const StoredHull&, const StoredHull&) = default;
 };
 
+// The revisions of one incarnation of a hull that change as it grows: those of its creation, of the
+// last change of its vertex set, and of its base.
+struct HullRevisions {
+  uint64_t create = 0;
+  uint64_t change = 0;
+  uint64_t base = 0;
+};
+
+inline HullRevisions RevisionsOf(const StoredHull& hull) {
+  return {hull.record.create_revision, hull.record.revision, hull.layout.base_revision};
+}
+
+inline void SetRevisions(const HullRevisions& revisions, StoredHull* hull) {
+  hull->record.create_revision = revisions.create;
+  hull->record.revision = revisions.change;
+  hull->layout.base_revision = revisions.base;
+}
+
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_STORE_HULL_RECORD_H_

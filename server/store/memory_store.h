@@ -6,6 +6,7 @@
 
 #include "server/contract/error_info.h"
 #include "server/process/random_id.h"
+#include "server/store/change_revisions.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -17,7 +18,7 @@ class MemoryStore : public Store {
   std::string id() const override { return id_; }
   Durability durability() const override { return Durability::kMemory; }
   bool keeps_hulls() const override { return false; }
-  uint64_t revision() const override { return 0; }
+  uint64_t revision() const override { return revision_; }
   absl::Status ForEachHull(const StoredHullVisitor&) override { return absl::OkStatus(); }
   absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull&) override {
@@ -26,7 +27,10 @@ class MemoryStore : public Store {
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord&, const std::string&) override {
     return 0;
   }
-  absl::Status Commit(std::span<const Change* const>) override { return absl::OkStatus(); }
+  absl::Status Commit(std::span<Change* const> changes) override {
+    revision_ = NumberChanges(changes, revision_);
+    return absl::OkStatus();
+  }
   absl::Status Recover() override { return absl::OkStatus(); }
   absl::StatusOr<std::string> MakeCopy() override {
     return WithReason(absl::FailedPreconditionError(
@@ -40,6 +44,7 @@ class MemoryStore : public Store {
   }
 
   const std::string id_ = RandomId();
+  uint64_t revision_ = 0;
 };
 
 }  // namespace hulld::server

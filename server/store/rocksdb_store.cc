@@ -7,7 +7,6 @@
 #include <rocksdb/write_batch.h>
 #include <spdlog/spdlog.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -16,6 +15,7 @@
 
 #include "server/process/random_id.h"
 #include "server/store/change_encoding.h"
+#include "server/store/change_revisions.h"
 #include "server/store/data_directory.h"
 #include "server/store/store_errors.h"
 #include "server/store/store_keys.h"
@@ -75,13 +75,12 @@ absl::Status RocksDbStore::DropLostIncarnations() {
   return WriteMeta(&batch);
 }
 
-absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
+absl::Status RocksDbStore::Commit(std::span<Change* const> changes) {
+  const uint64_t revision = NumberChanges(changes, revision_);
   rocksdb::WriteBatch batch;
-  uint64_t revision = 0;
   for (const Change* change : changes) {
     EncodeChange(batch, *change);
     if (EndsUnknown(*change)) PutSealed(batch, kLostKey, "");
-    revision = std::max(revision, change->revision);
   }
   PutSealed(batch, kRevisionKey, EncodeNumber(revision));
   rocksdb::WriteOptions options;
@@ -92,6 +91,7 @@ absl::Status RocksDbStore::Commit(std::span<const Change* const> changes) {
   const rocksdb::Status status = db_->Write(options, &batch);
   if (status.ok()) {
     files_->Commit();
+    revision_ = revision;
     return absl::OkStatus();
   }
   failure_ = WriteFailed(status);

@@ -70,7 +70,7 @@ class RocksDbStore : public Store {
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;
-  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   StoreFailures failures() const override {
     return {write_failures_.load(std::memory_order_relaxed),

@@ -15,6 +15,7 @@
 #include "core/hull/hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
+#include "server/store/other_changes.h"
 
 namespace hulld::server {
 
@@ -41,13 +42,22 @@ enum class VertexChange {
   kReplaced,
 };
 
-// One hull, or one body, created, changed or deleted.
+// One hull, or one body, created, changed or deleted. The store gives it its revisions as it
+// commits it (NumberChanges); until then those in `hull`, in its layouts and in `body` mean
+// nothing, but for what is deleted or replaced.
 struct Change {
   // The hull after the change; what is deleted if it is.
   StoredHull hull;
   // The store's revision after the change; hull.record.revision is lower where no vertex changed.
   uint64_t revision = 0;
+  // Whether that is a new one: not where points came and no vertex changed.
+  bool takes_revision = true;
+  // Whether this is a new incarnation of the hull, or the beginning of the body.
+  bool begins = false;
   bool deleted = false;
+  // A change of a hull that neither begins nor ends: its revisions when all changes that were
+  // submitted before are committed, and those of the same batch are not.
+  std::shared_ptr<const HullRevisions> before;
   // How the hull's vertices were kept before.
   VertexLayout former_layout;
   VertexChange vertex_change = VertexChange::kNone;
@@ -56,9 +66,13 @@ struct Change {
   std::optional<WriterSequence> writer;
   // The incarnation that this one takes the place of, if there is one.
   std::optional<StoredHull> replaced;
-  // The body after the change, or what is deleted if it is. Then all but `revision` and `deleted`
-  // is unused.
-  std::shared_ptr<const StoredBody> body;
+  // The body after the change, or what is deleted if it is. Then nothing that says of a hull is
+  // used.
+  std::shared_ptr<StoredBody> body;
+
+  const std::string& id() const {
+    return body != nullptr ? body->record.body_id : hull.record.hull_id;
+  }
 };
 
 // A hull that a store holds: its ID, and the rest, or DATA_LOSS naming the hull when what is kept
@@ -102,7 +116,7 @@ class Store {
   virtual Durability durability() const = 0;
   // Whether hulls can be read back: what the registry holds of them is then a copy.
   virtual bool keeps_hulls() const = 0;
-  // The last one committed when the store was opened.
+  // The last one committed. Never while Commit runs.
   virtual uint64_t revision() const = 0;
 
   // Every hull, in byte order of the IDs.
@@ -121,11 +135,12 @@ class Store {
     return absl::FailedPreconditionError("this store keeps no writers to read back");
   }
 
-  // Keeps changes, all or none, before anyone can see them: one call at a time, in the order in
-  // which they take effect. An error refuses them all, and what is kept is as before, also for a
-  // process that opens the store after this one was killed; unless the error is UNAVAILABLE and
-  // says that this is not known: then the next process may find them, until Recover succeeds.
-  virtual absl::Status Commit(std::span<const Change* const> changes) = 0;
+  // Gives changes their revisions, and keeps them, all or none, before anyone can see them: one
+  // call at a time, in the order in which they take effect. An error refuses them all, and what is
+  // kept is as before, also for a process that opens the store after this one was killed; unless
+  // the error is UNAVAILABLE and says that this is not known: then the next process may find them,
+  // until Recover succeeds.
+  virtual absl::Status Commit(std::span<Change* const> changes) = 0;
   // After an error: makes Commit possible again, or says why it is not. Never while Commit runs.
   virtual absl::Status Recover() = 0;
 
@@ -137,6 +152,18 @@ class Store {
   // Makes a consistent copy of all that is kept, as of some moment during the call, and returns its
   // directory, which the caller removes. FAILED_PRECONDITION: nothing is kept.
   virtual absl::StatusOr<std::string> MakeCopy() = 0;
+
+  // Whether other servers may commit to the same store while this one is open. Then Commit leaves
+  // out, of the changes that it is given, all of an ID that is in what TakeOthers is about to give:
+  // they were made of what was not the last any more. LoadVertices and LoadSequence answer ABORTED
+  // where the hull was changed since. Follow finds out what others have committed by the time of
+  // the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
+  virtual bool is_shared() const { return false; }
+  virtual absl::Status Follow() { return absl::OkStatus(); }
+  // What Commit and Follow found, whether they failed or not, since this was called last.
+  virtual OtherChanges TakeOthers() { return {}; }
+  // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
+  virtual void OnOthers(std::function<void()> others) { (void)others; }
 
   // `ended` is called, on any thread, once nothing can be committed or read here any more because
   // another server took the store over; at once if that is so already. The process is to end then.

@@ -69,12 +69,13 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());
   const auto shared = std::make_shared<Body>(std::move(body), memory_);
-  Locked locked(mutex_);
-  // Counted by now. What waits for others is not counted twice.
-  if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
-    return Answer<PutBodyResult>(locked, done, s);
-  }
-  PutBodyLocked(locked, shared, if_revision, done);
+  WhenFresh(done, [=, this](Locked& locked) {
+    // Counted by now. What waits for others is not counted twice.
+    if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
+      return Answer<PutBodyResult>(locked, done, s);
+    }
+    PutBodyLocked(locked, shared, if_revision, done);
+  });
 }
 
 // Whether a body may be put. OK also where it takes the place of another.
@@ -104,13 +105,18 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   const auto [entry, is_new] = bodies_.try_emplace(id);
   if (is_new) ++body_count_;
   Change change;
-  change.revision = ++assigned_revision_;
-  // One that was damaged begins anew.
-  const uint64_t created = is_new ? 0 : entry->second.committed->record().create_revision;
-  body->SetRevisions(created == 0 ? change.revision : created, change.revision);
   change.body = body->stored();
+  uint64_t& created = change.body->record.create_revision;
+  created = is_new ? 0 : entry->second.committed->record().create_revision;
+  // One that was damaged begins anew.
+  change.begins = created == 0;
   SubmitBody(locked, std::move(change),
-             [this, body, is_new, done](Locked& later, const absl::Status& status) {
+             [=, this, is_new = is_new](Locked& later, const absl::Status& status, const Change&) {
+               if (Committer::IsSuperseded(status)) {
+                 return Again(later, [=, this](Locked& again) {
+                   PutBodyLocked(again, body, if_revision, done);
+                 });
+               }
                const BodyRecord& record = body->record();
                if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
                later.Discard(std::exchange(bodies_.at(record.body_id).committed, body));
@@ -121,8 +127,7 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
 
 void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
                           Reply<uint64_t> done) {
-  Locked locked(mutex_);
-  DeleteBodyLocked(locked, id, if_revision, done);
+  WhenFresh(done, [=, this](Locked& locked) { DeleteBodyLocked(locked, id, if_revision, done); });
 }
 
 void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
@@ -146,45 +151,55 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
     return Answer<uint64_t>(locked, done, BodyMismatch(id, body->record().revision, *if_revision));
   }
   Change change;
-  change.revision = ++assigned_revision_;
   change.deleted = true;
   change.body = body->stored();
-  SubmitBody(
-      locked, std::move(change),
-      [this, id, done, revision = change.revision](Locked& later, const absl::Status& status) {
-        if (!status.ok()) return Answer<uint64_t>(later, done, status);
-        later.Discard(std::exchange(bodies_.at(id).committed, nullptr));
-        Answer<uint64_t>(later, done, revision);
-      });
+  SubmitBody(locked, std::move(change),
+             [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
+               if (Committer::IsSuperseded(status)) {
+                 return Again(later, [=, this](Locked& again) {
+                   DeleteBodyLocked(again, id, if_revision, done);
+                 });
+               }
+               if (!status.ok()) return Answer<uint64_t>(later, done, status);
+               later.Discard(std::exchange(bodies_.at(id).committed, nullptr));
+               Answer<uint64_t>(later, done, deletion.revision);
+             });
 }
 
 // finish: called once the change is committed and visible, or refused, before what waits for the
 // body goes on.
 void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
-  const uint64_t revision = change.revision;
   HULLD_CHECK(!std::exchange(bodies_.at(id).in_flight, true));
-  committer_.Submit(
-      locked, std::move(change),
-      [this, id, revision, finish = std::move(finish)](Locked& later, const absl::Status& status) {
-        const std::shared_ptr<const Body> former = bodies_.at(id).committed;
-        if (status.ok()) Publish(revision);
-        finish(later, status);
-        RegisteredBody& body = bodies_.at(id);
-        if (status.ok() && body.committed != nullptr) {
-          feed_.NoteBodyPut(later, former, body.committed);
-        } else if (status.ok()) {
-          feed_.NoteBodyDeleted(later, *former, revision);
-        }
-        body.in_flight = false;
-        std::deque<std::function<void(Locked&)>> waiting = std::exchange(body.waiting, {});
-        // Nothing was there before a creation that was refused, nor is after a deletion.
-        if (body.committed == nullptr) {
-          bodies_.erase(id);
-          --body_count_;
-        }
-        for (const auto& next : waiting) next(later);
-      });
+  committer_.Submit(locked, std::move(change),
+                    [this, id, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, Change& committed) {
+                      const std::shared_ptr<const Body> former = bodies_.at(id).committed;
+                      if (status.ok()) Publish(committed.revision);
+                      finish(later, status, committed);
+                      RegisteredBody& body = bodies_.at(id);
+                      if (status.ok() && body.committed != nullptr) {
+                        feed_.NoteBodyPut(later, former, body.committed);
+                      } else if (status.ok()) {
+                        feed_.NoteBodyDeleted(later, *former, committed.revision);
+                      }
+                      body.in_flight = false;
+                      std::deque<std::function<void(Locked&)>> waiting =
+                          std::exchange(body.waiting, {});
+                      // Nothing was there before a creation that was refused, nor is after a
+                      // deletion.
+                      if (body.committed == nullptr) {
+                        bodies_.erase(id);
+                        --body_count_;
+                      }
+                      for (auto& next : waiting) {
+                        if (Committer::IsSuperseded(status)) {
+                          after_others_.push_back(std::move(next));
+                        } else {
+                          next(later);
+                        }
+                      }
+                    });
 }
 
 std::shared_ptr<const Body> Registry::FindBody(const std::string& id) const {

@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "server/store/postgres/postgres_store.h"
@@ -42,8 +43,8 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
 }
 
 absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {
-  const absl::StatusOr<Rows> locked =
-      session.Run(absl::StrCat("SELECT pg_try_advisory_lock(", kLock, ")"));
+  const absl::StatusOr<Rows> locked = session.Run(absl::StrCat(
+      "SELECT pg_try_advisory_lock", options_.shared ? "_shared" : "", "(", kLock, ")"));
   if (!locked.ok()) return locked.status();
   return locked->at(0, 0) == "t";
 }
@@ -63,10 +64,14 @@ absl::Status PostgresStore::Superseded(std::string_view owner) {
 void PostgresStore::Keep() {
   bool failing = false;
   std::unique_lock lock(mutex_);
-  for (int beat = 1; !wake_.wait_for(lock, options_.beat, [this] { return ending_; }); ++beat) {
+  const auto period = options_.shared ? std::min(options_.look, options_.beat) : options_.beat;
+  const int64_t looks_per_beat = options_.beat / period;
+  for (int64_t look = 1; !wake_.wait_for(lock, period, [this] { return ending_; }); ++look) {
     lock.unlock();
-    absl::Status status = Beat();
-    if (status.ok() && beat % kBeatsPerMeasure == 0) status = MeasureDisk();
+    absl::Status status;
+    if (keeper_session_ == nullptr || look % looks_per_beat == 0) status = Beat();
+    if (status.ok() && options_.shared) status = LookForOthers();
+    if (status.ok() && look % (looks_per_beat * kBeatsPerMeasure) == 0) status = MeasureDisk();
     if (!status.ok()) {
       keeper_session_ = nullptr;
       has_lock_ = false;
@@ -90,7 +95,7 @@ absl::Status PostgresStore::Beat() {
   }
   const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
   if (!owner.ok()) return owner.status();
-  if (*owner != owner_) {
+  if (*owner != store_owner()) {
     End(Superseded(*owner));
     return absl::OkStatus();
   }

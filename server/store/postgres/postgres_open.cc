@@ -182,8 +182,11 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
   store->keeper_session_ = *std::move(session);
   if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok()) return OpenFailed(s);
   if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(s);
-  if (absl::Status s = store->MakeSchema(*store->keeper_session_); !s.ok()) return OpenFailed(s);
-  if (absl::Status s = store->Begin(); !s.ok()) return OpenFailed(s);
+  Session& keeper = *store->keeper_session_;
+  const bool shared = store->options_.shared;
+  const absl::Status made = shared ? store->MakeSharedSchema(keeper) : store->MakeSchema(keeper);
+  if (!made.ok()) return OpenFailed(made);
+  if (absl::Status s = shared ? store->Join() : store->Begin(); !s.ok()) return OpenFailed(s);
   store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
   return store;
 }
@@ -199,12 +202,13 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenSession(
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenWriter() const {
   return OpenSession(absl::StrCat("SET synchronous_commit = ", synchronous_commit_, ";",
-                                  kPrepareClaims, PrepareBatchStatements()));
+                                  kPrepareClaims, PrepareBatchStatements(),
+                                  options_.shared ? PrepareShared() : ""));
 }
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenReader() const {
-  return OpenSession(
-      absl::StrCat("SET statement_timeout = ", options_.answer_time.count(), ";", kPrepareReads));
+  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(), ";",
+                                  kPrepareReads, options_.shared ? PrepareFollow() : ""));
 }
 
 // The database ends this session, and with it our turn, when no beat has come for a while.
@@ -227,6 +231,11 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   synchronous_commit_ = std::string(settings->at(0, 0));
   const bool is_sync = synchronous_commit_ != "off" && settings->at(0, 1) == "on";
   durability_ = is_sync ? Durability::kSync : Durability::kRelaxed;
+  if (options_.shared && !is_sync) {
+    return absl::FailedPreconditionError(
+        "several servers over one database (--postgres-servers many) need synchronous_commit and "
+        "fsync on: the others would go on from changes that an outage took back");
+  }
   return CheckFormat(session).status();
 }
 

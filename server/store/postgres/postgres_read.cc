@@ -30,7 +30,7 @@ absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> sta
   }
   const Rows owner = std::move(rows->back());
   rows->pop_back();
-  if (owner.count() == 1 && owner.at(0, 0) == owner_) return rows;
+  if (owner.count() == 1 && owner.at(0, 0) == store_owner()) return rows;
   End(Superseded(owner.count() == 1 ? owner.at(0, 0) : ""));
   return ended();
 }
@@ -91,19 +91,29 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
     const uint64_t revision = deltas.bigint(i, 0);
     status = assembly.AddDelta(revision, Unseal(DeltaKey(incarnation, revision), deltas.at(i, 1)));
   }
-  return std::move(assembly).Finish(std::move(status));
+  absl::StatusOr<std::vector<Vector>> vertices = std::move(assembly).Finish(std::move(status));
+  if (!options_.shared || !absl::IsDataLoss(vertices.status())) return vertices;
+  return WhyDamaged(hull, vertices.status());
 }
 
 absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,
                                                      const std::string& writer_id) {
   const uint64_t incarnation = hull.create_revision;
-  std::vector<Statement> statements(1);
-  statements[0] = {.name = "hulld_sequence",
-                   .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}};
-  const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
-  if (!rows.ok()) return rows.status();
-  if (rows->front().count() == 0) return 0;
-  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), rows->front().at(0, 0));
+  std::string sealed;
+  if (options_.shared) {
+    absl::StatusOr<std::string> read = ReadSequence(hull, writer_id);
+    if (!read.ok()) return read.status();
+    sealed = *std::move(read);
+  } else {
+    std::vector<Statement> statements(1);
+    statements[0] = {.name = "hulld_sequence",
+                     .parameters = {hull.hull_id, EncodeBigint(incarnation), writer_id}};
+    const absl::StatusOr<std::vector<Rows>> rows = Read(std::move(statements));
+    if (!rows.ok()) return rows.status();
+    if (rows->front().count() > 0) sealed = std::string(rows->front().at(0, 0));
+  }
+  if (sealed.empty()) return 0;
+  return UnsealSequence(hull.hull_id, WriterKey(incarnation, writer_id), sealed);
 }
 
 absl::StatusOr<std::vector<WriterSequence>> PostgresStore::LoadWriters(const StoredHull& hull) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "server/process/random_id.h"
+#include "server/store/change_revisions.h"
 #include "server/store/postgres/batch_statements.h"
 
 namespace hulld::server {
@@ -22,14 +23,16 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kFirstPause{10};
 constexpr std::chrono::milliseconds kLongestPause{500};
 
-absl::Status OutcomeUnknown(const absl::Status& cause) {
+}  // namespace
+
+absl::Status PostgresStore::OutcomeUnknown(const absl::Status& cause) {
   return absl::UnavailableError(absl::StrCat(
       "the database was lost while it committed (", cause.message(),
       "), and cannot be asked yet whether it did: nobody sees the change, but it may appear if the "
       "server is restarted; look whether it did before you repeat it"));
 }
 
-absl::Status Refused(const absl::Status& cause) {
+absl::Status PostgresStore::Refused(const absl::Status& cause) {
   absl::Status status(
       cause.code(),
       absl::StrCat(
@@ -40,8 +43,6 @@ absl::Status Refused(const absl::Status& cause) {
   return status;
 }
 
-}  // namespace
-
 PostgresStore::~PostgresStore() {
   {
     const std::lock_guard lock(mutex_);
@@ -50,6 +51,7 @@ PostgresStore::~PostgresStore() {
   wake_.notify_all();
   if (keeper_.joinable()) keeper_.join();
   if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
+  if (options_.shared) Leave();
   // Who waits need not wait until the database sees that the session is closed.
   if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
 }
@@ -68,9 +70,8 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
 }
 
 // One transaction. Lost: it may have been committed. Other errors: it was not.
-absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t batch) {
-  uint64_t revision = 0;
-  for (const Change* change : changes) revision = std::max(revision, change->revision);
+absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t revision,
+                                    uint64_t batch) {
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   // First, so that a server that was superseded writes nothing.
@@ -146,10 +147,17 @@ absl::StatusOr<bool> PostgresStore::OutcomeBeforeOthers(uint64_t batch) {
   return next->bigint(0, 0) >= batch;
 }
 
-absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
+absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
+  if (options_.shared) return CommitShared(changes);
   if (absl::Status s = ended(); !s.ok()) return s;
   if (!unknown_.ok()) return unknown_;
   const uint64_t batch = batch_ + 1;
+  const uint64_t revision = NumberChanges(changes, revision_);
+  const auto keep = [&] {
+    batch_ = batch;
+    revision_ = revision;
+    return absl::OkStatus();
+  };
   const Clock::time_point deadline = Clock::now() + options_.patience;
   while (true) {
     if (writer_ == nullptr) {
@@ -158,11 +166,8 @@ absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
       if (!session.ok()) return WriteFailed(Refused(session.status()));
       writer_ = *std::move(session);
     }
-    const absl::Status status = Attempt(changes, batch);
-    if (status.ok()) {
-      batch_ = batch;
-      return status;
-    }
+    const absl::Status status = Attempt(changes, revision, batch);
+    if (status.ok()) return keep();
     if (ViolatedConstraint(status) == "store_fence") {
       ++write_failures_;
       End(Superseded(""));
@@ -177,10 +182,7 @@ absl::Status PostgresStore::Commit(std::span<const Change* const> changes) {
     }
     spdlog::warn("the database was lost while it committed ({}); the batch was {}",
                  std::string(status.message()), *committed ? "committed" : "not committed");
-    if (*committed) {
-      batch_ = batch;
-      return absl::OkStatus();
-    }
+    if (*committed) return keep();
     if (absl::Status s = ended(); !s.ok()) return WriteFailed(s);
     if (Clock::now() >= deadline) return WriteFailed(Refused(status));
   }

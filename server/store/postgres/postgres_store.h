@@ -32,6 +32,8 @@ struct PostgresOptions {
   bool take_over = false;
   // Opens a store that a migration has not finished, too.
   bool migrating = false;
+  // Other servers may be active over the same database. Not with take_over.
+  bool shared = false;
   // Asked while this waits for the active server; may be empty.
   std::function<bool()> should_stop;
   // How long nothing may come from the database while an answer is due. Longer than kLockTime.
@@ -42,23 +44,33 @@ struct PostgresOptions {
   // How often this looks whether it is still the active server, and the database whether this is
   // still there: ten times that after the last look.
   std::chrono::milliseconds beat{1000};
+  // Shared: how often this looks whether other servers committed.
+  std::chrono::milliseconds look{100};
 };
 
 // Keeps hulls in the schema "hulld" of a PostgreSQL database (14 or later); see postgres_open.cc
 // for its tables. Their rows hold the same values, sealed with the same keys, as the RocksDB store.
 //
-// Any number of servers may be started over one database; one is active, the others wait in Open.
-// The active one holds an advisory lock in a session of its own, which ends with it, or soon after
-// it stands still. That lock is for order alone. What keeps two servers apart is the epoch in the
-// row of the store, which each server raises when it becomes active: every transaction of a batch
-// writes the epoch that it belongs to beside it, and a constraint of the table refuses another. So
-// a server that was superseded can commit nothing, whatever it believes, and neither can what a
-// network delivers late.
+// Unless it is shared, any number of servers may be started over one database; one is active, the
+// others wait in Open. The active one holds an advisory lock in a session of its own, which ends
+// with it, or soon after it stands still. That lock is for order alone. What keeps two servers
+// apart is the epoch in the row of the store, which each server raises when it becomes active:
+// every transaction of a batch writes the epoch that it belongs to beside it, and a constraint of
+// the table refuses another. So a server that was superseded can commit nothing, whatever it
+// believes, and neither can what a network delivers late.
 //
 // A batch of changes is one transaction, sent in one piece. When the session is lost before its
 // outcome is known, the store raises the epoch again, in a new session: that waits for the
 // transaction if it is still there, and nothing of it can follow. How many batches there were then
 // tells whether it was committed. Nobody is told anything before.
+//
+// Shared, several servers are active at once (postgres_shared.cc). They hold the same advisory lock
+// together and belong to one epoch, so that they and a server that is active alone shut each other
+// out. A transaction takes the turn first, which is the lock of the row of the store, and is told
+// what others committed since this server knew of it; its revisions are the next after those.
+// Changes of IDs that others changed are left out, and made anew by the registry. COMMIT is sent
+// only by a session that was given the turn, so none can arrive after the turn went on; a server
+// that lost the answer finds its batch, or does not, once it has the turn again.
 class PostgresStore : public Store {
  public:
   // Waits while another server is active, unless take_over. Makes the schema where there is none.
@@ -75,13 +87,17 @@ class PostgresStore : public Store {
   Durability durability() const override { return durability_; }
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return revision_; }
+  bool is_shared() const override { return options_.shared; }
+  absl::Status Follow() override;
+  OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
+  void OnOthers(std::function<void()> others) override;
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;
-  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   StoreFailures failures() const override {
     return {.write = write_failures_.load(std::memory_order_relaxed),
@@ -98,7 +114,18 @@ class PostgresStore : public Store {
   uint64_t epoch() const { return epoch_.load(); }
 
  private:
+  // The owner of a store that is shared.
+  static constexpr char kSeveralServers[] = "several servers";
+  // A batch as it is to be when it is committed; number 0: none was sent.
+  struct SharedBatch {
+    uint64_t number = 0;
+    uint64_t revision = 0;
+  };
+
   PostgresStore(PostgresOptions options, Conninfo conninfo);
+
+  // Who has the store while this is active.
+  std::string store_owner() const { return options_.shared ? kSeveralServers : owner_; }
 
   absl::StatusOr<std::unique_ptr<Session>> OpenSession(const std::string& settings) const;
   absl::StatusOr<std::unique_ptr<Session>> OpenWriter() const;
@@ -124,12 +151,33 @@ class PostgresStore : public Store {
   absl::Status ended() const;
 
   // Committing. batch: its number.
-  absl::Status Attempt(std::span<const Change* const> changes, uint64_t batch);
+  absl::Status Attempt(std::span<const Change* const> changes, uint64_t revision, uint64_t batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
   absl::StatusOr<bool> OutcomeBeforeOthers(uint64_t batch);
   absl::Status WriteFailed(const absl::Status& status);
+  static absl::Status OutcomeUnknown(const absl::Status& cause);
+  static absl::Status Refused(const absl::Status& cause);
   void EndRelaxedRun();
+
+  // Shared.
+  static std::string PrepareFollow();
+  static std::string PrepareShared();
+  absl::Status MakeSharedSchema(Session& session);
+  absl::Status Join();
+  void Leave();
+  absl::Status CheckStore(const Rows& rows);
+  void GiveNewId();
+  absl::Status NoteOthers(const Rows& rows);
+  absl::Status CommitShared(std::span<Change* const> changes);
+  absl::Status AttemptShared(std::span<Change* const> changes, SharedBatch* batch);
+  void KeepShared(const SharedBatch& batch);
+  absl::StatusOr<bool> SharedOutcome(uint64_t batch);
+  absl::StatusOr<bool> FindSharedOutcome(uint64_t batch,
+                                         std::chrono::steady_clock::time_point deadline);
+  absl::Status LookForOthers();
+  absl::StatusOr<std::string> ReadSequence(const HullRecord& hull, const std::string& writer_id);
+  absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
 
   // Every row of a table, in byte order of the IDs: its ID and its sealed value.
   absl::Status ForEachRow(const char* statement,
@@ -152,6 +200,11 @@ class PostgresStore : public Store {
   std::unique_ptr<Session> writer_;
   // Batches that are committed, as far as is known.
   uint64_t batch_ = 0;
+  // Shared: batch_, for the keeper; and what others did up to it that nobody asked for yet.
+  std::atomic<uint64_t> seen_batch_ = 0;
+  OtherChanges others_;
+  // The database was found to have lost batches.
+  bool went_back_ = false;
   // Set: what became of batch_ + 1 is not known.
   absl::Status unknown_;
 
@@ -163,6 +216,7 @@ class PostgresStore : public Store {
   bool ending_ = false;
   absl::Status ended_;
   std::function<void()> on_ended_;
+  std::function<void()> on_others_;
   std::optional<StoreDisk> disk_;
 
   std::atomic<uint64_t> write_failures_ = 0;

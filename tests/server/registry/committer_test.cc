@@ -1,12 +1,15 @@
 #include "server/registry/committer.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <future>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -22,7 +25,7 @@ using ::testing::SizeIs;
 // Keeps the revisions of each batch. A test can hold the next commit, and decide how it ends.
 class GatedStore : public MemoryStore {
  public:
-  absl::Status Commit(std::span<const Change* const> changes) override {
+  absl::Status Commit(std::span<Change* const> changes) override {
     std::vector<uint64_t> batch;
     for (const Change* change : changes) batch.push_back(change->revision);
     Gate* gate = nullptr;
@@ -75,6 +78,21 @@ class GatedStore : public MemoryStore {
   std::vector<std::vector<uint64_t>> batches_;
 };
 
+// Another server changes some IDs at the next commit.
+class SharedStore : public GatedStore {
+ public:
+  bool is_shared() const override { return true; }
+  OtherChanges TakeOthers() override { return std::exchange(others, {}); }
+  absl::Status Follow() override {
+    ++follows;
+    return can_follow;
+  }
+
+  OtherChanges others;
+  std::atomic<int> follows = 0;
+  absl::Status can_follow;
+};
+
 class CommitterTest : public ::testing::Test {
  protected:
   using Outcome = std::pair<uint64_t, absl::StatusCode>;
@@ -91,12 +109,13 @@ class CommitterTest : public ::testing::Test {
   }
   std::future<void> SubmitLocked(const Locked& locked, uint64_t revision) {
     const auto ended = std::make_shared<std::promise<void>>();
-    committer_.Submit(locked, ChangeOf(revision),
-                      [this, revision, ended](Locked& later, const absl::Status& status) {
-                        EXPECT_TRUE(later.Holds(order_));
-                        outcomes_.emplace_back(revision, status.code());
-                        later.Afterwards([ended] { ended->set_value(); });
-                      });
+    committer_.Submit(
+        locked, ChangeOf(revision),
+        [this, revision, ended](Locked& later, const absl::Status& status, const Change&) {
+          EXPECT_TRUE(later.Holds(order_));
+          outcomes_.emplace_back(revision, status.code());
+          later.Afterwards([ended] { ended->set_value(); });
+        });
     return ended->get_future();
   }
 
@@ -158,7 +177,7 @@ TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
     std::thread passer;
     {
       const Locked locked(order_);
-      committer_.Submit(locked, ChangeOf(2), [&](Locked&, const absl::Status&) {
+      committer_.Submit(locked, ChangeOf(2), [&](Locked&, const absl::Status&, const Change&) {
         passer = std::thread([&] {
           const std::lock_guard lock(order_);
           completed_by_then = outcomes_.size();
@@ -188,10 +207,11 @@ TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
   std::promise<std::future<void>> next;
   {
     const Locked locked(order_);
-    committer_.Submit(locked, ChangeOf(1), [&](Locked& later, const absl::Status& status) {
-      EXPECT_TRUE(absl::IsUnavailable(status));
-      next.set_value(SubmitLocked(later, 2));
-    });
+    committer_.Submit(locked, ChangeOf(1),
+                      [&](Locked& later, const absl::Status& status, const Change&) {
+                        EXPECT_TRUE(absl::IsUnavailable(status));
+                        next.set_value(SubmitLocked(later, 2));
+                      });
   }
   gate.outcome.set_value(absl::UnavailableError("no disk"));
   next.get_future().get().wait();
@@ -226,10 +246,73 @@ TEST_F(CommitterTest, CommitsWhatIsQueuedBeforeItEnds) {
     Committer committer(store, order);
     const Locked locked(order);
     for (uint64_t revision = 1; revision <= 3; ++revision) {
-      committer.Submit(locked, ChangeOf(revision), [&](Locked&, const absl::Status&) { ++ended; });
+      committer.Submit(locked, ChangeOf(revision),
+                       [&](Locked&, const absl::Status&, const Change&) { ++ended; });
     }
   }
   EXPECT_EQ(ended, 3);
+}
+
+// Those of the batch and those that wait, the latest first, before Others is told; what is kept
+// follows.
+TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
+  SharedStore store;
+  FairMutex order;
+  std::vector<std::string> events;
+  std::promise<void> ended;
+  Committer committer(store, order);
+  committer.SetOthers([&](Locked& locked, const OtherChanges& others) {
+    EXPECT_TRUE(locked.Holds(order));
+    events.push_back(absl::StrCat("others at ", others.revision));
+  });
+  const auto submit = [&](const std::string& id, int number) {
+    const Locked locked(order);
+    Change change;
+    change.hull.record.hull_id = id;
+    committer.Submit(locked, std::move(change),
+                     [&, id, number](Locked&, const absl::Status& status, const Change&) {
+                       const char* how = status.ok()                       ? "kept"
+                                         : Committer::IsSuperseded(status) ? "superseded"
+                                                                           : "refused";
+                       events.push_back(absl::StrCat(id, number, " ", how));
+                       if (id == "last") ended.set_value();
+                     });
+  };
+  GatedStore::Gate first;
+  store.Close(first);
+  submit("a", 1);
+  first.entered.get_future().wait();
+  submit("a", 2);
+  submit("b", 1);
+  submit("a", 3);
+  store.others.revision = 7;
+  store.others.by_id["a"];
+  first.outcome.set_value(absl::OkStatus());
+  submit("last", 1);
+  ended.get_future().wait();
+  const std::lock_guard lock(order);
+  EXPECT_THAT(events, ElementsAre("a3 superseded", "a2 superseded", "a1 superseded", "others at 7",
+                                  "b1 kept", "last1 kept"));
+}
+
+TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
+  SharedStore store;
+  FairMutex order;
+  Committer committer(store, order);
+  committer.SetOthers([](Locked&, const OtherChanges&) {});
+  const auto follow = [&] {
+    std::promise<absl::Status> told;
+    {
+      const Locked locked(order);
+      committer.Follow(locked,
+                       [&](Locked&, const absl::Status& status) { told.set_value(status); });
+    }
+    return told.get_future().get();
+  };
+  EXPECT_TRUE(follow().ok());
+  EXPECT_EQ(store.follows, 1);
+  store.can_follow = absl::UnavailableError("no database");
+  EXPECT_TRUE(absl::IsUnavailable(follow()));
 }
 
 TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
@@ -240,7 +323,7 @@ TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {
       {
         Committer committer(store, order);
         const Locked locked(another);
-        committer.Submit(locked, Change(), [](Locked&, const absl::Status&) {});
+        committer.Submit(locked, Change(), [](Locked&, const absl::Status&, const Change&) {});
       },
       "check failed");
 }

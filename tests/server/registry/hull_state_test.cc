@@ -137,6 +137,29 @@ TEST(HullState, DamageIsFoundByAThreadThatWorks) {
   EXPECT_EQ(state.damage(), absl::DataLossError("damaged"));
 }
 
+TEST(HullState, WhatOthersDoTellsTheThreadThatBuilds) {
+  HullState state = Building();
+  state.Supersede();
+  EXPECT_EQ(state.work(), Work::kReverting);
+  EXPECT_FALSE(state.EndWork());
+  EXPECT_EQ(state.life(), Life::kPresent);
+
+  // It has not begun, and finds the new version.
+  state.Schedule();
+  state.Supersede();
+  EXPECT_EQ(state.work(), Work::kScheduled);
+
+  // It has not begun, and finds nothing.
+  state.Vanish();
+  EXPECT_TRUE(state.gone());
+  EXPECT_TRUE(state.EndWork());
+
+  HullState building = Building();
+  building.Vanish();
+  EXPECT_TRUE(building.gone());
+  EXPECT_FALSE(building.EndWork());
+}
+
 using HullStateDeathTest = ::testing::Test;
 
 TEST(HullStateDeathTest, AChunkStartsOnlyInAHullThatIsIdleAndSound) {
@@ -170,6 +193,13 @@ TEST(HullStateDeathTest, NothingComesBackThatWasNotStarted) {
   EXPECT_DEATH(HullState::Present().Commit(), "check failed");
   EXPECT_DEATH(HullState::Present().Refuse(), "check failed");
   EXPECT_DEATH(Gone().Commit(), "check failed");
+}
+
+TEST(HullStateDeathTest, OthersChangeOnlyWhatIsThereWithNothingInFlight) {
+  EXPECT_DEATH(HullState::Creating().Supersede(), "check failed");
+  EXPECT_DEATH(Growing().Supersede(), "check failed");
+  EXPECT_DEATH(Ending().Vanish(), "check failed");
+  EXPECT_DEATH(Gone().Vanish(), "check failed");
 }
 
 TEST(HullStateDeathTest, DamageHasOneCause) {

@@ -69,7 +69,7 @@ class ScriptedStore : public MemoryStore {
     return sequence;
   }
 
-  absl::Status Commit(std::span<const Change* const> changes) override {
+  absl::Status Commit(std::span<Change* const> changes) override {
     if (const auto hook = before_commit.Take()) {
       const absl::Status status = hook();
       if (!status.ok()) return status;
@@ -80,6 +80,7 @@ class ScriptedStore : public MemoryStore {
     }
     {
       const std::lock_guard lock(mutex_);
+      if (absl::Status s = MemoryStore::Commit(changes); !s.ok()) return s;
       for (const Change* change : changes) Apply(*change);
     }
     if (const auto hook = after_commit.Take()) hook();

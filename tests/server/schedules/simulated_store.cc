@@ -4,6 +4,7 @@
 
 #include <optional>
 
+#include "server/store/change_revisions.h"
 #include "tests/server/schedules/scheduler.h"
 
 namespace hulld::server {
@@ -63,13 +64,14 @@ absl::StatusOr<uint64_t> SimulatedStore::LoadSequence(const HullRecord& hull,
   return sequence;
 }
 
-absl::Status SimulatedStore::Commit(std::span<const Change* const> changes) {
+absl::Status SimulatedStore::Commit(std::span<Change* const> changes) {
   Scheduler& scheduler = Scheduler::Current();
   if (is_busy_) scheduler.Fail("two calls commit at the same time");
   if (is_failing_) scheduler.Fail("a batch comes after an error without Recover");
   is_busy_ = true;
   ++counts_.batches;
   scheduler.Note("store: begins to commit changes:", changes.size());
+  NumberChanges(changes, ledger_.revision());
   const absl::Status status = RefuseBatch(changes);
   is_failing_ = !status.ok();
   if (status.ok()) {

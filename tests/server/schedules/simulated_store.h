@@ -60,7 +60,7 @@ class SimulatedStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
-  absl::Status Commit(std::span<const Change* const> changes) override;
+  absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override;
 

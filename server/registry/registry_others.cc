@@ -1,0 +1,193 @@
+// Other servers over the same store: what they committed is taken over as of one of their batches,
+// on the committer's thread, so that nothing of it is being committed here meanwhile.
+#include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "core/base/check.h"
+#include "server/registry/registered_hull.h"
+#include "server/registry/registry.h"
+
+namespace hulld::server {
+namespace {
+
+// How soon who waits notices that its call was cancelled.
+constexpr std::chrono::milliseconds kCancellationPoll(20);
+
+}  // namespace
+
+absl::Status Registry::AwaitOthers(const std::function<bool()>& should_stop) {
+  if (!store_.is_shared()) return absl::OkStatus();
+  Locked locked(mutex_);
+  return AwaitOthers(locked, should_stop);
+}
+
+// The same for who holds the mutex, which is released meanwhile.
+absl::Status Registry::AwaitOthers(Locked& locked, const std::function<bool()>& should_stop) {
+  struct Wait {
+    ConditionVariable changed;
+    std::optional<absl::Status> status;
+  };
+  // What is due does not wait meanwhile.
+  locked.Unlock();
+  locked.Lock();
+  const auto wait = std::make_shared<Wait>();
+  committer_.Follow(locked, [wait](Locked&, const absl::Status& status) {
+    wait->status = status;
+    wait->changed.notify_all();
+  });
+  const auto is_over = [&] { return wait->status.has_value(); };
+  while (!is_over()) {
+    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kCancellationPoll, is_over); });
+    if (should_stop && should_stop()) return absl::CancelledError("the call was cancelled");
+  }
+  return *wait->status;
+}
+
+// Goes on with something that the answer to a call depends on, at once or once what other servers
+// had committed by now is taken over.
+void Registry::WhenFresh(Refusal refuse, std::function<void(Locked&)> next) {
+  Locked locked(mutex_);
+  if (!store_.is_shared()) return next(locked);
+  committer_.Follow(locked, [refuse = std::move(refuse), next = std::move(next)](
+                                Locked& later, const absl::Status& status) {
+    if (status.ok()) return next(later);
+    later.Afterwards([refuse, status] { refuse(status); });
+  });
+}
+
+// A change that another server superseded is made anew, of what there is by then.
+void Registry::Again(Locked& locked, std::function<void(Locked&)> task) {
+  locked.Afterwards([this, task = std::move(task)] {
+    Locked again(mutex_);
+    task(again);
+  });
+}
+
+void Registry::AdvanceLater(const HullPointer& hull) {
+  after_others_.push_back([this, hull](Locked& locked) { Advance(locked, hull); });
+}
+
+// Nothing of these IDs is in flight.
+void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
+  std::vector<std::pair<uint64_t, const std::string*>> in_order;
+  in_order.reserve(others.by_id.size());
+  for (const auto& [id, other] : others.by_id) in_order.emplace_back(other.revision, &id);
+  std::ranges::sort(in_order);
+  for (const auto& [revision, id] : in_order) {
+    TakeOver(locked, *id, others.by_id.at(*id));
+    hulls_.RestSome();
+  }
+  if (others.revision > revision_) {
+    Publish(others.revision);
+    feed_.NoteOther(locked, others.revision);
+  }
+  memory_.Evict(locked);
+  for (const auto& next : std::exchange(after_others_, {})) next(locked);
+}
+
+void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other) {
+  // Not what was read when the store was loaded.
+  const bool is_news = other.revision > revision_;
+  if (is_news) Publish(other.revision);
+  const std::shared_ptr<const Body> former_body = FindBody(id);
+  TakeOverBody(locked, id, other);
+  const std::shared_ptr<const Body> body = FindBody(id);
+  const HullPointer former = hulls_.Find(id);
+  if (former != nullptr && TakeOverVersion(locked, *former, other, is_news)) {
+    return AdvanceLater(former);
+  }
+  if (former != nullptr) {
+    vertex_count_ -= former->committed.record.vertex_count;
+    NoteChange(*former);
+    former->state.Vanish();
+    ++former->supersessions;
+    Forget(locked, former, Gone(id, other.hull.has_value() ? "replaced" : "deleted"));
+    AdvanceLater(former);
+  }
+  const HullPointer hull = other.hull.has_value() ? TakeOverHull(id, *other.hull) : nullptr;
+  if (!is_news) return;
+  const bool is_deletion = !other.body.has_value() && other.ended_at == other.revision;
+  if (body != nullptr && body->damage().ok()) {
+    if (former != nullptr) {
+      feed_.NoteBecameBody(locked, former->committed.record, body);
+    } else {
+      feed_.NoteBodyPut(locked, former_body, body);
+    }
+  } else if (hull != nullptr && !hull->state.damaged()) {
+    if (former_body != nullptr) {
+      feed_.NoteBecameHull(locked, *former_body, hull);
+    } else if (former != nullptr) {
+      feed_.NoteReplaced(locked, hull);
+    } else {
+      feed_.NoteCreated(locked, hull);
+    }
+  } else if (former_body != nullptr && body == nullptr && hull == nullptr) {
+    feed_.NoteBodyDeleted(locked, *former_body, other.revision);
+  } else if (hull == nullptr && (former != nullptr || is_deletion)) {
+    // Of one that was never known here, who resumes a watch may know.
+    HullRecord record;
+    record.hull_id = id;
+    record.create_revision =
+        former == nullptr ? other.revision : former->committed.record.create_revision;
+    feed_.NoteDeleted(locked, record, other.revision);
+  } else {
+    feed_.NoteOther(locked, other.revision);
+  }
+}
+
+// Whether it is another version of the hull that was known.
+bool Registry::TakeOverVersion(Locked& locked, RegisteredHull& hull, const OtherChange& other,
+                               bool is_news) {
+  if (!other.hull.has_value() || !other.hull->ok() || hull.state.damaged()) return false;
+  const StoredHull& stored = **other.hull;
+  const HullRecord before = hull.committed.record;
+  if (before.create_revision != stored.record.create_revision) return false;
+  // Also where the record is the same: an empty chunk counts in the sequences of its writer.
+  vertex_count_ += stored.record.vertex_count - before.vertex_count;
+  hull.Supersede(locked, stored);
+  NoteChange(hull);
+  if (is_news) feed_.NoteChanged(locked, hulls_.Find(before.hull_id));
+  return true;
+}
+
+// Adds a hull that was not known.
+Registry::HullPointer Registry::TakeOverHull(const std::string& id,
+                                             const absl::StatusOr<StoredHull>& stored) {
+  if (stored.ok()) {
+    hulls_.AddResting(*stored);
+    vertex_count_ += stored->record.vertex_count;
+    HullPointer hull = hulls_.Find(id);
+    NoteChange(*hull);
+    return hull;
+  }
+  spdlog::error("{}", std::string(stored.status().message()));
+  StoredHull nothing;
+  nothing.record.hull_id = id;
+  HullPointer hull = hulls_.Insert(nothing, HullState::Present());
+  MarkDamaged(*hull, stored.status());
+  return hull;
+}
+
+void Registry::TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other) {
+  const auto found = bodies_.find(id);
+  if (!other.body.has_value()) {
+    if (found == bodies_.end()) return;
+    HULLD_CHECK(!found->second.in_flight);
+    locked.Discard(std::move(found->second.committed));
+    bodies_.erase(found);
+    --body_count_;
+    return;
+  }
+  if (found == bodies_.end()) ++body_count_;
+  const auto body = other.body->ok()
+                        ? std::make_shared<const Body>(**other.body, memory_)
+                        : std::make_shared<const Body>(id, other.body->status(), memory_);
+  locked.Discard(std::exchange(bodies_[id].committed, body));
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,50 @@
+#include "server/store/change_revisions.h"
+
+#include <unordered_map>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+namespace {
+
+// What the changes so far make of the revisions of hulls.
+using Grown = std::unordered_map<const HullRevisions*, HullRevisions>;
+
+void NumberBody(Change& change) {
+  if (change.deleted) return;
+  BodyRecord& record = change.body->record;
+  record.revision = change.revision;
+  if (change.begins) record.create_revision = change.revision;
+}
+
+void NumberHull(Change& change, Grown& grown) {
+  if (change.deleted) return;
+  HullRevisions now{.create = change.revision, .change = change.revision};
+  if (!change.begins) {
+    HULLD_CHECK(change.before != nullptr);
+    now = grown.try_emplace(change.before.get(), *change.before).first->second;
+    change.former_layout.base_revision = now.base;
+    if (change.takes_revision) now.change = change.revision;
+  }
+  if (change.vertex_change == VertexChange::kReplaced) now.base = change.revision;
+  if (!change.begins) grown[change.before.get()] = now;
+  SetRevisions(now, &change.hull);
+}
+
+}  // namespace
+
+uint64_t NumberChanges(std::span<Change* const> changes, uint64_t revision) {
+  Grown grown;
+  for (Change* change : changes) {
+    if (change->takes_revision) ++revision;
+    change->revision = revision;
+    if (change->body != nullptr) {
+      NumberBody(*change);
+    } else {
+      NumberHull(*change, grown);
+    }
+  }
+  return revision;
+}
+
+}  // namespace hulld::server

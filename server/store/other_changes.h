@@ -1,0 +1,37 @@
+#ifndef HULLD_SERVER_STORE_OTHER_CHANGES_H_
+#define HULLD_SERVER_STORE_OTHER_CHANGES_H_
+
+#include <absl/status/statusor.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "server/store/body_record.h"
+#include "server/store/hull_record.h"
+
+namespace hulld::server {
+
+// What other servers made of one ID.
+struct OtherChange {
+  // The store's revision at the last change that can be seen: that of what there is by now, or that
+  // at which it ended.
+  uint64_t revision = 0;
+  // At which an incarnation ended last; 0: none did.
+  uint64_t ended_at = 0;
+  // What there is by now: one of the two, or nothing. DATA_LOSS: it is damaged.
+  std::optional<absl::StatusOr<StoredHull>> hull;
+  std::optional<absl::StatusOr<StoredBody>> body;
+};
+
+// What other servers committed to a store that is shared (Store::is_shared), up to a moment.
+struct OtherChanges {
+  // The store's at that moment; 0: there is nothing that was not known.
+  uint64_t revision = 0;
+  std::map<std::string, OtherChange> by_id;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_STORE_OTHER_CHANGES_H_

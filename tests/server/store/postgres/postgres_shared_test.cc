@@ -1,0 +1,389 @@
+// Several servers that are active at once over one database.
+#include <absl/strings/str_cat.h>
+
+#include <algorithm>
+#include <future>
+#include <map>
+#include <set>
+#include <thread>
+
+#include "core/hull/growth/hull_builder.h"
+#include "tests/server/store/postgres/postgres_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using Cut = CuttingProxy::Cut;
+using Server = std::unique_ptr<PostgresRegistry>;
+
+class PostgresShared : public PostgresTest {
+ protected:
+  void SetUp() override {
+    PostgresTest::SetUp();
+    options_.shared = true;
+  }
+  void TearDown() override {
+    if (proxy_ != nullptr) proxy_->SetDown(false);
+    PostgresTest::TearDown();
+  }
+
+  // One that reaches the database without the proxy.
+  Server StartBeside() {
+    PostgresOptions through_proxy = options_;
+    options_.conninfo = cluster().Conninfo(database_, cluster().socket_directory());
+    Server server = MakeRegistry();
+    options_ = through_proxy;
+    return server;
+  }
+  static uint64_t Received(PostgresRegistry& server, const std::string& id) {
+    const auto view = server.View(id);
+    return view.ok() ? view->record.counts.received : 0;
+  }
+  static absl::StatusOr<ReplaceResult> Replace(PostgresRegistry& server, const std::string& id,
+                                               const std::vector<Vector>& points,
+                                               std::optional<uint64_t> if_revision = {}) {
+    auto builder = std::make_shared<HullBuilder>();
+    const auto counts = builder->Add(points, {});
+    return server.Replace({id, if_revision, true, builder, *counts});
+  }
+  static absl::StatusOr<PutBodyResult> PutBody(PostgresRegistry& server, const std::string& id,
+                                               std::optional<uint64_t> if_revision = {}) {
+    StoredBody body;
+    body.record.body_id = id;
+    body.hull_ids = {"piece"};
+    body.pieces = {{0, Pose()}};
+    return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
+      server.registry().PutBody(std::move(body), if_revision, std::move(done));
+    });
+  }
+  static std::vector<std::string> Listed(PostgresRegistry& server) {
+    EXPECT_TRUE(server.registry().AwaitOthers({}).ok());
+    std::vector<std::string> ids;
+    for (const ListedHull& hull : server.registry().List("", "", 100).hulls) {
+      ids.push_back(hull.record.hull_id);
+    }
+    return ids;
+  }
+};
+
+TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  EXPECT_EQ(Received(*other, "h"), 8);
+  ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
+  EXPECT_EQ(Received(*hulls_, "h"), 9);
+  EXPECT_THAT(CanonicalOf(*hulls_->View("h")).vertices(),
+              ::testing::ElementsAreArray(CanonicalOf(*other->View("h")).vertices()));
+  // No vertex, hence no revision.
+  const uint64_t revision = hulls_->View("h")->record.revision;
+  ASSERT_TRUE(hulls_->Put("h", {{0.5, 0.5, 0.5}}).ok());
+  EXPECT_EQ(Received(*other, "h"), 10);
+  EXPECT_EQ(other->View("h")->record.revision, revision);
+  ASSERT_TRUE(other->Delete("h").ok());
+  EXPECT_TRUE(absl::IsNotFound(hulls_->View("h").status()));
+  ASSERT_TRUE(hulls_->Create("i").ok());
+  EXPECT_TRUE(absl::IsAlreadyExists(other->Create("i").status()));
+  EXPECT_THAT(Listed(*other), ::testing::ElementsAre("i"));
+  EXPECT_EQ(other->registry().Sizes().vertex_count, 0);
+}
+
+TEST_F(PostgresShared, RevisionsAreOfOneOrder) {
+  Start();
+  const Server other = StartBeside();
+  uint64_t last = 0;
+  for (int i = 0; i < 6; ++i) {
+    PostgresRegistry& server = i % 2 == 0 ? *hulls_ : *other;
+    const auto created = server.Create(absl::StrCat("h", i));
+    ASSERT_TRUE(created.ok()) << created.status();
+    EXPECT_EQ(created->hull.create_revision, last + 1);
+    last = created->hull.create_revision;
+  }
+  EXPECT_EQ(hulls_->store().id(), other->store().id());
+}
+
+TEST_F(PostgresShared, ASequenceIsCountedOnceWhereverItsChunksGo) {
+  Start();
+  const Server other = StartBeside();
+  const auto here = hulls_->Open("h");
+  ASSERT_TRUE(here.ok());
+  const auto there = other->Open("h");
+  ASSERT_TRUE(there.ok());
+  ASSERT_TRUE(hulls_->Append(here->session, 1, CubeCorners()).ok());
+  // The writer moved on, and sends what it does not know to be there again.
+  const auto again = other->Append(there->session, 1, CubeCorners());
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_TRUE(again->already_applied);
+  ASSERT_TRUE(other->Append(there->session, 2, {{9, 9, 9}}).ok());
+  const auto late = hulls_->Append(here->session, 2, {{9, 9, 9}});
+  ASSERT_TRUE(late.ok()) << late.status();
+  EXPECT_TRUE(late->already_applied);
+  EXPECT_TRUE(hulls_->Append(here->session, 3, {{10, 9, 9}}).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(other->Append(there->session, 5, {{1, 1, 1}}).status()));
+  EXPECT_EQ(Received(*other, "h"), 10);
+  EXPECT_EQ(other->Open("h")->last_sequence, 3);
+}
+
+// Each writer sends each of its chunks through both servers, as one that lost an answer does.
+TEST_F(PostgresShared, ManyWritersOfOneHullLoseNothingAndCountNothingTwice) {
+  Start();
+  const Server other = StartBeside();
+  constexpr int kWriters = 4;
+  constexpr uint64_t kChunks = 25;
+  const std::vector<Vector> points = SpherePoints(kWriters * kChunks);
+  std::vector<std::thread> writers;
+  for (int w = 0; w < kWriters; ++w) {
+    writers.emplace_back([&, w] {
+      const std::string name = absl::StrCat("w", w);
+      const auto here = hulls_->Open("h", name);
+      const auto there = other->Open("h", name);
+      ASSERT_TRUE(here.ok() && there.ok()) << here.status() << there.status();
+      for (uint64_t sequence = 1; sequence <= kChunks; ++sequence) {
+        const Vector& point = points[w * kChunks + sequence - 1];
+        auto first = std::async(std::launch::async,
+                                [&] { return other->Append(there->session, sequence, {point}); });
+        const auto second = hulls_->Append(here->session, sequence, {point});
+        const auto result = first.get();
+        ASSERT_TRUE(result.ok() && second.ok()) << result.status() << second.status();
+        EXPECT_NE(result->already_applied, second->already_applied);
+      }
+    });
+  }
+  for (std::thread& writer : writers) writer.join();
+  for (PostgresRegistry* server : {hulls_.get(), other.get()}) {
+    const auto view = server->View("h");
+    EXPECT_EQ(view->record.counts.received, points.size());
+    EXPECT_EQ(view->record.counts.outside, points.size());
+    EXPECT_EQ(CanonicalOf(*view).vertices().size(), points.size());
+  }
+}
+
+TEST_F(PostgresShared, OneOfTwoConditionsOnOneRevisionHolds) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const uint64_t revision = other->View("h")->record.revision;
+  auto first = std::async(std::launch::async,
+                          [&] { return Replace(*hulls_, "h", SpherePoints(20), revision); });
+  const auto second = Replace(*other, "h", SpherePoints(30), revision);
+  const auto result = first.get();
+  EXPECT_NE(result.ok(), second.ok());
+  EXPECT_TRUE(absl::IsAborted(result.ok() ? second.status() : result.status()));
+  EXPECT_EQ(Received(*hulls_, "h"), result.ok() ? 20 : 30);
+  EXPECT_EQ(Received(*other, "h"), result.ok() ? 20 : 30);
+}
+
+TEST_F(PostgresShared, CreationsDeletionsAndReplacementsOfOneIdTakeTurns) {
+  Start();
+  const Server other = StartBeside();
+  std::vector<std::thread> threads;
+  std::atomic<int> balance = 0;
+  for (PostgresRegistry* server : {hulls_.get(), other.get()}) {
+    threads.emplace_back([&balance, server] {
+      for (int i = 0; i < 30; ++i) {
+        const auto created = server->Create("h");
+        if (created.ok()) ++balance;
+        EXPECT_TRUE(created.ok() || absl::IsAlreadyExists(created.status())) << created.status();
+        const auto replaced = Replace(*server, "h", CubeCorners(i));
+        EXPECT_TRUE(replaced.ok()) << replaced.status();
+        if (replaced.ok() && replaced->created) ++balance;
+        const auto deleted = server->Delete("h");
+        if (deleted.ok()) --balance;
+        EXPECT_TRUE(deleted.ok() || absl::IsNotFound(deleted.status())) << deleted.status();
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(balance, 0);
+  EXPECT_TRUE(absl::IsNotFound(hulls_->View("h").status()));
+  EXPECT_TRUE(absl::IsNotFound(other->View("h").status()));
+  EXPECT_EQ(Ask("SELECT count(*) FROM hulld.hulls").front(), "0");
+  EXPECT_EQ(hulls_->registry().Sizes().vertex_count, 0);
+}
+
+TEST_F(PostgresShared, BodiesAndHullsShareTheirIdsAcrossServers) {
+  Start();
+  const Server other = StartBeside();
+  const auto put = PutBody(*hulls_, "b");
+  ASSERT_TRUE(put.ok()) << put.status();
+  EXPECT_TRUE(absl::IsAlreadyExists(other->Create("b").status()));
+  const auto again = PutBody(*other, "b", put->body.revision);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_FALSE(again->created);
+  EXPECT_EQ(again->body.create_revision, put->body.create_revision);
+  EXPECT_TRUE(absl::IsAborted(PutBody(*hulls_, "b", put->body.revision).status()));
+  ASSERT_TRUE(hulls_->registry().AwaitOthers({}).ok());
+  const std::string id = "b";
+  EXPECT_EQ(hulls_->registry().FindBodies(std::span(&id, 1)).bodies[0]->record().revision,
+            again->body.revision);
+  const auto deleted = PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
+    hulls_->registry().DeleteBody("b", std::nullopt, std::move(done));
+  });
+  EXPECT_TRUE(deleted.ok()) << deleted.status();
+  EXPECT_TRUE(other->Create("b").ok());
+  EXPECT_FALSE(other->registry().has_bodies());
+}
+
+TEST_F(PostgresShared, SessionsEndWhereverTheirHullIsDeleted) {
+  Start();
+  const Server other = StartBeside();
+  std::promise<absl::Status> gone;
+  const auto opened = PostgresRegistry::Wait<OpenResult>([&](Reply<OpenResult> done) {
+    hulls_->registry().OpenAppend(
+        "h", "w", true, [&](const absl::Status& status) { gone.set_value(status); },
+        std::move(done));
+  });
+  ASSERT_TRUE(opened.ok()) << opened.status();
+  ASSERT_TRUE(hulls_->Append(opened->session, 1, CubeCorners()).ok());
+  ASSERT_TRUE(other->Delete("h").ok());
+  // Nobody calls this server.
+  EXPECT_TRUE(absl::IsFailedPrecondition(gone.get_future().get()));
+  EXPECT_TRUE(absl::IsFailedPrecondition(hulls_->Append(opened->session, 2, {{9, 9, 9}}).status()));
+}
+
+TEST_F(PostgresShared, AWatchOnOneServerIsToldWhatAnotherDid) {
+  Start();
+  const Server other = StartBeside();
+  std::atomic<int> ready = 0;
+  const auto watch = hulls_->registry().OpenWatch(WatchTarget(), {}, [&] {
+    ++ready;
+    ready.notify_all();
+  });
+  ASSERT_TRUE(watch.ok());
+  std::vector<std::pair<std::string, ChangeKind>> told;
+  int waited = 0;
+  const auto take_until = [&](size_t count) {
+    while (told.size() < count) {
+      const auto piece = hulls_->registry().TakeChanges(**watch);
+      ASSERT_TRUE(piece.ok()) << piece.status();
+      for (const HullChange& change : piece->changes) {
+        told.emplace_back(change.record.hull_id, change.kind);
+      }
+      if (piece->waits) ready.wait(waited++);
+    }
+  };
+  ASSERT_TRUE(other->Create("h").ok());
+  take_until(1);
+  ASSERT_TRUE(other->Put("h", CubeCorners()).ok());
+  take_until(2);
+  ASSERT_TRUE(other->Delete("h").ok());
+  take_until(3);
+  hulls_->registry().CloseWatch(*watch);
+  using Told = std::pair<std::string, ChangeKind>;
+  EXPECT_THAT(
+      told, ::testing::ElementsAre(Told("h", ChangeKind::kCreated), Told("h", ChangeKind::kChanged),
+                                   Told("h", ChangeKind::kDeleted)));
+}
+
+TEST_F(PostgresShared, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  proxy_->CutNext(Cut::kAfterCommit);
+  const auto put = hulls_->Put("h", {{9, 9, 9}});
+  ASSERT_TRUE(put.ok()) << put.status();
+  EXPECT_FALSE(put->already_applied);
+  EXPECT_EQ(proxy_->cuts(), 1);
+  EXPECT_EQ(Received(*other, "h"), 9);
+  EXPECT_EQ(Received(*hulls_, "h"), 9);
+  proxy_->CutNext(Cut::kBeforeCommit);
+  ASSERT_TRUE(hulls_->Put("h", {{10, 9, 9}}).ok());
+  EXPECT_EQ(proxy_->cuts(), 2);
+  EXPECT_EQ(Received(*other, "h"), 10);
+}
+
+// It is refused as unknown, and then found as if another server had done it.
+TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
+  options_.patience = std::chrono::milliseconds(0);
+  for (const Cut cut : {Cut::kBeforeCommit, Cut::kAfterCommit}) {
+    const std::string id = cut == Cut::kAfterCommit ? "after" : "before";
+    Start();
+    const Server other = StartBeside();
+    ASSERT_TRUE(hulls_->Put(id, CubeCorners()).ok());
+    const auto opened = hulls_->Open(id);
+    proxy_->CutNext(cut);
+    proxy_->GoDownWithCut();
+    EXPECT_TRUE(absl::IsUnavailable(hulls_->Append(opened->session, 2, {{9, 9, 9}}).status()));
+    // What others did cannot be known.
+    EXPECT_TRUE(absl::IsUnavailable(hulls_->View(id).status()));
+    ASSERT_TRUE(other->Put(id, {{10, 9, 9}}, "v").ok());
+    proxy_->SetDown(false);
+    const auto again = hulls_->Append(opened->session, 2, {{9, 9, 9}});
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(again->already_applied, cut == Cut::kAfterCommit);
+    EXPECT_EQ(Received(*hulls_, id), 10);
+    EXPECT_EQ(Received(*other, id), 10);
+  }
+}
+
+TEST_F(PostgresShared, AllGoOnWhenTheDatabaseEndsTheirSessions) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  Ask("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = current_database() "
+      "AND pid <> pg_backend_pid()");
+  ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
+  EXPECT_EQ(Received(*hulls_, "h"), 9);
+}
+
+TEST_F(PostgresShared, AServerThatWasActiveAloneIsShutOutAndShutsOut) {
+  options_.shared = false;
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  options_.shared = true;
+  options_.should_stop = [] { return true; };
+  // It waits for the one that is active alone.
+  EXPECT_TRUE(absl::IsCancelled(Open().status()));
+  hulls_ = nullptr;
+  options_.should_stop = {};
+  Start();
+  EXPECT_EQ(Received(*hulls_, "h"), 8);
+  options_.shared = false;
+  options_.take_over = true;
+  const Server alone = MakeRegistry();
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->View("h").status()));
+  EXPECT_EQ(Received(*alone, "h"), 8);
+  EXPECT_TRUE(alone->Put("h", {{9, 9, 9}}).ok());
+}
+
+TEST_F(PostgresShared, WithoutSyncItIsRefused) {
+  Ask("ALTER ROLE hulld SET synchronous_commit = off");
+  const absl::Status status = Open().status();
+  Ask("ALTER ROLE hulld RESET synchronous_commit");
+  EXPECT_TRUE(absl::IsFailedPrecondition(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("synchronous_commit"));
+}
+
+TEST_F(PostgresShared, ADatabaseThatWasPutBackIsAnotherStoreForAll) {
+  Start();
+  const Server other = StartBeside();
+  const std::string id = hulls_->store().id();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  EXPECT_EQ(Received(*other, "h"), 8);
+  bool ended = false;
+  hulls_->store().OnEnded([&] { ended = true; });
+  Ask("UPDATE hulld.store SET batch = batch - 1");
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->Put("h", {{9, 9, 9}}).status()));
+  EXPECT_TRUE(ended);
+  // It sees the new ID at the latest.
+  EXPECT_TRUE(absl::IsUnavailable(other->View("h").status()));
+  Start();
+  EXPECT_NE(hulls_->store().id(), id);
+}
+
+TEST_F(PostgresShared, WhoIsTooFarBehindEnds) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  options_.look = std::chrono::hours(1);
+  bool ended = false;
+  hulls_->store().OnEnded([&] { ended = true; });
+  Ask("UPDATE hulld.store SET batch = batch + 1, pruned = batch + 1");
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->View("h").status()));
+  EXPECT_TRUE(ended);
+}
+
+}  // namespace
+}  // namespace hulld::server
