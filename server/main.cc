@@ -37,7 +37,8 @@ void LogStore(const Config& config) {
     spdlog::info("hulls live in memory and end with this process");
   } else if (config.store == "postgres") {
     // The store said more when it was opened.
-    spdlog::info("this is the active server of its database");
+    spdlog::info(config.postgres_servers == "many" ? "this is an active server of its database"
+                                                   : "this is the active server of its database");
   } else if (config.durability == "sync") {
     spdlog::info("hulls live in {}; what is acknowledged is on disk", config.data_dir);
   } else {

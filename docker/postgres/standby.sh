@@ -10,4 +10,6 @@ if [[ ! -s $PGDATA/PG_VERSION ]]; then
     sleep 1
   done
 fi
+# The image's directory is open to all, which postgres refuses.
+chmod 0700 "$PGDATA"
 exec postgres "$@"

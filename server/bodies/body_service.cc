@@ -104,7 +104,12 @@ grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* c
                                                   grpc::ByteBuffer* response) {
   return ListCall::Start(*context, admission_, Rpc::kListBodies, {request, response},
                          [this](ListCall* call) {
-                           call->End(List(call->request(), call->call(), &call->response()));
+                           const auto list = [this, call] {
+                             return List(call->request(), call->call(), &call->response());
+                           };
+                           // Asks the store first where it is shared.
+                           if (registry_.is_shared()) return call->EndOn(readers_, list);
+                           call->End(list());
                          });
 }
 

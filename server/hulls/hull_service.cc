@@ -64,7 +64,12 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
                                                  grpc::ByteBuffer* response) {
   return ListCall::Start(*context, admission_, Rpc::kListHulls, {request, response},
                          [this](ListCall* call) {
-                           call->End(List(call->request(), call->call(), &call->response()));
+                           const auto list = [this, call] {
+                             return List(call->request(), call->call(), &call->response());
+                           };
+                           // Asks the store first where it is shared.
+                           if (registry_.is_shared()) return call->EndOn(readers_, list);
+                           call->End(list());
                          });
 }
 

@@ -66,11 +66,22 @@ void WatchStream::Open() {
   if (!target.ok()) return FinishCall(target.status());
   const absl::StatusOr<WatchStart> start = ReadStart();
   if (!start.ok()) return FinishCall(start.status());
+  RunOn(readers_, [this, target = *target, start = *start] { Begin(target, start); });
+}
+
+// What the server has acknowledged by now, or another one over the same store, is told.
+void WatchStream::Begin(const WatchTarget& target, const WatchStart& start) {
+  const absl::Status fresh = registry_.AwaitOthers([this] { return call().ShouldStop(); });
+  if (call().ShouldStop()) return FinishCall(call().StopStatus());
+  if (!fresh.ok()) return FinishCall(fresh);
   absl::StatusOr<std::shared_ptr<ChangeWatch>> watch =
-      registry_.OpenWatch(*target, *start, [this, self = shared_from_this()] { TellNext(); });
+      registry_.OpenWatch(target, start, [this, self = shared_from_this()] { TellNext(); });
   if (!watch.ok()) return FinishCall(watch.status());
-  watch_ = *std::move(watch);
-  RunOn(readers_, [this] { TellNext(); });
+  {
+    const std::lock_guard lock(watch_mutex_);
+    watch_ = *std::move(watch);
+  }
+  TellNext();
 }
 
 absl::StatusOr<WatchTarget> WatchStream::ReadTarget() const {

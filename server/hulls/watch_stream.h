@@ -38,6 +38,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
   void OnRevoked() override { Nudge(); }
   void OnDone() override;
 
+  void Begin(const WatchTarget& target, const WatchStart& start);
   absl::StatusOr<WatchTarget> ReadTarget() const;
   absl::StatusOr<WatchStart> ReadStart() const;
   void TellNext();
@@ -48,7 +49,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
 
   Registry& registry_;
   WorkerPool& readers_;
-  // Written before anything else can happen; guards the end of it.
+  // Guards its beginning and its end against who cancels. Between these it stays.
   std::mutex watch_mutex_;
   std::shared_ptr<ChangeWatch> watch_;
   // What was there has been told.

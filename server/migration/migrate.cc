@@ -6,6 +6,7 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
 
 #include "server/access/secret_file.h"
@@ -56,7 +57,9 @@ absl::StatusOr<std::unique_ptr<Store>> OpenRocksDbSource(const std::string& data
   RocksDbOptions options;
   options.data_dir = data_dir;
   options.read_only = true;
-  if (!std::filesystem::exists(DatabaseDirectory(data_dir))) {
+  // Where it cannot be looked at, opening it says why.
+  std::error_code error;
+  if (!std::filesystem::exists(DatabaseDirectory(data_dir), error) && !error) {
     return absl::NotFoundError("there is no store of hulld");
   }
   if (absl::Status s = RocksDbStore::Open(options).status(); !s.ok()) return s;
@@ -127,7 +130,25 @@ std::string Describe(const MigrationCounts& counts) {
   return absl::StrCat(text, "; ", counts.resumed, " of these were there from an earlier run");
 }
 
+// What is compared is what a server will open, nothing that is still in our memory.
+absl::Status CompareAnew(const Place& to, const Migration& migration,
+                         absl::StatusOr<std::unique_ptr<MigrationTarget>>* target) {
+  target->value().reset();
+  *target = OpenTarget(to);
+  if (absl::IsCancelled(target->status())) {
+    return absl::AbortedError(absl::StrCat(
+        to.Describe(),
+        ": a hulld that waited for this database has its turn before all was compared; end it"));
+  }
+  if (!target->ok()) return Explain(to, target->status());
+  return migration.Compare(target->value()->store());
+}
+
 absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ostream& err) {
+  if (from.data_dir == to.data_dir && from.conninfo_file == to.conninfo_file) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("source and destination are both ", from.Describe()));
+  }
   const absl::StatusOr<std::unique_ptr<Store>> source = OpenSource(from);
   if (!source.ok()) return Explain(from, source.status());
   absl::StatusOr<std::unique_ptr<MigrationTarget>> target = OpenTarget(to);
@@ -136,16 +157,24 @@ absl::Status Run(const Place& from, const Place& to, std::ostream& out, std::ost
   absl::StatusOr<Migration> migration =
       Migration::Read(**source, [&lines](uint64_t done, uint64_t all) { lines.Tell(done, all); });
   if (!migration.ok()) return Explain(from, migration.status());
-  const absl::StatusOr<MigrationCounts> counts = migration->CopyTo(**target);
+  absl::StatusOr<MigrationCounts> counts = migration->CopyTo(**target);
   if (!counts.ok()) return counts.status();
   out << "copied store " << migration->source().store_id << " at revision "
       << migration->source().revision << ": " << Describe(*counts) << std::endl;
-  // What is compared is what a server will open, nothing that is still in our memory.
-  target->reset();
-  target = OpenTarget(to);
-  if (!target.ok()) return Explain(to, target.status());
   lines.SetPhase("compared");
-  if (absl::Status s = migration->Compare((*target)->store()); !s.ok()) return s;
+  absl::Status compared = CompareAnew(to, *migration, &target);
+  if (absl::IsDataLoss(compared) && counts->resumed > 0) {
+    // Points that move no vertex leave the store's revision as it is, so the source may have
+    // changed unseen since the earlier run.
+    out << std::string(compared.message()) << "; copying it anew" << std::endl;
+    if (absl::Status s = (*target)->Begin(migration->source()); !s.ok()) return s;
+    lines.SetPhase("copied");
+    counts = migration->CopyTo(**target);
+    if (!counts.ok()) return counts.status();
+    lines.SetPhase("compared");
+    compared = CompareAnew(to, *migration, &target);
+  }
+  if (!compared.ok()) return compared;
   if (absl::Status s = (*target)->Finish(migration->source()); !s.ok()) return s;
   out << "compared: every record is the same; " << to.Describe() << " is store "
       << (*target)->store().id() << " now\n";

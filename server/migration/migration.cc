@@ -182,7 +182,7 @@ absl::Status Migration::CopyBodies(MigrationTarget& target, MigrationCounts* cou
       continue;
     }
     std::vector<Change> changes(1);
-    changes[0].body = std::make_shared<const StoredBody>(body);
+    changes[0].body = std::make_shared<StoredBody>(body);
     changes[0].revision = body.record.revision;
     if (absl::Status s = batch.Add(std::move(changes)); !s.ok()) return s;
     progress_(counts->hulls + counts->bodies, all());

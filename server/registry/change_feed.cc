@@ -113,9 +113,9 @@ void ChangeFeed::NoteDeleted(Locked& locked, const HullRecord& record, uint64_t 
 void ChangeFeed::NoteBodyPut(Locked& locked, const std::shared_ptr<const Body>& former,
                              const std::shared_ptr<const Body>& body) {
   const BodyRecord& record = body->record();
-  const Life life = former == nullptr                           ? Life::kBegan
-                    : record.create_revision == record.revision ? Life::kReplaced
-                                                                : Life::kChanged;
+  const Life life = former == nullptr                                            ? Life::kBegan
+                    : record.create_revision != former->record().create_revision ? Life::kReplaced
+                                                                                 : Life::kChanged;
   Note(locked, record.body_id,
        {record.revision, record.create_revision, life, true, nullptr, body});
 }
@@ -131,7 +131,8 @@ void ChangeFeed::NoteBecameBody(Locked& locked, const HullRecord& former,
   const BodyRecord& record = body->record();
   RememberDeletion(former.hull_id, {record.revision, former.create_revision, Life::kEnded});
   Note(locked, record.body_id,
-       {record.revision, record.create_revision, Life::kReplaced, true, nullptr, body, true});
+       {record.revision, record.create_revision, Life::kReplaced, true, nullptr, body,
+        former.create_revision});
 }
 
 void ChangeFeed::NoteBecameHull(Locked& locked, const Body& former,
@@ -140,20 +141,21 @@ void ChangeFeed::NoteBecameHull(Locked& locked, const Body& former,
   RememberDeletion(record.hull_id,
                    {record.revision, former.record().create_revision, Life::kEnded, true});
   Note(locked, record.hull_id,
-       {record.revision, record.create_revision, Life::kReplaced, false, hull, nullptr, true});
+       {record.revision, record.create_revision, Life::kReplaced, false, hull, nullptr,
+        former.record().create_revision});
 }
 
 // What a watch of hulls alone is told is of the hull that there is, or was.
 std::optional<ChangeFeed::State> ChangeFeed::AsToldTo(const WatchTarget& target,
                                                       const State& state) {
-  if (target.bodies || (!state.is_body && !state.changes_kind)) return state;
+  if (target.bodies || (!state.is_body && state.other_kind_began == 0)) return state;
   if (!state.is_body) {
     State begun = state;
     begun.life = Life::kBegan;
     return begun;
   }
-  if (state.changes_kind) return State{state.revision, state.create_revision, Life::kEnded};
-  return std::nullopt;
+  if (state.other_kind_began == 0) return std::nullopt;
+  return State{state.revision, state.other_kind_began, Life::kEnded};
 }
 
 void ChangeFeed::Note(Locked& locked, const std::string& id, const State& state) {

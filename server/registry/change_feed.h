@@ -169,8 +169,9 @@ class ChangeFeed {
     // One of them, or none when it went.
     std::shared_ptr<RegisteredHull> hull = nullptr;
     std::shared_ptr<const Body> body = nullptr;
-    // What the ID was before was of the other kind, and ended by the same change.
-    bool changes_kind = false;
+    // Not 0: what the ID was before was of the other kind and ended by the same change; this is the
+    // create_revision of that.
+    uint64_t other_kind_began = 0;
   };
   struct Deletion {
     uint64_t revision;

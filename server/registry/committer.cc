@@ -63,9 +63,18 @@ void Committer::Run() {
     if (round.batch.empty() && round.followers.empty()) return;
     absl::Status status;
     if (!round.batch.empty()) status = Write(round.batch);
-    // A commit has followed the others, if it did not fail.
+    if (!status.ok()) {
+      // Refused before anybody looks at what others did: where the outcome is not known, what is
+      // there by then may be this very batch.
+      Round looking = {{}, std::exchange(round.followers, {})};
+      Settle(round, status, absl::OkStatus());
+      if (looking.followers.empty()) continue;
+      round = std::move(looking);
+      status = absl::OkStatus();
+    }
+    // A commit has followed the others.
     absl::Status followed;
-    if (round.batch.empty() || !status.ok()) followed = store_.Follow();
+    if (round.batch.empty()) followed = store_.Follow();
     Settle(round, status, followed);
   }
 }
@@ -96,9 +105,11 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
 // Completes a batch that the store kept; or, if it refused the batch, that and all that waits.
 void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& followed) {
   std::vector<Pending>& batch = round.batch;
+  // Before others take changes out of it.
+  const bool was_written = !batch.empty();
   Locked locked(order_);
   if (store_.is_shared()) TellOthers(locked, batch);
-  if (!batch.empty()) {
+  if (was_written) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {
       spdlog::error("changes refused: {}", std::string(status.message()));

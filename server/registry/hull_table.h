@@ -17,9 +17,9 @@ namespace hulld::server {
 // The hulls of a registry, by ID.
 //
 // A store may hold millions of hulls, of which few are in use. A hull that nobody used since it was
-// read from the store, or that came to rest, takes a record here and no more: 240 bytes of heap, its
-// ID included, instead of 1120; with an ID of 32 bytes 289 instead of 1271 (observed: mallinfo2 of
-// glibc 2.36 over 200 000 hulls; IDs of up to 15 bytes cost nothing more). It becomes a
+// read from the store, or that came to rest, takes a record here and no more: 240 bytes of heap,
+// its ID included, instead of 1120; with an ID of 32 bytes 289 instead of 1271 (observed: mallinfo2
+// of glibc 2.36 over 200 000 hulls; IDs of up to 15 bytes cost nothing more). It becomes a
 // RegisteredHull when it is looked for, and a record again when a hand that goes round the table
 // finds that nothing of it is in use. Each operation moves the hand by a few hulls, so there is no
 // pass over all of them.

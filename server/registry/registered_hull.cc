@@ -107,6 +107,7 @@ void RegisteredHull::DiscardAll(Locked& locked) {
   DiscardServed(locked);
   locked.Discard(std::exchange(canonical, nullptr));
   locked.Discard(std::exchange(live, nullptr));
+  live_is_ahead = false;
   SetCommittedMark(locked, {});
 }
 
@@ -192,6 +193,13 @@ absl::Status Gone(const std::string& id, const char* how) {
           QuotedHull(id), " was ", how,
           " while points were streamed into it; open the stream again and start anew")),
       v1::ERROR_REASON_HULL_GONE, {{"hull_id", id}});
+}
+
+absl::Status StoreDisagrees(const HullRecord& record) {
+  return absl::UnavailableError(absl::StrCat(
+      "the store does not hold ", QuotedHull(record.hull_id), " as of revision ", record.revision,
+      ", which is the last that this server knows of; if that does not pass, the database was "
+      "changed by others than hulld: restart this server"));
 }
 
 absl::Status HullNotFound(const std::string& id) {

@@ -183,6 +183,9 @@ std::string QuotedHull(const std::string& id);
 // FAILED_PRECONDITION: the hull of a session ended. how: "deleted".
 absl::Status Gone(const std::string& id, const char* how);
 absl::Status HullNotFound(const std::string& id);
+
+// UNAVAILABLE: a store that is shared lacks what it should hold, and no other server took it.
+absl::Status StoreDisagrees(const HullRecord& record);
 absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision);
 
 }  // namespace hulld::server

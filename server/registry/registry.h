@@ -139,6 +139,8 @@ class Registry {
   // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
   // question to the store, one for all who wait; nothing where it is not shared.
   absl::Status AwaitOthers(const std::function<bool()>& should_stop);
+  // Whether that asks the store, as other servers may be active over it.
+  bool is_shared() const { return store_.is_shared(); }
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.

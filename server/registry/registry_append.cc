@@ -164,6 +164,9 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
     if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
     // Who asks sees that.
     if (hull.state.gone()) return 0;
+    if (hull.supersessions == supersessions && hull.committed.record == record) {
+      return StoreDisagrees(record);
+    }
     return CommittedSequence(locked, hull, writer_id);
   }
   if (!sequence.ok()) return sequence.status();
@@ -350,7 +353,9 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   locked.Lock();
   if (absl::IsAborted(loaded.status())) {
     if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
-    return Superseded();
+    const bool is_known = hull.state.work() == HullState::Work::kReverting || hull.state.gone() ||
+                          hull.state.changing_life();
+    return is_known ? Superseded() : StoreDisagrees(stored.record);
   }
   if (hull.state.work() == HullState::Work::kReverting) return Superseded();
   if (hull.live != nullptr) return hull.live;

@@ -224,6 +224,8 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     hull.changed.notify_all();
     if (absl::IsAborted(loaded.status())) {
       if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
+      const HullRecord& now = hull.committed.record;
+      if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;
     }
     // A writer was faster. What was read, or not found, is of a state that was left since.

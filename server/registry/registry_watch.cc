@@ -65,6 +65,10 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   const auto is_watched = [&](const std::string& id) {
     return target.ids.empty() ? id.starts_with(prefix) : id == prefix;
   };
+  // What is damaged has no revision that can be read.
+  const auto is_new = [&watch](uint64_t revision) {
+    return watch.after_revision == 0 || revision > watch.after_revision;
+  };
   const auto begin_of = [&](const auto& all) {
     return watch.last_id.empty() ? all.lower_bound(prefix) : all.upper_bound(watch.last_id);
   };
@@ -79,15 +83,15 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
     if (!has_body || (has_hull && hull->first < body->first)) {
       watch.last_id = hull->first;
       const HullTable::Entry& entry = hull->second;
-      const bool is_new = entry.revision() > watch.after_revision;
-      if (is_new && entry.visible()) piece->changes.push_back(entry.Describe(hull->first));
+      if (is_new(entry.revision()) && entry.visible())
+        piece->changes.push_back(entry.Describe(hull->first));
       ++hull;
     } else {
       watch.last_id = body->first;
       const auto& committed = body->second.committed;
-      const bool is_new =
-          committed != nullptr && committed->record().revision > watch.after_revision;
-      if (is_new) piece->changes.push_back(committed->Describe());
+      if (committed != nullptr && is_new(committed->record().revision)) {
+        piece->changes.push_back(committed->Describe());
+      }
       ++body;
     }
   }

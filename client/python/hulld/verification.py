@@ -280,7 +280,11 @@ class Verifier:
         a, b = (packed[int(index)] for index in found.pairs[row])
         answers = found.answers
         if a.id not in found.hulls or b.id not in found.hulls:
-            raise VerificationError("the row has no answer")
+            if int(answers.relations[row]) == 0:
+                raise VerificationError("the row has no answer")
+            raise VerificationError(
+                "this step names no revisions; check the first one, or one that refreshes hulls"
+            )
         self._check(
             a,
             b,

@@ -101,7 +101,9 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
   const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   const size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
                                  table.HullOfPiece(b, pieces.b), wanted, columns);
-  return bytes + AddPieces(table, a, b, answer.of_body.pieces, columns);
+  // Without an answer nothing decided, although the relation alone may have been found.
+  return bytes +
+         AddPieces(table, a, b, answer.answer.ok() ? answer.of_body.pieces : std::nullopt, columns);
 }
 
 size_t AddUnansweredPair(const PlacementTable& table, const v1::Wanted& wanted,

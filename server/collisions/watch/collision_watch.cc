@@ -218,6 +218,7 @@ void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
     const bool is_asked = body != nullptr && CheckPiecePrefix(*body, call().caller().prefix).ok();
     pieces_.Set(hulls[n], is_asked ? body->hull_ids() : std::vector<std::string>(), &difference);
   }
+  difference.Settle();
   // Those are watched all the while.
   const auto is_placed = [this](const std::string& id) { return hulls_of_.contains(id); };
   std::erase_if(difference.added, is_placed);
@@ -229,6 +230,12 @@ void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
 // The client is to hear of a hull, or of a body and the hulls of its pieces.
 void CollisionWatch::TellOf(size_t hull) {
   hulls_to_tell_.push_back(hull);
+  TellOfPieces(hull);
+}
+
+// Of those of its pieces that it did not hear of: a body may have been resolved before they were
+// followed.
+void CollisionWatch::TellOfPieces(size_t hull) {
   const HullView& view = *table_.hull(hull);
   if (view.body == nullptr) return;
   for (const HullView& of_piece : view.body->hulls) {
@@ -295,9 +302,10 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
     if (table_.query_hull_changed(placements.front())) {
       for (const uint32_t i : placements) pairs_.ForgetPoints(i);
     }
-    if (!table_.hull_changed(placements.front())) continue;
     const bool is_there = table_.hull(k).ok();
-    if (is_there) TellOf(k);
+    if (is_there) TellOfPieces(k);
+    if (!table_.hull_changed(placements.front())) continue;
+    if (is_there) hulls_to_tell_.push_back(k);
     for (const uint32_t i : placements) {
       changed.push_back(i);
       if (!is_there) problems_to_tell_.push_back(i);

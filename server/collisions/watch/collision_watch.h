@@ -70,6 +70,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   void FollowPieces(std::span<const size_t> hulls);
   std::vector<size_t> ConcernedBy(const WatchPiece& piece) const;
   void TellOf(size_t hull);
+  void TellOfPieces(size_t hull);
   absl::Status HandleUpdate(const v1::CollisionWatchUpdate& update);
   void TakeChanges();
   absl::Status HandleChanges(const WatchPiece& piece);

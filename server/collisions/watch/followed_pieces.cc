@@ -1,6 +1,7 @@
 #include "server/collisions/watch/followed_pieces.h"
 
 #include <algorithm>
+#include <iterator>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -14,6 +15,18 @@ namespace {
 size_t BytesOf(const std::string& id) { return 2 * id.size() + 256; }
 
 }  // namespace
+
+void FollowedPieces::Difference::Settle() {
+  std::ranges::sort(added);
+  std::ranges::sort(dropped);
+  std::vector<std::string> both;
+  std::ranges::set_intersection(added, dropped, std::back_inserter(both));
+  const auto stays = [&both](const std::string& id) {
+    return std::ranges::binary_search(both, id);
+  };
+  std::erase_if(added, stays);
+  std::erase_if(dropped, stays);
+}
 
 void FollowedPieces::Set(size_t body, std::span<const std::string> hull_ids,
                          Difference* difference) {

@@ -21,6 +21,10 @@ class FollowedPieces {
   struct Difference {
     std::vector<std::string> added;
     std::vector<std::string> dropped;
+
+    // Leaves out what one body gave up and another took, in either order: it is of concern all the
+    // while. Cost: O(n log n).
+    void Settle();
   };
 
   // The hulls of the pieces of a body from now on, each once; none where it is no body. Cost:

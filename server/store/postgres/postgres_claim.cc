@@ -67,9 +67,13 @@ void PostgresStore::Keep() {
   const auto period = options_.shared ? std::min(options_.look, options_.beat) : options_.beat;
   const int64_t looks_per_beat = options_.beat / period;
   for (int64_t look = 1; !wake_.wait_for(lock, period, [this] { return ending_; }); ++look) {
+    const bool is_beat = look % looks_per_beat == 0;
+    // A database that is gone is not asked more often than that.
+    if (keeper_session_ == nullptr && !is_beat) continue;
     lock.unlock();
     absl::Status status;
-    if (keeper_session_ == nullptr || look % looks_per_beat == 0) status = Beat();
+    if (is_beat) status = Beat();
+    if (status.ok() && is_beat && options_.shared) status = EndStuckTurns();
     if (status.ok() && options_.shared) status = LookForOthers();
     if (status.ok() && look % (looks_per_beat * kBeatsPerMeasure) == 0) status = MeasureDisk();
     if (!status.ok()) {

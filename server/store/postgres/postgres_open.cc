@@ -169,7 +169,8 @@ PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
     : options_(std::move(options)),
       conninfo_(std::move(conninfo)),
       owner_(OwnerName()),
-      readers_([this] { return OpenReader(); }, kMostReaders) {}
+      readers_([this] { return OpenReader(); }, kMostReaders),
+      follower_([this] { return OpenReader(); }, 1) {}
 
 absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
   absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(options.conninfo);
@@ -305,9 +306,9 @@ absl::Status PostgresStore::WaitForTurn() {
     } else if (pause < kLongestTurnPause && 2 * pause >= kLongestTurnPause) {
       const absl::StatusOr<std::string> owner = Owner(*keeper_session_);
       spdlog::info(
-          "another hulld is active over this database ({}): this one waits until that ends; with "
-          "--take-over it would not",
-          owner.ok() && !owner->empty() ? *owner : "it just starts");
+          "another hulld is active over this database ({}): this one waits until that ends{}",
+          owner.ok() && !owner->empty() ? *owner : "it just starts",
+          options_.shared ? "" : "; with --take-over it would not");
     }
     if (options_.should_stop && options_.should_stop()) {
       return absl::CancelledError("told to end before its turn came");

@@ -227,7 +227,7 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
 absl::Status PostgresStore::Follow() {
   if (absl::Status s = ended(); !s.ok()) return s;
   const Statement follow = {.name = "hulld_follow", .parameters = {EncodeBigint(batch_)}};
-  const absl::StatusOr<std::vector<Rows>> rows = readers_.Ask(std::span(&follow, 1));
+  const absl::StatusOr<std::vector<Rows>> rows = follower_.Ask(std::span(&follow, 1));
   if (rows.ok()) {
     const absl::Status noted = NoteOthers(rows->front());
     if (went_back_) GiveNewId();
@@ -367,6 +367,20 @@ absl::StatusOr<bool> PostgresStore::FindSharedOutcome(uint64_t batch, Clock::tim
     std::unique_lock lock(mutex_);
     if (wake_.wait_for(lock, pause, [this] { return ending_; })) return outcome;
   }
+}
+
+// Ends sessions that hold the turn and send nothing, as those of a server that stands still in the
+// middle of sending a batch do: PostgreSQL bounds how long it waits between transactions and
+// between batches of statements, but not within these.
+absl::Status PostgresStore::EndStuckTurns() {
+  return keeper_session_
+      ->Run(absl::StrCat(
+          "SELECT pg_terminate_backend(a.pid) FROM pg_locks l JOIN pg_stat_activity a USING (pid) "
+          "WHERE l.relation = 'hulld.store'::regclass AND l.mode = 'RowShareLock' AND l.granted "
+          "AND a.datname = current_database() AND a.usename = current_user "
+          "AND a.wait_event = 'ClientRead' AND a.state_change < now() - interval '",
+          options_.longest_send.count(), " ms'"))
+      .status();
 }
 
 // Whether others have committed since this knew what they did; then it is told.

@@ -25,11 +25,13 @@ constexpr std::chrono::milliseconds kLongestPause{500};
 
 }  // namespace
 
-absl::Status PostgresStore::OutcomeUnknown(const absl::Status& cause) {
+absl::Status PostgresStore::OutcomeUnknown(const absl::Status& cause) const {
   return absl::UnavailableError(absl::StrCat(
       "the database was lost while it committed (", cause.message(),
-      "), and cannot be asked yet whether it did: nobody sees the change, but it may appear if the "
-      "server is restarted; look whether it did before you repeat it"));
+      "), and cannot be asked yet whether it did: ",
+      options_.shared ? "the change may be there, or not"
+                      : "nobody sees the change, but it may appear if the server is restarted",
+      "; look whether it did before you repeat it"));
 }
 
 absl::Status PostgresStore::Refused(const absl::Status& cause) {

@@ -46,6 +46,9 @@ struct PostgresOptions {
   std::chrono::milliseconds beat{1000};
   // Shared: how often this looks whether other servers committed.
   std::chrono::milliseconds look{100};
+  // Shared: how long a session may hold the turn while the database waits for the rest of its
+  // batch, as when its server stands still. It is ended then.
+  std::chrono::milliseconds longest_send{30'000};
 };
 
 // Keeps hulls in the schema "hulld" of a PostgreSQL database (14 or later); see postgres_open.cc
@@ -156,7 +159,7 @@ class PostgresStore : public Store {
   absl::StatusOr<bool> Reclaim(uint64_t batch);
   absl::StatusOr<bool> OutcomeBeforeOthers(uint64_t batch);
   absl::Status WriteFailed(const absl::Status& status);
-  static absl::Status OutcomeUnknown(const absl::Status& cause);
+  absl::Status OutcomeUnknown(const absl::Status& cause) const;
   static absl::Status Refused(const absl::Status& cause);
   void EndRelaxedRun();
 
@@ -175,6 +178,7 @@ class PostgresStore : public Store {
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
   absl::StatusOr<bool> FindSharedOutcome(uint64_t batch,
                                          std::chrono::steady_clock::time_point deadline);
+  absl::Status EndStuckTurns();
   absl::Status LookForOthers();
   absl::StatusOr<std::string> ReadSequence(const HullRecord& hull, const std::string& writer_id);
   absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
@@ -209,6 +213,8 @@ class PostgresStore : public Store {
   absl::Status unknown_;
 
   SessionPool readers_;
+  // Shared: of its own, so that all that wait to know what others did do not wait for readers.
+  SessionPool follower_;
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

@@ -260,6 +260,32 @@ TEST_P(MigrationTest, ASourceThatChangedMeanwhileIsCopiedAnew) {
   ExpectSame(*from_->Serve(), *to_->Serve());
 }
 
+// Chunks that change no vertex take no revision of the store.
+TEST_P(MigrationTest, ASourceThatChangedUnseenMeanwhileIsCopiedAnew) {
+  FillSource();
+  std::vector<std::string> copied;
+  {
+    const auto source = from_->Open();
+    auto target = to_->OpenTarget();
+    ASSERT_TRUE(source.ok() && target.ok());
+    InterruptedTarget interrupted(*std::move(target), 2);
+    EXPECT_FALSE(Migration::Read(**source, [](auto...) {})->CopyTo(interrupted).ok());
+    const auto note = [&copied](const std::string& id, const auto&) { copied.push_back(id); };
+    ASSERT_TRUE(interrupted.store().ForEachHull(note).ok());
+    ASSERT_FALSE(copied.empty());
+  }
+  {
+    const auto hulls = from_->Serve();
+    const uint64_t revision = hulls->store().revision();
+    for (const std::string& id : copied) ASSERT_TRUE(hulls->Put(id, {}).ok());
+    EXPECT_EQ(hulls->store().revision(), revision);
+  }
+  const Ran ran = Migrate(*from_, *to_);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("copying it anew"));
+  ExpectSame(*from_->Serve(), *to_->Serve());
+}
+
 TEST_P(MigrationTest, OnlyAnEmptyDestinationIsTaken) {
   ASSERT_TRUE(from_->Serve()->Put("h", CubeCorners()).ok());
   // One that a server made, and that never held anything, will do.
@@ -338,6 +364,8 @@ TEST_P(MigrationTest, TheCommandLineIsChecked) {
   EXPECT_EQ(RunMigrate({"--from-data-dir", "x"}, out, err), 2);
   EXPECT_THAT(err.str(), HasSubstr("name one source"));
   EXPECT_EQ(RunMigrate({"--from", "x"}, out, err), 2);
+  EXPECT_EQ(RunMigrate({"--from-data-dir", "x", "--to-data-dir", "x"}, out, err), 2);
+  EXPECT_THAT(err.str(), HasSubstr("source and destination are both x"));
   EXPECT_EQ(RunMigrate({"--help"}, out, err), 0);
   EXPECT_THAT(out.str(), HasSubstr("the copy is another store"));
 }

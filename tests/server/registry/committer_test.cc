@@ -85,10 +85,12 @@ class SharedStore : public GatedStore {
   OtherChanges TakeOthers() override { return std::exchange(others, {}); }
   absl::Status Follow() override {
     ++follows;
+    if (found_by_follow.revision > 0) others = std::exchange(found_by_follow, {});
     return can_follow;
   }
 
   OtherChanges others;
+  OtherChanges found_by_follow;
   std::atomic<int> follows = 0;
   absl::Status can_follow;
 };
@@ -293,6 +295,36 @@ TEST(Committer, WhatAnotherServerSupersedesIsRefusedAndTheRestIsKept) {
   const std::lock_guard lock(order);
   EXPECT_THAT(events, ElementsAre("a3 superseded", "a2 superseded", "a1 superseded", "others at 7",
                                   "b1 kept", "last1 kept"));
+}
+
+// What was perhaps committed comes back as if another server had done it: it was not superseded.
+TEST(Committer, ABatchWithoutAKnownOutcomeIsRefusedBeforeAnybodyLooks) {
+  SharedStore store;
+  FairMutex order;
+  std::vector<std::string> events;
+  std::promise<void> followed;
+  Committer committer(store, order);
+  committer.SetOthers([&](Locked&, const OtherChanges&) { events.emplace_back("others"); });
+  GatedStore::Gate gate;
+  store.Close(gate);
+  {
+    const Locked locked(order);
+    Change change;
+    change.deleted = true;
+    change.hull.record.hull_id = "h";
+    committer.Submit(locked, std::move(change),
+                     [&](Locked&, const absl::Status& status, const Change&) {
+                       events.push_back(Committer::IsSuperseded(status) ? "superseded" : "refused");
+                     });
+    committer.Follow(locked, [&](Locked&, const absl::Status&) { followed.set_value(); });
+  }
+  gate.entered.get_future().wait();
+  store.found_by_follow.revision = 7;
+  store.found_by_follow.by_id["h"];
+  gate.outcome.set_value(absl::UnavailableError("lost while it committed"));
+  followed.get_future().wait();
+  const std::lock_guard lock(order);
+  EXPECT_THAT(events, ElementsAre("refused", "others"));
 }
 
 TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {

@@ -129,7 +129,7 @@ void PostgresCluster::Start() {
   while (true) {
     server_ = Spawn(AsServer({ProgramDirectory() + "/postgres", "-D", directory_ + "/data", "-k",
                               directory_, "-c", "listen_addresses=", "-c", "shared_buffers=16MB",
-                              "-c", "max_connections=50", "-c", "autovacuum=off"}),
+                              "-c", "max_connections=200", "-c", "autovacuum=off"}),
                     log);
     int status = 0;
     while (waitpid(server_, &status, WNOHANG) == 0) {

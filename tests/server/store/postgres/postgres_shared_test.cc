@@ -1,11 +1,13 @@
 // Several servers that are active at once over one database.
 #include <absl/strings/str_cat.h>
+#include <libpq-fe.h>
 
 #include <algorithm>
 #include <future>
 #include <map>
 #include <set>
 #include <thread>
+#include <tuple>
 
 #include "core/hull/growth/hull_builder.h"
 #include "tests/server/store/postgres/postgres_fixture.h"
@@ -276,6 +278,80 @@ TEST_F(PostgresShared, AWatchOnOneServerIsToldWhatAnotherDid) {
                                    Told("h", ChangeKind::kDeleted)));
 }
 
+// The stream keeps the hull awake, but not what it holds of it.
+TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
+  Limits limits;
+  limits.memory_limit = 1 << 20;
+  auto store = Open();
+  ASSERT_TRUE(store.ok()) << store.status();
+  hulls_ = std::make_unique<PostgresRegistry>(*std::move(store), limits);
+  ASSERT_TRUE(hulls_->loaded().ok());
+  const Server other = StartBeside();
+  const auto opened = hulls_->Open("h");
+  ASSERT_TRUE(hulls_->Append(opened->session, 1, CubeCorners()).ok());
+  // More than the limit, so that what is not in use goes.
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(hulls_->Put(absl::StrCat("large/", i), SpherePoints(1000)).ok());
+    ASSERT_TRUE(hulls_->View(absl::StrCat("large/", i)).ok());
+  }
+  ASSERT_TRUE(other->Put("h", {{9, 9, 9}}, "v").ok());
+  EXPECT_EQ(Received(*hulls_, "h"), 9);
+  ASSERT_TRUE(hulls_->Append(opened->session, 2, {{-9, 9, 9}}).ok());
+  EXPECT_EQ(Received(*other, "h"), 10);
+}
+
+// Both changes of an ID are told as one. A watch of hulls alone is told of the hull.
+TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
+  options_.look = std::chrono::hours(1);
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(other->Create("was-hull").ok());
+  ASSERT_TRUE(PutBody(*other, "was-body").ok());
+  ASSERT_TRUE(PutBody(*other, "replaced").ok());
+  Registry& registry = hulls_->registry();
+  ASSERT_TRUE(registry.AwaitOthers({}).ok());
+  WatchTarget both;
+  both.bodies = true;
+  const auto watch_hulls = registry.OpenWatch(WatchTarget(), {}, [] {});
+  const auto watch_both = registry.OpenWatch(both, {}, [] {});
+  ASSERT_TRUE(watch_hulls.ok() && watch_both.ok());
+  const auto delete_body = [&](const std::string& id) {
+    return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
+      other->registry().DeleteBody(id, std::nullopt, std::move(done));
+    });
+  };
+  ASSERT_TRUE(other->Delete("was-hull").ok());
+  ASSERT_TRUE(PutBody(*other, "was-hull").ok());
+  ASSERT_TRUE(delete_body("was-body").ok());
+  ASSERT_TRUE(other->Create("was-body").ok());
+  ASSERT_TRUE(delete_body("replaced").ok());
+  ASSERT_TRUE(PutBody(*other, "replaced").ok());
+  ASSERT_TRUE(PutBody(*other, "replaced").ok());
+  ASSERT_TRUE(registry.AwaitOthers({}).ok());
+
+  using Told = std::tuple<std::string, ChangeKind, bool>;
+  const auto told_to = [&](const std::shared_ptr<ChangeWatch>& watch) {
+    std::vector<Told> told;
+    for (bool waits = false; !waits;) {
+      const auto piece = registry.TakeChanges(*watch);
+      if (!piece.ok()) break;
+      for (const HullChange& change : piece->changes) {
+        told.emplace_back(change.record.hull_id, change.kind, change.is_body);
+      }
+      waits = piece->waits;
+    }
+    registry.CloseWatch(watch);
+    return told;
+  };
+  EXPECT_THAT(told_to(*watch_hulls),
+              ::testing::ElementsAre(Told("was-hull", ChangeKind::kDeleted, false),
+                                     Told("was-body", ChangeKind::kCreated, false)));
+  EXPECT_THAT(told_to(*watch_both),
+              ::testing::ElementsAre(Told("was-hull", ChangeKind::kReplaced, true),
+                                     Told("was-body", ChangeKind::kReplaced, false),
+                                     Told("replaced", ChangeKind::kReplaced, true)));
+}
+
 TEST_F(PostgresShared, ACommitWhoseAnswerWasLostIsFoundAndNotRepeated) {
   Start();
   const Server other = StartBeside();
@@ -371,6 +447,31 @@ TEST_F(PostgresShared, ADatabaseThatWasPutBackIsAnotherStoreForAll) {
   EXPECT_TRUE(absl::IsUnavailable(other->View("h").status()));
   Start();
   EXPECT_NE(hulls_->store().id(), id);
+}
+
+// Half of a batch has come, and nothing follows.
+TEST_F(PostgresShared, WhoStopsInTheMiddleOfABatchHoldsNobodyUpForLong) {
+  options_.longest_send = std::chrono::milliseconds(100);
+  options_.beat = std::chrono::milliseconds(50);
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const std::string conninfo = cluster().Conninfo(database_, cluster().socket_directory());
+  PGconn* const stopped = PQconnectdb(conninfo.c_str());
+  ASSERT_EQ(PQstatus(stopped), CONNECTION_OK) << PQerrorMessage(stopped);
+  ASSERT_EQ(PQenterPipelineMode(stopped), 1);
+  for (const char* statement : {"BEGIN", "SELECT batch FROM hulld.store FOR UPDATE"}) {
+    ASSERT_EQ(PQsendQueryParams(stopped, statement, 0, nullptr, nullptr, nullptr, nullptr, 0), 1);
+  }
+  ASSERT_EQ(PQsendFlushRequest(stopped), 1);
+  ASSERT_EQ(PQflush(stopped), 0);
+  // It has the turn once both are answered; each answer ends with a null.
+  for (int answers = 0; answers < 2;) {
+    PGresult* const result = PQgetResult(stopped);
+    if (result == nullptr) ++answers;
+    PQclear(result);
+  }
+  EXPECT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
+  PQfinish(stopped);
 }
 
 TEST_F(PostgresShared, WhoIsTooFarBehindEnds) {
