@@ -48,7 +48,8 @@ class Parser {
     app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
     app_.footer(
         "Precedence: flag, environment variable, file, default.\n"
-        "'hulld doctor --help' tells how to audit a store, 'hulld migrate --help' how to move one.");
+        "'hulld doctor --help' tells how to audit a store, 'hulld migrate --help' how to move "
+        "one.");
   }
 
   // The arguments that stand for the variables that are set.
@@ -151,7 +152,8 @@ class Parser {
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
         "File of the connection string of --store postgres, which only hulld may read");
     Add("postgres-servers", config_.postgres_servers,
-        "With --store postgres: one server at a time is active over a database, and others wait, or "
+        "With --store postgres: one server at a time is active over a database, and others wait, "
+        "or "
         "many are at once, all with this setting")
         ->check(CLI::IsMember({"one", "many"}));
     app_.add_flag(

@@ -329,7 +329,10 @@ def test_a_watch_that_was_quiet_for_long_goes_on(monkeypatch: pytest.MonkeyPatch
         def cancel(self) -> None:
             pass
 
-    watch = hulld.HullWatch(Quiet, lambda after: watch_hulls("", None, after), None, QUICK, 20)
+    def begin(after: Any) -> Any:
+        return watch_hulls("", None, False, after)
+
+    watch = hulld.HullWatch(Quiet, begin, None, QUICK, 20)
     assert [next(watch).header.revision for _ in range(3)] == [10, 20, 30]
 
 
