@@ -200,8 +200,11 @@ TEST(HullCost, BlocksOfExtremeCloudsCostNoMoreThanTheirPoints) {
       const SignCost one_by_one = CostOf([&] { return BuiltOneByOne(points); });
       const auto count = static_cast<double>(points.size());
       EXPECT_LE(block.all, 2 * one_by_one.all + 4 * count) << extreme.name << " " << n;
+#ifdef NDEBUG
+      // Otherwise the surface is checked after every change, whose signs are counted, too.
       EXPECT_LE(static_cast<double>(block.wide), 0.5 * count) << extreme.name << " " << n;
       EXPECT_LE(static_cast<double>(one_by_one.wide), count) << extreme.name << " " << n;
+#endif
     }
   }
 }
