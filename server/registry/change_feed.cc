@@ -93,11 +93,6 @@ void ChangeFeed::NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHul
        {record.revision, record.create_revision, Life::kChanged, false, hull});
 }
 
-void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
-  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
-  revision_ = revision;
-}
-
 void ChangeFeed::NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull) {
   const HullRecord& record = hull->committed.record;
   Note(locked, record.hull_id,
@@ -143,6 +138,11 @@ void ChangeFeed::NoteBecameHull(Locked& locked, const Body& former,
   Note(locked, record.hull_id,
        {record.revision, record.create_revision, Life::kReplaced, false, hull, nullptr,
         former.record().create_revision});
+}
+
+void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
+  HULLD_CHECK(locked.Holds(order_) && revision > revision_);
+  revision_ = revision;
 }
 
 // What a watch of hulls alone is told is of the hull that there is, or was.

@@ -117,6 +117,8 @@ class ChangeFeed {
                       const std::shared_ptr<const Body>& body);
   void NoteBecameHull(Locked& locked, const Body& former,
                       const std::shared_ptr<RegisteredHull>& hull);
+  // What cannot be told was given this revision: watches that wait are told that it moved on.
+  void NoteOther(const Locked& locked, uint64_t revision);
 
   // Starts at the stage kChanges, with what is committed from now on.
   std::shared_ptr<ChangeWatch> Open(const WatchTarget& target, std::function<void()> on_ready);
@@ -129,8 +131,6 @@ class ChangeFeed {
                  std::span<const std::string> dropped);
 
   static const WatchTarget& TargetOf(const ChangeWatch& watch);
-  // What cannot be told was given this revision: watches that wait are told that it moved on.
-  void NoteOther(const Locked& locked, uint64_t revision);
   // Whether all that went after this revision is remembered.
   bool Remembers(uint64_t revision) const { return revision >= deletions_begin_; }
   // Moves a watch back to where everything is told, and says so.

@@ -48,8 +48,8 @@ class Parser {
     app_.set_version_flag("--version", std::string("hulld ") + HULLD_VERSION);
     app_.footer(
         "Precedence: flag, environment variable, file, default.\n"
-        "'hulld doctor --help' tells how to audit a store, 'hulld migrate --help' how to move "
-        "one.");
+        "'hulld doctor --help' tells how to audit a store, "
+        "'hulld migrate --help' how to move one.");
   }
 
   // The arguments that stand for the variables that are set.
@@ -153,8 +153,7 @@ class Parser {
         "File of the connection string of --store postgres, which only hulld may read");
     Add("postgres-servers", config_.postgres_servers,
         "With --store postgres: one server at a time is active over a database, and others wait, "
-        "or "
-        "many are at once, all with this setting")
+        "or many are at once, all with this setting")
         ->check(CLI::IsMember({"one", "many"}));
     app_.add_flag(
             "--take-over", config_.take_over,
