@@ -17,13 +17,60 @@
 
 namespace hulld {
 
-DirectionMap::DirectionMap(const Vector& center) : center_(center), n_(1), half_(0.5) {
+namespace {
+
+// Of moments relative to their sum along the axes: flatter sets have no frame.
+constexpr double kLeastRelativeMoment = 0x1p-40;
+// The condition number of L from which on it is worth its multiplications.
+constexpr double kWorthAFrame = 4;
+
+double RowSumNorm(const Eigen::Matrix3d& m) { return m.cwiseAbs().rowwise().sum().maxCoeff(); }
+
+}  // namespace
+
+// L is the inverse of the Cholesky factor of the moments.
+MapFrame::MapFrame(const Vector& center, const Eigen::Matrix3d& moments) : center_(center) {
+  const double trace = moments.trace();
+  if (!(trace > 0 && trace <= kLargestDouble)) return;
+  const Eigen::Matrix3d c = moments / trace;
+  Eigen::Matrix3d factor = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < i; ++j) {
+      factor(i, j) = (c(i, j) - factor.row(i).dot(factor.row(j))) / factor(j, j);
+    }
+    const double pivot = c(i, i) - factor.row(i).squaredNorm();
+    if (!(pivot >= kLeastRelativeMoment)) return;
+    factor(i, i) = std::sqrt(pivot);
+    inverse.row(i) = -(factor.row(i).head(i) * inverse.topRows(i)) / factor(i, i);
+    inverse(i, i) = 1 / factor(i, i);
+  }
+  if (RowSumNorm(inverse) * RowSumNorm(factor) < kWorthAFrame) return;
+  const Eigen::Matrix3d l = inverse / inverse.cwiseAbs().maxCoeff();
+  entries_ = {l(0, 0), l(1, 0), l(1, 1), l(2, 0), l(2, 1), l(2, 2)};
+  is_plain_ = false;
+}
+
+Eigen::Matrix3d MapFrame::matrix() const {
+  const auto& [xx, yx, yy, zx, zy, zz] = entries_;
+  return Eigen::Matrix3d{{xx, 0, 0}, {yx, yy, 0}, {zx, zy, zz}};
+}
+
+Vector MapFrame::FromMap(const Vector& direction) const {
+  if (is_plain_) return direction;
+  const auto& [xx, yx, yy, zx, zy, zz] = entries_;
+  const double x = direction.x() / xx;
+  const double y = (direction.y() - yx * x) / yy;
+  return {x, y, (direction.z() - zx * x - zy * y) / zz};
+}
+
+DirectionMap::DirectionMap(const MapFrame& frame) : frame_(frame), n_(1), half_(0.5) {
   gauges_.assign(corner_count(), INFINITY);
   hints_.assign(cell_count(), UINT32_MAX);
 }
 
-DirectionMap::DirectionMap(const Vector& center, int resolution)
-    : center_(center), n_(resolution), half_(0.5 * resolution) {
+DirectionMap::DirectionMap(const MapFrame& frame, int resolution)
+    : frame_(frame), n_(resolution), half_(0.5 * resolution) {
   gauges_.reserve(corner_count());
   hints_.reserve(cell_count());
 }
@@ -40,29 +87,41 @@ void DirectionMap::AppendCell(uint32_t hint) {
 
 Vector DirectionMap::CornerDirection(int face, int i, int j) const {
   HULLD_DCHECK(0 <= face && face < 6 && 0 <= i && i <= n_ && 0 <= j && j <= n_);
-  return CubeDirection(static_cast<uint32_t>(face), (i - half_) / half_, (j - half_) / half_);
+  return frame_.FromMap(
+      CubeDirection(static_cast<uint32_t>(face), (i - half_) / half_, (j - half_) / half_));
 }
 
-// The gauge g of the set round c is convex and subadditive. The direction that a point is
-// interpolated at is within 8 u0 (u0 the unit roundoff) of its own, a corner's point within 2 u0
-// (|c| + m) of the corner's ray at distance m, so that g there is at most 1 / m (1 + 2 u0 (|c| + m)
-// max g) and g(p - c) at most what interpolation gives and (8 + 4 (|c| + m) / m) u0 * max g, max g
-// over all directions. The interpolation is of positive terms and errs, with the distance and the
-// stored gauges, by 16 u0 of itself, which is at least the least gauge. Relative to that all this
-// is at most `ratio` (24 + 4 (kappa + ratio)) u0, with ratio = largest / least reach and kappa =
-// |c| / least reach; half of kDirectionMapMargin bounds it. Proven.
-void DirectionMap::Finish(double least_reach, double largest_reach) {
+// The gauge g of the set round c, in the frame, is convex and subadditive. |L| is the largest sum
+// of a row's absolute entries, E the extent, u0 the unit roundoff.
+//
+// A corner: solving L w = d for its direction d is exact for a right side within 4 u0 |L| |w| of d
+// (Higham 2002, 8.5), and its point, m w beyond c, is rounded by at most 2 u0 (|c| + m |w|), where
+// m |w| is at most E. So that point is within u0 |L| (6 E + 2 |c|) of m d in the frame, and g(d) at
+// most 1 / m times 1 + u0 |L| (6 E + 2 |c|) max g, max g over all directions.
+//
+// A point p: L (p - c) errs by at most 4 u0 |L| |p - c|, and g there is at least |p - c| / E, as
+// the set is within E of c: by at most 4 u0 |L| E max g of itself. The direction that it is
+// interpolated at is within 8 u0 of its own, which adds at most 8 u0 max g. The interpolation is of
+// positive terms and errs, with the distance and the stored gauges, by 16 u0 of itself, which is at
+// least the least gauge.
+//
+// max g is at most 1 / least reach, the least gauge 1 / largest reach. Relative to what is computed
+// all this is at most ratio (24 + 16 stretch) u0, with ratio = largest / least reach and stretch =
+// |L| (E + |c|) / least reach; half of kDirectionMapMargin bounds it. Products that underflow add
+// less than the slack, as distances are at least kMapMinDistance. Proven.
+void DirectionMap::Finish(double least_reach, double largest_reach, double extent) {
   HULLD_CHECK(gauges_.size() == corner_count() && hints_.size() == cell_count());
   if (!(least_reach > 0)) return;
   const double ratio = largest_reach / least_reach;
-  const double kappa = center_.cwiseAbs().maxCoeff() / least_reach;
-  const double error = ratio * (24 + 4 * (kappa + ratio)) * kUnitRoundoff;
+  const double stretch =
+      RowSumNorm(frame_.matrix()) * (extent + LargestComponent(center())) / least_reach;
+  const double error = ratio * (24 + 16 * stretch) * kUnitRoundoff;
   rejects_ = error < 0.5 * kDirectionMapMargin;
 }
 
 bool DirectionMap::Coarsen() {
   if (n_ % 2 != 0) return false;
-  DirectionMap coarse(center_, n_ / 2);
+  DirectionMap coarse(frame_, n_ / 2);
   const auto cells = static_cast<size_t>(n_);
   for (size_t row = 0; row < 6 * cells; row += 2) {
     for (size_t k = 0; k < cells; k += 2) coarse.hints_.push_back(hints_[row * cells + k]);
@@ -143,9 +202,11 @@ alignas(16) constexpr int32_t kKeptFirst[16][4] = {
 // done.
 __attribute__((target("avx2"))) size_t DirectionMap::WriteSurvivorsAvx2(
     std::span<const Vector> points, uint32_t*& end) const {
-  const __m256d center_x = _mm256_set1_pd(center_.x());
-  const __m256d center_y = _mm256_set1_pd(center_.y());
-  const __m256d center_z = _mm256_set1_pd(center_.z());
+  const __m256d center_x = _mm256_set1_pd(center().x());
+  const __m256d center_y = _mm256_set1_pd(center().y());
+  const __m256d center_z = _mm256_set1_pd(center().z());
+  const bool is_plain = frame_.is_plain();
+  const Eigen::Matrix3d l = frame_.matrix();
   const __m256d sign = _mm256_set1_pd(-0.0);
   const __m256d zero = _mm256_setzero_pd();
   const __m256d half = _mm256_set1_pd(half_);
@@ -165,12 +226,21 @@ __attribute__((target("avx2"))) size_t DirectionMap::WriteSurvivorsAvx2(
     const __m256d ab = _mm256_permute2f128_pd(a, b, 0x30);
     const __m256d ac = _mm256_permute2f128_pd(a, c, 0x21);
     const __m256d bc = _mm256_permute2f128_pd(b, c, 0x30);
-    const __m256d x = _mm256_sub_pd(_mm256_shuffle_pd(ab, ac, 0b1010), center_x);
-    const __m256d y = _mm256_sub_pd(_mm256_shuffle_pd(ab, bc, 0b0101), center_y);
-    const __m256d z = _mm256_sub_pd(_mm256_shuffle_pd(ac, bc, 0b1010), center_z);
+    __m256d x = _mm256_sub_pd(_mm256_shuffle_pd(ab, ac, 0b1010), center_x);
+    __m256d y = _mm256_sub_pd(_mm256_shuffle_pd(ab, bc, 0b0101), center_y);
+    __m256d z = _mm256_sub_pd(_mm256_shuffle_pd(ac, bc, 0b1010), center_z);
+    if (!is_plain) {
+      z = _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l(2, 0)), x),
+                                      _mm256_mul_pd(_mm256_set1_pd(l(2, 1)), y)),
+                        _mm256_mul_pd(_mm256_set1_pd(l(2, 2)), z));
+      y = _mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l(1, 0)), x),
+                        _mm256_mul_pd(_mm256_set1_pd(l(1, 1)), y));
+      x = _mm256_mul_pd(_mm256_set1_pd(l(0, 0)), x);
+    }
     const __m256d abs_x = _mm256_andnot_pd(sign, x);
     const __m256d abs_y = _mm256_andnot_pd(sign, y);
     const __m256d abs_z = _mm256_andnot_pd(sign, z);
+    // Not a number where y or z is not: then the point is out of range. x is always a number.
     const __m256d m = _mm256_max_pd(abs_x, _mm256_max_pd(abs_y, abs_z));
     const __m256d is_x = _mm256_cmp_pd(abs_x, m, _CMP_EQ_OQ);
     const __m256d is_y = _mm256_andnot_pd(is_x, _mm256_cmp_pd(abs_y, m, _CMP_EQ_OQ));

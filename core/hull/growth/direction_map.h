@@ -2,6 +2,7 @@
 #define HULLD_CORE_HULL_GROWTH_DIRECTION_MAP_H_
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,40 @@
 
 namespace hulld {
 
+// The coordinates in which a map measures a set: q = L (p - center), L a lower triangular matrix.
+// Where a set is flat or slender, in any direction, L makes it about as wide in all directions, so
+// that the cells of a map divide its surface evenly. L is what its doubles say; that they are
+// rounded matters to nobody.
+class MapFrame {
+ public:
+  // L = 1.
+  explicit MapFrame(const Vector& center) : center_(center) {}
+  // The frame that turns points with these second moments about `center`, the sums of the products
+  // of their differences, into points equally spread in all directions, times a factor; |L| is at
+  // most 1, component by component. L = 1 where the points nearly are so, or are so flat that
+  // rounding would matter, or where the moments are not finite.
+  MapFrame(const Vector& center, const Eigen::Matrix3d& moments);
+
+  const Vector& center() const { return center_; }
+  bool is_plain() const { return is_plain_; }
+  Eigen::Matrix3d matrix() const;
+  // L (p - center), rounded. An overflow gives an infinite or NaN component.
+  Vector ToMap(const Vector& point) const {
+    const Vector v = point - center_;
+    if (is_plain_) return v;
+    const auto& [xx, yx, yy, zx, zy, zz] = entries_;
+    return {xx * v.x(), yx * v.x() + yy * v.y(), (zx * v.x() + zy * v.y()) + zz * v.z()};
+  }
+  // The difference of points that L turns into `direction`, rounded.
+  Vector FromMap(const Vector& direction) const;
+
+ private:
+  Vector center_;
+  // Of L, row by row up to the diagonal.
+  std::array<double, 6> entries_ = {1, 0, 1, 0, 0, 1};
+  bool is_plain_ = true;
+};
+
 // A cube map of directions round a point c strictly inside a growing convex set: 6 faces of n x n
 // cells. Each corner of a cell holds a bound of the set's gauge in its direction, and each cell a
 // hint where on the surface its directions lead. The set only grows, so what the map holds stays
@@ -25,12 +60,13 @@ namespace hulld {
 // lies in a cell on a face of the cube; there the gauge is at most what the values at the cell's
 // four corners give by interpolation along one side and then the other. So a few points of the set,
 // found along the corners' directions, reject all points below a surface that follows planes
-// exactly and curves closely, even where points lie along the surface.
+// exactly and curves closely, even where points lie along the surface. A linear map of the set
+// changes none of this, so all is done in the coordinates of a frame.
 class DirectionMap {
  public:
   // Where a point lies: its cell, that cell's first corner among all corners, how far from there
   // to the opposite corner along either side, from 0 to 1, and its distance m from c, the largest
-  // absolute component.
+  // absolute component in the frame.
   struct Place {
     size_t cell;
     size_t corner;
@@ -40,29 +76,31 @@ class DirectionMap {
   };
 
   // One cell a face, and nothing is certainly inside.
-  explicit DirectionMap(const Vector& center);
+  explicit DirectionMap(const MapFrame& frame);
   // No corners and no cells yet: they are appended, so that a map can be made little by little.
-  DirectionMap(const Vector& center, int resolution);
+  DirectionMap(const MapFrame& frame, int resolution);
   // Appends the next corner, face by face, i major. reach: a distance m such that the double
   // nearest to center + m * direction, component by component, is in the set.
   void AppendCorner(double reach);
   // Appends the next cell, in the same order.
   void AppendCell(uint32_t hint);
-  // Says what the least and the largest reach of all corners are. Requires that all corners and
-  // cells are there. Where the shape is too slender for the rounding of this map to be negligible,
-  // nothing is certainly inside.
-  void Finish(double least_reach, double largest_reach);
+  // Says what the least and the largest reach of all corners are, and a bound of how far the set
+  // reaches from the center, by components. Requires that all corners and cells are there. Where
+  // the shape is too slender for the rounding of this map to be negligible, nothing is certainly
+  // inside.
+  void Finish(double least_reach, double largest_reach, double extent);
 
-  const Vector& center() const { return center_; }
+  const MapFrame& frame() const { return frame_; }
+  const Vector& center() const { return frame_.center(); }
   int resolution() const { return n_; }
   size_t cell_count() const { return 6 * static_cast<size_t>(n_) * static_cast<size_t>(n_); }
 
   // NaN-free for every finite point. The cell may be a neighbour of the true one by rounding; the
   // gauges allow for that.
-  Place PlaceOf(const Vector& point) const { return PlaceIn(center_, n_, point); }
+  Place PlaceOf(const Vector& point) const { return PlaceIn(frame_, n_, point); }
   // The same for a map of any resolution.
-  static Place PlaceIn(const Vector& center, int resolution, const Vector& point) {
-    const Vector v = point - center;
+  static Place PlaceIn(const MapFrame& frame, int resolution, const Vector& point) {
+    const Vector v = frame.ToMap(point);
     const OnCube on_cube(v.x(), v.y(), v.z());
     const double m = on_cube.largest();
     if (m == 0) return {0, 0, 0, 0, 0};
@@ -87,8 +125,8 @@ class DirectionMap {
   uint32_t hint(size_t cell) const { return hints_[cell]; }
   void SetHint(size_t cell, uint32_t hint) { hints_[cell] = hint; }
 
-  // The direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest component is
-  // +-1.
+  // The direction of corner (i, j), 0 <= i, j <= resolution(), of a face: its largest component in
+  // the frame is +-1.
   Vector CornerDirection(int face, int i, int j) const;
   // Halves the resolution, keeping one of four corners; false, and no change, where it is odd.
   bool Coarsen();
@@ -114,7 +152,7 @@ class DirectionMap {
   }
   size_t WriteSurvivorsAvx2(std::span<const Vector> points, uint32_t*& end) const;
 
-  Vector center_;
+  MapFrame frame_;
   int n_;
   double half_;
   bool rejects_ = false;

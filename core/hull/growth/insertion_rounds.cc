@@ -84,7 +84,7 @@ uint32_t Spread(uint32_t x) {
 // Directions in Morton order on a fine grid, face by face.
 SortKey KeyOf(const DirectionMap& directions, const Vector& point, uint32_t index) {
   const auto cell =
-      static_cast<uint32_t>(DirectionMap::PlaceIn(directions.center(), 1 << kGridBits, point).cell);
+      static_cast<uint32_t>(DirectionMap::PlaceIn(directions.frame(), 1 << kGridBits, point).cell);
   constexpr uint32_t kMask = (1u << kGridBits) - 1;
   const uint32_t face = cell >> (2 * kGridBits);
   const uint32_t order = Spread((cell >> kGridBits) & kMask) << 1 | Spread(cell & kMask);
@@ -116,8 +116,11 @@ class RoundsInsertion {
     const bool is_last = round + 1 == rounds_.count();
     members_.clear();
     if (!is_last) rounds_.AppendRound(round, members_);
-    surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(), kMapFineness,
-                           kWalksPerPoint, poll_);
+    // Where most points of a round are outside, most of the next are, however new the surface is.
+    if (surface_.IsMapWorthwhile()) {
+      surface_.MeasureBefore(vertices_, is_last ? points_.size() : members_.size(), kMapFineness,
+                             kWalksPerPoint, poll_);
+    }
     const DirectionMap* directions = surface_.directions();
     if (is_last) ChooseLast(round, directions);
     chosen_.clear();

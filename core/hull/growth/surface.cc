@@ -86,6 +86,7 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
   HULLD_CHECK(horizon_.size() >= 3);
   const VertexId apex = vertices.Add(point);
   JoinHorizon(vertices, apex);
+  ++joined_;
   // Here rather than when they are needed, so that no insertion does it for many.
   while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
   if (directions_) {
@@ -118,6 +119,7 @@ void Surface::StartJournal() {
                  .asked = asked_,
                  .rejected = rejected_,
                  .measured_at = measured_at_,
+                 .joined = joined_,
                  .mark = mark_,
                  .last = last_,
                  .was_measuring = measuring_.has_value(),
@@ -137,6 +139,7 @@ void Surface::Undo() {
   asked_ = before_->asked;
   rejected_ = before_->rejected;
   measured_at_ = before_->measured_at;
+  joined_ = before_->joined;
   last_ = before_->last;
   if (before_->has_new_directions) directions_ = std::move(before_->directions);
   // What was measured of a larger surface is not true of this one: measured anew soon.

@@ -144,12 +144,15 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Measures the surface anew when a map is worth that for so many points to be looked up.
-  // fineness: at most so many times the cells a side that suit points one by one. True when it did;
-  // it does not where no interior point is known, or the poll, whose steps are walks, said stop.
-  // Cost: at most `walks_per_point` walks for each point.
+  // Measures the surface anew when a map is worth that for so many points to be looked up; where
+  // it changed much since it was last measured, round a center and in a frame that suit its present
+  // shape. fineness: at most so many times the cells a side that suit points one by one. True when
+  // it did; it does not where no interior point is known, or the poll, whose steps are walks, said
+  // stop. Cost: at most `walks_per_point` walks for each point.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll);
+  // False where the map rejected too few of the points looked up since it was measured.
+  bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
   // Tells how many points were looked up in the map and how many it rejected: what it is worth.
   void CountRejected(size_t asked, size_t rejected) {
     asked_ += asked;
@@ -255,9 +258,8 @@ class Surface {
   void Measure(const VertexTable& vertices);
   void Update(const VertexTable& vertices);
   bool IsWorthMeasuring() const;
-  bool IsMapWorthwhile() const { return 8 * rejected_ >= asked_; }
   void SetCenter(const VertexTable& vertices);
-  void StartMeasuring(const VertexTable& vertices, int resolution);
+  void StartMeasuring(int resolution);
   void ContinueMeasuring(const VertexTable& vertices, size_t corners);
   void MeasureCorner(const VertexTable& vertices);
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
@@ -290,6 +292,7 @@ class Surface {
     size_t asked;
     size_t rejected;
     size_t measured_at;
+    size_t joined;
     uint32_t mark;
     TriangleId last;
     bool was_measuring;
@@ -317,6 +320,8 @@ class Surface {
   size_t rejected_ = 0;
   // The count of triangles when it was last measured.
   size_t measured_at_ = 0;
+  // Points joined since.
+  size_t joined_ = 0;
   uint64_t work_ = 0;
 
   // What one insertion works with: the triangles that the point sees or whose planes hold it, their

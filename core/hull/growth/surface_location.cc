@@ -144,22 +144,30 @@ void Surface::Update(const VertexTable& vertices) {
   next_update_ = 2 * alive_;
   if (!directions_) SetCenter(vertices);
   if (IsWorthMeasuring() && !measuring_) {
-    StartMeasuring(vertices, ResolutionFor(alive_, IsMapWorthwhile()));
+    // The first surface, from which the center comes, may have been a corner of what it is now.
+    if (directions_->resolution() == 1) SetCenter(vertices);
+    StartMeasuring(ResolutionFor(alive_, IsMapWorthwhile()));
   }
 }
 
-// Puts the center strictly inside and forgets what was measured; does nothing where no double is
-// inside.
+// Puts the center strictly inside, fits the frame of the map to the shape, and forgets what was
+// measured; does nothing where no double is inside.
 void Surface::SetCenter(const VertexTable& vertices) {
   work_ += 2 * triangles_.size();
   const std::optional<Vector> interior = FindInterior(vertices);
   if (!interior) return;
   KeepDirections();
-  directions_.emplace(*interior);
   extent_ = 0;
   for (VertexId v = 0; v < vertices.id_bound(); ++v) {
     if (vertices.IsAlive(v)) extent_ = std::max(extent_, LargestComponent(vertices[v] - *interior));
   }
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (VertexId v = 0; v < vertices.id_bound(); ++v) {
+    if (!vertices.IsAlive(v)) continue;
+    const Vector unit = (vertices[v] - *interior) / extent_;
+    moments += unit * unit.transpose();
+  }
+  directions_.emplace(MapFrame(*interior, moments));
 }
 
 std::optional<Vector> Surface::FindInterior(const VertexTable& vertices) const {
@@ -183,36 +191,45 @@ bool Surface::IsWorthMeasuring() const { return alive_ >= kWorthMeasuring && IsM
 
 bool Surface::MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                             double walks_per_point, StopPoll& poll) {
-  if (!directions_ || !IsWorthMeasuring() || !IsMapWorthwhile()) return false;
+  if (!directions_ || !IsWorthMeasuring()) return false;
   // Six faces, and some two walks to measure a corner.
   const double affordable = std::sqrt(static_cast<double>(points) * walks_per_point / 12);
   const double useful = fineness * ResolutionFor(alive_, true);
   const int wanted = static_cast<int>(std::min({affordable, useful, 256.0})) & ~1;
   if (wanted < 4) return false;
-  if (wanted <= directions_->resolution() && 4 * alive_ <= 5 * measured_at_) return false;
-  StartMeasuring(vertices, wanted);
+  // What the last map rejected tells little of a surface much of which is new; and the center of
+  // one that grew to a side is far from its middle.
+  const bool is_new = 8 * joined_ > measured_at_ &&
+                      wanted >= std::min(directions_->resolution(), ResolutionFor(alive_, true));
+  if (!is_new) {
+    if (!IsMapWorthwhile()) return false;
+    if (wanted <= directions_->resolution() && 4 * alive_ <= 5 * measured_at_) return false;
+  }
+  const bool is_cheap =
+      2 * static_cast<double>(triangles_.size()) <= walks_per_point * static_cast<double>(points);
+  if (directions_->resolution() == 1 || (is_new && is_cheap)) SetCenter(vertices);
+  StartMeasuring(wanted);
   while (measuring_ && !poll.Step(kCornersPerInsertion)) {
     ContinueMeasuring(vertices, kCornersPerInsertion);
   }
   return !measuring_;
 }
 
-void Surface::StartMeasuring(const VertexTable& vertices, int resolution) {
-  // The first surface, from which the center comes, may have been a corner of what it is now.
-  if (directions_->resolution() == 1) SetCenter(vertices);
+void Surface::StartMeasuring(int resolution) {
   measured_at_ = alive_;
+  joined_ = 0;
   asked_ = 0;
   rejected_ = 0;
   const size_t row = static_cast<size_t>(resolution) + 1;
   work_ += row;
-  measuring_ = Measurement{DirectionMap(directions_->center(), resolution),
+  measuring_ = Measurement{DirectionMap(directions_->frame(), resolution),
                            std::vector<TriangleId>(row, Alive(last_))};
 }
 
 void Surface::ContinueMeasuring(const VertexTable& vertices, size_t corners) {
   for (; corners > 0 && measuring_->face < 6; --corners) MeasureCorner(vertices);
   if (measuring_->face < 6) return;
-  measuring_->map.Finish(measuring_->least, measuring_->largest);
+  measuring_->map.Finish(measuring_->least, measuring_->largest, extent_);
   KeepDirections();
   directions_ = std::move(measuring_->map);
   measuring_.reset();
@@ -251,7 +268,7 @@ void Surface::MeasureCorner(const VertexTable& vertices) {
 // the surface.
 double Surface::Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near) {
   const Vector center = directions_->center();
-  double m = extent_;
+  double m = extent_ / LargestComponent(direction);
   // A walk to a point outside ends at any triangle that it sees, hence the rounds; where many are
   // nearly coplanar, their rounded planes tell little, hence the growing steps.
   double step_back = 0x1p-30;

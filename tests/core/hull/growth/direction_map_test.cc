@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include "core/numeric/simd_path.h"
@@ -18,15 +19,25 @@ using Gauge = std::function<double(const Vector&)>;
 double OctahedronGauge(const Vector& d) { return d.cwiseAbs().sum(); }
 double BallGauge(const Vector& d) { return d.norm(); }
 
-// A map round `center` of the set with the given gauge about it.
-DirectionMap MapOf(const Gauge& gauge, const Vector& center, int resolution) {
-  DirectionMap map(center, resolution);
+// A thin, sheared plate: the octahedron times this.
+const Eigen::Matrix3d kPlate{{2, 0, 0}, {0.3, 1.5, 0}, {-0.7, 1.1, 1e-3}};
+double PlateGauge(const Vector& d) { return OctahedronGauge(kPlate.inverse() * d); }
+MapFrame FrameOfPlate(const Vector& center) {
+  return MapFrame(center, kPlate * kPlate.transpose());
+}
+
+// A map in `frame` of the set with the given gauge about its center.
+DirectionMap MapOf(const Gauge& gauge, const MapFrame& frame, int resolution) {
+  DirectionMap map(frame, resolution);
   double least = INFINITY;
   double largest = 0;
+  double extent = 0;
   for (int face = 0; face < 6; ++face) {
     for (int i = 0; i <= resolution; ++i) {
       for (int j = 0; j <= resolution; ++j) {
-        const double reach = (1 - 1e-9) / gauge(map.CornerDirection(face, i, j));
+        const Vector direction = map.CornerDirection(face, i, j);
+        const double reach = (1 - 1e-9) / gauge(direction);
+        extent = std::max(extent, reach * LargestComponent(direction));
         map.AppendCorner(reach);
         least = std::min(least, reach);
         largest = std::max(largest, reach);
@@ -34,8 +45,12 @@ DirectionMap MapOf(const Gauge& gauge, const Vector& center, int resolution) {
       }
     }
   }
-  map.Finish(least, largest);
+  map.Finish(least, largest, extent);
   return map;
+}
+
+DirectionMap MapOf(const Gauge& gauge, const Vector& center, int resolution) {
+  return MapOf(gauge, MapFrame(center), resolution);
 }
 
 size_t SurvivorCount(const DirectionMap& map, const std::vector<Vector>& points) {
@@ -78,6 +93,48 @@ TEST(DirectionMap, FollowsCurvesToTheSecondOrder) {
   }
 }
 
+// The plate is an octahedron in its frame. Without one, most of its cells straddle an edge.
+TEST(DirectionMap, FramesMakeFlatSetsRound) {
+  const Vector center(0.25, -3, 10);
+  const auto points_at = [&](double value) {
+    std::vector<Vector> points = PointsAt(OctahedronGauge, Vector(0, 0, 0), value, 5001);
+    for (Vector& p : points) p = center + kPlate * p;
+    return points;
+  };
+  const std::vector<Vector> inside = points_at(1 - 1e-4);
+  for (const int resolution : {2, 6, 32}) {
+    const DirectionMap map = MapOf(PlateGauge, FrameOfPlate(center), resolution);
+    EXPECT_FALSE(map.frame().is_plain());
+    EXPECT_EQ(SurvivorCount(map, inside), 0u);
+    EXPECT_EQ(SurvivorCount(map, points_at(1)), 5001u);
+    EXPECT_GT(SurvivorCount(MapOf(PlateGauge, center, resolution), inside), 1000u);
+  }
+}
+
+TEST(DirectionMap, RoundSetsNeedNoFrame) {
+  const Eigen::Matrix3d ball = Eigen::Matrix3d::Identity();
+  EXPECT_TRUE(MapFrame(Vector::Zero(), 7 * ball).is_plain());
+  EXPECT_TRUE(MapFrame(Vector::Zero(), 0 * ball).is_plain());
+  for (const double unusable : {HUGE_VAL, std::nan("")}) {
+    EXPECT_TRUE(MapFrame(Vector::Zero(), unusable * Eigen::Matrix3d::Ones()).is_plain());
+  }
+}
+
+// At any scale. A set without any thickness has none.
+TEST(DirectionMap, FramesUndoThemselves) {
+  const Vector center(1, 1, 1);
+  const Vector direction(0.25, -1, 0.5);
+  for (const double scale : {1e-300, 1.0, 1e300}) {
+    const MapFrame frame(center, scale * kPlate * kPlate.transpose());
+    EXPECT_FALSE(frame.is_plain());
+    EXPECT_EQ(frame.matrix().cwiseAbs().maxCoeff(), 1);
+    EXPECT_GE(frame.matrix().diagonal().minCoeff(), 0x1p-20);
+    EXPECT_LT((frame.ToMap(center + frame.FromMap(direction)) - direction).norm(), 1e-9) << scale;
+    const Vector along(1, 2, -3);
+    EXPECT_TRUE(MapFrame(center, scale * along * along.transpose()).is_plain());
+  }
+}
+
 TEST(DirectionMap, CoarsenedMapsStillBound) {
   const Vector center(0, 0, 0);
   DirectionMap map = MapOf(BallGauge, center, 12);
@@ -92,24 +149,34 @@ TEST(DirectionMap, CoarsenedMapsStillBound) {
 }
 
 TEST(DirectionMap, KeepsWhatItCannotMeasure) {
-  const DirectionMap map = MapOf(BallGauge, Vector::Zero(), 8);
+  const DirectionMap map = MapOf(BallGauge, Vector(0, 0, 0), 8);
   const std::vector<Vector> far = {Vector::Constant(1e308), Vector(-1.7e308, 0, 1),
                                    Vector(0, 0, 1e302), Vector(1, 1, 1)};
   EXPECT_EQ(SurvivorCount(map, far), far.size());
+  // In a frame, an infinite difference times zero, or less another, is not a number.
+  constexpr double kMost = std::numeric_limits<double>::max();
+  std::vector<Vector> overflowing;
+  for (const double x : {-kMost, 0.0, kMost}) {
+    for (const double y : {-kMost, 0.0, kMost}) {
+      for (const double z : {-kMost, kMost}) overflowing.emplace_back(x, y, z);
+    }
+  }
+  for (const Vector& center : {Vector(0, 0, 0), Vector(1e305, -1e305, 1e305)}) {
+    // So large that its map is of use round either center.
+    const Gauge large = [](const Vector& d) { return PlateGauge(d) / 1e302; };
+    const DirectionMap plate = MapOf(large, FrameOfPlate(center), 8);
+    EXPECT_EQ(SurvivorCount(plate, PointsAt(large, center, 0.1, 100)), 0u);
+    EXPECT_EQ(SurvivorCount(plate, overflowing), overflowing.size());
+  }
   // A ratio of reaches at which rounding is no longer negligible.
   const Gauge needle = [](const Vector& d) { return Vector(d.x(), 1e12 * d.y(), d.z()).norm(); };
-  const DirectionMap slender = MapOf(needle, Vector::Zero(), 8);
+  const DirectionMap slender = MapOf(needle, Vector(0, 0, 0), 8);
   EXPECT_EQ(SurvivorCount(slender, PointsAt(needle, Vector::Zero(), 0.01, 100)), 100u);
 }
 
-TEST(DirectionMap, SimdPathsKeepTheSamePoints) {
+// Compares which points are kept by either path.
+void ExpectSamePoints(const DirectionMap& map, const std::vector<Vector>& points) {
   const SimdPath before = CurrentSimdPath();
-  Random random(TestSeed(522));
-  const DirectionMap map = MapOf(BallGauge, Vector(0.1, 0.2, 0.3), 20);
-  std::vector<Vector> points = RandomInBall(random, 3003, 1.2);
-  // On the borders of cells and faces, and beyond all distances.
-  for (int i = -20; i <= 20; ++i) points.emplace_back(0.1 + 0.9, 0.2 + 0.09 * i / 2, 0.3 - 0.9);
-  points.push_back(Vector::Constant(1e305));
   std::vector<uint32_t> fast;
   StopPoll never;
   map.AppendSurvivors(points, fast, never);
@@ -120,6 +187,18 @@ TEST(DirectionMap, SimdPathsKeepTheSamePoints) {
   map.AppendSurvivors(points, portable, never);
   UseSimdPath(before);
   EXPECT_EQ(fast, portable);
+}
+
+TEST(DirectionMap, SimdPathsKeepTheSamePoints) {
+  Random random(TestSeed(522));
+  const Vector center(0.1, 0.2, 0.3);
+  std::vector<Vector> points = RandomInBall(random, 3003, 1.2);
+  // On the borders of cells and faces, and beyond all distances.
+  for (int i = -20; i <= 20; ++i) points.emplace_back(0.1 + 0.9, 0.2 + 0.09 * i / 2, 0.3 - 0.9);
+  points.push_back(Vector::Constant(1e305));
+  ExpectSamePoints(MapOf(BallGauge, center, 20), points);
+  for (Vector& p : points) p = center + kPlate * (p - center);
+  ExpectSamePoints(MapOf(PlateGauge, FrameOfPlate(center), 20), points);
 }
 
 }  // namespace

@@ -27,6 +27,17 @@ struct NamedPoints {
   std::vector<Vector> points;
 };
 
+HullBuilder BuiltAtOnce(const std::vector<Vector>& points) {
+  HullBuilder builder;
+  EXPECT_TRUE(builder.Add(points).ok());
+  return builder;
+}
+
+std::vector<Vector> SortedVertices(const HullBuilder& builder) {
+  const Hull hull = builder.Snapshot();
+  return {hull.vertices().begin(), hull.vertices().end()};
+}
+
 // Shells that each hide the one before.
 std::vector<Vector> GrowingShells(Random& random, size_t n) {
   std::vector<Vector> points = RandomOnSphere(random, n, 1);
@@ -72,6 +83,48 @@ TEST(HullCost, InsidePointsAreRejectedWithoutAWalk) {
     }
     EXPECT_LT(builder.housekeeping_steps(), ball.size()) << chunk << " seed " << seed;
     EXPECT_GT(builder.housekeeping_steps(), builder.vertex_count());
+  }
+}
+
+// What a depth camera sees, row by row from above, that looks at a wall and a table before it: all
+// points lie along two planes, with noise, and hardly any inside.
+std::vector<Vector> DepthFrame(Random& random, int width, int height) {
+  std::vector<Vector> points;
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const double x = (2.0 * u - width) / width;
+      const double y = (1.1 * v - 0.55 * height) / height;
+      double noise = -6;
+      for (int k = 0; k < 12; ++k) noise += random.Unit();
+      const double depth = std::min(2.0, 0.5 / std::max(y, 1e-9)) * (1 + 1e-3 * noise);
+      points.emplace_back(x * depth, y * depth, depth);
+    }
+  }
+  return points;
+}
+
+// Each block of a frame lies beside those before it, and is flat. The map of directions follows
+// them, whichever way they lie: few points look for their place by walking.
+TEST(HullCost, DepthFramesAreRejectedWithoutAWalk) {
+  const uint64_t seed = TestSeed(510);
+  Random random(seed);
+  std::vector<Vector> frame = DepthFrame(random, 424, 240);
+  const Eigen::Quaterniond tilt(0.8, -0.3, 0.4, 0.2);
+  for (const bool is_tilted : {false, true}) {
+    if (is_tilted) {
+      for (Vector& p : frame) p = tilt.normalized() * p;
+    }
+    const HullBuilder at_once = BuiltAtOnce(frame);
+    for (const size_t blocks : {size_t{1}, size_t{4}}) {
+      HullBuilder builder;
+      const size_t size = frame.size() / blocks;
+      for (size_t i = 0; i < frame.size(); i += size) {
+        ASSERT_TRUE(builder.Add(std::span(frame).subspan(i, size)).ok());
+      }
+      EXPECT_LT(3 * builder.housekeeping_steps(), 2 * frame.size())
+          << blocks << (is_tilted ? " tilted" : "") << " seed " << seed;
+      EXPECT_EQ(SortedVertices(builder), SortedVertices(at_once));
+    }
   }
 }
 
@@ -174,12 +227,6 @@ SignCost CostOf(Build build) {
       3 * (after.nearest_filter + after.fixed_point - before.nearest_filter - before.fixed_point);
   return {static_cast<double>(fast + 100 * expansion + 1000 * integer + steps),
           expansion + integer};
-}
-
-HullBuilder BuiltAtOnce(const std::vector<Vector>& points) {
-  HullBuilder builder;
-  EXPECT_TRUE(builder.Add(points).ok());
-  return builder;
 }
 
 HullBuilder BuiltOneByOne(std::span<const Vector> points) {
