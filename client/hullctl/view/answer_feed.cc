@@ -31,13 +31,30 @@ v1::Pose ToPose(const Pose7& numbers) {
   return pose;
 }
 
-v1::Wanted WantedOfPair() {
+v1::Wanted WantedOfPair(bool certificate) {
   v1::Wanted wanted;
   wanted.set_axis(true);
-  wanted.set_certificate(true);
+  wanted.set_certificate(certificate);
   wanted.set_separation(true);
   wanted.set_witness(true);
   return wanted;
+}
+
+int32_t IndexOf(bool has_piece, const v1::DecidingPiece& piece) {
+  return has_piece ? static_cast<int32_t>(piece.index()) : -1;
+}
+
+// That of the pieces that decided; null where boxes settle them.
+const v1::Certificate* CertificateOf(
+    std::pair<int32_t, int32_t> pieces,
+    const google::protobuf::RepeatedPtrField<v1::PieceCertificate>& certificates) {
+  // A hull counts as its only piece.
+  const auto a = static_cast<uint32_t>(std::max(pieces.first, 0));
+  const auto b = static_cast<uint32_t>(std::max(pieces.second, 0));
+  for (const v1::PieceCertificate& one : certificates) {
+    if (one.piece_a() == a && one.piece_b() == b) return &one.certificate();
+  }
+  return nullptr;
 }
 
 std::string PairJson(std::pair<uint32_t, uint32_t> pair) {
@@ -143,13 +160,13 @@ v1::PackedPlacements Pack(const std::vector<ViewObject>& from, std::vector<uint3
 
 }  // namespace
 
-v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b) {
+v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, bool certificate) {
   v1::CheckCollisionRequest request;
   request.mutable_a()->set_hull_id(a.hull_id);
   *request.mutable_a()->mutable_pose() = ToPose(a.pose);
   request.mutable_b()->set_hull_id(b.hull_id);
   *request.mutable_b()->mutable_pose() = ToPose(b.pose);
-  *request.mutable_wanted() = WantedOfPair();
+  *request.mutable_wanted() = WantedOfPair(certificate);
   return request;
 }
 
@@ -162,6 +179,11 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
   row.rung = response.rung();
   if (response.has_axis()) row.axis = &response.axis();
   if (response.has_certificate()) row.certificate = &response.certificate();
+  if (response.has_piece_a() || response.has_piece_b()) {
+    row.pieces = {IndexOf(response.has_piece_a(), response.piece_a()),
+                  IndexOf(response.has_piece_b(), response.piece_b())};
+    row.certificate = CertificateOf(*row.pieces, response.piece_certificates());
+  }
   if (response.has_separation()) row.separation = response.separation();
   if (response.has_witness()) row.witness = response.witness();
   return AnswerMessage(pair, a, b, update, /*rest=*/true, response.hull_a(), response.hull_b(), row,
@@ -226,6 +248,7 @@ void AnswerFeed::Ask(const ViewQuestion& question) {
       question_.pair.reset();
     }
     question_.tolerance = question.tolerance;
+    question_.certificate = question.certificate;
     question_.update = question.update;
     question_.rest = question.rest;
     asked_ = true;
@@ -277,7 +300,7 @@ bool AnswerFeed::AnswerPair(const Question& question) {
 absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) const {
   const ViewObject& a = question.objects[question.pair->first];
   const ViewObject& b = question.objects[question.pair->second];
-  const auto response = client_.CheckCollision(PairRequest(a, b));
+  const auto response = client_.CheckCollision(PairRequest(a, b, question.certificate));
   if (!response.ok()) return response.status();
   if (question.tolerance == 0) {
     return PairAnswerJson(*question.pair, a, b, question.update, *response);
@@ -289,7 +312,8 @@ absl::StatusOr<std::string> AnswerFeed::RestingAnswer(const Question& question) 
 
 absl::StatusOr<std::string> AnswerFeed::TolerantAnswer(const Question& question) const {
   v1::CheckCollisionRequest request =
-      PairRequest(question.objects[question.pair->first], question.objects[question.pair->second]);
+      PairRequest(question.objects[question.pair->first], question.objects[question.pair->second],
+                  /*certificate=*/false);
   // A tolerance excludes them.
   request.clear_wanted();
   request.set_tolerance(question.tolerance);
@@ -307,11 +331,13 @@ absl::StatusOr<std::string> AnswerFeed::MovingAnswer(const Question& question) {
   const ViewObject& b = question.objects[question.pair->second];
   const std::pair<std::string, std::string> hulls(a.hull_id, b.hull_id);
   absl::StatusOr<v1::StreamCollisionsResponse> response;
-  if (stream_ == nullptr || hulls != streamed_hulls_) {
+  if (stream_ == nullptr || hulls != streamed_hulls_ ||
+      question.certificate != streamed_certificate_) {
     stream_ = client_.OpenCollisionStream();
     streamed_hulls_ = hulls;
+    streamed_certificate_ = question.certificate;
     v1::CollisionStreamOpen open;
-    const v1::CheckCollisionRequest request = PairRequest(a, b);
+    const v1::CheckCollisionRequest request = PairRequest(a, b, question.certificate);
     *open.add_placements() = request.a();
     *open.add_placements() = request.b();
     open.add_pairs(0);

@@ -41,6 +41,7 @@ class AnswerFeed {
     v1::FindCollisionsRequest rules;
     std::optional<std::pair<uint32_t, uint32_t>> pair;
     double tolerance = 0;
+    bool certificate = false;
     uint64_t update = 0;
     bool rest = true;
     bool hulls_changed = false;
@@ -58,9 +59,11 @@ class AnswerFeed {
   const Client& client_;
   const std::shared_ptr<PageChannel> page_;
 
-  // Used by the thread alone: the stream of a pair, and which hulls it is of.
+  // Used by the thread alone: the stream of a pair, which hulls or bodies it is of, and whether it
+  // tells certificates.
   std::unique_ptr<CollisionStream> stream_;
   std::pair<std::string, std::string> streamed_hulls_;
+  bool streamed_certificate_ = false;
   v1::HullVersion streamed_version_a_;
   v1::HullVersion streamed_version_b_;
 
@@ -81,8 +84,8 @@ std::string PairAnswerJson(std::pair<uint32_t, uint32_t> pair, const ViewObject&
                            const v1::CheckCollisionResponse& response,
                            const std::string& tolerant_json = "");
 
-// What is wanted for that.
-v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b);
+// What is wanted for that, with or without what proves it.
+v1::CheckCollisionRequest PairRequest(const ViewObject& a, const ViewObject& b, bool certificate);
 
 // The message `collisions` for a scene.
 absl::StatusOr<std::string> SceneAnswerJson(const Client& client,

@@ -14,7 +14,8 @@ std::string MessageOf(const absl::Status& status) {
 
 }  // namespace
 
-std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish) {
+std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
+                     std::vector<std::string>* pieces) {
   if (wish.file) {
     if (*wish.file >= files.size()) return MissingFrame(wish, "there is no such file");
     return MeshFrame(*wish.file, *files[*wish.file]);
@@ -26,7 +27,17 @@ std::string FrameFor(const Client& client, const ShapeFiles& files, const Geomet
   }
   const std::string hull_id = wish.hull_id.value_or("");
   const auto mesh = client.GetHullMesh(hull_id);
-  return mesh.ok() ? HullFrame(hull_id, *mesh) : MissingFrame(wish, MessageOf(mesh.status()));
+  if (mesh.ok()) return HullFrame(hull_id, *mesh);
+  const auto body =
+      absl::IsNotFound(mesh.status()) ? client.GetBody(hull_id) : absl::NotFoundError("");
+  if (!body.ok()) {
+    const bool is_neither = absl::IsNotFound(body.status());
+    return MissingFrame(wish, MessageOf(is_neither ? mesh.status() : body.status()));
+  }
+  for (const v1::Placement& piece : body->pieces()) {
+    if (pieces != nullptr) pieces->push_back(piece.hull_id());
+  }
+  return BodyFrame(*body);
 }
 
 GeometryFeed::GeometryFeed(const Client& client, std::shared_ptr<PageChannel> page)

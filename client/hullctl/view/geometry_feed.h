@@ -41,8 +41,9 @@ class GeometryFeed {
   OrderedWorker<Order> worker_;
 };
 
-// The frame that answers a wish.
-std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish);
+// The frame that answers a wish. Of a body, `pieces`, unless null, gets the IDs of its hulls.
+std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
+                     std::vector<std::string>* pieces = nullptr);
 
 }  // namespace hulld
 

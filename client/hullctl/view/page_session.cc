@@ -15,17 +15,19 @@ std::string CommonPrefix(const std::string& a, const std::string& b) {
   return {a.begin(), end};
 }
 
-// One watch that covers all of the scene. Events of other hulls are passed over.
+// One watch that covers all of the scene. Events of what is not in it are passed over.
 v1::WatchHullsRequest WatchFor(const ViewScene& scene) {
   v1::WatchHullsRequest request;
+  request.set_bodies(true);
   std::vector<std::string> names = scene.prefixes;
+  names.insert(names.end(), scene.pieces.begin(), scene.pieces.end());
   for (const ViewObject& object : scene.objects) {
     if (!object.hull_id.empty()) names.push_back(object.hull_id);
   }
   if (names.empty()) return request;
   std::string prefix = names[0];
   for (const std::string& name : names) prefix = CommonPrefix(prefix, name);
-  const bool is_one = scene.prefixes.empty() &&
+  const bool is_one = scene.prefixes.empty() && scene.pieces.empty() &&
                       std::all_of(names.begin(), names.end(),
                                   [&names](const std::string& name) { return name == names[0]; });
   if (is_one) {
@@ -71,7 +73,10 @@ void PageSession::OnMessage(std::string_view json) {
     return;
   }
   if (message->show) Show(*message->show);
-  if (!message->geometry.empty()) geometry_.Ask(message->geometry);
+  if (!message->geometry.empty()) {
+    FollowToo(message->geometry);
+    geometry_.Ask(message->geometry);
+  }
   if (message->question) answers_.Ask(*message->question);
   if (message->edit) Edit(*std::move(message->edit));
 }
@@ -99,7 +104,6 @@ void PageSession::Show(const std::string& key) {
     page_->SendText(ProblemMessage(absl::StrCat("There is no scene \"", key, "\".")));
     return;
   }
-  std::erase_if(followers_, [](const auto& follower) { return follower->finished(); });
   if (!followers_.empty()) followers_.back()->Cancel();
   uint64_t number = 0;
   {
@@ -108,16 +112,46 @@ void PageSession::Show(const std::string& key) {
     prefixes_ = scene->prefixes;
     known_.clear();
     for (const ViewObject& object : scene->objects) known_.insert(object.hull_id);
+    known_.insert(scene->pieces.begin(), scene->pieces.end());
   }
   answers_.Show(*scene, number);
   geometry_.Show(scene->files);
   page_->SendText(SceneMessage(*scene, number));
   if (program_.on_show) program_.on_show(key);
-  if (scene->prefixes.empty() && known_.empty()) return;
+  if (!scene->prefixes.empty() || !scene->objects.empty()) Follow(WatchFor(*scene));
+}
+
+void PageSession::Follow(v1::WatchHullsRequest request) {
+  std::erase_if(followers_, [](const auto& follower) { return follower->finished(); });
+  if (!followers_.empty()) followers_.back()->Cancel();
+  watched_ = std::move(request);
+  uint64_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    number = scene_;
+  }
   followers_.push_back(std::make_unique<HullFollower>(
-      program_.client, WatchFor(*scene),
+      program_.client, watched_,
       [this, number](const v1::HullEvent& event, bool synced) { TakeHull(number, event, synced); },
       [this](const std::string& complaint) { page_->SendText(ProblemMessage(complaint)); }));
+}
+
+void PageSession::FollowToo(const std::vector<GeometryWish>& wishes) {
+  std::string prefix = watched_.hull_id().empty() ? watched_.prefix() : watched_.hull_id();
+  bool is_covered = true;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const GeometryWish& wish : wishes) {
+      if (!wish.hull_id || !known_.insert(*wish.hull_id).second) continue;
+      is_covered = is_covered && watched_.hull_id().empty() && wish.hull_id->starts_with(prefix);
+      prefix = CommonPrefix(prefix, *wish.hull_id);
+    }
+  }
+  if (is_covered) return;
+  v1::WatchHullsRequest wider;
+  wider.set_bodies(true);
+  wider.set_prefix(prefix);
+  Follow(std::move(wider));
 }
 
 void PageSession::TakeHull(uint64_t scene, const v1::HullEvent& event, bool synced) {

@@ -47,6 +47,10 @@ class PageSession final : public PageHandler {
  private:
   void Show(const std::string& key);
   void Edit(ViewEdit edit);
+  // Tells of these from now on, as of the objects: pieces of bodies.
+  void FollowToo(const std::vector<GeometryWish>& wishes);
+  // Instead of what was followed.
+  void Follow(v1::WatchHullsRequest request);
   // Called by the thread of the follower of scene number `scene`.
   void TakeHull(uint64_t scene, const v1::HullEvent& event, bool synced);
 
@@ -63,6 +67,8 @@ class PageSession final : public PageHandler {
   std::vector<std::string> prefixes_;
   std::unordered_set<std::string> known_;
 
+  // What the last follower watches.
+  v1::WatchHullsRequest watched_;
   // Last: their threads use the others. The last one follows the scene on show; those before it
   // were cancelled. The bridge's thread must not wait for them, as they may wait for it to send.
   std::vector<std::unique_ptr<HullFollower>> followers_;

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/body/body_pieces.h"
 #include "client/hullctl/printing/json.h"
 
 namespace hulld {
@@ -101,6 +102,7 @@ ViewQuestion ReadQuestion(Reader* reader) {
   if (pair.size() == 2 && pair[0] != pair[1]) question.pair.emplace(pair[0], pair[1]);
   if (!pair.empty() && !question.pair) reader->Complain("pair", "is not two objects");
   question.tolerance = reader->Number("tolerance");
+  question.certificate = reader->Flag("certificate");
   question.rest = reader->Flag("rest");
   return question;
 }
@@ -254,6 +256,25 @@ std::string SceneMessage(const ViewScene& scene, uint64_t number) {
 
 std::string HullFrame(const std::string& hull_id, const HullMesh& mesh) {
   return FacetFrame(std::move(JsonObject().Add("kind", "hull").Add("hullId", hull_id)), mesh);
+}
+
+std::string BodyFrame(const v1::GetBodyResponse& body) {
+  std::string pieces = "[";
+  for (const v1::Placement& piece : body.pieces()) {
+    const RigidPose pose = NumbersOf(piece.pose());
+    absl::StrAppend(&pieces, pieces.size() > 1 ? "," : "",
+                    JsonObject()
+                        .Add("hullId", piece.hull_id())
+                        .AddJson("pose", NumbersJson(pose.data(), pose.size()))
+                        .Close());
+  }
+  return StartFrame(JsonObject()
+                        .Add("kind", "body")
+                        .Add("hullId", body.body().body_id())
+                        .AddJson("info", MessageJson(body.body()))
+                        .AddJson("pieces", pieces + "]")
+                        .Close(),
+                    0);
 }
 
 std::string SimplifiedFrame(const v1::GetHullMeshRequest& request, const HullMesh& mesh) {

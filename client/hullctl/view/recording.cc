@@ -13,15 +13,28 @@
 namespace hulld {
 namespace {
 
-std::vector<GeometryWish> AllShapes(const ViewScene& scene) {
-  std::vector<GeometryWish> wishes;
-  for (uint32_t file = 0; file < scene.files.size(); ++file) wishes.emplace_back().file = file;
-  std::set<std::string> hull_ids;
-  for (const ViewObject& object : scene.objects) {
-    if (!object.hull_id.empty()) hull_ids.insert(object.hull_id);
+// A frame for each file, hull and body of the scene, and for each hull of a body.
+std::string AllFrames(const Client& client, const ViewScene& scene) {
+  std::string frames = "[";
+  const auto add = [&](const GeometryWish& wish, std::vector<std::string>* pieces) {
+    const std::string frame = FrameFor(client, scene.files, wish, pieces);
+    absl::StrAppend(&frames, frames.size() > 1 ? "," : "", QuoteJson(absl::Base64Escape(frame)));
+  };
+  for (uint32_t file = 0; file < scene.files.size(); ++file) {
+    GeometryWish wish;
+    wish.file = file;
+    add(wish, nullptr);
   }
-  for (const std::string& hull_id : hull_ids) wishes.emplace_back().hull_id = hull_id;
-  return wishes;
+  std::set<std::string> known;
+  std::vector<std::string> wanted;
+  for (const ViewObject& object : scene.objects) wanted.push_back(object.hull_id);
+  for (size_t i = 0; i < wanted.size(); ++i) {
+    if (wanted[i].empty() || !known.insert(wanted[i]).second) continue;
+    GeometryWish wish;
+    wish.hull_id = wanted[i];
+    add(wish, &wanted);
+  }
+  return frames + "]";
 }
 
 absl::StatusOr<std::string> AllPairs(const Client& client, const ViewScene& scene) {
@@ -31,7 +44,11 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const ViewScene& scen
   for (uint32_t a = 0; a < objects.size(); ++a) {
     for (uint32_t b = a + 1; b < objects.size(); ++b) {
       if (objects[a].hull_id.empty() || objects[b].hull_id.empty()) continue;
-      const auto response = client.CheckCollision(PairRequest(objects[a], objects[b]));
+      auto response = client.CheckCollision(PairRequest(objects[a], objects[b], true));
+      if (absl::IsResourceExhausted(response.status())) {
+        // Bodies of very many pieces, whose certificate no message holds.
+        response = client.CheckCollision(PairRequest(objects[a], objects[b], false));
+      }
       if (!response.ok()) return response.status();
       absl::StrAppend(&answers, answers.size() > 1 ? "," : "",
                       PairAnswerJson({a, b}, objects[a], objects[b], 0, *response));
@@ -43,11 +60,6 @@ absl::StatusOr<std::string> AllPairs(const Client& client, const ViewScene& scen
 }  // namespace
 
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene) {
-  std::string frames = "[";
-  for (const GeometryWish& wish : AllShapes(scene)) {
-    absl::StrAppend(&frames, frames.size() > 1 ? "," : "",
-                    QuoteJson(absl::Base64Escape(FrameFor(program.client, scene.files, wish))));
-  }
   const auto collisions = SceneAnswerJson(program.client, scene.rules, scene.objects, 0, 0);
   if (!collisions.ok()) return collisions.status();
   const auto answers = AllPairs(program.client, scene);
@@ -55,7 +67,7 @@ absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewSc
   return JsonObject()
       .AddJson("hello", HelloMessage(program))
       .AddJson("scene", SceneMessage(scene, 1))
-      .AddJson("frames", frames + "]")
+      .AddJson("frames", AllFrames(program.client, scene))
       .AddJson("collisions", *collisions)
       .AddJson("answers", *answers)
       .Close();

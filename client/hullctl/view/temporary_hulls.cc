@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "client/formats/point_file.h"
-#include "client/hullctl/command_line/hull_segment.h"
+#include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/command_line/point_input.h"
 #include "client/hullctl/view/bridge/random_name.h"
 

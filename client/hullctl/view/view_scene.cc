@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <unordered_set>
 #include <utility>
 
 #include "client/formats/byte_source.h"
@@ -14,11 +15,6 @@
 
 namespace hulld {
 namespace {
-
-bool HasTriangles(PointFormat format) {
-  return format == PointFormat::kObj || format == PointFormat::kOff ||
-         format == PointFormat::kStl || format == PointFormat::kGltf;
-}
 
 absl::Status ReadMeshShape(const std::string& path, FileShape* shape) {
   const auto mesh = ReadMesh(path);
@@ -97,7 +93,7 @@ absl::StatusOr<FileShape> ReadShape(const std::string& path) {
   FileShape shape;
   shape.name = ShownName(path);
   const absl::Status read =
-      HasTriangles(*format) ? ReadMeshShape(path, &shape) : ReadPointShape(path, *format, &shape);
+      IsMeshFormat(*format) ? ReadMeshShape(path, &shape) : ReadPointShape(path, *format, &shape);
   if (!read.ok()) return read;
   return shape;
 }
@@ -108,30 +104,46 @@ bool IsFile(const std::string& argument) {
          !std::filesystem::is_directory(argument, ignored);
 }
 
-absl::Status AddHulls(const Client& client, const std::string& id_or_prefix, ViewScene* scene) {
-  const auto list = client.ListAllHulls(id_or_prefix);
-  if (!list.ok()) return list.status();
-  const auto& hulls = list->hulls();
-  const bool exact = std::any_of(hulls.begin(), hulls.end(), [&](const v1::HullInfo& hull) {
-    return hull.hull_id() == id_or_prefix;
-  });
-  if (hulls.empty() && !id_or_prefix.empty()) {
-    return absl::NotFoundError(absl::StrCat("there is no hull \"", id_or_prefix,
+absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
+                               ViewScene* scene) {
+  const auto hulls = client.ListAllHulls(id_or_prefix);
+  if (!hulls.ok()) return hulls.status();
+  const auto bodies = client.ListAllBodies(id_or_prefix);
+  if (!bodies.ok()) return bodies.status();
+  std::vector<std::string> ids;
+  std::unordered_set<std::string> pieces;
+  for (const v1::BodyInfo& body : bodies->bodies()) {
+    ids.push_back(body.body_id());
+    // Without the right to see its pieces, the page says so of the body itself.
+    const auto whole = client.GetBody(body.body_id());
+    if (!whole.ok()) continue;
+    for (const v1::Placement& piece : whole->pieces()) pieces.insert(piece.hull_id());
+  }
+  for (const v1::HullInfo& hull : hulls->hulls()) ids.push_back(hull.hull_id());
+  if (ids.empty() && !id_or_prefix.empty()) {
+    return absl::NotFoundError(absl::StrCat("there is no hull or body \"", id_or_prefix,
                                             "\", none whose ID starts so, and no such file"));
   }
-  for (const v1::HullInfo& hull : hulls) {
-    if (exact && hull.hull_id() != id_or_prefix) continue;
-    scene->objects.push_back({hull.hull_id(), hull.hull_id(), -1, kIdentityPose});
+  std::sort(ids.begin(), ids.end());
+  const auto add = [scene](const std::string& id) {
+    scene->objects.push_back({id, id, -1, kIdentityPose});
+  };
+  if (std::binary_search(ids.begin(), ids.end(), id_or_prefix)) {
+    add(id_or_prefix);
+    return absl::OkStatus();
   }
-  if (!exact) scene->prefixes.push_back(id_or_prefix);
+  for (const std::string& id : ids) {
+    if (!pieces.contains(id)) add(id);
+  }
+  scene->pieces.insert(scene->pieces.end(), pieces.begin(), pieces.end());
+  scene->prefixes.push_back(id_or_prefix);
   return absl::OkStatus();
 }
 
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene) {
   const auto source = ByteSource::Open(path);
   if (!source.ok()) return source.status();
-  // The page draws hulls.
-  absl::StatusOr<Scene> file = ReadScene(source->get(), BodyForm::kPieces);
+  absl::StatusOr<Scene> file = ReadScene(source->get());
   if (!file.ok()) return file.status();
   for (uint32_t i = 0; i < file->size(); ++i) {
     const std::string& hull_id = *file->HullOf(i);

@@ -29,10 +29,10 @@ struct FileShape {
 };
 inline constexpr uint64_t kMaxDrawnPoints = 2'000'000;
 
-// One thing that is looked at: a hull at a pose, a file, or both.
+// One thing that is looked at: a hull or a body at a pose, a file, or a file with its hull.
 struct ViewObject {
   std::string name;
-  // Empty: none.
+  // That of a hull or a body. Empty: none.
   std::string hull_id;
   // Index into ViewScene::files, -1: none.
   int file = -1;
@@ -46,26 +46,29 @@ struct ViewScene {
   std::string note;
   std::vector<ViewObject> objects;
   std::vector<std::shared_ptr<const FileShape>> files;
-  // Hulls that appear under these become objects, too.
+  // Hulls and bodies that appear under these become objects, too.
   std::vector<std::string> prefixes;
+  // Hulls under them that are shown as pieces of bodies alone.
+  std::vector<std::string> pieces;
   // Which pairs are asked about: groups and movers of a scene file. Without placements.
   v1::FindCollisionsRequest rules;
 };
 
-// Reads a mesh (obj, off, stl, gltf) or the points of any other format. Points that are not finite
-// are left out. INVALID_ARGUMENT names the file and the place.
+// Reads a mesh (IsMeshFormat) or the points of any other format. Points that are not finite are
+// left out. INVALID_ARGUMENT names the file and the place.
 absl::StatusOr<FileShape> ReadShape(const std::string& path);
 
 // The name of a file without its folders; bytes that are not UTF-8 become question marks, as they
 // would end the connection to the page.
 std::string ShownName(const std::string& path);
 
-// Whether the argument names a file that is there, rather than a hull.
+// Whether the argument names a file that is there, rather than a hull or a body.
 bool IsFile(const std::string& argument);
 
-// Adds the hull of this ID, or all hulls whose IDs start so, to the scene. NOT_FOUND: there are
-// neither.
-absl::Status AddHulls(const Client& client, const std::string& id_or_prefix, ViewScene* scene);
+// Adds the hull or the body of this ID to the scene, or all whose IDs start so, but for hulls that
+// are pieces of these bodies. NOT_FOUND: there is none.
+absl::Status AddHullsAndBodies(const Client& client, const std::string& id_or_prefix,
+                               ViewScene* scene);
 
 // Adds the placements of a scene file (`hullctl scene --help`). INVALID_ARGUMENT names the place.
 absl::Status AddSceneFile(const std::string& path, ViewScene* scene);

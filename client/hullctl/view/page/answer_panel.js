@@ -37,7 +37,7 @@ export class AnswerPanel {
     if (!pair) {
       const hint = model.objects.filter((o) => o.hullId && !o.gone).length > 1 ?
           'Select an object, then shift-click another one.' :
-          'A pair needs two hulls.';
+          'A pair needs two hulls or bodies.';
       this.root.replaceChildren(
           element('h2', {}, 'Answer'), element('p', {className: 'quiet'}, hint));
       return;
@@ -115,11 +115,18 @@ export class AnswerPanel {
       ['point of B', witness && vector(witness.pointB.x, witness.pointB.y, witness.pointB.z)],
       ['certificate', certificate && this.certificateText(certificate)],
       ['decided by', RUNGS[answer.rung]],
+      ...this.pieceRows(answer),
       ...this.tolerantRows(answer),
       ['revisions', `${answer.hullA.revision} and ${answer.hullB.revision}`],
     ]);
     list.id = 'answer-facts';
     return list;
+  }
+
+  // Of bodies, the pieces that decided.
+  pieceRows({pieces}) {
+    return this.model.decidingPieces().map(
+        (piece, k) => [`piece of ${'AB'[k]}`, piece && `${pieces[k]}: ${piece.hullId}`]);
   }
 
   // What the tolerance makes of it: perhaps a lesser answer, by a cheaper rung.

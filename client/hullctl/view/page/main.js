@@ -12,7 +12,7 @@ import {ObjectPanel} from 'hulld/object_panel.js';
 import {ObjectView} from 'hulld/object_view.js';
 import {pick} from 'hulld/picking.js';
 import {keepPicture} from 'hulld/picture.js';
-import {HullShape, MeshShape, newVertices} from 'hulld/shape.js';
+import {Body, HullShape, MeshShape, newVertices} from 'hulld/shape.js';
 import {ShellView} from 'hulld/shell_view.js';
 import {Stage} from 'hulld/stage.js';
 import {Tree} from 'hulld/tree.js';
@@ -140,6 +140,7 @@ class Viewer {
     document.body.dataset.scene = message.key;
     this.moved = new Set(model.objects.map(({index}) => index));
     this.awaited.clear();
+    this.former = new Map();
     this.fitted = false;
     // Answers to earlier questions are about another scene.
     this.firstUpdate = this.connection.live ? this.update + 1 : 0;
@@ -185,13 +186,18 @@ class Viewer {
       }
     }
     this.updateStatus(hull.revision);
-    if (!gone) this.fetchIfOlder(hull.hullId);
+    if (!gone) {
+      this.fetchIfOlder(hull.hullId);
+    } else if (model.bodiesWith(hull.hullId).length) {
+      model.setHull(hull.hullId, null);
+      this.geometryChanged();
+    }
   }
 
-  // A hull that changed while its shape was on its way comes once more.
+  // A hull or a body that changed while its shape was on its way comes once more.
   fetchIfOlder(id) {
     const told = this.model.info.get(id)?.revision;
-    if (isNewer(told, this.model.hulls.get(id)?.revision)) this.fetchHulls([id]);
+    if (isNewer(told, this.model.revisionOf(id))) this.fetchHulls([id]);
   }
 
   frame(frame) {
@@ -201,6 +207,8 @@ class Viewer {
       model.meshes.set(frame.head.file, new MeshShape(frame));
     } else if (kind === 'hull') {
       this.hullCame(new HullShape(frame), frame.head.hullId);
+    } else if (kind === 'body') {
+      this.bodyCame(new Body(frame.head), frame.head.hullId);
     } else if (kind === 'simplified') {
       const hull = new HullShape(frame);
       this.shell.showSimplified(frame.head, hull);
@@ -218,16 +226,35 @@ class Viewer {
 
   hullCame(hull, id) {
     const {model} = this;
-    const before = model.hulls.get(id);
-    model.hulls.set(id, hull);
+    if (model.hulls.has(id) && !model.isCrowd) this.keepForFlash(id);
+    const wasAbsent = model.absent.has(id);
+    model.setHull(id, hull);
     this.awaited.delete(id);
     this.fetchIfOlder(id);
     this.updateStatus(hull.revision);
-    if (!before || model.isCrowd) return;
-    const fresh = newVertices(before, hull);
-    if (!fresh.length) return;
-    // After the views are built anew.
-    this.flashes = [...(this.flashes || []), {id, hull, fresh}];
+    if (wasAbsent) this.soon('tree', () => this.tree.rebuild());
+  }
+
+  // What objects with this hull looked like before it changed: new vertices flash once the views
+  // are built anew.
+  keepForFlash(id) {
+    this.former ??= new Map();
+    for (const object of this.model.objects) {
+      const isConcerned = object.hullId === id || this.model.bodyOf(object)?.hullIds.has(id);
+      const shape = isConcerned && !this.former.has(object.index) && this.model.hullOf(object);
+      if (shape) this.former.set(object.index, shape);
+    }
+  }
+
+  // Its pieces are asked for like hulls that are objects themselves.
+  bodyCame(body, id) {
+    const {model} = this;
+    model.setBody(id, body);
+    this.awaited.delete(id);
+    this.fetchIfOlder(id);
+    this.updateStatus(body.revision);
+    this.fetchHulls([...body.hullIds].filter((piece) => !model.hulls.has(piece)));
+    this.soon('tree', () => this.tree.rebuild());
   }
 
   frameMissing(head) {
@@ -236,8 +263,13 @@ class Viewer {
       return;
     }
     this.awaited.delete(head.hullId);
+    const isPiece = this.model.bodiesWith(head.hullId).length > 0;
+    if (isPiece) {
+      this.model.setHull(head.hullId, null);
+      this.soon('tree', () => this.tree.rebuild());
+    }
     const known = this.model.info.get(head.hullId);
-    if (known || head.file !== undefined) this.say(head.message);
+    if (known || isPiece || head.file !== undefined) this.say(head.message);
     for (const object of this.model.objects) {
       if (object.hullId === head.hullId && head.hullId) {
         object.gone = true;
@@ -252,12 +284,14 @@ class Viewer {
       const {model} = this;
       if (!this.fitted && this.awaited.size === 0) this.firstFit();
       this.rebuildViews();
-      for (const {id, hull, fresh} of this.flashes || []) {
-        for (const object of model.objects) {
-          if (object.hullId === id) this.views.get(object.index)?.flash(hull, fresh);
-        }
+      for (const [index, before] of this.former || []) {
+        const shape = model.hullOf(model.objects[index]);
+        // A body whose other pieces are on their way waits for them.
+        if (!shape) continue;
+        const fresh = newVertices(before, shape);
+        if (fresh.length) this.views.get(index)?.flash(shape, fresh);
+        this.former.delete(index);
       }
-      this.flashes = [];
       this.gizmo.update();
       this.marks.rebuild();
       this.labels.rebuild();
@@ -290,9 +324,11 @@ class Viewer {
     if (!pair || message.update < this.firstUpdate || message.pair[0] !== pair[0] ||
         message.pair[1] !== pair[1])
       return;
+    const before = this.model.decidingPieces();
     this.model.answer = message;
     this.marks.rebuild();
     this.answerPanel.update();
+    if (this.model.decidingPieces().some((piece, k) => piece !== before[k])) this.tree.rebuild();
   }
 
   collisions(message) {
@@ -328,6 +364,7 @@ class Viewer {
       poses: objects.flatMap((index) => model.objects[index].pose),
       pair: model.pair || [],
       tolerance: model.tolerance,
+      certificate: model.wantsCertificate(rest),
       rest,
     });
   }
@@ -417,7 +454,9 @@ class Viewer {
     document.documentElement.dataset.theme = name;
     $('theme').textContent = name === 'dark' ? 'Light' : 'Dark';
     this.stage.setTheme(name);
-    if (this.views) this.rebuildViews();
+    if (!this.views) return;
+    this.rebuildViews();
+    this.marks.rebuild();
   }
 
   syncShown() {

@@ -2,8 +2,10 @@
 // pairs of the certificate.
 import {DrawnGroup} from 'hulld/drawn_group.js';
 import {MARK_COLOURS} from 'hulld/palette.js';
-import {toWorld} from 'hulld/pose.js';
 import {discTexture, THREE} from 'hulld/three.js';
+
+// More lines hide what they stand on.
+const MOST_PIECE_EDGES = 20000;
 
 const number = ({x, y, z}) => [Number(x), Number(y), Number(z)];
 
@@ -24,6 +26,7 @@ export class Marks extends DrawnGroup {
       if (witness && this.on.witness) this.addWitness(witness);
       if (answer.axis?.direction) this.addAxis(number(answer.axis.direction), witness, objects);
       if (answer.certificate && this.on.certificate) this.addCertificate(answer, objects);
+      this.addPieces(objects);
     }
     this.stage.draw();
   }
@@ -57,6 +60,19 @@ export class Marks extends DrawnGroup {
     this.group.add(dots);
   }
 
+  // The edges of the pieces that decided.
+  addPieces(objects) {
+    this.model.decidingPieces().forEach((piece, k) => {
+      const hull = piece && this.model.hulls.get(piece.hullId);
+      if (!hull || hull.edges.length > 2 * MOST_PIECE_EDGES) return;
+      const vertices = Array.from(
+          {length: hull.vertexCount},
+          (_, i) => this.local(
+              this.model.placed(objects[k], piece, hull.xyz.subarray(3 * i, 3 * i + 3))));
+      this.line(Array.from(hull.edges, (i) => vertices[i]), this.stage.theme.edge);
+    });
+  }
+
   addWitness(points) {
     const [a, b] = points.map((p) => this.local(p));
     this.line([a, b], MARK_COLOURS.witness);
@@ -68,9 +84,10 @@ export class Marks extends DrawnGroup {
     const n = new THREE.Vector3(...direction).normalize();
     if (!(n.length() > 0.5)) return;
     const {axis} = this.model.answer;
-    const feature = ({xyz}, object) =>
-        this.local(toWorld(object.pose, xyz.slice(0, 3).map(Number)));
-    const ends = [feature(axis.featureA, objects[0]), feature(axis.featureB, objects[1])];
+    const pieces = this.model.decidingPieces();
+    const ends = [axis.featureA, axis.featureB].map(
+        ({xyz}, k) =>
+            this.local(this.model.placed(objects[k], pieces[k], xyz.slice(0, 3).map(Number))));
     const near = witness ? witness.map((p) => this.local(p)) : ends;
     const middle = near[0].clone().add(near[1]).multiplyScalar(0.5);
     const height = (n.dot(ends[0]) + n.dot(ends[1])) / 2;
@@ -116,10 +133,11 @@ export class Marks extends DrawnGroup {
 
   addCertificate({certificate}, objects) {
     const points = [];
+    const pieces = this.model.decidingPieces();
     for (const pair of certificate.pairs) {
-      points.push(
-          this.local(toWorld(objects[0].pose, number(pair.vertexA))),
-          this.local(toWorld(objects[1].pose, number(pair.vertexB))));
+      [pair.vertexA, pair.vertexB].forEach((vertex, k) => {
+        points.push(this.local(this.model.placed(objects[k], pieces[k], number(vertex))));
+      });
     }
     if (!points.length) return;
     this.line(points, MARK_COLOURS.certificate);

@@ -5,6 +5,9 @@ import {samePose, toWorld} from 'hulld/pose.js';
 // At most so many objects are each drawn and labelled on their own; more are drawn as a crowd.
 export const MOST_SINGLE_OBJECTS = 200;
 
+// Of bodies with more pairs of pieces no certificate is asked for.
+const MOST_PIECE_PAIRS = 1000;
+
 // Of larger shapes the box stands for them.
 const MOST_CORNERS = 100;
 
@@ -19,8 +22,11 @@ export class Model extends EventTarget {
   clear() {
     this.objects = [];
     this.files = [];
-    // By hull ID, and by file.
+    // By ID, and by file. Hulls are those of objects and of the pieces of bodies.
     this.hulls = new Map();
+    this.bodies = new Map();
+    // Hulls of pieces that there are not.
+    this.absent = new Set();
     this.meshes = new Map();
     this.info = new Map();
     this.selected = null;
@@ -67,8 +73,55 @@ export class Model extends EventTarget {
     return this.objects.length > MOST_SINGLE_OBJECTS;
   }
 
+  // The hull, or of a body all of its pieces; undefined while it is on its way.
   hullOf(object) {
-    return this.hulls.get(object.hullId);
+    return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
+  }
+
+  bodyOf(object) {
+    return this.bodies.get(object.hullId);
+  }
+
+  // The hull of an ID; null where there is none.
+  setHull(id, hull) {
+    if (hull) {
+      this.hulls.set(id, hull);
+      this.bodies.delete(id);
+      this.absent.delete(id);
+    } else {
+      this.hulls.delete(id);
+      this.absent.add(id);
+    }
+    for (const body of this.bodiesWith(id)) body.pieceChanged();
+  }
+
+  setBody(id, body) {
+    this.bodies.set(id, body);
+    this.hulls.delete(id);
+  }
+
+  bodiesWith(id) {
+    return [...this.bodies.values()].filter(({hullIds}) => hullIds.has(id));
+  }
+
+  // What has been told of an ID, hull or body, at which revision.
+  revisionOf(id) {
+    return (this.hulls.get(id) ?? this.bodies.get(id))?.revision;
+  }
+
+  // The pieces that decided the answer, of the objects of the pair: null for a hull, and where none
+  // decided alone.
+  decidingPieces() {
+    const {answer, pair} = this;
+    return [0, 1].map((k) => {
+      const body = pair && this.bodyOf(this.objects[pair[k]]);
+      return body?.pieces[answer?.pieces?.[k] ?? -1] ?? null;
+    });
+  }
+
+  // A point of an object in the world; `piece` is the piece in whose frame it is, or null.
+  placed(object, piece, p) {
+    return toWorld(object.pose, piece ? toWorld(piece.pose, p) : p);
   }
 
   meshOf(object) {
@@ -171,6 +224,14 @@ export class Model extends EventTarget {
     if (this.selected === null || this.other === null) return null;
     const pair = [this.selected, this.other].sort((a, b) => a - b);
     return pair.every((i) => this.objects[i].hullId) ? pair : null;
+  }
+
+  // Whether the pair's certificate is asked for: of large bodies it is one for each of very many
+  // pairs of pieces.
+  wantsCertificate(rest) {
+    const counts = (this.pair || []).map((i) => this.bodyOf(this.objects[i])?.pieces.length ?? 0);
+    const isPlain = counts.every((count) => count === 0);
+    return isPlain || (rest && Math.max(1, counts[0]) * Math.max(1, counts[1]) <= MOST_PIECE_PAIRS);
   }
 
   // `rest`: whether the motion has ended.

@@ -39,29 +39,33 @@ export class ObjectPanel {
         element('div', {className: 'block', id: 'object-facts'}, ...this.factRows(object));
     const blocks = [this.factsBlock];
     if (object.hullId) blocks.push(this.poseBlock(object));
-    if (object.hullId && this.live && this.model.hullOf(object)?.info.dimension === 3) {
+    const isHull = object.hullId && !this.model.bodyOf(object);
+    if (isHull && this.live && this.model.hullOf(object)?.dimension === 3) {
       blocks.push(this.simplifyBlock(object));
     }
-    if (this.mayEdit && object.hullId && !object.gone) blocks.push(this.editBlock(object));
+    if (this.mayEdit && isHull && !object.gone) blocks.push(this.editBlock(object));
     this.root.replaceChildren(...blocks);
   }
 
   factRows(object) {
     const hull = this.model.hullOf(object);
     const mesh = this.model.meshOf(object);
-    const info = this.model.info.get(object.hullId) || hull?.info;
+    const body = this.model.bodyOf(object);
+    const info = this.model.info.get(object.hullId) || hull?.info || body?.info;
+    const isSolid = !body && hull?.dimension === 3;
     const rows = [element('h2', {}, object.name)];
-    if (object.gone) rows.push(element('p', {className: 'quiet'}, 'This hull was deleted.'));
+    if (object.gone) rows.push(element('p', {className: 'quiet'}, 'It was deleted.'));
     if (hull?.message) rows.push(element('p', {className: 'quiet'}, hull.message));
     rows.push(facts([
-      ['hull', object.hullId || null],
+      [body ? 'body' : 'hull', object.hullId || null],
       ['revision', info?.revision],
-      ['dimension', info?.dimension],
+      ['pieces', body && grouped(body.pieces.length)],
+      ['dimension', body ? null : info?.dimension],
       ['vertices', hull && grouped(hull.vertexCount)],
-      ['edges', hull?.info.dimension === 3 ? grouped(hull.edgeCount) : null],
+      ['edges', isSolid ? grouped(hull.edgeCount) : null],
       ['facets', hull && grouped(hull.facetCount)],
-      ['points', info?.counts && grouped(info.counts.received)],
-      ['volume', hull?.info.dimension === 3 ? exact(hull.measures.volume) : null],
+      ['points', !body && info?.counts ? grouped(info.counts.received) : null],
+      ['volume', isSolid ? exact(hull.measures.volume) : null],
       [
         'box',
         hull && !hull.isEmpty ? hull.high.map((h, k) => short(h - hull.low[k])).join(' \u00d7 ') :
@@ -84,7 +88,7 @@ export class ObjectPanel {
       'mesh',
       `${grouped(mesh.vertexCount)} vertices, ${grouped(mesh.triangles.length / 3)} triangles`
     ]);
-    if (!hull || hull.info.dimension !== 3) return rows;
+    if (!hull || hull.dimension !== 3) return rows;
     const {volume, area} = mesh.measures;
     if (volume) {
       rows.push(

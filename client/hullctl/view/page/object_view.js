@@ -87,7 +87,7 @@ export class ObjectView extends DrawnGroup {
 
   // Far sides first, then near ones: right for anything convex.
   addHull(hull, isBeside) {
-    const flat = hull.info.dimension < 3;
+    const flat = hull.dimension < 3;
     const sides = flat ? [THREE.DoubleSide] :
         isHuge(hull)   ? [THREE.FrontSide] :
                          [THREE.BackSide, THREE.FrontSide];

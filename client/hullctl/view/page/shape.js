@@ -1,5 +1,6 @@
 // What a frame holds, made ready for drawing and measured. All in double; only what goes to the
 // GPU is float, relative to the shape's centre, so that nothing jitters far from the origin.
+import {toWorld} from 'hulld/pose.js';
 
 function boxOf(xyz) {
   const low = [Infinity, Infinity, Infinity];
@@ -145,10 +146,67 @@ export class HullShape extends Shape {
     this.info = head.header.hull;
     this.error = head.header.error;
     this.edgeCount = edges.length / 2;
+    this.dimension = this.info.dimension;
   }
 
   get revision() {
     return this.info.revision;
+  }
+}
+
+// The hulls of a body's pieces as one shape, in the frame of the body.
+class BodyShape extends Shape {
+  // placed: [{hull, pose}].
+  constructor(placed) {
+    const total = (count) => placed.reduce((sum, {hull}) => sum + count(hull), 0);
+    const xyz = new Float64Array(total((hull) => hull.xyz.length));
+    const triangles = new Uint32Array(total((hull) => hull.triangles.length));
+    const edges = new Uint32Array(total((hull) => hull.edges.length));
+    let [vertex, t, e] = [0, 0, 0];
+    for (const {hull, pose} of placed) {
+      for (let i = 0; i < hull.xyz.length; i += 3) {
+        xyz.set(toWorld(pose, hull.xyz.subarray(i, i + 3)), 3 * vertex + i);
+      }
+      for (const index of hull.triangles) triangles[t++] = vertex + index;
+      for (const index of hull.edges) edges[e++] = vertex + index;
+      vertex += hull.vertexCount;
+    }
+    super(xyz, triangles, edges);
+    this.facetCount = total((hull) => hull.facetCount);
+    this.edgeCount = edges.length / 2;
+    this.dimension = Math.max(-1, ...placed.map(({hull}) => hull.dimension));
+    this.isBody = true;
+  }
+}
+
+// A body as the bridge tells it, and its shape once its pieces have come.
+export class Body {
+  constructor({info, pieces}) {
+    this.info = info;
+    // [{hullId, pose}].
+    this.pieces = pieces;
+    this.hullIds = new Set(pieces.map(({hullId}) => hullId));
+  }
+
+  get revision() {
+    return this.info.revision;
+  }
+
+  // The hull of one of the pieces came, changed or went.
+  pieceChanged() {
+    this.made = undefined;
+  }
+
+  // Undefined while a piece is on its way; pieces that are `absent` are left out.
+  shape(hulls, absent) {
+    if (this.made === undefined) {
+      const isReady = [...this.hullIds].every((id) => hulls.has(id) || absent.has(id));
+      const there = this.pieces.filter(({hullId}) => hulls.has(hullId));
+      this.made = isReady ?
+          new BodyShape(there.map(({hullId, pose}) => ({hull: hulls.get(hullId), pose}))) :
+          null;
+    }
+    return this.made ?? undefined;
   }
 }
 

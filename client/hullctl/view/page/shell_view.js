@@ -5,7 +5,7 @@ import {MARK_COLOURS} from 'hulld/palette.js';
 import {unitQuaternion} from 'hulld/pose.js';
 import {THREE} from 'hulld/three.js';
 
-// Shells of larger hulls are not drawn: they take longer to make than people wait.
+// Shells of larger hulls have as many facets as the hull.
 const MOST_FACETS = 20000;
 
 export class ShellView extends DrawnGroup {
@@ -42,7 +42,7 @@ export class ShellView extends DrawnGroup {
     if (selected === null || tolerance === 0) return;
     this.object = this.model.objects[selected];
     const hull = this.model.hullOf(this.object);
-    if (hull?.info.dimension === 3) this.addShell(hull, tolerance);
+    if (hull?.dimension === 3 && !hull.isBody) this.addShell(hull, tolerance);
     this.place();
   }
 
@@ -54,8 +54,9 @@ export class ShellView extends DrawnGroup {
   }
 
   addShell(hull, distance) {
-    if (hull.facetCount > MOST_FACETS || !(distance > 0)) return;
-    this.add(shellGeometry(hull, distance), hull.centre, {color: MARK_COLOURS.shell, opacity: 0.2});
+    if (!(distance > 0)) return;
+    const make = hull.facetCount > MOST_FACETS ? fineShell : shellGeometry;
+    this.add(make(hull, distance), hull.centre, {color: MARK_COLOURS.shell, opacity: 0.2});
   }
 
   add(geometry, centre, {color, opacity}) {
@@ -127,6 +128,38 @@ function shellGeometry(hull, distance) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
   geometry.setIndex(indices);
+  geometry.computeBoundingSphere();
+  return geometry;
+}
+
+// The same for a hull of many small facets, in time and memory linear in them: each vertex moves
+// out by the distance along a mean of the normals around it. That direction is one in which the
+// hull reaches farthest at the vertex, so that the moved one is just as far from the hull as the
+// distance; what is spanned by such points lies inside of the round shell.
+function fineShell(hull, distance) {
+  const {xyz, triangles} = hull;
+  const normals = new Float64Array(xyz.length);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [3 * triangles[t], 3 * triangles[t + 1], 3 * triangles[t + 2]];
+    const ux = xyz[b] - xyz[a], uy = xyz[b + 1] - xyz[a + 1], uz = xyz[b + 2] - xyz[a + 2];
+    const vx = xyz[c] - xyz[a], vy = xyz[c + 1] - xyz[a + 1], vz = xyz[c + 2] - xyz[a + 2];
+    const nx = uy * vz - uz * vy, ny = uz * vx - ux * vz, nz = ux * vy - uy * vx;
+    for (const corner of [a, b, c]) {
+      normals[corner] += nx;
+      normals[corner + 1] += ny;
+      normals[corner + 2] += nz;
+    }
+  }
+  const positions = new Float32Array(xyz.length);
+  for (let i = 0; i < xyz.length; i += 3) {
+    const scale = distance / (Math.hypot(normals[i], normals[i + 1], normals[i + 2]) || 1);
+    for (let k = 0; k < 3; ++k) {
+      positions[i + k] = xyz[i + k] - hull.centre[k] + scale * normals[i + k];
+    }
+  }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
+  geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
   geometry.computeBoundingSphere();
   return geometry;
 }

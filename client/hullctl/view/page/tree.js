@@ -5,6 +5,10 @@ import {RELATIONS} from 'hulld/palette.js';
 // More rows make the page slow; the search finds the rest.
 const MOST_ROWS = 400;
 
+// Of a body, so many pieces are listed unasked, and at most.
+const MOST_OPEN_PIECES = 8;
+const MOST_PIECE_ROWS = 100;
+
 const groupOf = (name) => name.slice(0, name.lastIndexOf('/') + 1);
 
 export class Tree {
@@ -13,6 +17,8 @@ export class Tree {
     this.root = document.getElementById('tree');
     this.search = document.getElementById('search');
     this.closed = new Set();
+    // Bodies whose pieces are listed, where that differs from what few or many pieces suggest.
+    this.turned = new Set();
     this.search.addEventListener('input', () => this.rebuild());
     this.search.addEventListener('keydown', (event) => {
       if (event.key !== 'Enter') return;
@@ -42,7 +48,10 @@ export class Tree {
       if (group) rows.push(this.groupRow(group, members));
       if (this.closed.has(group)) continue;
       const room = Math.max(MOST_ROWS - rows.length, 0);
-      rows.push(...members.slice(0, room).map((object) => this.row(object, Boolean(group))));
+      for (const object of members.slice(0, room)) {
+        rows.push(this.row(object, Boolean(group)));
+        if (this.isOpen(object)) rows.push(...this.pieceRows(object, Boolean(group)));
+      }
     }
     const shown = rows.filter(({dataset}) => dataset.index !== undefined).length;
     const closed =
@@ -53,8 +62,7 @@ export class Tree {
           element('div', {className: 'more'}, `and ${grouped(rest)} more: search to find them`));
     }
     if (!found.length) {
-      const empty =
-          this.model.objects.length ? 'No name has this in it.' : 'There are no hulls yet.';
+      const empty = this.model.objects.length ? 'No name has this in it.' : 'There is nothing yet.';
       rows.push(element('div', {className: 'more'}, empty));
     }
     this.root.replaceChildren(...rows);
@@ -83,6 +91,51 @@ export class Tree {
           for (const object of members) object.visible = !visible;
           this.model.tell('visibility');
         }));
+  }
+
+  isOpen({index, hullId}) {
+    const body = this.model.bodies.get(hullId);
+    const isShort = body?.pieces.length <= MOST_OPEN_PIECES && !this.model.isCrowd;
+    return Boolean(body) && isShort !== this.turned.has(index);
+  }
+
+  // Opens and closes the list of a body's pieces.
+  opener(object) {
+    const isOpen = this.isOpen(object);
+    return element(
+        'button', {
+          type: 'button',
+          className: 'eye',
+          'aria-expanded': String(isOpen),
+          'aria-label': `Pieces of ${object.name}`,
+          'data-row': `pieces ${object.index}`,
+          onclick: () => {
+            if (!this.turned.delete(object.index)) this.turned.add(object.index);
+            this.rebuild();
+          },
+        },
+        isOpen ? '\u25be' : '\u25b8');
+  }
+
+  // The pieces are not chosen or moved by themselves: the body is one thing.
+  pieceRows(object, nested) {
+    const {model} = this;
+    const {pieces} = model.bodies.get(object.hullId);
+    const place = model.pair?.indexOf(object.index) ?? -1;
+    const decider = place < 0 ? null : model.decidingPieces()[place];
+    const rows = pieces.slice(0, MOST_PIECE_ROWS).map((piece, i) => {
+      const isAbsent = model.absent.has(piece.hullId);
+      return element(
+          'div', {className: `row piece ${nested ? 'nested' : ''} ${isAbsent ? 'gone' : ''}`},
+          element('span', {className: 'name', title: piece.hullId}, `${i}: ${piece.hullId}`),
+          isAbsent && element('span', {className: 'tag quiet'}, 'missing'),
+          piece === decider && element('span', {className: 'tag quiet'}, 'decides'));
+    });
+    const rest = pieces.length - rows.length;
+    if (rest > 0) {
+      rows.push(element('div', {className: 'more'}, `and ${grouped(rest)} pieces more`));
+    }
+    return rows;
   }
 
   row(object, nested) {
@@ -121,6 +174,7 @@ export class Tree {
                 'span', {className: `tag ${relation.style}`, title: relation.word},
                 `${relation.sign} ${relation.word}`),
         object.gone && element('span', {className: 'tag quiet'}, 'deleted'),
+        model.bodyOf(object) && this.opener(object),
         this.eye(object.visible, object.name, `eye ${object.index}`, () => {
           object.visible = !object.visible;
           model.tell('visibility');

@@ -35,5 +35,20 @@ TEST(ViewScene, TakesEachFormatOfAScene) {
               HasSubstr(wrong.path() + ":1: "));
 }
 
+TEST(ViewScene, ABodyOfASceneIsOneObject) {
+  const TempFile file("cell.yaml",
+                      "prefix: cell/\nhulls: {leg: {box: [1, 1, 1]}}\n"
+                      "bodies: {stand: [{hull: leg}, {hull: leg, at: [2, 0, 0]}]}\n"
+                      "place: {here: {body: stand, at: [1, 2, 3]}, beside: {hull: leg}}\n");
+  ViewScene scene;
+  const absl::Status added = AddSceneFile(file.path(), &scene);
+  ASSERT_TRUE(added.ok()) << added;
+  ASSERT_EQ(scene.objects.size(), 2U);
+  EXPECT_EQ(scene.objects[0].name, "here");
+  EXPECT_EQ(scene.objects[0].hull_id, "cell/stand");
+  EXPECT_THAT(scene.objects[0].pose, ElementsAre(1, 0, 0, 0, 1, 2, 3));
+  EXPECT_EQ(scene.objects[1].hull_id, "cell/leg");
+}
+
 }  // namespace
 }  // namespace hulld

@@ -223,6 +223,109 @@ class ViewerTest(unittest.TestCase):
         answer = self.assert_answers_as_api()
         self.assertAlmostEqual(answer["separation"]["value"], -1)
 
+    # --- Bodies ---
+
+    def test_a_body_is_one_object_that_is_dragged_whole(self):
+        self.hulld.hullctl("body", "put", "room/stool", "box", "box@4,0,0", "box@1,0,0,1,2,4,0")
+        self.addCleanup(self.hulld.hullctl, "body", "delete", "room/stool")
+        self.view("room/right", "room/stool")
+        # The row of the body, and those of its pieces.
+        self.assertEqual(self.browser.js("hulldViewer.model.objects.map(({name}) => name)"),
+                         ["room/right", "room/stool"])
+        self.assertEqual(self.browser.js("[...document.querySelectorAll('#tree .piece .name')]"
+                                         ".map((row) => row.textContent)"),
+                         ["0: box", "1: box", "2: box"])
+        # The third is turned a quarter, about its middle.
+        shape = "hulldViewer.model.hullOf(hulldViewer.model.objects[1])."
+        self.assertEqual(self.browser.js(f"[{shape}low, {shape}high, {shape}vertexCount]"),
+                         [[-1, -1, -1], [5, 5, 1], 24])
+        self.assertGreater(self.pixels()["drawn"], 0.03)
+        answer = self.assert_answers_as_api()
+        self.assertEqual(self.browser.fact("piece of B"), f"{answer['pieceB']['index']}: box")
+        self.drag_handle(-110, 40)
+        self.browser.wait("hulldViewer.model.objects[1].pose.some((v, i) => v !== [1,0,0,0,0,0,0][i])")
+        self.assert_answers_as_api()
+        # Numbers that say which piece decides, with marks where that piece stands.
+        for x, decider in (("-2.5", 1), ("2.5", 0)):
+            field = self.browser.driver.find_element(By.CSS_SELECTOR, "[data-pose='4']")
+            field.clear()
+            field.send_keys(x, Keys.TAB)
+            for index in (5, 6):
+                field = self.browser.driver.find_element(By.CSS_SELECTOR, f"[data-pose='{index}']")
+                field.clear()
+                field.send_keys("1", Keys.TAB)
+            self.browser.wait("hulldViewer.model.objects[1].pose[4] === arguments[0]", float(x))
+            answer = self.assert_answers_as_api()
+            self.assertEqual(answer["pieceB"]["index"], decider)
+            self.assertEqual(self.browser.js(
+                "[...document.querySelectorAll('#tree .piece')]"
+                ".findIndex((row) => row.textContent.includes('decides'))"), decider)
+            # The certificate's vertices, each a corner of the piece, in the world.
+            self.assertTrue(self.browser.js("""(() => {
+              const {model, marks} = hulldViewer;
+              const [, piece] = model.decidingPieces();
+              const {certificate} = model.answer;
+              const {x, y, z} = certificate.pairs[0].vertexB;
+              const placed = model.placed(model.objects[1], piece, [x, y, z].map(Number));
+              return certificate.pairs.length > 0 &&
+                  placed.every((v, k) => Math.abs(v - model.objects[1].pose[4 + k] -
+                                                  piece.pose[4 + k]) <= 1) &&
+                  marks.group.children.length > 0;
+            })()"""))
+
+    def test_a_body_follows_its_pieces_and_may_lack_one(self):
+        self.hulld.add_box("leg", size=1.0, low=(0.0, 0.0, 0.0))
+        self.hulld.hullctl("body", "put", "pair", "leg", "leg@3,0,0", "lid@0,0,1")
+        self.addCleanup(self.hulld.hullctl, "body", "delete", "pair")
+        self.view("pair")
+        self.browser.wait("document.querySelector('#tree').textContent.includes('missing')")
+        shape = "hulldViewer.model.hullOf(hulldViewer.model.objects[0])"
+        self.browser.wait(f"{shape}.vertexCount === 16")
+        # It grows at both places, and the piece that it lacked comes.
+        self.hulld.add("leg", ["0.5 0.5 -2"])
+        self.browser.wait(f"{shape}.vertexCount === 18 && {shape}.low[2] === -2")
+        self.hulld.add_box("lid", size=1.0, low=(0.0, 0.0, 0.0))
+        self.browser.wait(f"{shape}.vertexCount === 26")
+        self.browser.wait("!document.querySelector('#tree').textContent.includes('missing')")
+        # Put anew, of hulls of which the viewer has never heard.
+        self.hulld.add_box("other", size=1.0, low=(7.0, 0.0, 0.0))
+        self.hulld.hullctl("body", "put", "pair", "other")
+        self.browser.wait(f"{shape}.low[0] === 7 && {shape}.vertexCount === 8")
+        self.hulld.add("other", ["9 0.5 0.5"])
+        self.browser.wait(f"{shape}.high[0] === 9")
+
+    def test_pieces_of_bodies_are_shown_with_them_alone(self):
+        for side in ("a", "b"):
+            self.hulld.add_box(f"parts/{side}")
+        self.hulld.hullctl("body", "put", "parts/all", "parts/a", "parts/b@3,0,0")
+        self.addCleanup(self.hulld.hullctl, "body", "delete", "parts/all")
+        names = "hulldViewer.model.objects.map(({name}) => name)"
+        self.view("parts/")
+        self.assertEqual(self.browser.js(names), ["parts/all"])
+        self.view("parts/a", "parts/all")
+        self.assertEqual(self.browser.js(names), ["parts/a", "parts/all"])
+        target = pathlib.Path(self.hulld.directory, "parts.html")
+        self.hulld.hullctl("view", "parts/a", "parts/all", "--html", str(target))
+        self.browser.driver.get(target.as_uri())
+        self.browser.wait("document.body.dataset.fitted")
+        self.assertEqual(self.browser.js(
+            "hulldViewer.model.hullOf(hulldViewer.model.objects[1]).vertexCount"), 16)
+        self.browser.wait("document.querySelector('#relation').textContent.includes('overlapping')")
+
+    def test_a_body_of_a_thousand_pieces(self):
+        pieces = [{"hullId": "box", "pose": {"translation": {"x": 3 * (i % 10), "y": 3 * (i // 10 % 10),
+                                                             "z": 3 * (i // 100)}}}
+                  for i in range(1000)]
+        pathlib.Path(self.hulld.directory, "block.json").write_text(json.dumps({"pieces": pieces}))
+        self.hulld.hullctl("body", "put", "block", "--pieces", "block.json")
+        self.addCleanup(self.hulld.hullctl, "body", "delete", "block")
+        self.view("block", "room/right")
+        shape = "hulldViewer.model.hullOf(hulldViewer.model.objects[0])"
+        self.browser.wait(f"{shape}.vertexCount === 8000")
+        self.assert_answers_as_api()
+        self.drag_handle(60, 20)
+        self.assert_answers_as_api()
+
     # --- What hulls do ---
 
     def test_hulls_grow_appear_and_go(self):
@@ -307,6 +410,31 @@ class ViewerTest(unittest.TestCase):
           return reach(position, 0, shell.group.children[1].userData.centre) >=
               reach(hull.xyz, 0, [0, 0, 0]) - 1e-4;
         })()"""))
+
+    def test_the_shell_about_many_facets_is_as_far_out_as_it_says(self):
+        self.hulld.hullctl("generate", "sphere", "12000", "-o", "many.xyz")
+        self.hulld.hullctl("append", "many", "many.xyz", "--create")
+        self.view("many")
+        self.assertGreater(self.browser.js("hulldViewer.model.hulls.get('many').facetCount"), 20000)
+        self.browser.js("(() => { const slider = document.querySelector('#tolerance');"
+                        " slider.value = 60; slider.dispatchEvent(new Event('input')); })()")
+        self.browser.wait("hulldViewer.shell.group.children.length === 1")
+        # How far each vertex of the sphere was moved away from its middle, in tolerances.
+        least, most = self.browser.js("""(() => {
+          const {model, shell} = hulldViewer;
+          const {xyz, centre} = model.hulls.get('many');
+          const at = shell.group.children[0].geometry.attributes.position.array;
+          let [least, most] = [Infinity, -Infinity];
+          for (let i = 0; i < xyz.length; i += 3) {
+            const was = Math.hypot(...[0, 1, 2].map((k) => xyz[i + k] - centre[k]));
+            const moved = (Math.hypot(at[i], at[i + 1], at[i + 2]) - was) / model.tolerance;
+            least = Math.min(least, moved);
+            most = Math.max(most, moved);
+          }
+          return [least, most];
+        })()""")
+        self.assertGreater(least, 0.98)
+        self.assertLess(most, 1.0001)
 
     def test_usable_at_phone_and_desk_width(self):
         self.view("room/")
