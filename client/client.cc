@@ -70,11 +70,15 @@ absl::Status CheckConsistent(const HullMesh& mesh) {
 
 // Follows the pages of a list; `items` are those of a page.
 template <typename Request, typename Response, typename Items, typename ListPage>
-absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit, const Items& items,
+absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
+                                 const std::optional<v1::Freshness>& freshness, const Items& items,
                                  const ListPage& list_page) {
   constexpr uint64_t kLargestPage = 1000;
   Response all;
   Request request;
+  if (freshness.has_value()) *request.mutable_freshness() = *freshness;
+  const bool is_linearizable =
+      !request.freshness().has_max_staleness() && request.freshness().at_least_revision() == 0;
   request.set_prefix(prefix);
   const auto count = [&] { return static_cast<uint64_t>(items(all)->size()); };
   do {
@@ -88,6 +92,11 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit, cons
       return absl::InternalError("the server answered a page that continues with itself");
     }
     all.set_next_page_token(page->next_page_token());
+    // Otherwise what is on no page yet could be missing on the next.
+    if (!is_linearizable && page->header().revision() > 0) {
+      request.mutable_freshness()->set_at_least_revision(page->header().revision());
+      request.mutable_freshness()->set_store_id(page->header().store_id());
+    }
     request.set_page_token(page->next_page_token());
   } while (!request.page_token().empty() && (limit == 0 || count() < limit));
   return all;
@@ -119,6 +128,14 @@ Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
       status_(v1::StatusService::NewStub(channel_)),
       maintenance_(v1::MaintenanceService::NewStub(channel_)) {}
 
+template <typename Request>
+const Request& Client::WithFreshness(const Request& request, Request* copy) const {
+  if (!options_.freshness.has_value() || request.has_freshness()) return request;
+  *copy = request;
+  *copy->mutable_freshness() = *options_.freshness;
+  return *copy;
+}
+
 Deadline Client::NextDeadline() const { return options_.retry.Now() + options_.timeout; }
 
 template <typename Response, typename Request, typename Stub>
@@ -132,7 +149,12 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     grpc::ClientContext context;
     context.set_deadline(options_.retry.ForCall(deadline));
     response.Clear();
-    return FromGrpcStatus((stub->*method)(&context, request, &response), context);
+    const grpc::Status status = (stub->*method)(&context, request, &response);
+    // Nobody here cancels it: gRPC ends so what reaches a server in the moment in which it goes.
+    if (status.error_code() == grpc::StatusCode::CANCELLED) {
+      return absl::UnavailableError("the server ended the call, as it is going");
+    }
+    return FromGrpcStatus(status, context);
   };
   absl::Status status = retry ? CallWithRetries(options_.retry, deadline, attempt) : attempt();
   if (!status.ok()) return status;
@@ -210,6 +232,7 @@ absl::StatusOr<v1::GetHullResponse> Client::GetHull(const std::string& hull_id, 
   v1::GetHullRequest request;
   request.set_hull_id(hull_id);
   request.set_audit(audit);
+  if (options_.freshness.has_value()) *request.mutable_freshness() = *options_.freshness;
   return Call(hulls_.get(), &v1::HullService::Stub::GetHull, request, true);
 }
 
@@ -220,8 +243,10 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(const std::string& hull_id) const {
 }
 
 absl::StatusOr<HullMesh> Client::GetHullMesh(
-    const v1::GetHullMeshRequest& request,
+    const v1::GetHullMeshRequest& given,
     const std::function<void(const HullMesh&)>& on_part) const {
+  v1::GetHullMeshRequest copy;
+  const v1::GetHullMeshRequest& request = WithFreshness(given, &copy);
   const Deadline deadline = NextDeadline();
   HullMesh mesh;
   absl::Status status = CallWithRetries(options_.retry, deadline, [&] {
@@ -245,13 +270,15 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(
 }
 
 absl::StatusOr<v1::ListHullsResponse> Client::ListHulls(const v1::ListHullsRequest& request) const {
-  return Call(hulls_.get(), &v1::HullService::Stub::ListHulls, request, true);
+  v1::ListHullsRequest copy;
+  return Call(hulls_.get(), &v1::HullService::Stub::ListHulls, WithFreshness(request, &copy), true);
 }
 
 absl::StatusOr<v1::ListHullsResponse> Client::ListAllHulls(const std::string& prefix,
                                                            uint64_t limit) const {
   return ListAll<v1::ListHullsRequest, v1::ListHullsResponse>(
-      prefix, limit, [](v1::ListHullsResponse& page) { return page.mutable_hulls(); },
+      prefix, limit, options_.freshness,
+      [](v1::ListHullsResponse& page) { return page.mutable_hulls(); },
       [this](const v1::ListHullsRequest& request) { return ListHulls(request); });
 }
 
@@ -262,18 +289,22 @@ absl::StatusOr<v1::PutBodyResponse> Client::PutBody(const v1::PutBodyRequest& re
 absl::StatusOr<v1::GetBodyResponse> Client::GetBody(const std::string& body_id) const {
   v1::GetBodyRequest request;
   request.set_body_id(body_id);
+  if (options_.freshness.has_value()) *request.mutable_freshness() = *options_.freshness;
   return Call(bodies_.get(), &v1::BodyService::Stub::GetBody, request, true);
 }
 
 absl::StatusOr<v1::ListBodiesResponse> Client::ListBodies(
     const v1::ListBodiesRequest& request) const {
-  return Call(bodies_.get(), &v1::BodyService::Stub::ListBodies, request, true);
+  v1::ListBodiesRequest copy;
+  return Call(bodies_.get(), &v1::BodyService::Stub::ListBodies, WithFreshness(request, &copy),
+              true);
 }
 
 absl::StatusOr<v1::ListBodiesResponse> Client::ListAllBodies(const std::string& prefix,
                                                              uint64_t limit) const {
   return ListAll<v1::ListBodiesRequest, v1::ListBodiesResponse>(
-      prefix, limit, [](v1::ListBodiesResponse& page) { return page.mutable_bodies(); },
+      prefix, limit, options_.freshness,
+      [](v1::ListBodiesResponse& page) { return page.mutable_bodies(); },
       [this](const v1::ListBodiesRequest& request) { return ListBodies(request); });
 }
 
@@ -299,7 +330,9 @@ std::unique_ptr<HullWatch> Client::WatchHulls(const v1::WatchHullsRequest& reque
 
 absl::StatusOr<v1::CheckCollisionResponse> Client::CheckCollision(
     const v1::CheckCollisionRequest& request) const {
-  return Call(collisions_.get(), &v1::CollisionService::Stub::CheckCollision, request, true);
+  v1::CheckCollisionRequest copy;
+  return Call(collisions_.get(), &v1::CollisionService::Stub::CheckCollision,
+              WithFreshness(request, &copy), true);
 }
 
 template <typename Response, typename Start>
@@ -329,8 +362,10 @@ absl::Status Client::Receive(const Start& start,
   return receiver_status.ok() ? status : receiver_status;
 }
 
-absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
+absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& given,
                                           const BatchReceiver& receive) const {
+  v1::BatchCheckCollisionsRequest copy;
+  const v1::BatchCheckCollisionsRequest& request = WithFreshness(given, &copy);
   return Receive<v1::BatchCheckCollisionsResponse>(
       [&](grpc::ClientContext* context) {
         return collisions_->BatchCheckCollisions(context, request);
@@ -338,15 +373,17 @@ absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest&
       receive);
 }
 
-absl::Status Client::FindCollisions(const v1::FindCollisionsRequest& request,
+absl::Status Client::FindCollisions(const v1::FindCollisionsRequest& given,
                                     const SceneReceiver& receive) const {
+  v1::FindCollisionsRequest copy;
+  const v1::FindCollisionsRequest& request = WithFreshness(given, &copy);
   return Receive<v1::FindCollisionsResponse>(
       [&](grpc::ClientContext* context) { return collisions_->FindCollisions(context, request); },
       receive);
 }
 
 std::unique_ptr<CollisionStream> Client::OpenCollisionStream() const {
-  return std::make_unique<CollisionStream>(collisions_, options_.timeout);
+  return std::make_unique<CollisionStream>(collisions_, options_.timeout, options_.freshness);
 }
 
 std::unique_ptr<CollisionWatch> Client::WatchCollisions(v1::CollisionWatchOpen open) const {

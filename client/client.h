@@ -21,6 +21,7 @@
 #include "client/watch/hull_watch.h"
 #include "hulld/v1/body.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "hulld/v1/maintenance.grpc.pb.h"
 #include "hulld/v1/status.grpc.pb.h"
@@ -36,6 +37,9 @@ struct ClientOptions {
   // the wait for the next acknowledgement.
   std::chrono::milliseconds timeout{30000};
   RetryPolicy retry;
+  // How fresh the answers to reads must be whose request does not say so itself
+  // (proto/hulld/v1/freshness.proto). Absent: they are linearizable. Pages of a list never go back.
+  std::optional<v1::Freshness> freshness;
   // Connections to one server are shared within a process unless this is set.
   bool own_connection = false;
   // TLS and the token.
@@ -137,7 +141,8 @@ class Client {
   absl::Status BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
                                     const BatchReceiver& receive) const;
 
-  // A stream of pose changes, to be opened with its first message. The timeout bounds the wait for
+  // A stream of pose changes, to be opened with its first message, which gets the freshness of the
+  // options. The timeout bounds the wait for
   // each answer.
   std::unique_ptr<CollisionStream> OpenCollisionStream() const;
 
@@ -165,6 +170,10 @@ class Client {
   template <typename Response, typename Start>
   absl::Status Receive(const Start& start,
                        const std::function<absl::Status(const Response&)>& receive) const;
+
+  // The request, or `copy`, which is it with the freshness of the options.
+  template <typename Request>
+  const Request& WithFreshness(const Request& request, Request* copy) const;
 
   // One unary call; `retry` when it is safe to repeat.
   template <typename Response, typename Request, typename Stub>

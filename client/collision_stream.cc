@@ -24,8 +24,9 @@ void Append(const v1::StreamCollisionsResponse& piece, v1::StreamCollisionsRespo
 }  // namespace
 
 CollisionStream::CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
-                                 std::chrono::milliseconds timeout)
-    : stub_(std::move(stub)), timeout_(timeout) {
+                                 std::chrono::milliseconds timeout,
+                                 std::optional<v1::Freshness> freshness)
+    : stub_(std::move(stub)), timeout_(timeout), freshness_(std::move(freshness)) {
   stub_->async()->StreamCollisions(&context_, this);
   AddHold();
   StartRead(&incoming_);
@@ -40,6 +41,7 @@ CollisionStream::~CollisionStream() {
 }
 
 absl::StatusOr<v1::StreamCollisionsResponse> CollisionStream::Open(v1::CollisionStreamOpen open) {
+  if (freshness_.has_value() && !open.has_freshness()) *open.mutable_freshness() = *freshness_;
   *request_.mutable_open() = std::move(open);
   return Ask();
 }

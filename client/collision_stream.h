@@ -9,6 +9,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "hulld/v1/collision.grpc.pb.h"
 
@@ -19,9 +20,10 @@ namespace hulld {
 class CollisionStream final
     : public grpc::ClientBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse> {
  public:
-  // timeout: for each answer.
+  // timeout: for each answer. freshness: of an `open` that has none.
   CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
-                  std::chrono::milliseconds timeout);
+                  std::chrono::milliseconds timeout,
+                  std::optional<v1::Freshness> freshness = std::nullopt);
   // Cancels the call unless it has ended, and waits for gRPC to let go of it.
   ~CollisionStream() override;
 
@@ -45,6 +47,7 @@ class CollisionStream final
 
   const std::shared_ptr<v1::CollisionService::Stub> stub_;
   const std::chrono::milliseconds timeout_;
+  const std::optional<v1::Freshness> freshness_;
   grpc::ClientContext context_;
   v1::StreamCollisionsRequest request_;
   v1::StreamCollisionsResponse incoming_;

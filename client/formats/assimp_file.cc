@@ -1,4 +1,5 @@
-// STL and glTF through assimp, which holds every coordinate as float: these formats do so, too.
+// STL, glTF and COLLADA through assimp, which holds every coordinate as float: the first two do so,
+// too.
 #include <absl/strings/str_cat.h>
 #include <assimp/config.h>
 #include <assimp/scene.h>
@@ -123,6 +124,8 @@ absl::Status VisitMeshes(const aiScene& scene, const MeshVisitor& visit) {
 // No post-processing: assimp then neither joins nor drops vertices.
 absl::Status ReadThroughAssimp(const std::string& path, const MeshVisitor& visit) {
   Assimp::Importer importer;
+  // COLLADA: otherwise assimp turns what is not Y_UP.
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   const aiScene* scene = nullptr;
   std::string problem;
   try {
@@ -148,6 +151,10 @@ absl::Status ReadStl(const std::string& path, PointCollector* points) {
 }
 
 absl::Status ReadGltf(const std::string& path, PointCollector* points) {
+  return ReadAssimpPoints(path, points);
+}
+
+absl::Status ReadDae(const std::string& path, PointCollector* points) {
   return ReadAssimpPoints(path, points);
 }
 

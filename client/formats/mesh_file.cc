@@ -178,8 +178,7 @@ absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy
   const absl::StatusOr<PointFormat> format = PointFormatOfPath(path);
   if (!format.ok()) return format.status();
   std::vector<MeshPart> parts;
-  const bool has_names =
-      *format == PointFormat::kObj || *format == PointFormat::kStl || *format == PointFormat::kGltf;
+  const bool has_names = *format == PointFormat::kObj || IsAssimpFormat(*format);
   if (split == SplitBy::kComponent || !has_names) {
     const auto mesh = ReadMesh(path);
     if (!mesh.ok()) return mesh.status();
@@ -243,13 +242,14 @@ absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path) {
       break;
     case PointFormat::kStl:
     case PointFormat::kGltf:
+    case PointFormat::kDae:
       status = ReadAssimpMesh(path, &mesh);
       break;
     default:
       status = absl::InvalidArgumentError(
           absl::StrCat(path,
-                       ": no mesh is read from this format; convert it to obj, off, stl or "
-                       "gltf"));
+                       ": no mesh is read from this format; convert it to obj, off, stl, "
+                       "gltf or dae"));
   }
   if (!status.ok()) return status;
   return mesh;

@@ -19,8 +19,8 @@ struct TriangleMesh {
   std::vector<std::array<uint32_t, 3>> triangles;
 };
 
-// Reads obj, off, stl, gltf or glb, by the extension; polygons become fans. INVALID_ARGUMENT names
-// the file and the place.
+// Reads obj, off, stl, gltf, glb or dae, by the extension; polygons become fans. INVALID_ARGUMENT
+// names the file and the place.
 absl::StatusOr<TriangleMesh> ReadMesh(const std::string& path);
 
 // A part of a file, under the name that the file has for it; empty where it has none.
@@ -30,8 +30,8 @@ struct MeshPart {
 };
 
 enum class SplitBy {
-  // What the file names: objects and groups of obj, solids of stl, nodes of gltf. Parts of one name
-  // are one part; off has no names, and is one part.
+  // What the file names: objects and groups of obj, solids of stl, nodes of gltf and dae. Parts of
+  // one name are one part; off has no names, and is one part.
   kName,
   // What hangs together: triangles that share a vertex, at the same coordinates. "component-1" and
   // so on, in the order of the file.
@@ -42,7 +42,7 @@ enum class SplitBy {
 // no part; parts without triangles are left out. INVALID_ARGUMENT also when there is no triangle.
 absl::StatusOr<std::vector<MeshPart>> ReadParts(const std::string& path, SplitBy split);
 
-// The readers of each format. Those of stl and gltf place each mesh as its node says.
+// The readers of each format. Those of assimp place each mesh as its node says.
 absl::Status ReadObjMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadOffMesh(ByteSource* source, TriangleMesh* mesh);
 absl::Status ReadAssimpMesh(const std::string& path, TriangleMesh* mesh);

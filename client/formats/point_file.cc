@@ -22,7 +22,8 @@ constexpr FormatName kFormatNames[] = {
     {"obj", PointFormat::kObj}, {"off", PointFormat::kOff},   {"ply", PointFormat::kPly},
     {"xyz", PointFormat::kXyz}, {"csv", PointFormat::kCsv},   {"pcd", PointFormat::kPcd},
     {"stl", PointFormat::kStl}, {"gltf", PointFormat::kGltf}, {"glb", PointFormat::kGltf},
-    {"txt", PointFormat::kXyz}, {"asc", PointFormat::kXyz},   {"tsv", PointFormat::kCsv},
+    {"dae", PointFormat::kDae}, {"txt", PointFormat::kXyz},   {"asc", PointFormat::kXyz},
+    {"tsv", PointFormat::kCsv},
 };
 
 absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
@@ -44,23 +45,29 @@ absl::Status ReadText(const ReadRequest& request, PointCollector* points) {
       return ReadPcd(source->get(), points);
     case PointFormat::kStl:
     case PointFormat::kGltf:
+    case PointFormat::kDae:
       break;
   }
   return absl::InternalError("not a format that is read as a stream");
 }
 
 absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
-  const bool needs_file =
-      request.format == PointFormat::kStl || request.format == PointFormat::kGltf;
-  if (!needs_file) return ReadText(request, points);
+  if (!IsAssimpFormat(request.format)) return ReadText(request, points);
   if (request.path == "-") {
     return absl::InvalidArgumentError(
-        "stl and gltf cannot be read from standard input; save the data to a file and name it");
+        "stl, gltf and dae cannot be read from standard input; save the data to a file and name "
+        "it");
   }
   // Says plainly why a file cannot be opened.
   if (auto source = ByteSource::Open(request.path); !source.ok()) return source.status();
-  return request.format == PointFormat::kStl ? ReadStl(request.path, points)
-                                             : ReadGltf(request.path, points);
+  switch (request.format) {
+    case PointFormat::kStl:
+      return ReadStl(request.path, points);
+    case PointFormat::kGltf:
+      return ReadGltf(request.path, points);
+    default:
+      return ReadDae(request.path, points);
+  }
 }
 
 }  // namespace
@@ -92,6 +99,14 @@ absl::StatusOr<PointFormat> PointFormatOfPath(const std::string& path) {
   return absl::InvalidArgumentError(
       absl::StrCat(path, ": no known format has this extension; say which with --format (",
                    absl::StrJoin(PointFormatNames(), ", "), ")"));
+}
+
+bool IsMeshFormat(PointFormat format) {
+  return format == PointFormat::kObj || format == PointFormat::kOff || IsAssimpFormat(format);
+}
+
+bool IsAssimpFormat(PointFormat format) {
+  return format == PointFormat::kStl || format == PointFormat::kGltf || format == PointFormat::kDae;
 }
 
 absl::StatusOr<ReadCounts> ReadPoints(const ReadRequest& request, const BlockReceiver& receive) {

@@ -173,7 +173,7 @@ absl::StatusOr<ShapeHull> MeshHull(const CollisionShape& shape, const std::strin
   const auto format = PointFormatOfPath(file);
   if (!format.ok()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(file, ": meshes are read from obj, stl, ply, off and gltf; convert it"));
+        absl::StrCat(file, ": meshes are read from obj, stl, ply, off, gltf and dae; convert it"));
   }
   ShapeHull hull;
   const auto counts = ReadPoints({file, *format, {}, {}}, [&](const PointBlock& block) {

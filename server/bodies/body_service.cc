@@ -15,6 +15,7 @@
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
+#include "server/wire/fresh_answer.h"
 #include "server/wire/page_token.h"
 
 namespace hulld::server {
@@ -102,15 +103,12 @@ grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* cont
 grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* context,
                                                   const grpc::ByteBuffer* request,
                                                   grpc::ByteBuffer* response) {
-  return ListCall::Start(*context, admission_, Rpc::kListBodies, {request, response},
-                         [this](ListCall* call) {
-                           const auto list = [this, call] {
-                             return List(call->request(), call->call(), &call->response());
-                           };
-                           // Asks the store first where it is shared.
-                           if (registry_.is_shared()) return call->EndOn(readers_, list);
-                           call->End(list());
-                         });
+  return ListCall::Start(
+      *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
+        EndFresh(registry_, readers_, call, [this, call](std::chrono::nanoseconds staleness) {
+          return List(call->request(), call->call(), staleness, &call->response());
+        });
+      });
 }
 
 grpc::ServerUnaryReactor* BodyService::DeleteBody(grpc::CallbackServerContext* context,
@@ -149,14 +147,18 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
                               v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
   if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
-  const absl::Status fresh = registry_.AwaitOthers([&call] { return call.ShouldStop(); });
-  if (!fresh.ok()) return fresh;
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
+  if (!freshness.ok()) return freshness.status();
+  const auto staleness = registry_.AwaitFresh(*freshness, [&call] { return call.ShouldStop(); });
+  if (!staleness.ok()) return staleness.status();
   const FoundBodies found = registry_.FindBodies(std::span(&id, 1));
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
   if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
-  EncodeHeader(registry_.store(), found.store_revision, response->mutable_header());
+  EncodeHeader(registry_.store(), AsOf{found.store_revision, *staleness},
+               response->mutable_header());
   EncodeBody(*body, response->mutable_body());
   response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
   for (const StoredPiece& piece : body->pieces()) {
@@ -168,17 +170,16 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
 }
 
 absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call& call,
+                               std::chrono::nanoseconds staleness,
                                v1::ListBodiesResponse* response) {
   const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
   if (!prefix.ok()) return prefix.status();
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const absl::Status fresh = registry_.AwaitOthers([&call] { return call.ShouldStop(); });
-  if (!fresh.ok()) return fresh;
   const BodyPage page =
       registry_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize));
-  EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
+  EncodeHeader(registry_.store(), AsOf{page.store_revision, staleness}, response->mutable_header());
   for (const std::shared_ptr<const Body>& body : page.bodies) {
     EncodeBody(*body, response->add_bodies());
   }

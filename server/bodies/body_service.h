@@ -4,6 +4,8 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
+
 #include "hulld/v1/body.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"
@@ -50,7 +52,7 @@ class BodyService : public BodyServiceOfBytes {
   absl::Status Get(const v1::GetBodyRequest& request, const Call& call,
                    v1::GetBodyResponse* response);
   absl::Status List(const v1::ListBodiesRequest& request, const Call& call,
-                    v1::ListBodiesResponse* response);
+                    std::chrono::nanoseconds staleness, v1::ListBodiesResponse* response);
   void Delete(DeleteCall* call);
 
   Registry& registry_;

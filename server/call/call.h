@@ -47,6 +47,9 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
+  // When it came; of a stream that BeginMessage is called for, the message that is under way.
+  std::chrono::steady_clock::time_point arrival() const { return arrival_; }
+  std::chrono::steady_clock::time_point message_arrival() const { return message_arrival_; }
   Metrics& metrics() const { return admission_.metrics(); }
   RequestMemory& request_memory() const { return admission_.request_memory(); }
 

@@ -8,6 +8,7 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
 #include "server/wire/answer_columns.h"
+#include "server/wire/decode.h"
 
 namespace hulld::server {
 namespace {
@@ -56,6 +57,10 @@ absl::Status BatchStream::Validate() {
       MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
                        registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
+  if (!freshness.ok()) return freshness.status();
+  freshness_ = *freshness;
   options_ = *std::move(options);
   team_options_ = options_;
   team_options_.threads = team_threads_;
@@ -65,13 +70,18 @@ absl::Status BatchStream::Validate() {
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
+  // Each is asked for twice, on average, at the most: placing it again costs less than the memory
+  // for all of them.
+  const bool is_textbook = options_.method == Method::kTextbookSat;
+  if (!is_textbook && pair_count_ <= table_.size()) table_.PlaceOnDemand();
   call().AddPairs(pair_count_);
   return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
                        "the batch");
 }
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
-  const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true};
+  const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
+                         freshness_};
   if (!may_wait) return table_.TryResolve(registry(), options_, plan);
   if (absl::Status s = table_.Resolve(registry(), options_, plan); !s.ok()) return s;
   return true;
@@ -98,6 +108,7 @@ bool BatchStream::IsAnswerable(const PlacedPair& pair) const {
 }
 
 bool BatchStream::IsForTeam(const PlacedPair& pair) const {
+  if (options_.method != Method::kTextbookSat) return false;
   if (table_.is_body(pair.a) || table_.is_body(pair.b)) return false;
   return IsTextbookForTeam(options_, table_.placed()[pair.a], table_.placed()[pair.b]);
 }

@@ -77,6 +77,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
 
   // Written before the first piece.
   uint64_t pair_count_ = 0;
+  Freshness freshness_;
   QueryOptions options_;
   // The same for a pair that is worth the team.
   QueryOptions team_options_;

@@ -66,9 +66,9 @@ const QueryHull& NoHull() {
   return no_hull;
 }
 
-void EncodeVersions(const Store& store, uint64_t revision, const HullView& a, const HullView& b,
+void EncodeVersions(const Store& store, const AsOf& as_of, const HullView& a, const HullView& b,
                     v1::CheckCollisionResponse* response) {
-  EncodeHeader(store, revision, response->mutable_header());
+  EncodeHeader(store, as_of, response->mutable_header());
   EncodeVersion(store.id(), a.record, response->mutable_hull_a());
   EncodeVersion(store.id(), b.record, response->mutable_hull_b());
 }
@@ -213,7 +213,7 @@ void CollisionService::PairQuery::Place(const Registry& registry, Resolved resol
   };
   a = PlacedHull(query_hull(*views[0]), X_WA);
   b = PlacedHull(query_hull(*views[1]), X_WB);
-  EncodeVersions(registry.store(), resolved.store_revision, *views[0], *views[1], response);
+  EncodeVersions(registry.store(), resolved.as_of(), *views[0], *views[1], response);
 }
 
 struct CollisionService::TextbookQuery {
@@ -267,7 +267,11 @@ void CollisionService::Check(CheckCall* call) {
   const v1::CheckCollisionRequest& request = call->request();
   absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), request);
   if (!query.ok()) return call->End(query.status());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request.freshness(), registry_.store(), call->call().arrival());
+  if (!freshness.ok()) return call->End(freshness.status());
   PlacedLookup lookup;
+  lookup.plan.freshness = *freshness;
   lookup.canonical = query->options.WantsCanonical();
   lookup.prefix = call->call().caller().prefix;
   std::optional<Resolved> ready = TryResolvePlaced(registry_, HullIds(request), lookup);
@@ -295,7 +299,7 @@ void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<Resolved> reso
 
 void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call) {
   if (absl::Status s = ValidateForBodies(query.options); !s.ok()) return call->End(s);
-  EncodeVersions(registry_.store(), resolved.store_revision, *resolved.hulls[0], *resolved.hulls[1],
+  EncodeVersions(registry_.store(), resolved.as_of(), *resolved.hulls[0], *resolved.hulls[1],
                  &call->response());
   BodyQuestion::Start(pool_, *std::move(resolved.hulls[0]), query.X_WA,
                       *std::move(resolved.hulls[1]), query.X_WB, query.options,

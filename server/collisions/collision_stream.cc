@@ -117,6 +117,10 @@ absl::Status CollisionStream::HandleOpen() {
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
                        call().lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(open.freshness(), registry_.store(), call().message_arrival());
+  if (!freshness.ok()) return Prefixed("open: ", freshness.status());
+  freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(open.placements(), open.packed_placements(), call().caller(),
                            registry_.limits().max_placements, "the stream");
@@ -178,7 +182,9 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   return absl::OkStatus();
 }
 
-absl::Status CollisionStream::Refresh(const ReadPlan& plan) {
+absl::Status CollisionStream::Refresh(ReadPlan plan) {
+  plan.freshness = freshness_;
+  plan.freshness.began = call().message_arrival();
   if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;

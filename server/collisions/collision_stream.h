@@ -65,7 +65,7 @@ class CollisionStream
   absl::Status HandleOpen();
   absl::Status ChargeFor(size_t pairs);
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
-  absl::Status Refresh(const ReadPlan& plan);
+  absl::Status Refresh(ReadPlan plan);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
@@ -88,6 +88,7 @@ class CollisionStream
   // From `open`.
   bool open_ = false;
   bool only_changes_ = false;
+  Freshness freshness_;
   v1::Wanted wanted_;
   QueryOptions options_;
   PlacementTable table_;

@@ -7,6 +7,7 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/wire/answer_columns.h"
+#include "server/wire/decode.h"
 
 namespace hulld::server {
 namespace {
@@ -73,6 +74,10 @@ absl::Status SceneStream::Validate() {
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request().wanted(), request().tolerance(),
                        registry().limits(), call().lifetime());
   if (!options.ok()) return options.status();
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
+  if (!freshness.ok()) return freshness.status();
+  freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
                            registry().limits().max_placements, "the scene");
@@ -89,7 +94,8 @@ absl::Status SceneStream::Validate() {
 
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
   // The box of each placement, and at least a pair of it.
-  const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true};
+  const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
+                         freshness_};
   if (!may_wait) return table_.TryResolve(registry(), options_.query, plan);
   if (absl::Status s = table_.Resolve(registry(), options_.query, plan); !s.ok()) return s;
   return true;

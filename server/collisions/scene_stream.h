@@ -65,6 +65,7 @@ class SceneStream
 
   // Written before the first piece.
   SceneOptions options_;
+  Freshness freshness_;
   std::vector<GroupPair> ignored_groups_;
   PlacementTable table_;
   std::optional<SceneSearch> search_;

@@ -13,7 +13,9 @@
 #include "server/hulls/replace_stream.h"
 #include "server/hulls/watch_stream.h"
 #include "server/settings/config.h"
+#include "server/wire/decode.h"
 #include "server/wire/encode.h"
+#include "server/wire/fresh_answer.h"
 #include "server/wire/page_token.h"
 
 namespace hulld::server {
@@ -62,15 +64,12 @@ WriteReactor* HullService::GetHullMesh(grpc::CallbackServerContext* context,
 grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* context,
                                                  const grpc::ByteBuffer* request,
                                                  grpc::ByteBuffer* response) {
-  return ListCall::Start(*context, admission_, Rpc::kListHulls, {request, response},
-                         [this](ListCall* call) {
-                           const auto list = [this, call] {
-                             return List(call->request(), call->call(), &call->response());
-                           };
-                           // Asks the store first where it is shared.
-                           if (registry_.is_shared()) return call->EndOn(readers_, list);
-                           call->End(list());
-                         });
+  return ListCall::Start(
+      *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
+        EndFresh(registry_, readers_, call, [this, call](std::chrono::nanoseconds staleness) {
+          return List(call->request(), call->call(), staleness, &call->response());
+        });
+      });
 }
 
 grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* context,
@@ -111,10 +110,14 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
   if (absl::Status s = CheckHullId(call.caller(), request.hull_id(), "hull_id"); !s.ok()) {
     return s;
   }
-  const auto resolved = registry_.Resolve(request.hull_id(), [&call] { return call.ShouldStop(); });
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
+  if (!freshness.ok()) return freshness.status();
+  const auto resolved = registry_.Resolve(
+      request.hull_id(), [&call] { return call.ShouldStop(); }, *freshness);
   if (!resolved.ok()) return resolved.status();
-  const auto& [revision, view] = *resolved;
-  EncodeHeader(registry_.store(), revision, response->mutable_header());
+  const auto& [as_of, view] = *resolved;
+  EncodeHeader(registry_.store(), as_of, response->mutable_header());
   EncodeRecord(view.record, response->mutable_hull());
   EncodeBox(*view.served, response);
   if (request.without_facets() && !request.audit()) return absl::OkStatus();
@@ -134,16 +137,15 @@ absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& cal
 }
 
 absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& call,
+                               std::chrono::nanoseconds staleness,
                                v1::ListHullsResponse* response) {
   const absl::StatusOr<std::string> prefix = PrefixToList(call.caller(), request.prefix());
   if (!prefix.ok()) return prefix.status();
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const absl::Status fresh = registry_.AwaitOthers([&call] { return call.ShouldStop(); });
-  if (!fresh.ok()) return fresh;
   const HullPage page = registry_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize));
-  EncodeHeader(registry_.store(), page.store_revision, response->mutable_header());
+  EncodeHeader(registry_.store(), AsOf{page.store_revision, staleness}, response->mutable_header());
   for (const ListedHull& hull : page.hulls) {
     v1::HullInfo* info = response->add_hulls();
     EncodeRecord(hull.record, info);

@@ -3,6 +3,8 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
+
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/admission.h"
 #include "server/call/call.h"
@@ -71,7 +73,7 @@ class HullService : public HullServiceOfBytes {
   absl::Status Get(const v1::GetHullRequest& request, const Call& call,
                    v1::GetHullResponse* response);
   absl::Status List(const v1::ListHullsRequest& request, const Call& call,
-                    v1::ListHullsResponse* response);
+                    std::chrono::nanoseconds staleness, v1::ListHullsResponse* response);
   void Delete(DeleteCall* call);
 
   Registry& registry_;

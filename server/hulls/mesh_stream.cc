@@ -8,6 +8,7 @@
 #include "core/hull/simplification/simplify.h"
 #include "server/contract/status_map.h"
 #include "server/settings/config.h"
+#include "server/wire/decode.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
@@ -39,7 +40,10 @@ absl::Status MeshStream::MakeHeader() {
   absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const auto resolved = registry_.Resolve(request().hull_id(), should_stop);
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(request().freshness(), registry_.store(), call().arrival());
+  if (!freshness.ok()) return freshness.status();
+  const auto resolved = registry_.Resolve(request().hull_id(), should_stop, *freshness);
   if (!resolved.ok()) return resolved.status();
   const absl::StatusOr<const Hull*> hull = registry_.Canonical(resolved->second, should_stop);
   if (!hull.ok()) return hull.status();

@@ -134,8 +134,8 @@ absl::Status WatchStream::LoadBoxes(WatchPiece* piece) {
   loaded.reserve(piece->changes.size());
   for (HullChange& change : piece->changes) {
     if (WantsBox(change)) {
-      const auto resolved =
-          registry_.Resolve(change.record.hull_id, [this] { return call().ShouldStop(); });
+      const auto resolved = registry_.Resolve(
+          change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::OfWhatIsHere());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
       if (!status.ok() && !absl::IsDataLoss(status)) return status;

@@ -30,6 +30,7 @@ class WorkerPool {
   // client: who waits for it.
   void Submit(std::function<void()> task, ClientId client = kNoClient);
 
+  size_t threads() const { return threads_.size(); }
   // Tasks that wait for a thread.
   size_t waiting() const { return waiting_.load(std::memory_order_relaxed); }
 

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -57,17 +58,29 @@ void Committer::FollowSoon() {
   ready_.notify_one();
 }
 
+std::optional<SteadyClock::time_point> Committer::caught_up(const Locked& locked) const {
+  HULLD_CHECK(locked.Holds(order_));
+  return caught_up_;
+}
+
+void Committer::NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked) {
+  HULLD_CHECK(locked.Holds(order_));
+  caught_up_ = asked;
+}
+
 void Committer::Run() {
   while (true) {
     Round round = WaitForRound();
     if (round.batch.empty() && round.followers.empty()) return;
+    // Before anything is sent: a commit asks as well.
+    const SteadyClock::time_point asked = SteadyClock::now();
     absl::Status status;
     if (!round.batch.empty()) status = Write(round.batch);
     if (!status.ok()) {
       // Refused before anybody looks at what others did: where the outcome is not known, what is
       // there by then may be this very batch.
       Round looking = {{}, std::exchange(round.followers, {})};
-      Settle(round, status, absl::OkStatus());
+      Settle(round, status, absl::OkStatus(), asked);
       if (looking.followers.empty()) continue;
       round = std::move(looking);
       status = absl::OkStatus();
@@ -75,7 +88,7 @@ void Committer::Run() {
     // A commit has followed the others.
     absl::Status followed;
     if (round.batch.empty()) followed = store_.Follow();
-    Settle(round, status, followed);
+    Settle(round, status, followed, asked);
   }
 }
 
@@ -102,13 +115,36 @@ absl::Status Committer::Write(std::vector<Pending>& batch) {
   return status;
 }
 
+// What other servers did, with what hulls that are in memory grew by. status: of asking what they
+// did; who could not be asked that is asked no more.
+OtherChanges Committer::TakeOthers(const absl::Status& status) {
+  OtherChanges others = store_.TakeOthers();
+  if (!status.ok() || others.revision == 0 || grown_ == nullptr) return others;
+  std::vector<HullGrowth> grown;
+  {
+    Locked locked(order_);
+    grown = grown_(locked, others);
+  }
+  if (grown.empty()) return others;
+  std::vector<std::optional<std::vector<Vector>>> growth = store_.LoadGrowth(grown);
+  for (size_t i = 0; i < grown.size(); ++i) {
+    others.by_id.at(grown[i].after.record.hull_id).growth = std::move(growth[i]);
+  }
+  return others;
+}
+
 // Completes a batch that the store kept; or, if it refused the batch, that and all that waits.
-void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& followed) {
+// asked: when the store was, at the earliest.
+void Committer::Settle(Round& round, const absl::Status& status, const absl::Status& followed,
+                       SteadyClock::time_point asked) {
   std::vector<Pending>& batch = round.batch;
   // Before others take changes out of it.
   const bool was_written = !batch.empty();
+  OtherChanges others;
+  if (store_.is_shared()) others = TakeOthers(was_written ? status : followed);
   Locked locked(order_);
-  if (store_.is_shared()) TellOthers(locked, batch);
+  if (others.revision != 0) TellOthers(locked, others, batch);
+  if (store_.is_shared() && status.ok() && followed.ok()) caught_up_ = asked;
   if (was_written) {
     const std::lock_guard lock(mutex_);
     if (!status.ok() && !statistics_.failing) {
@@ -139,9 +175,8 @@ void Committer::Settle(Round& round, const absl::Status& status, const absl::Sta
 }
 
 // Refuses what other servers superseded, of the batch and of what waits, and tells of them.
-void Committer::TellOthers(Locked& locked, std::vector<Pending>& batch) {
-  const OtherChanges others = store_.TakeOthers();
-  if (others.revision == 0) return;
+void Committer::TellOthers(Locked& locked, const OtherChanges& others,
+                           std::vector<Pending>& batch) {
   std::vector<Pending> superseded;
   const auto take_from = [&](std::vector<Pending>& pending) {
     const auto [first, last] = std::ranges::stable_partition(

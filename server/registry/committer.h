@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "server/process/metrics.h"
@@ -54,6 +55,9 @@ class Committer {
   // were refused, the latest first, and before those of the same batch that were kept complete, as
   // they follow it. Nothing of these IDs is in flight then.
   using Others = std::function<void(Locked& order, const OtherChanges& others)>;
+  // Asked, with `order` held, which of the hulls that others changed only grew and are wanted as
+  // what they grew by: their points are then among what Others is told, if the store can give them.
+  using Grown = std::function<std::vector<HullGrowth>(Locked& order, const OtherChanges& others)>;
   // Told, with `order` held, once Others was told of all that other servers had committed when it
   // was submitted, or why that could not be found out.
   using Follower = std::function<void(Locked& order, const absl::Status&)>;
@@ -73,11 +77,21 @@ class Committer {
   void Submit(const Locked& locked, Change change, Completion done);
 
   // For a store that is shared. Before the first change and the first follower.
-  void SetOthers(Others others) { others_ = std::move(others); }
+  // grown: may be empty.
+  void SetOthers(Others others, Grown grown = nullptr) {
+    others_ = std::move(others);
+    grown_ = std::move(grown);
+  }
   // Requires that `locked` holds `order`. Cost: a question to the store, one for all who wait.
   void Follow(const Locked& locked, Follower follower);
   // Others is to be told soon, if there is anything to tell. Takes no lock but the queue's.
   void FollowSoon();
+  // Others was told of all that other servers had committed by this time, at least: when the store
+  // was sent the last question that it answered. None: it was not asked yet. Requires that `locked`
+  // holds `order`.
+  std::optional<SteadyClock::time_point> caught_up(const Locked& locked) const;
+  // For who asked the store itself, at this time, and told Others. Requires the same.
+  void NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked);
 
   CommitStatistics Statistics() const;
   // Where each batch is timed and counted; set before the first change, and outlives this.
@@ -98,13 +112,18 @@ class Committer {
   void Run();
   Round WaitForRound();
   absl::Status Write(std::vector<Pending>& batch);
-  void Settle(Round& round, const absl::Status& status, const absl::Status& followed);
-  void TellOthers(Locked& locked, std::vector<Pending>& batch);
+  OtherChanges TakeOthers(const absl::Status& status);
+  void Settle(Round& round, const absl::Status& status, const absl::Status& followed,
+              SteadyClock::time_point asked);
+  void TellOthers(Locked& locked, const OtherChanges& others, std::vector<Pending>& batch);
 
   Store& store_;
   FairMutex& order_;
   StoreMetrics* metrics_ = nullptr;
   Others others_;
+  Grown grown_;
+  // Guarded by order_.
+  std::optional<SteadyClock::time_point> caught_up_;
 
   mutable Mutex mutex_;
   // The rest is guarded by mutex_.

@@ -67,6 +67,8 @@ class KnownHulls {
     uint32_t first = 0;
     bool is_due = false;
     bool is_prepared = false;
+    // It was read from the store for this lookup, with others.
+    bool is_loaded = false;
     // About what it holds of the hull.
     uint64_t bytes = 0;
     absl::StatusOr<HullView> view = absl::UnknownError("not looked up");

@@ -19,6 +19,7 @@ RegisteredHull::RegisteredHull(const StoredHull& stored, const HullState& initia
       account(budget, [this](Locked& locked) { DropUnused(locked); }) {}
 
 void RegisteredHull::DiscardBuilder(Locked& locked) {
+  builder_lacks = {};
   if (builder == nullptr) return;
   locked.Discard(std::move(builder));
   builder_bytes = 0;
@@ -117,25 +118,63 @@ void RegisteredHull::Requeue(PendingChunk chunk) {
   chunks.insert(next, std::move(chunk));
 }
 
-// What is in memory is read again where vertices changed.
-void RegisteredHull::Supersede(Locked& locked, const StoredHull& stored) {
+// Not where the dimension grows, as that moves all points.
+bool RegisteredHull::GrewInto(const StoredHull& stored) const {
+  const HullRecord& now = stored.record;
+  const HullRecord& before = committed.record;
+  const VertexLayout& layout = committed.layout;
+  return live != nullptr && state.visible() && !state.damaged() &&
+         now.create_revision == before.create_revision && now.dimension == before.dimension &&
+         now.revision > before.revision && stored.layout.base_revision == layout.base_revision &&
+         stored.layout.delta_count > layout.delta_count &&
+         stored.layout.delta_vertices > layout.delta_vertices &&
+         stored.layout.delta_vertices - layout.delta_vertices <= kMostGrowth;
+}
+
+bool RegisteredHull::Supersede(Locked& locked, const StoredHull& stored,
+                               const std::vector<Vector>* growth) {
   state.Supersede();
-  DiscardBuilder(locked);
   RevertLive(locked);
-  if (stored.record.revision != committed.record.revision) {
+  const bool is_same = stored.record.revision == committed.record.revision;
+  const bool grows = !is_same && growth != nullptr && live != nullptr;
+  const bool is_built_here = builder != nullptr;
+  if (grows) {
+    Grow(locked, *growth, stored.record.dimension);
+  } else if (!is_same) {
     DiscardAll(locked);
     has_box = false;
   }
   committed = head = stored;
   writers.clear();
   ++supersessions;
-  NoteUse();
+  // Nobody asked here for what another server added: it is no reason to keep the hull, unless
+  // somebody appends to it here, too.
+  if (grows && !is_built_here) {
+    CountParts();
+  } else {
+    NoteUse();
+  }
+  return grows;
+}
+
+// Readers keep the versions that they hold. A thread that builds has the builder and, as `live` was
+// reverted, another LiveHull than this.
+void RegisteredHull::Grow(Locked& locked, const std::vector<Vector>& points, int dimension) {
+  SetCommittedMark(locked, live->Append(points, dimension));
+  DiscardServed(locked);
+  locked.Discard(std::exchange(canonical, nullptr));
+  points_since_prepared += points.size();
+  if (builder == nullptr) return;
+  builder_lacks.insert(builder_lacks.end(), points.begin(), points.end());
+  if (builder_lacks.size() > kMostGrowth) DiscardBuilder(locked);
 }
 
 void RegisteredHull::NoteUse() {
   CountParts();
   const bool is_for_writing = !readable_from_store || !state.quiet() || !chunks.empty();
-  account.Set(builder_bytes + (live == nullptr ? 0 : LiveHull::OwnBytes()), is_for_writing);
+  account.Set(builder_bytes + builder_lacks.capacity() * sizeof(Vector) +
+                  (live == nullptr ? 0 : LiveHull::OwnBytes()),
+              is_for_writing);
 }
 
 // A part whose address comes again is free memory that was used again: nobody held it.

@@ -53,6 +53,10 @@ struct RegisteredHull {
     uint64_t head = 0;
   };
 
+  // Points that other servers added and that are added here at once, at most: some 100 us. With
+  // more, the hull is read anew when it is next asked for; so is a builder made anew.
+  static constexpr uint64_t kMostGrowth = 1 << 12;
+
   // readable: whether the store gives back what it keeps of the hull.
   RegisteredHull(const StoredHull& stored, const HullState& initial, bool readable,
                  MemoryBudget& budget);
@@ -87,10 +91,19 @@ struct RegisteredHull {
   void RevertLive(Locked& locked);
   // A chunk waits again, before those that came after it.
   void Requeue(PendingChunk chunk);
+  // Whether a chunk waits that came before this one, which does not.
+  bool IsQueuedBefore(const PendingChunk& chunk) const {
+    return !chunks.empty() && chunks.front().place < chunk.place;
+  }
   // The hull is gone.
   void DiscardAll(Locked& locked);
-  // Another server made `stored` of the committed hull. Requires that nothing is in flight.
-  void Supersede(Locked& locked, const StoredHull& stored);
+  // Whether `stored`, of another server, is the committed hull with few points more, all of them in
+  // deltas, so that adding those to `live` costs less than reading the hull anew.
+  bool GrewInto(const StoredHull& stored) const;
+  // Another server made `stored` of the committed hull. growth: null, or what GrewInto says is all
+  // that came, which is added where there is `live`; without it what is in memory goes where
+  // vertices changed. Requires that nothing is in flight. Returns whether it was added.
+  bool Supersede(Locked& locked, const StoredHull& stored, const std::vector<Vector>* growth);
   // The committed hull, as watches are told of it.
   HullChange Describe() const;
   // The last sequence of a writer, chunks in flight included; 0 for a writer not in `writers`.
@@ -140,6 +153,9 @@ struct RegisteredHull {
   std::unique_ptr<HullBuilder> builder;
   // What it holds, also while a thread owns it.
   uint64_t builder_bytes = 0;
+  // Points of the committed hull that other servers added and that `builder` lacks; who builds next
+  // adds them. None without `builder`.
+  std::vector<Vector> builder_lacks;
   // Told of each step of `state`, and when points were read from the store.
   ConditionVariable changed;
   std::list<PendingChunk> chunks;
@@ -161,6 +177,7 @@ struct RegisteredHull {
   };
 
   void KeepBox();
+  void Grow(Locked& locked, const std::vector<Vector>& points, int dimension);
   // Brings what the account says of parts up to date.
   void CountParts();
   // Drops what is not in use, if it can be made again.

@@ -5,12 +5,14 @@
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/registry/registered_hull.h"
+#include "server/settings/cpu_limit.h"
 #include "server/settings/memory_limit.h"
 
 namespace hulld::server {
@@ -29,7 +31,7 @@ uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
 }  // namespace
 
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
-                   std::optional<PoolMetrics> preparers)
+                   std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
     : store_(store),
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
@@ -38,9 +40,11 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
   preparers_.emplace(1, preparers);
+  loaders_.emplace(std::max(1, DefaultThreads() - 1), loaders);
   if (!store.is_shared()) return;
   committer_.SetOthers(
-      [this](Locked& locked, const OtherChanges& others) { TakeOver(locked, others); });
+      [this](Locked& locked, const OtherChanges& others) { TakeOver(locked, others); },
+      [this](Locked&, const OtherChanges& others) { return GrownHulls(others); });
 }
 
 Registry::~Registry() {
@@ -50,6 +54,7 @@ Registry::~Registry() {
     ending_ = true;
   }
   preparers_.reset();
+  loaders_.reset();
   // Closed sessions may hold hulls for longer.
   const std::lock_guard lock(mutex_);
   for (const auto& [id, hull] : hulls_.entries()) {
@@ -80,8 +85,10 @@ absl::Status Registry::Load() {
   if (!status.ok()) return status;
   if (absl::Status s = LoadBodies(); !s.ok() || !store_.is_shared()) return s;
   // What was read was not of one moment.
+  const SteadyClock::time_point asked = SteadyClock::now();
   const absl::Status followed = store_.Follow();
   TakeOver(locked, store_.TakeOthers());
+  if (followed.ok()) committer_.NoteCaughtUp(locked, asked);
   store_.OnOthers([this] { committer_.FollowSoon(); });
   return followed;
 }

@@ -66,8 +66,9 @@ struct PendingChunk;
 // hulls that would otherwise come to hold many points that are no vertices any more. The canonical
 // snapshot of a version is made by the first reader that needs it, without the mutex. Thread-safe.
 //
-// Where other servers commit to the same store, reads and changes first learn what those did, which
-// takes the place of what is known here; a change that another one preceded is refused by the
+// Where other servers commit to the same store, changes first learn what those did, and reads that
+// are to be fresher than what is known here; it takes the place of that, and a hull in memory that
+// only grew is given the points that came. A change that another one preceded is refused by the
 // committer, and made anew of what there is by then, so callers do not hear of it
 // (registry_others.cc). A chunk is kept for that until it is committed.
 //
@@ -82,9 +83,11 @@ class Registry {
   static constexpr uint64_t kMostLookupsPerHold = 128;
 
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
-  // no chunk be pending when it is destroyed. preparers: where to report what waits to be prepared.
+  // no chunk be pending when it is destroyed. preparers, loaders: where to report what waits to be
+  // prepared, and to be read from the store.
   Registry(Store& store, const Limits& limits, WorkerPool& writers,
-           std::optional<PoolMetrics> preparers = std::nullopt);
+           std::optional<PoolMetrics> preparers = std::nullopt,
+           std::optional<PoolMetrics> loaders = std::nullopt);
   Registry(const Registry&) = delete;
   Registry& operator=(const Registry&) = delete;
   ~Registry();
@@ -139,8 +142,13 @@ class Registry {
   // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
   // question to the store, one for all who wait; nothing where it is not shared.
   absl::Status AwaitOthers(const std::function<bool()>& should_stop);
-  // Whether that asks the store, as other servers may be active over it.
-  bool is_shared() const { return store_.is_shared(); }
+  // Waits until what is here is as fresh as this, in the same way, and tells how stale it may be:
+  // before what does not do so itself. FAILED_PRECONDITION: the store has not given that revision.
+  // Otherwise as AwaitOthers. Cost: a question to the store only where it is not.
+  absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
+                                                      const std::function<bool()>& should_stop);
+  // The same, but nullopt, at once, where it would have to wait.
+  std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -155,15 +163,16 @@ class Registry {
   // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
   absl::Status CheckMemory(MemoryUse use);
 
-  // The hulls, ready to be served, all current at one revision of the store. May read from the
-  // store and prepare, hence not for gRPC's threads. CANCELLED when should_stop said so.
+  // The hulls, ready to be served, all current at one revision of the store, as fresh as the plan
+  // says. May read from the store and prepare, hence not for gRPC's threads. CANCELLED when
+  // should_stop said so. FAILED_PRECONDITION, UNAVAILABLE: as AwaitFresh.
   // RESOURCE_EXHAUSTED: hulls would have to be read from the store, or are more than
   // kMostLookupsPerHold, and what readers hold is beyond their share of --memory-limit; without a
   // time to retry, if these hulls are most of it.
   absl::StatusOr<Resolved> Resolve(std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
-  // The same, but nullopt, at once, where it would have to read from the store or to prepare.
+  // The same, but nullopt, at once, where it would have to ask or read the store, or to prepare.
   std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
   // As Resolve, for who asks for the same hulls again and again: `known` is kept in between, and
   // only what changed since is looked up.
@@ -171,8 +180,9 @@ class Registry {
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
   // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
-  absl::StatusOr<std::pair<uint64_t, HullView>> Resolve(const std::string& id,
-                                                        const std::function<bool()>& should_stop);
+  absl::StatusOr<std::pair<AsOf, HullView>> Resolve(const std::string& id,
+                                                    const std::function<bool()>& should_stop,
+                                                    const Freshness& freshness = {});
 
   // The canonical snapshot of what was resolved, made if nobody needed it before; it lives as long
   // as view.served. Not for gRPC's threads. DATA_LOSS: the store is damaged. CANCELLED: should_stop
@@ -264,15 +274,29 @@ class Registry {
                         const Reply<uint64_t>& done);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
 
+  // Whether what is here needs no comparing with what others did.
+  bool IsAlwaysFresh(const Freshness& freshness) const {
+    return !store_.is_shared() && freshness.at_least_revision == 0;
+  }
+  std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked, const Freshness& freshness);
+  absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
+                                                      const std::function<bool()>& should_stop);
+  void AskAhead(Locked& locked);
+
   // Other servers (registry_others.cc).
   absl::Status AwaitOthers(Locked& locked, const std::function<bool()>& should_stop);
   using Refusal = std::function<void(const absl::Status&)>;
   void WhenFresh(Refusal refuse, std::function<void(Locked&)> next);
   void Again(Locked& locked, std::function<void(Locked&)> task);
   void AdvanceLater(const HullPointer& hull);
+  // Hulls that are advanced at a time by what other servers added, and the points of all of them:
+  // some milliseconds under the mutex.
+  static constexpr size_t kMostGrownHulls = 1 << 10;
+  static constexpr uint64_t kMostGrowth = 1 << 16;
+  std::vector<HullGrowth> GrownHulls(const OtherChanges& others) const;
   void TakeOver(Locked& locked, const OtherChanges& others);
   void TakeOver(Locked& locked, const std::string& id, const OtherChange& other);
-  bool TakeOverVersion(Locked& locked, RegisteredHull& hull, const OtherChange& other,
+  bool TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
                        bool is_news);
   HullPointer TakeOverHull(const std::string& id, const absl::StatusOr<StoredHull>& stored);
   void TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other);
@@ -294,8 +318,8 @@ class Registry {
   absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
   absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
   absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, const LiveHull::Mark& committed,
-                                        LiveHull& live, std::unique_ptr<HullBuilder>& builder,
-                                        BuiltChunk& built);
+                                        std::span<const Vector> builder_lacks, LiveHull& live,
+                                        std::unique_ptr<HullBuilder>& builder, BuiltChunk& built);
   absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
   void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
   void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
@@ -307,9 +331,11 @@ class Registry {
   absl::Status LookUpDue(Locked& locked, std::span<const std::string> ids, KnownHulls& known,
                          const std::function<bool()>& should_stop, const ReadPlan& plan,
                          bool may_wait);
-  absl::Status LookUp(Locked& locked, const std::string& id, KnownHulls& hulls, uint32_t k,
-                      const std::function<bool()>& should_stop, const ReadPlan& plan,
+  absl::Status LookUp(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
+                      uint32_t k, const std::function<bool()>& should_stop, const ReadPlan& plan,
                       bool may_wait);
+  void LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
+                const std::function<bool()>& should_stop);
   absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
   absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
                               const std::function<bool()>& should_stop);
@@ -352,12 +378,16 @@ class Registry {
   CacheStatistics cache_;
   // Nothing more is prepared.
   bool ending_ = false;
+  // The store is being asked for reads to come.
+  bool is_asking_ahead_ = false;
   ChangeFeed feed_;
 
   // Last, as their threads use the rest.
   Committer committer_;
   // One thread: what it does is in nobody's way, and nobody waits for it.
   std::optional<WorkerPool> preparers_;
+  // These help readers that read many hulls from the store.
+  std::optional<WorkerPool> loaders_;
 };
 
 }  // namespace hulld::server

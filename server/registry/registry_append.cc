@@ -75,6 +75,14 @@ absl::Status CheckChunkRevision(const AppendSession& session, const HullRecord& 
   return RevisionMismatch(record, *chunk.if_revision);
 }
 
+// Adds what a builder lacks. False: it holds another hull then than the record says, and is to be
+// made anew.
+bool BringUp(HullBuilder& builder, std::span<const Vector> lacks, const HullRecord& record) {
+  if (lacks.empty()) return true;
+  return builder.Add(lacks).ok() && builder.vertex_count() == record.vertex_count &&
+         builder.dimension() == record.dimension;
+}
+
 void AnswerChunk(Locked& locked, const Reply<ChunkResult>& done, uint64_t sequence,
                  absl::StatusOr<ChunkResult> result) {
   if (!result.ok()) result = Prefixed(absl::StrCat("chunk ", sequence, ": "), result.status());
@@ -238,6 +246,11 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
   if (!is_new && store_.is_shared()) {
     const absl::Status fresh = AwaitOthers(locked, pending.should_stop);
     verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
+    // One that was sent before it has to be made anew meanwhile.
+    if (hull->IsQueuedBefore(pending)) {
+      hull->Requeue(std::move(pending));
+      return;
+    }
   }
   if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
   if (*verdict == Verdict::kAlreadyApplied) {
@@ -247,9 +260,12 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
-    // Its turn comes again.
-    hull->Requeue(std::move(pending));
-    return;
+    if (!pending.should_stop || !pending.should_stop()) {
+      // Its turn comes again.
+      hull->Requeue(std::move(pending));
+      return;
+    }
+    built = absl::CancelledError("the call was cancelled");
   }
   if (!built.ok()) return AnswerChunk(locked, pending.done, sequence, built.status());
   SubmitChunk(locked, hull, pending, *std::move(built));
@@ -302,10 +318,12 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   change.former_layout = hull.head.layout;
   std::unique_ptr<HullBuilder> builder = std::move(hull.builder);
   HULLD_CHECK(builder != nullptr || hull.state.in_flight() == 0);
+  const std::vector<Vector> builder_lacks = std::exchange(hull.builder_lacks, {});
   const LiveHull::Mark committed = hull.committed_mark;
 
   locked.Unlock();
-  const absl::StatusOr<PointCounts> added = AddPoints(pending, committed, **live, builder, built);
+  const absl::StatusOr<PointCounts> added =
+      AddPoints(pending, committed, builder_lacks, **live, builder, built);
   if (!store_.is_shared()) pending.chunk.points = {};
   const uint64_t builder_bytes = builder == nullptr ? 0 : builder->MemoryBytes();
   locked.Lock();
@@ -367,14 +385,16 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   return hull.live;
 }
 
-// The points of a chunk go into its hull's builder, which is made of the committed points where
-// there is none; what became vertices goes into the LiveHull, and what the store is to keep of it
-// into the change. Without the mutex.
-absl::StatusOr<PointCounts> Registry::AddPoints(PendingChunk& pending,
-                                                const LiveHull::Mark& committed, LiveHull& live,
-                                                std::unique_ptr<HullBuilder>& builder,
-                                                BuiltChunk& built) {
+// The points of a chunk go into its hull's builder, which first gets what other servers added, and
+// is made of the committed points where there is none; what became vertices goes into the LiveHull,
+// and what the store is to keep of it into the change. Without the mutex.
+absl::StatusOr<PointCounts> Registry::AddPoints(
+    PendingChunk& pending, const LiveHull::Mark& committed, std::span<const Vector> builder_lacks,
+    LiveHull& live, std::unique_ptr<HullBuilder>& builder, BuiltChunk& built) {
   Change& change = built.change;
+  if (builder != nullptr && !BringUp(*builder, builder_lacks, change.hull.record)) {
+    builder = nullptr;
+  }
   if (builder == nullptr) {
     absl::StatusOr<std::unique_ptr<HullBuilder>> made =
         BuildHull(change.hull.record, live.PointsAt(committed), pending.should_stop);

@@ -72,6 +72,25 @@ void Registry::AdvanceLater(const HullPointer& hull) {
   after_others_.push_back([this, hull](Locked& locked) { Advance(locked, hull); });
 }
 
+// Hulls whose points are in memory and that only grew, as far as they can be added within one hold
+// of the mutex. What is committed here stays so until Others is told, as the same thread does both.
+std::vector<HullGrowth> Registry::GrownHulls(const OtherChanges& others) const {
+  std::vector<HullGrowth> grown;
+  uint64_t points = 0;
+  for (const auto& [id, other] : others.by_id) {
+    if (!other.hull.has_value() || !other.hull->ok()) continue;
+    const auto found = hulls_.entries().find(id);
+    if (found == hulls_.entries().end() || found->second.awake() == nullptr) continue;
+    const RegisteredHull& hull = *found->second.awake();
+    const StoredHull& stored = **other.hull;
+    if (!hull.GrewInto(stored)) continue;
+    points += stored.layout.delta_vertices - hull.committed.layout.delta_vertices;
+    if (grown.size() == kMostGrownHulls || points > kMostGrowth) break;
+    grown.push_back({hull.committed, stored});
+  }
+  return grown;
+}
+
 // Nothing of these IDs is in flight.
 void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
   std::vector<std::pair<uint64_t, const std::string*>> in_order;
@@ -98,7 +117,7 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
   TakeOverBody(locked, id, other);
   const std::shared_ptr<const Body> body = FindBody(id);
   const HullPointer former = hulls_.Find(id);
-  if (former != nullptr && TakeOverVersion(locked, *former, other, is_news)) {
+  if (former != nullptr && TakeOverVersion(locked, former, other, is_news)) {
     return AdvanceLater(former);
   }
   if (former != nullptr) {
@@ -141,17 +160,20 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
 }
 
 // Whether it is another version of the hull that was known.
-bool Registry::TakeOverVersion(Locked& locked, RegisteredHull& hull, const OtherChange& other,
+bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
                                bool is_news) {
-  if (!other.hull.has_value() || !other.hull->ok() || hull.state.damaged()) return false;
+  if (!other.hull.has_value() || !other.hull->ok() || hull->state.damaged()) return false;
   const StoredHull& stored = **other.hull;
-  const HullRecord before = hull.committed.record;
+  const HullRecord& before = hull->committed.record;
   if (before.create_revision != stored.record.create_revision) return false;
   // Also where the record is the same: an empty chunk counts in the sequences of its writer.
   vertex_count_ += stored.record.vertex_count - before.vertex_count;
-  hull.Supersede(locked, stored);
-  NoteChange(hull);
-  if (is_news) feed_.NoteChanged(locked, hulls_.Find(before.hull_id));
+  const bool grew =
+      hull->Supersede(locked, stored, other.growth.has_value() ? &*other.growth : nullptr);
+  cache_.grown += grew;
+  if (grew && !ending_ && hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
+  NoteChange(*hull);
+  if (is_news) feed_.NoteChanged(locked, hull);
   return true;
 }
 

@@ -2,10 +2,14 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
+#include <ranges>
 #include <utility>
+#include <vector>
 
 #include "core/base/check.h"
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/registry/memory/hull_loader.h"
 #include "server/registry/registered_hull.h"
@@ -21,10 +25,66 @@ bool Stopped(const std::function<bool()>& should_stop) { return should_stop && s
 
 absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
 
+absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          "freshness.at_least_revision is ", wanted, ", but the store is at revision ", current,
+          " and nobody was told of a later one; give the revision of an answer's header")),
+      v1::ERROR_REASON_FUTURE_REVISION,
+      {{"at_least_revision", wanted}, {"current_revision", current}});
+}
+
 // Nobody is told.
 absl::Status WouldWait() { return absl::UnavailableError("it would have to wait"); }
 
 }  // namespace
+
+// Where what is here is as fresh as this: how stale it may be. Otherwise a question to the store
+// decides. A read that is content, but would soon not be, has that asked for those to come, so that
+// none of them waits.
+std::optional<std::chrono::nanoseconds> Registry::TryFresh(Locked& locked,
+                                                           const Freshness& freshness) {
+  using std::chrono::nanoseconds;
+  if (revision_ < freshness.at_least_revision) return std::nullopt;
+  if (!store_.is_shared()) return nanoseconds(0);
+  const std::optional<SteadyClock::time_point> caught_up = committer_.caught_up(locked);
+  if (!caught_up.has_value()) return std::nullopt;
+  const SteadyClock::time_point began =
+      freshness.began.has_value() ? *freshness.began : SteadyClock::now();
+  const nanoseconds staleness = std::max<nanoseconds>(began - *caught_up, nanoseconds(0));
+  if (!freshness.max_staleness.has_value()) return staleness;
+  if (staleness > *freshness.max_staleness) return std::nullopt;
+  if (staleness > *freshness.max_staleness / 2) AskAhead(locked);
+  return staleness;
+}
+
+void Registry::AskAhead(Locked& locked) {
+  if (std::exchange(is_asking_ahead_, true)) return;
+  committer_.Follow(locked, [this](Locked&, const absl::Status&) { is_asking_ahead_ = false; });
+}
+
+absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
+    Locked& locked, const Freshness& freshness, const std::function<bool()>& should_stop) {
+  if (const auto staleness = TryFresh(locked, freshness)) return *staleness;
+  if (store_.is_shared()) {
+    if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
+  }
+  if (revision_ >= freshness.at_least_revision) return std::chrono::nanoseconds(0);
+  return FutureRevision(freshness.at_least_revision, revision_);
+}
+
+std::optional<std::chrono::nanoseconds> Registry::TryFresh(const Freshness& freshness) {
+  if (IsAlwaysFresh(freshness)) return std::chrono::nanoseconds(0);
+  Locked locked(mutex_);
+  return TryFresh(locked, freshness);
+}
+
+absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
+    const Freshness& freshness, const std::function<bool()>& should_stop) {
+  if (IsAlwaysFresh(freshness)) return std::chrono::nanoseconds(0);
+  Locked locked(mutex_);
+  return AwaitFresh(locked, freshness, should_stop);
+}
 
 // Brings what is known of each hull up to this moment. The mutex is let go of after a number of
 // lookups; what changed by then is looked up again, so at the end all is of one moment. That comes
@@ -47,7 +107,7 @@ absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> id
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
       const absl::Status status =
-          LookUp(locked, ids[due.first], known, known.due_.back(), should_stop, plan, may_wait);
+          LookUp(locked, ids, known, known.due_.back(), should_stop, plan, may_wait);
       if (!status.ok()) return status;
       due.is_due = false;
       known.due_.pop_back();
@@ -80,10 +140,11 @@ absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
 }
 
 // What readers are given of one hull now, or why there is nothing.
-absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls& hulls, uint32_t k,
-                              const std::function<bool()>& should_stop, const ReadPlan& plan,
-                              bool may_wait) {
+absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
+                              uint32_t k, const std::function<bool()>& should_stop,
+                              const ReadPlan& plan, bool may_wait) {
   KnownHulls::Known& known = hulls.hulls_[k];
+  const std::string& id = ids[known.first];
   bool was_missing = false;
   while (true) {
     const HullPointer hull = FindVisible(id);
@@ -100,7 +161,12 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls&
     if (!may_wait && (is_missing || (prepare && plan.prepare_first))) return WouldWait();
     if (is_missing) {
       if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
-      if (!std::exchange(was_missing, true)) ++cache_.misses;
+      if (!std::exchange(was_missing, true)) {
+        ++cache_.misses;
+        LoadMany(locked, ids, hulls, should_stop);
+        if (Stopped(should_stop)) return Cancelled();
+        continue;
+      }
       const absl::Status loaded = LoadForReaders(locked, *hull, should_stop);
       if (Stopped(should_stop) || absl::IsCancelled(loaded)) return Cancelled();
       if (loaded.ok() || hull->state.gone()) continue;
@@ -112,7 +178,9 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls&
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
-    if (!was_missing) ++cache_.hits;
+    const bool is_loaded = std::exchange(known.is_loaded, false);
+    if (!was_missing) ++(is_loaded ? cache_.misses : cache_.hits);
+    was_missing |= is_loaded;
     if (prepare) SchedulePreparing(hull);
     known.view = HullView{hull->committed.record, hull->Serve()};
     known.bytes = hull->SharedBytes();
@@ -122,6 +190,57 @@ absl::Status Registry::LookUp(Locked& locked, const std::string& id, KnownHulls&
       hulls_.RestSome();
     }
     return absl::OkStatus();
+  }
+}
+
+// Reads the points of the next hulls that are due, as far as they are missing and nobody else reads
+// them, from the store, by several threads at a time. Releases the mutex meanwhile. What cannot be
+// read, or was left behind by a writer, stays missing.
+void Registry::LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
+                        const std::function<bool()>& should_stop) {
+  // At some 200 bytes a point, a twentieth of what all may hold: until each is looked up, nobody
+  // asks whether readers hold too much.
+  const uint64_t most_points = std::min<uint64_t>(1 << 17, limits_.memory_limit / 4096);
+  std::vector<HullPointer> chosen;
+  std::vector<uint32_t> indices;
+  std::vector<StoredHull> stored;
+  uint64_t points = 0;
+  if (locked.lookups() > 0) {
+    locked.Unlock();
+    locked.Lock();
+  }
+  // And the one of the caller.
+  const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
+  for (const uint32_t k : std::span(hulls.due_).last(count) | std::views::reverse) {
+    locked.NoteLookup();
+    const HullPointer hull = FindVisible(ids[hulls.hulls_[k].first]);
+    if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
+        hull->state.life() == HullState::Life::kEnding) {
+      continue;
+    }
+    const VertexLayout& layout = hull->committed.layout;
+    points += layout.base_vertices + layout.delta_vertices;
+    if (points > most_points) break;
+    chosen.push_back(hull);
+    indices.push_back(k);
+    stored.push_back(hull->committed);
+  }
+  if (chosen.size() < 2) return;
+  for (const HullPointer& hull : chosen) hull->loading = true;
+  locked.Unlock();
+  std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> loaded =
+      LoadLives(store_, stored, *loaders_, should_stop);
+  locked.Lock();
+  for (size_t i = 0; i < chosen.size(); ++i) {
+    RegisteredHull& hull = *chosen[i];
+    hull.loading = false;
+    hull.changed.notify_all();
+    const bool is_current = hull.committed.record.revision == stored[i].record.revision;
+    if (!loaded[i].ok() || !is_current || hull.live != nullptr || hull.state.gone()) continue;
+    hull.SetLive(*std::move(loaded[i]));
+    ++cache_.loads;
+    hull.NoteUse();
+    hulls.hulls_[indices[i]].is_loaded = true;
   }
 }
 
@@ -137,10 +256,12 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
                                            const ReadPlan& plan) {
   known.Begin(ids);
   known.BeginLookup();
-  if (absl::Status s = AwaitOthers(should_stop); !s.ok()) return s;
   Resolved resolved;
   {
     Locked locked(mutex_);
+    const auto staleness = AwaitFresh(locked, plan.freshness, should_stop);
+    if (!staleness.ok()) return staleness.status();
+    resolved.staleness = *staleness;
     const absl::Status status = LookUpDue(locked, ids, known, should_stop, plan, true);
     if (!status.ok()) return status;
     resolved.store_revision = revision_;
@@ -152,13 +273,14 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
 
 std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
                                              const ReadPlan& plan) {
-  // It has to ask the store what others did.
-  if (store_.is_shared()) return std::nullopt;
   KnownHulls known;
   known.Begin(ids);
   Resolved resolved;
   {
     Locked locked(mutex_);
+    const auto staleness = TryFresh(locked, plan.freshness);
+    if (!staleness.has_value()) return std::nullopt;
+    resolved.staleness = *staleness;
     if (!LookUpDue(locked, ids, known, {}, plan, false).ok()) return std::nullopt;
     resolved.store_revision = revision_;
   }
@@ -166,13 +288,14 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
   return resolved;
 }
 
-absl::StatusOr<std::pair<uint64_t, HullView>> Registry::Resolve(
-    const std::string& id, const std::function<bool()>& should_stop) {
-  absl::StatusOr<Resolved> resolved = Resolve(std::span(&id, 1), should_stop);
+absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
+    const std::string& id, const std::function<bool()>& should_stop, const Freshness& freshness) {
+  absl::StatusOr<Resolved> resolved =
+      Resolve(std::span(&id, 1), should_stop, {.freshness = freshness});
   if (!resolved.ok()) return resolved.status();
   absl::StatusOr<HullView>& hull = resolved->hulls.front();
   if (!hull.ok()) return hull.status();
-  return std::pair(resolved->store_revision, *std::move(hull));
+  return std::pair(resolved->as_of(), *std::move(hull));
 }
 
 absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
@@ -230,7 +353,11 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     }
     // A writer was faster. What was read, or not found, is of a state that was left since.
     const bool is_current = hull.committed.record.revision == stored.record.revision;
-    if (hull.live != nullptr || hull.state.gone() || !is_current) continue;
+    if (hull.live != nullptr || hull.state.gone() || !is_current) {
+      // Others may be faster again and again.
+      if (Stopped(should_stop)) return Cancelled();
+      continue;
+    }
     if (loaded.ok()) {
       hull.SetLive(*std::move(loaded));
       ++cache_.loads;

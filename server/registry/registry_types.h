@@ -3,6 +3,7 @@
 
 #include <absl/status/statusor.h>
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "core/numeric/vector.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/fair_queue.h"
+#include "server/process/synchronization.h"
 #include "server/registry/memory/served_hull.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
@@ -32,6 +34,28 @@ struct HullView {
   std::shared_ptr<const ServedBody> body = nullptr;
 };
 
+// How fresh what a read is answered from must be, where other servers commit to the same store; as
+// proto/hulld/v1/freshness.proto says. All of it must hold. By default a read is linearizable.
+struct Freshness {
+  // However old, without asking: for one that the registry told of a change, which then is here.
+  static Freshness OfWhatIsHere() { return {0, std::nullopt, std::nullopt}; }
+
+  uint64_t at_least_revision = 0;
+  // What was committed up to this long before the read began is to be seen; none: however old.
+  std::optional<std::chrono::nanoseconds> max_staleness = std::chrono::nanoseconds(0);
+  // When the read began; none: when it is made. Who waits for a thread meanwhile gives it, and is
+  // content with what others asked in between.
+  std::optional<SteadyClock::time_point> began;
+};
+
+// What the answer to a read is of.
+struct AsOf {
+  // Of the store.
+  uint64_t revision = 0;
+  // Everything that was committed up to this long before the read began is seen; at least.
+  std::chrono::nanoseconds staleness{0};
+};
+
 // What a reader is about to do with the hulls that it asks for.
 struct ReadPlan {
   // Questions that it will ask of each hull as it is now, if it knows.
@@ -39,11 +63,16 @@ struct ReadPlan {
   // It will wait while what these questions pay for is prepared (LiveHull). Otherwise another
   // thread prepares it for later ones.
   bool prepare_first = false;
+  Freshness freshness = {};
 };
 
 // Hulls that all were current at one revision of the store.
 struct Resolved {
+  AsOf as_of() const { return {store_revision, staleness}; }
+
   uint64_t store_revision = 0;
+  // As in AsOf.
+  std::chrono::nanoseconds staleness{0};
   // In the order asked for; NOT_FOUND where there is none, DATA_LOSS where the store is damaged.
   std::vector<absl::StatusOr<HullView>> hulls;
 };
@@ -134,6 +163,8 @@ struct CacheStatistics {
   uint64_t misses = 0;
   // Hulls read back from the store.
   uint64_t loads = 0;
+  // How often a hull in memory was advanced by the points that another server added to it.
+  uint64_t grown = 0;
   // How often a hull dropped its builder or what it serves to stay within the limit.
   uint64_t evictions = 0;
   // Hulls found damaged in the store.

@@ -62,6 +62,13 @@ inline void SetRevisions(const HullRevisions& revisions, StoredHull* hull) {
   hull->layout.base_revision = revisions.base;
 }
 
+// Two versions of one incarnation of a hull. They have the same base, so that all that came between
+// them is in deltas.
+struct HullGrowth {
+  StoredHull before;
+  StoredHull after;
+};
+
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_STORE_HULL_RECORD_H_

@@ -7,7 +7,9 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "core/numeric/vector.h"
 #include "server/store/body_record.h"
 #include "server/store/hull_record.h"
 
@@ -23,6 +25,9 @@ struct OtherChange {
   // What there is by now: one of the two, or nothing. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;
+  // The points that make the hull that is known here what there is by now, where they were asked
+  // for (Store::LoadGrowth) and could be had. Otherwise the hull is to be read anew.
+  std::optional<std::vector<Vector>> growth;
 };
 
 // What other servers committed to a store that is shared (Store::is_shared), up to a moment.

@@ -124,6 +124,13 @@ absl::Status RocksDbStore::LoadBase(const StoredHull& hull, VertexAssembly* asse
 absl::Status RocksDbStore::LoadDeltas(const StoredHull& hull, VertexAssembly* assembly) {
   if (hull.layout.delta_count == 0) return absl::OkStatus();
   const uint64_t incarnation = hull.record.create_revision;
+  // A single one mostly came with the last change: one value costs half of what a range does.
+  if (hull.layout.delta_count == 1) {
+    const absl::StatusOr<std::optional<std::string>> delta =
+        Read(DeltaKey(incarnation, hull.record.revision));
+    if (delta.ok() && delta->has_value()) return assembly->AddDelta(hull.record.revision, **delta);
+    if (!delta.ok() && !absl::IsDataLoss(delta.status())) return delta.status();
+  }
   return ScanRange(DeltaKey(incarnation, hull.layout.base_revision + 1),
                    DeltaKey(incarnation, hull.record.revision + 1),
                    [&](std::string_view key, std::string_view sealed) {

@@ -162,6 +162,13 @@ class Store {
   virtual absl::Status Follow() { return absl::OkStatus(); }
   // What Commit and Follow found, whether they failed or not, since this was called last.
   virtual OtherChanges TakeOthers() { return {}; }
+  // For each hull the points of its deltas between the two versions, in their order; none where
+  // they are not there as the versions say, as after the hull was given a new base, or cannot be
+  // read. All of them are asked for at once. Never while Commit, Recover or Follow runs.
+  virtual std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
+      std::span<const HullGrowth> hulls) {
+    return std::vector<std::optional<std::vector<Vector>>>(hulls.size());
+  }
   // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
   virtual void OnOthers(std::function<void()> others) { (void)others; }
 

@@ -94,7 +94,7 @@ size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   return bytes + AddNumbers(nullptr, wanted, columns);
 }
 
-size_t AddAnswer(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b,
+size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const QueryHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   if (!answer.ok()) {
     const size_t bytes = AddUnanswered(wanted, columns);

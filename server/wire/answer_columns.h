@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "core/query/collision.h"
-#include "core/query/placed/placed_hull.h"
+#include "core/query/placed/query_hull.h"
 #include "hulld/v1/collision.pb.h"
 
 namespace hulld::server {
@@ -21,7 +21,7 @@ size_t FullMessageBytes(const v1::Wanted& wanted);
 
 // The answer for hulls a and b, or why there is none. Requires canonical hulls where the answer
 // names vertices.
-size_t AddAnswer(const absl::StatusOr<Answer>& answer, const PlacedHull& a, const PlacedHull& b,
+size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const QueryHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
 // Whether something in the columns names a row, so that they cannot follow the rows of others.

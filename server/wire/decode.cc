@@ -3,8 +3,12 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <chrono>
+#include <cstdint>
 #include <cstring>
+#include <optional>
 
+#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
 
@@ -41,6 +45,29 @@ absl::StatusOr<std::vector<Vector>> DecodePoints(const Coordinates& coordinates,
                          "max-points-per-chunk");
   }
   return ToPoints(coordinates);
+}
+
+absl::Status OtherStore(const Store& store) {
+  return WithReason(
+      absl::FailedPreconditionError(absl::StrCat(
+          "freshness.store_id is not that of this store, which is \"", store.id(),
+          "\": the revision means something else here, as after the store was put back to an "
+          "earlier time; read without at_least_revision")),
+      v1::ERROR_REASON_OTHER_STORE, {{"store_id", store.id()}});
+}
+
+absl::StatusOr<std::chrono::nanoseconds> DecodeStaleness(
+    const google::protobuf::Duration& message) {
+  constexpr int64_t kNanosPerSecond = 1'000'000'000;
+  // Far more than a server runs, and far from overflow.
+  constexpr int64_t kMostSeconds = kNanosPerSecond;
+  if (message.seconds() < 0 || message.nanos() < 0 || message.nanos() >= kNanosPerSecond) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("freshness.max_staleness is ", message.seconds(), " s and ", message.nanos(),
+                     " ns; it is at least 0, and its nanos are less than a second"));
+  }
+  if (message.seconds() >= kMostSeconds) return std::chrono::seconds(kMostSeconds);
+  return std::chrono::seconds(message.seconds()) + std::chrono::nanoseconds(message.nanos());
 }
 
 }  // namespace
@@ -91,6 +118,26 @@ absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>&
   pose.t = Vector(numbers[4], numbers[5], numbers[6]);
   if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
   return pose;
+}
+
+absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
+                                          SteadyClock::time_point began) {
+  Freshness freshness;
+  freshness.began = began;
+  freshness.at_least_revision = message.at_least_revision();
+  if (message.at_least_revision() > 0 && message.store_id().empty()) {
+    return absl::InvalidArgumentError(
+        "freshness.at_least_revision needs store_id; give that of the same header");
+  }
+  if (!message.store_id().empty() && message.store_id() != store.id()) return OtherStore(store);
+  if (message.has_max_staleness()) {
+    absl::StatusOr<std::chrono::nanoseconds> bound = DecodeStaleness(message.max_staleness());
+    if (!bound.ok()) return bound.status();
+    freshness.max_staleness = *bound;
+  } else if (message.at_least_revision() > 0) {
+    freshness.max_staleness = std::nullopt;
+  }
+  return freshness;
 }
 
 absl::StatusOr<Method> DecodeMethod(v1::Method method) {

@@ -12,6 +12,7 @@
 #include "core/query/collision.h"
 #include "core/query/terms/pose.h"
 #include "hulld/v1/collision.pb.h"
+#include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/registry/registry.h"
@@ -35,6 +36,12 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message);
 inline constexpr int kPoseNumbers = 7;
 // The i-th of such poses. INVALID_ARGUMENT as DecodePose.
 absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i);
+
+// How fresh the answer to a read must be that began at this time; an empty message, as an absent
+// one is: linearizable. INVALID_ARGUMENT: a negative or malformed duration, or a revision without
+// the store. FAILED_PRECONDITION: the revision is of another store.
+absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
+                                          SteadyClock::time_point began);
 
 // INVALID_ARGUMENT: a number that means no method.
 absl::StatusOr<Method> DecodeMethod(v1::Method method);

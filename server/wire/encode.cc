@@ -70,6 +70,11 @@ void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* mes
   message->set_revision(revision);
 }
 
+void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* message) {
+  EncodeHeader(store, as_of.revision, message);
+  if (as_of.staleness.count() > 0) EncodeDuration(as_of.staleness, message->mutable_staleness());
+}
+
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
   message->set_hull_id(record.hull_id);
   message->set_create_revision(record.create_revision);

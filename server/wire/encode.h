@@ -20,6 +20,8 @@ namespace hulld::server {
 void EncodeVector(const Vector& vector, v1::Vector3* message);
 void EncodeCounts(const PointCounts& counts, v1::PointCounts* message);
 void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message);
+// The same of a read.
+void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* message);
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message);
 // store_id: the ID of the store that keeps the hull.
 void EncodeVersion(const std::string& store_id, const HullRecord& record, v1::HullVersion* message);

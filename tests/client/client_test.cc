@@ -105,6 +105,32 @@ TEST_F(ClientTest, ListingFollowsPagesUpToTheLimit) {
   EXPECT_NE(limited->next_page_token(), "");
 }
 
+TEST_F(ClientTest, PagesThatMayBeStaleAreOfAtLeastTheRevisionOfTheFirst) {
+  for (const char* id : {"a", "b", "c", "d", "e", "f", "g"}) fake_.PutHull(id, {});
+  ClientOptions options = MakeClient().options();
+  // Linearizable pages, by saying nothing or nothing of weight, stay so.
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(Client(options).ListAllHulls("").ok());
+    for (const v1::ListHullsRequest& request : fake_.list_requests()) {
+      EXPECT_EQ(request.freshness().at_least_revision(), 0);
+    }
+    options.freshness.emplace();
+  }
+  options.freshness->mutable_max_staleness()->set_seconds(1);
+  const size_t before = fake_.list_requests().size();
+  ASSERT_TRUE(Client(options).ListAllHulls("").ok());
+  const std::vector<v1::ListHullsRequest> requests = fake_.list_requests();
+  ASSERT_EQ(requests.size(), before + 3);
+  EXPECT_EQ(requests[before].freshness().at_least_revision(), 0);
+  for (size_t i = before; i < requests.size(); ++i) {
+    EXPECT_EQ(requests[i].freshness().max_staleness().seconds(), 1);
+    if (i == before) continue;
+    // The fake server's revision after each page.
+    EXPECT_EQ(requests[i].freshness().at_least_revision(), 100 + i);
+    EXPECT_EQ(requests[i].freshness().store_id(), "store");
+  }
+}
+
 TEST_F(ClientTest, DeletingPassesTheRevisionOn) {
   FakeHull hull;
   hull.revision = 7;

@@ -129,6 +129,9 @@ class FakeHulld::Hulls final : public v1::HullService::Service {
                          v1::ListHullsResponse* response) override {
     if (auto status = fake_.Enter("ListHulls"); !status.ok()) return status;
     const std::lock_guard lock(fake_.mutex_);
+    fake_.list_requests_.push_back(*request);
+    response->mutable_header()->set_store_id("store");
+    response->mutable_header()->set_revision(100 + fake_.list_requests_.size());
     // Pages are small, so that clients have several to follow.
     const int asked = static_cast<int>(request->page_size());
     const int size = asked == 0 ? 3 : std::min(3, asked);
@@ -399,6 +402,11 @@ v1::CheckCollisionRequest FakeHulld::last_collision_request() {
 std::vector<v1::BatchCheckCollisionsRequest> FakeHulld::batch_requests() {
   const std::lock_guard lock(mutex_);
   return batch_requests_;
+}
+
+std::vector<v1::ListHullsRequest> FakeHulld::list_requests() {
+  const std::lock_guard lock(mutex_);
+  return list_requests_;
 }
 
 }  // namespace hulld

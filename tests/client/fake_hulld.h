@@ -83,6 +83,7 @@ class FakeHulld final {
   v1::CheckCollisionResponse collision_answer;
   v1::CheckCollisionRequest last_collision_request();
   std::vector<v1::BatchCheckCollisionsRequest> batch_requests();
+  std::vector<v1::ListHullsRequest> list_requests();
   std::string audit_finding;
 
  private:
@@ -105,6 +106,7 @@ class FakeHulld final {
   int most_unacknowledged_ = 0;
   v1::CheckCollisionRequest last_collision_request_;
   std::vector<v1::BatchCheckCollisionsRequest> batch_requests_;
+  std::vector<v1::ListHullsRequest> list_requests_;
 
   std::unique_ptr<Hulls> hull_service_;
   std::unique_ptr<Collisions> collision_service_;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "tests/client/collision_round.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld {
@@ -69,17 +70,6 @@ class Watches : public server::ServerTest {
     const std::string kind = v1::CollisionEventKind_Name(event.kind());
     return absl::StrCat(absl::StripPrefix(kind, "COLLISION_EVENT_KIND_"), " ", event.placement_a(),
                         " ", event.placement_b());
-  }
-  // The messages up to the next that is `synced`, as one.
-  static v1::WatchCollisionsResponse Round(CollisionWatch& watch) {
-    v1::WatchCollisionsResponse all;
-    while (true) {
-      const auto message = watch.Next();
-      EXPECT_TRUE(message.ok()) << message.status();
-      if (!message.ok()) return all;
-      all.MergeFrom(*message);
-      if (message->synced()) return all;
-    }
   }
   static std::vector<std::string> Events(const v1::WatchCollisionsResponse& round) {
     std::vector<std::string> texts;

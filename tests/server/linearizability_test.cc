@@ -6,6 +6,7 @@
 
 #include <bit>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -320,6 +321,64 @@ TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
   late.store_revision = 0;
   history.Record("a", late);
   EXPECT_THAT(HistoryFault(history), HasSubstr("the store told revision 0 at tick 3"));
+}
+
+// A hull with point 5 since tick 102, as after revision 2, and a probe at ticks 200 to 201 that is
+// answered from this long ago, of this revision of the hull and of the store.
+Operation PastProbe(std::optional<uint64_t> bound, uint64_t staleness, uint64_t revision,
+                    bool touching) {
+  Operation probe = ProbeAt(200, 201, revision, 5, touching);
+  probe.max_staleness = bound;
+  probe.staleness = staleness;
+  return probe;
+}
+std::string FaultOf(const Operation& probe) {
+  return LinearizabilityFault({CreateAt(1, 2), AppendAt(100, 102, 2, 5, 1), probe});
+}
+
+TEST(FreshnessCheck, ABoundedReadMayBeAnsweredFromAsLongAgoAsItSays) {
+  EXPECT_NE(FaultOf(PastProbe(0, 0, 1, false)), "");
+  EXPECT_EQ(FaultOf(PastProbe(150, 98, 1, false)), "");
+  EXPECT_EQ(FaultOf(PastProbe(150, 150, 1, false)), "");
+  EXPECT_EQ(FaultOf(PastProbe(150, 150, 2, true)), "");
+  // The change was acknowledged before that.
+  EXPECT_NE(FaultOf(PastProbe(150, 97, 1, false)), "");
+  // Of before the hull was there.
+  Operation too_early = PastProbe(199, 199, 1, false);
+  EXPECT_EQ(FaultOf(too_early), "");
+  too_early.outcome = Outcome::kNotFound;
+  too_early.store_revision = 0;
+  EXPECT_EQ(FaultOf(too_early), "");
+  too_early.max_staleness = 197;
+  EXPECT_NE(FaultOf(too_early), "");
+}
+
+TEST(FreshnessCheck, RefusesAnAnswerThatIsStalerThanAskedFor) {
+  EXPECT_THAT(FaultOf(PastProbe(149, 150, 2, true)), HasSubstr("150 ns ago to one who wants"));
+  EXPECT_EQ(FaultOf(PastProbe(std::nullopt, 150, 2, true)), "");
+}
+
+TEST(FreshnessCheck, ARevisionThatWasAskedForIsSeen) {
+  Operation probe = PastProbe(std::nullopt, 199, 1, false);
+  probe.at_least_revision = 1;
+  EXPECT_EQ(FaultOf(probe), "");
+  probe.at_least_revision = 2;
+  EXPECT_THAT(FaultOf(probe), HasSubstr("to one who wants at least 2"));
+  // Nor is a hull that was created by then missing.
+  probe.outcome = Outcome::kNotFound;
+  probe.store_revision = 0;
+  EXPECT_NE(FaultOf(probe), "");
+  probe.at_least_revision = 0;
+  EXPECT_EQ(FaultOf(probe), "");
+}
+
+// The answer claims what it does not hold.
+TEST(FreshnessCheck, RefusesAnAnswerThatLacksAChangeOfItsOwnRevision) {
+  Operation probe = PastProbe(150, 150, 1, false);
+  probe.store_revision = 2;
+  EXPECT_NE(FaultOf(probe), "");
+  probe.store_revision = 1;
+  EXPECT_EQ(FaultOf(probe), "");
 }
 
 class Linearizability : public ServerTest {};

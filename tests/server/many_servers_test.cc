@@ -1,162 +1,227 @@
 // Several processes that are active at once over one PostgreSQL database. Clients go from one to
 // another, and what they saw is checked against the specification.
 
-#include <absl/strings/str_cat.h>
-#include <gmock/gmock.h>
-#include <grpcpp/grpcpp.h>
+#include "tests/server/harness/postgres/many_servers.h"
+
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <random>
+#include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
+#include "client/appender.h"
+#include "client/client.h"
+#include "client/verify/answer_check.h"
 #include "tests/server/harness/history_client.h"
-#include "tests/server/harness/hull_history.h"
-#include "tests/server/harness/hulld_process.h"
+#include "tests/server/harness/postgres/cutting_proxy.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
 namespace hulld::server {
 namespace {
 
-class ManyServers : public ::testing::Test {
+using Cut = CuttingProxy::Cut;
+
+uint64_t NumberIn(const char* variable, uint64_t otherwise) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
+}
+
+class ManyServers : public ManyServersTest {
  protected:
-  static constexpr int kServers = 3;
-  static constexpr int kClients = 6;
-
-  void SetUp() override {
-    if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+  // What comes next arrives when its connection is gone.
+  static void Delay(CuttingProxy& proxy, Cut cut) {
+    proxy.CutNext(cut);
+    // Clients may have no more changes for it.
+    proxy.DeliverOnceHeld(std::chrono::seconds(1));
   }
-
-  // Servers over an empty database.
-  void Begin() {
-    servers_.clear();
-    addresses_.clear();
-    PostgresCluster& cluster = PostgresCluster::Shared();
-    conninfo_ = cluster.WriteConninfo(cluster.MakeDatabase());
-    for (int i = 0; i < kServers; ++i) servers_.push_back(Start());
-    for (int i = 0; i < kServers; ++i) addresses_.push_back(AddressOf(*servers_[i]));
+  Client ClientOf(size_t server) {
+    ClientOptions options;
+    options.server = address(server);
+    options.own_connection = true;
+    return Client(options);
   }
-
-  std::unique_ptr<Process> Start() const {
-    return std::make_unique<Process>(std::vector<std::string>{
-        "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file", conninfo_,
-        "--postgres-servers", "many"});
+  // Few runs unless HULLD_MANY_RUNS says otherwise, each with a seed of its own.
+  void ForEachRun(const std::function<void(uint64_t seed)>& run) {
+    const uint64_t first = NumberIn("HULLD_TEST_SEED", 0);
+    const uint64_t end = first + NumberIn("HULLD_MANY_RUNS", 2);
+    for (uint64_t seed = first; seed < end && !HasFailure(); ++seed) run(seed);
   }
-  // It must come to listen.
-  static std::string AddressOf(Process& hulld) {
-    const std::string line = hulld.ReadLineWith("listening on ");
-    if (line.empty()) {
-      for (const std::string& said : hulld.lines()) ADD_FAILURE() << said;
-      std::abort();
-    }
-    return AddressIn(line);
-  }
-  std::shared_ptr<grpc::Channel> Connect(size_t server) {
-    const std::lock_guard lock(mutex_);
-    grpc::ChannelArguments own;
-    own.SetInt("hulld.test.channel", ++channels_);
-    return grpc::CreateCustomChannel(addresses_[server], grpc::InsecureChannelCredentials(), own);
-  }
-  void Replace(size_t server) {
-    servers_[server] = Start();
-    const std::string address = AddressOf(*servers_[server]);
-    const std::lock_guard lock(mutex_);
-    addresses_[server] = address;
-  }
-
-  // Every client goes to another server now and then. fault: called once, when half of the calls
-  // were made.
-  void Run(int calls, uint64_t seed, const std::function<void()>& fault, HullHistory& history) {
-    HistoryClient(Connect(0), history, "probe", 0).MakeProbe();
-    std::atomic<int> made = 0;
-    std::vector<std::thread> clients;
-    for (int i = 0; i < kClients; ++i) {
-      clients.emplace_back([&, i] {
-        std::mt19937_64 random(100 * seed + i);
-        HistoryClient client(Connect(i % kServers), history, absl::StrCat("client-", i),
-                             100 * seed + i);
-        for (int call = 0; call < calls; ++call) {
-          const bool is_answered = client.CallAtRandom(call % 3 == 0 ? "shared/a" : "shared/b");
-          if (!is_answered || random() % 5 == 0) client.Connect(Connect(random() % kServers));
-          ++made;
-          made.notify_one();
-        }
-      });
-    }
-    int seen = 0;
-    while ((seen = made) < kClients * calls / 2) made.wait(seen);
-    fault();
-    for (std::thread& client : clients) client.join();
-  }
-
-  // How many runs: few unless HULLD_MANY_RUNS says otherwise.
-  static int Runs() {
-    const char* const runs = std::getenv("HULLD_MANY_RUNS");
-    return runs == nullptr ? 2 : std::atoi(runs);
-  }
-
-  std::string conninfo_;
-  std::vector<std::unique_ptr<Process>> servers_;
-  std::mutex mutex_;
-  // Guarded by mutex_.
-  std::vector<std::string> addresses_;
-  int channels_ = 0;
 };
 
 TEST_F(ManyServers, ClientsThatGoFromOneToAnotherSeeOneStore) {
-  for (int run = 0; run < Runs(); ++run) {
+  ForEachRun([this](uint64_t seed) {
     Begin();
     HullHistory history;
-    Run(
-        80, run, [] {}, history);
-    ASSERT_EQ(HistoryFault(history), "") << "run " << run;
+    Run({.seed = seed}, {}, history);
+    ExpectLinearizable(history, seed);
     size_t acknowledged = 0;
     for (const auto& [hull_id, operations] : history.operations()) {
       for (const Operation& operation : operations) {
         acknowledged += operation.outcome == Operation::Outcome::kOk;
       }
     }
-    EXPECT_GT(acknowledged, size_t{kClients * 80 / 2});
-  }
+    EXPECT_GT(acknowledged, kClients * 80 / 2);
+  });
 }
 
 TEST_F(ManyServers, TheOthersGoOnWhenOneIsKilled) {
-  for (int run = 0; run < Runs(); ++run) {
+  ForEachRun([this](uint64_t seed) {
     Begin();
     HullHistory history;
-    const size_t victim = run % kServers;
-    Run(
-        80, 1000 + run,
-        [&] {
-          servers_[victim]->Signal(SIGKILL);
-          servers_[victim]->Wait();
-          Replace(victim);
-        },
-        history);
-    ASSERT_EQ(HistoryFault(history), "") << "run " << run;
-  }
+    Run({.seed = 1000 + seed}, {[&] { Replace(seed % kServers); }}, history);
+    ExpectLinearizable(history, seed);
+  });
 }
 
 TEST_F(ManyServers, OneThatStoodStillFindsWhatTheOthersDid) {
   Begin();
   HullHistory history;
-  Run(
-      80, 2000,
-      [&] {
-        servers_[0]->Signal(SIGSTOP);
-        HistoryClient client(Connect(1), history, "meanwhile", 2);
-        for (int call = 0; call < 20; ++call) client.CallAtRandom("shared/a");
-        servers_[0]->Signal(SIGCONT);
-      },
-      history);
-  EXPECT_EQ(HistoryFault(history), "");
+  const auto stand_still = [&] {
+    server(0).Signal(SIGSTOP);
+    HistoryClient client(Connect(1), history, "meanwhile", 2);
+    for (int call = 0; call < 20; ++call) client.CallAtRandom("shared/a");
+    server(0).Signal(SIGCONT);
+  };
+  Run({.seed = 2000}, {stand_still}, history);
+  ExpectLinearizable(history, 2000);
+}
+
+// Each server reaches the database through a network that loses a COMMIT, or the answer to one,
+// delivers either when its connection is gone, or is down for a while. Two clients each
+// write under one ID.
+TEST_F(ManyServers, NothingIsLostBehindANetworkThatCuts) {
+  constexpr int kFaults = 8;
+  ForEachRun([this](uint64_t seed) {
+    PostgresCluster& cluster = PostgresCluster::Shared();
+    const std::string database = cluster.MakeDatabase();
+    std::vector<std::unique_ptr<CuttingProxy>> proxies;
+    std::vector<std::string> files;
+    for (size_t i = 0; i < kServers; ++i) {
+      proxies.push_back(std::make_unique<CuttingProxy>(cluster.socket_directory()));
+      files.push_back(cluster.WriteConninfo(database, proxies.back()->directory()));
+    }
+    Begin(files);
+    std::mt19937_64 random(seed);
+    std::vector<Fault> faults;
+    for (int i = 0; i < kFaults; ++i) {
+      const size_t victim = random() % kServers;
+      CuttingProxy& proxy = *proxies[victim];
+      switch (random() % 5) {
+        case 0:
+          faults.push_back([&proxy] { proxy.CutNext(Cut::kBeforeCommit); });
+          break;
+        case 1:
+          faults.push_back([&proxy] { proxy.CutNext(Cut::kAfterCommit); });
+          break;
+        case 2:
+          faults.push_back([&proxy] { Delay(proxy, Cut::kHold); });
+          break;
+        case 3:
+          faults.push_back([&proxy] { Delay(proxy, Cut::kHoldCommit); });
+          break;
+        default:
+          faults.push_back([this, &proxy, victim] {
+            proxy.SetDown(true);
+            ExpectNoAnswer(victim);
+            proxy.SetDown(false);
+          });
+          break;
+      }
+    }
+    HullHistory history;
+    Run({.seed = 3000 + seed, .share_writers = true}, faults, history);
+    ExpectLinearizable(history, seed);
+  });
+}
+
+TEST_F(ManyServers, ThoseThatStartAtOnceOverAnEmptyDatabaseServeOneStore) {
+  constexpr size_t kAtOnce = 8;
+  PostgresCluster& cluster = PostgresCluster::Shared();
+  BeginAtOnce(std::vector<std::string>(kAtOnce, cluster.WriteConninfo(cluster.MakeDatabase())));
+  HullHistory history;
+  Run({.each = 20, .seed = 4000}, {}, history);
+  ExpectLinearizable(history, 4000);
+}
+
+// Two servers append to a hull at the same time, a third asks, and what tells the first of the
+// others is lost now and then. Every answer is proven, and all say at the end what a server does
+// that was given all points at once.
+TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
+  constexpr int kRounds = 60;
+  PostgresCluster& cluster = PostgresCluster::Shared();
+  const std::string database = cluster.MakeDatabase();
+  CuttingProxy proxy(cluster.socket_directory());
+  const std::string file = cluster.WriteConninfo(database);
+  Begin({cluster.WriteConninfo(database, proxy.directory()), file, file});
+  const Client clients[] = {ClientOf(0), ClientOf(1), ClientOf(2)};
+  std::mt19937_64 random(7);
+  v1::PointBlock all;
+  // Most are outside of what was before.
+  const auto make_points = [&](int round) {
+    std::uniform_int_distribution<int> coordinate(-10 - round, 10 + round);
+    v1::PointBlock points;
+    for (int i = 0; i < 3 * (1 + round % 4); ++i) points.add_xyz(coordinate(random));
+    all.MergeFrom(points);
+    return points;
+  };
+  v1::PointBlock cube;
+  for (int corner = 0; corner < 8; ++corner) {
+    for (int axis = 0; axis < 3; ++axis) cube.add_xyz(corner >> axis & 1);
+  }
+  AppendOptions options;
+  options.create_if_absent = true;
+  const auto append = [&](const Client& client, const std::string& id,
+                          const v1::PointBlock& points) {
+    const auto stream = client.OpenAppend(id, options);
+    ASSERT_TRUE(stream.ok()) << stream.status();
+    ASSERT_TRUE((*stream)->Append(points).ok());
+    const absl::Status finished = (*stream)->Finish();
+    ASSERT_TRUE(finished.ok()) << finished;
+  };
+  append(clients[1], "cube", cube);
+  // Its chunks are on their way while the others are appended.
+  const auto stream = clients[0].OpenAppend("grown", options);
+  ASSERT_TRUE(stream.ok()) << stream.status();
+  std::set<v1::Relation> relations;
+  for (int round = 0; round < kRounds; ++round) {
+    ASSERT_TRUE((*stream)->Append(make_points(round)).ok());
+    append(clients[1], "grown", make_points(round));
+    if (round % 10 == 5) proxy.CutListeners();
+    v1::CheckCollisionRequest request;
+    request.mutable_a()->set_hull_id("grown");
+    request.mutable_b()->set_hull_id("cube");
+    request.mutable_b()->mutable_pose()->mutable_translation()->set_x(40);
+    request.mutable_wanted()->set_certificate(true);
+    const auto checked = CheckCollisionVerified(clients[round % 3 == 0 ? 2 : 0], request);
+    ASSERT_TRUE(checked.ok()) << checked.status();
+    // Another change may come whenever a hull is fetched to check the answer.
+    if (checked->verification.verdict == Verdict::kMoved) continue;
+    EXPECT_EQ(checked->verification.verdict, Verdict::kValid) << checked->verification.reason;
+    relations.insert(checked->response.relation());
+  }
+  const absl::Status finished = (*stream)->Finish();
+  ASSERT_TRUE(finished.ok()) << finished;
+  EXPECT_GE(relations.size(), 2);
+  append(clients[2], "at-once", all);
+  const auto expected = clients[2].GetHullMesh("at-once");
+  ASSERT_TRUE(expected.ok()) << expected.status();
+  for (const Client& client : clients) {
+    const auto mesh = client.GetHullMesh("grown");
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->xyz, expected->xyz);
+    EXPECT_EQ(mesh->facet_sizes, expected->facet_sizes);
+    EXPECT_EQ(mesh->facet_indices, expected->facet_indices);
+    const auto hull = client.GetHull("grown", true);
+    ASSERT_TRUE(hull.ok()) << hull.status();
+    EXPECT_EQ(hull->hull().counts().received(), all.xyz_size() / 3);
+  }
 }
 
 }  // namespace

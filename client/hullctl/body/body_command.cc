@@ -7,6 +7,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/body/body_pieces.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
 
@@ -129,7 +130,9 @@ void OnGiven(Command command, Invocation* invocation, const Arguments& arguments
 }
 
 void AddName(Command command, const Arguments& arguments) {
-  command.AddText("ID", &arguments->body_id, "Name of the body").Required();
+  command.AddText("ID", &arguments->body_id, "Name of the body")
+      .Required()
+      .Completes(ValueKind::kBody);
 }
 
 void AddIfRevision(Command command, const Arguments& arguments, const std::string& help) {
@@ -166,19 +169,22 @@ void AddBodyCommand(Command program, Invocation* invocation) {
   const auto arguments = std::make_shared<BodyArguments>();
   body.SetDetails(
       "A body is a list of pieces, hulls at fixed poses, under one name. Bodies and hulls share\n"
-      "their names: 'check', 'batch', 'scene' and 'stream' take either. The relation of two "
-      "bodies\n"
-      "is the strongest over all pairs of pieces. A piece is its hull as it is when a question is\n"
-      "asked.");
+      "their names: 'check', 'batch', 'scene', 'stream', 'watch' and 'view' take either. The\n"
+      "relation of two bodies is the strongest over all pairs of pieces. A piece is its hull as "
+      "it\n"
+      "is when a question is asked.");
   AddPut(body, invocation, arguments);
   Command get = body.AddCommand("get", "Show the pieces of a body");
   AddName(get, arguments);
+  AddFreshnessOptions(get, invocation);
   get.SetExamples({{"", "hullctl body get bracket"}});
   OnGiven(get, invocation, arguments, Get);
   Command list = body.AddCommand("list", "List the bodies");
-  list.AddText("PREFIX", &arguments->prefix, "Only names that start with it");
+  list.AddText("PREFIX", &arguments->prefix, "Only names that start with it")
+      .Completes(ValueKind::kBody);
   list.AddNumber("--limit", 1, 1000000000, "Stop after N bodies (default: all)",
                  [arguments](uint64_t number) { arguments->limit = number; });
+  AddFreshnessOptions(list, invocation);
   list.SetExamples({{"", "hullctl body list cell-3/"}});
   OnGiven(list, invocation, arguments, List);
   Command remove = body.AddCommand("delete", "Remove a body; its hulls stay");

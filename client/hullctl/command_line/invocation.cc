@@ -77,6 +77,7 @@ Client Invocation::MakeClient() const {
   options.server = server;
   options.timeout = timeout;
   options.security = security;
+  options.freshness = freshness;
   return Client(std::move(options));
 }
 

@@ -54,6 +54,8 @@ struct Invocation {
   std::chrono::milliseconds timeout{30000};
   // The value of --timeout, if given. It bounds calls that take time in proportion to the data.
   std::optional<std::chrono::milliseconds> given_timeout;
+  // How fresh the answers to reads must be, if options say so.
+  std::optional<v1::Freshness> freshness;
   OutputForm form = OutputForm::kTable;
   // Colours for `out`.
   Painter paint;

@@ -262,21 +262,21 @@ void AddAppendCommand(Command program, Invocation* invocation) {
                "committed")
       .Needs(writer);
   command
-      .AddText("--split", &arguments->split,
-               "Make a hull ID/PART of each part, and a body ID of them: of what the file names "
-               "(objects and groups of obj, solids of stl, nodes of gltf), or of what hangs "
-               "together")
+      .AddText(
+          "--split", &arguments->split,
+          "Make a hull ID/PART of each part, and a body ID of them: of what the file names "
+          "(objects and groups of obj, solids of stl, nodes of gltf and dae), or of what hangs "
+          "together")
       .ValueName("HOW")
       .OneOf({"names", "components"});
   command.SetDetails(
-      "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf.\n"
+      "Formats: obj, off, ply, xyz, csv, pcd (text becomes the nearest double), stl, gltf, dae.\n"
       "--create makes the hull when there are points for it; files that are refused leave none.\n"
       "--resume needs the same files, options and writer as before.\n"
       "--split may be run again: a body that has the parts stays as it is.\n"
-      "Of meshes (obj, off, stl, gltf) it is said how much larger the hull is: its volume over "
-      "that\n"
-      "of the mesh, both summed exactly, where the mesh is closed. From 1.5 on there is a "
-      "warning.");
+      "Of meshes (obj, off, stl, gltf, dae) it is said how much larger the hull is: its volume\n"
+      "over that of the mesh, both summed exactly, where the mesh is closed. From 1.5 on there is\n"
+      "a warning.");
   command.SetExamples(
       {{"A new hull of a file", "hullctl append spider spider.obj --create"},
        {"Points as another program makes them", "scanner | hullctl append room - --create"},

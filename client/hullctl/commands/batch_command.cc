@@ -5,6 +5,7 @@
 #include <optional>
 #include <unordered_map>
 
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
@@ -339,6 +340,7 @@ void AddBatchCommand(Command program, Invocation* invocation) {
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddQueryOptions(command, &arguments->wishes);
   command.AddFlag("--colliding", &arguments->colliding, "Leave out the pairs that are separated");
+  AddFreshnessOptions(command, invocation);
   command.SetDetails(kSceneFileHelp);
   command.SetExamples(
       {{"A scene as text", "hullctl batch scene.txt"},

@@ -12,6 +12,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/load/load.h"
 #include "client/hullctl/load/load_subjects.h"
@@ -337,6 +338,7 @@ void AddBenchCommand(Command program, Invocation* invocation) {
       bench.AddCommand("load", "Ask as many clients would; show throughput, latencies and errors");
   AddSettingOptions(load, &arguments->settings);
   AddPlanOptions(load, &arguments->plan);
+  AddFreshnessOptions(load, invocation);
   load.AddFlag(
       "--json", [invocation] { invocation->form = OutputForm::kJson; },
       "The same as --output json");
@@ -347,7 +349,9 @@ void AddBenchCommand(Command program, Invocation* invocation) {
       "hidden.\n"
       "Nothing is retried; latencies are those of requests that succeeded.");
   load.SetExamples({{"As fast as four clients go", "hullctl bench load --clients 4 --duration 30s"},
-                    {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"}});
+                    {"At a steady rate", "hullctl bench load --rate 500 --mode mixed"},
+                    {"Content with what was known 200 ms ago, of several servers over one store",
+                     "hullctl bench load --clients 64 --max-staleness 200ms"}});
   load.OnGiven([=] { invocation->action = [=] { return Load(*invocation, *arguments); }; });
 }
 

@@ -2,6 +2,7 @@
 
 #include "client/formats/text_number.h"
 #include "client/hullctl/command_line/arguments.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
@@ -115,6 +116,9 @@ void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
   if (run.wide()) {
     table.Row({"store", response.header().store_id()})
         .Row({"store revision", std::to_string(response.header().revision())});
+    if (response.header().has_staleness()) {
+      table.Row({"stale by at most", DurationText(response.header().staleness())});
+    }
   }
   table.Print(run.out);
 }
@@ -189,13 +193,14 @@ void AddCheckCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("check", "Ask whether two hulls or bodies collide");
   command.AddText("A", request->mutable_a()->mutable_hull_id(), "Name of a hull or a body")
       .Required()
-      .Completes(ValueKind::kHull);
+      .Completes(ValueKind::kPlaced);
   command.AddText("B", request->mutable_b()->mutable_hull_id(), "Name of a hull or a body")
       .Required()
-      .Completes(ValueKind::kHull);
+      .Completes(ValueKind::kPlaced);
   AddPoseOption(command, "--pose-a", request->mutable_a());
   AddPoseOption(command, "--pose-b", request->mutable_b());
   AddQueryOptions(command, &arguments->wishes);
+  AddFreshnessOptions(command, invocation);
   CheckArguments* const checked = arguments.get();
   command
       .AddParsed(

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -105,6 +106,7 @@ void AddGetCommand(Command program, Invocation* invocation) {
       .Completes(ValueKind::kHull);
   command.AddFlag("--audit", &options->flag,
                   "Also let the server check the hull by other means than it was built by");
+  AddFreshnessOptions(command, invocation);
   command.SetExamples(
       {{"", "hullctl get arm/3"}, {"As JSON, for a script", "hullctl get arm/3 --output json"}});
   command.OnGiven([=] {

@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/table.h"
@@ -148,6 +149,7 @@ void AddListCommand(Command program, Invocation* invocation) {
   command.AddFlag("--count", &arguments->count,
                   "Only how many there are, with how many vertices and points, and how many "
                   "bodies");
+  AddFreshnessOptions(command, invocation);
   command.SetExamples({{"Those of one cell", "hullctl list cell-3/"},
                        {"The ten largest", "hullctl list --sort vertices --limit 10"},
                        {"How many there are", "hullctl list --count"},

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/output_file.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/json.h"
@@ -129,6 +130,7 @@ void AddMeshCommand(Command program, Invocation* invocation) {
                   "Simplify to a hull that encloses this one, instead of one inside it");
   command.AddFlag("--verify", &arguments->verify,
                   "Fetch the hull, too, and check the simplification and its error exactly");
+  AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "Coordinates read back as the same doubles. Facets are whole polygons, counter-clockwise\n"
       "from outside; a flat hull is one facet, a segment an `l`, a point a `p`.\n"

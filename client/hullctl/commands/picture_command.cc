@@ -128,7 +128,8 @@ void AddPictureCommand(Command program, Invocation* invocation) {
       program.AddCommand("picture", "Draw points, a mesh and a hull side by side as SVG");
   command.AddText("--points", &arguments->points, "File of points to draw as dots")
       .ValueName("FILE");
-  command.AddText("--mesh", &arguments->mesh, "Mesh to draw with shading: obj, off, stl or gltf")
+  command
+      .AddText("--mesh", &arguments->mesh, "Mesh to draw with shading: obj, off, stl, gltf or dae")
       .ValueName("FILE");
   command.AddText("--hull", &arguments->hull_id, "Hull of the server to draw")
       .ValueName("ID")

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "client/formats/byte_source.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
@@ -159,6 +160,7 @@ void AddCheck(Command scene, const std::string* scene_file, Invocation* invocati
   Command command = scene.AddCommand("check", "Answer what a scene file asks");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input").Required();
   AddWantedOptions(command, &arguments->wishes);
+  AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "Where the file names pairs, each is answered, as by 'hullctl batch'; else all pairs that\n"
       "collide, or are within the clearance, are found, as by 'hullctl scene FILE'. Hulls and\n"
@@ -182,6 +184,7 @@ void AddSceneCommand(Command program, Invocation* invocation) {
       program.AddCommand("scene", "Find all pairs of a scene that collide; keep scenes as files");
   command.AddText("FILE", &arguments->file, "The scene; - is standard input");
   AddWantedOptions(command, &arguments->wishes);
+  AddFreshnessOptions(command, invocation);
   command.SetDetails(std::string(kSceneFileHelp) +
                      "\nWith a clearance, pairs within it are found although they are separated.");
   command.SetExamples({{"", "hullctl scene scene.json"},

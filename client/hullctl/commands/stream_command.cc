@@ -5,6 +5,7 @@
 
 #include "client/formats/byte_source.h"
 #include "client/formats/text_number.h"
+#include "client/hullctl/command_line/freshness_options.h"
 #include "client/hullctl/command_line/query_options.h"
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
@@ -157,6 +158,7 @@ void AddStreamCommand(Command program, Invocation* invocation) {
   AddWantedOptions(command, &arguments->wishes);
   command.AddFlag("--only-changes", &arguments->only_changes,
                   "Answer updates only by pairs whose relation changed");
+  AddFreshnessOptions(command, invocation);
   command.SetDetails(
       "FILE starts with a scene, as for 'hullctl batch'. Behind one in JSON, each line is a\n"
       "CollisionStreamUpdate of the contract, answered before the next is read. Poses are seven\n"

@@ -126,7 +126,7 @@ class Viewing {
   ExitCode LoadThings() {
     ViewScene scene;
     std::vector<std::string> things = arguments_.things;
-    scene.title = things.empty()      ? "All hulls"
+    scene.title = things.empty()      ? "All hulls and bodies"
                   : IsFile(things[0]) ? ShownName(things[0])
                                       : things[0];
     if (things.size() > 1) absl::StrAppend(&scene.title, " and ", things.size() - 1, " more");
@@ -143,7 +143,7 @@ class Viewing {
         const absl::Status added = AddFile(thing, &scene);
         if (!added.ok()) return run_.FailUsage(added);
       } else {
-        const absl::Status added = AddHulls(program_.client, thing, &scene);
+        const absl::Status added = AddHullsAndBodies(program_.client, thing, &scene);
         if (!added.ok()) return run_.Fail(added);
       }
     }
@@ -248,13 +248,13 @@ ExitCode View(const Invocation& run, const ViewArguments& arguments) {
 
 void AddViewCommand(Command program, Invocation* invocation) {
   auto arguments = std::make_shared<ViewArguments>();
-  Command command = program.AddCommand("view", "Look at hulls and files in a browser");
+  Command command = program.AddCommand("view", "Look at hulls, bodies and files in a browser");
   command
       .AddTexts(
           "ID|PREFIX|FILE", &arguments->things,
-          "Hulls, hulls whose IDs start so, meshes, points, or a scene (.json, .yaml); default: "
-          "all hulls")
-      .Completes(ValueKind::kHull);
+          "Hulls and bodies, those whose IDs start so, meshes, points, or a scene (.json, .yaml); "
+          "default: all hulls and bodies")
+      .Completes(ValueKind::kPlaced);
   command.AddFlag("--demo", &arguments->demo,
                   "Show the textbook's scenes, keys 0 to 7, with hulls made for them");
   command.AddText("--scene", &arguments->scene_key, "The scene of --demo to start with")
@@ -283,6 +283,8 @@ void AddViewCommand(Command program, Invocation* invocation) {
       .ValueName("x|y|z")
       .OneOf({"x", "y", "z"});
   command.SetDetails(
+      "A body is one thing that is dragged as a whole; hulls that are its pieces are shown by\n"
+      "themselves only when they are named.\n"
       "The page asks hulld through hullctl: it never sees your token, and without --edit it\n"
       "changes nothing on the server. The hull of a FILE is made by the server, under view/, and "
       "deleted at the end;\n"

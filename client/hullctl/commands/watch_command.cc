@@ -186,8 +186,8 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
 void AddWatchCommand(Command program, Invocation* invocation) {
   auto options = std::make_shared<WatchOptions>();
   Command command = program.AddCommand("watch", "Tell of hulls, or of a scene, as they change");
-  command.AddText("PREFIX", &options->prefix, "Only hulls whose names start with it")
-      .Completes(ValueKind::kHull);
+  command.AddText("PREFIX", &options->prefix, "Only hulls and bodies whose names start with it")
+      .Completes(ValueKind::kPlaced);
   command.AddFlag("--exact", &options->exact, "Only the hull of this very name");
   command
       .AddText("--scene", &options->scene,

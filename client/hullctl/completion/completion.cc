@@ -92,6 +92,8 @@ void OfferValues(const OptionDescription& option, const std::string& start,
       completion->directories = true;
       return;
     case ValueKind::kHull:
+    case ValueKind::kBody:
+    case ValueKind::kPlaced:
     case ValueKind::kContext:
       break;
   }

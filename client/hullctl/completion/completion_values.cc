@@ -3,6 +3,7 @@
 #include <absl/strings/match.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <set>
 #include <string>
 #include <utility>
@@ -16,7 +17,7 @@ namespace {
 // A person waits.
 constexpr std::chrono::milliseconds kPatience(500);
 // That a list takes little of that time.
-constexpr uint64_t kMostHulls = 20000;
+constexpr uint64_t kMostListed = 20000;
 // More than fill a screen are shown by their parts.
 constexpr size_t kMostShown = 100;
 
@@ -30,24 +31,45 @@ std::vector<Candidate> Contexts(const std::string& start) {
   return candidates;
 }
 
-std::vector<Candidate> Hulls(Invocation* invocation, const std::string& start) {
+// Hulls, bodies, or both.
+std::vector<Candidate> Things(Invocation* invocation, ValueKind kind, const std::string& start) {
   if (!ResolveConnection(invocation).ok()) return {};
   ClientOptions options = invocation->MakeClient().options();
   options.timeout = kPatience;
   options.retry.max_attempts = 1;
-  const auto listed = Client(options).ListAllHulls(start, kMostHulls);
-  if (!listed.ok()) return {};
+  const Client client(options);
   std::vector<Candidate> candidates;
-  std::set<std::string> parts;
-  for (const v1::HullInfo& hull : listed->hulls()) {
-    candidates.push_back({hull.hull_id(), absl::StrCat(hull.vertex_count(), " vertices")});
-    parts.insert(hull.hull_id().substr(0, hull.hull_id().find('/', start.size()) + 1));
+  bool many = false;
+  if (kind != ValueKind::kBody) {
+    const auto hulls = client.ListAllHulls(start, kMostListed);
+    if (!hulls.ok()) return {};
+    for (const v1::HullInfo& hull : hulls->hulls()) {
+      candidates.push_back({hull.hull_id(), absl::StrCat(hull.vertex_count(), " vertices")});
+    }
+    many = !hulls->next_page_token().empty();
   }
-  const bool many = candidates.size() > kMostShown || !listed->next_page_token().empty();
+  if (kind != ValueKind::kHull) {
+    const auto bodies = client.ListAllBodies(start, kMostListed);
+    if (!bodies.ok()) return {};
+    for (const v1::BodyInfo& body : bodies->bodies()) {
+      const char* const pieces = body.piece_count() == 1 ? " piece" : " pieces";
+      candidates.push_back({body.body_id(), absl::StrCat("body, ", body.piece_count(), pieces)});
+    }
+    many = many || !bodies->next_page_token().empty();
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.text < b.text; });
+  std::set<std::string> parts;
+  for (const Candidate& candidate : candidates) {
+    parts.insert(candidate.text.substr(0, candidate.text.find('/', start.size()) + 1));
+  }
+  many = many || candidates.size() > kMostShown;
   // An ID without a further "/" has no part.
   if (!many || parts.contains("")) return candidates;
   candidates.clear();
-  for (const std::string& part : parts) candidates.push_back({part, "hulls"});
+  for (const std::string& part : parts) {
+    candidates.push_back({part, kind == ValueKind::kBody ? "bodies" : "hulls"});
+  }
   return candidates;
 }
 
@@ -55,7 +77,7 @@ std::vector<Candidate> Hulls(Invocation* invocation, const std::string& start) {
 
 ValueSource ValuesFor(Invocation* invocation) {
   return [invocation](ValueKind kind, const std::string& start) {
-    return kind == ValueKind::kContext ? Contexts(start) : Hulls(invocation, start);
+    return kind == ValueKind::kContext ? Contexts(start) : Things(invocation, kind, start);
   };
 }
 

@@ -8,8 +8,8 @@
 
 namespace hulld {
 
-// What a value is, for who completes it.
-enum class ValueKind { kText, kFile, kDirectory, kHull, kContext };
+// What a value is, for who completes it. kPlaced: a hull or a body.
+enum class ValueKind { kText, kFile, kDirectory, kHull, kBody, kPlaced, kContext };
 
 // An option, a flag, or an argument that is known by its place.
 struct OptionDescription {

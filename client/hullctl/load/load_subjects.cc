@@ -43,6 +43,12 @@ void FillPlacement(const std::string& hull_id, Xoshiro256& random, v1::Placement
   t->set_z(kHalfRoom * random.NextSigned());
 }
 
+// Of the hulls that the load makes, none is to be missed.
+ClientOptions Linearizable(ClientOptions connection) {
+  connection.freshness.reset();
+  return connection;
+}
+
 }  // namespace
 
 // One client: its connection, its requests, its stream.
@@ -141,7 +147,9 @@ class LoadSubjects::LoadClient {
 };
 
 LoadSubjects::LoadSubjects(LoadSettings settings, ClientOptions connection)
-    : settings_(std::move(settings)), connection_(std::move(connection)), client_(connection_) {}
+    : settings_(std::move(settings)),
+      connection_(std::move(connection)),
+      client_(Linearizable(connection_)) {}
 
 std::string LoadSubjects::HullId(uint64_t i) const {
   return absl::StrCat(settings_.prefix, "hull-", i);

@@ -175,9 +175,9 @@ void AddCoverCommand(Command program, Invocation* invocation) {
   Command command = program.AddCommand("cover", "Ask whether hulls or a body enclose a mesh");
   command
       .AddTexts("ID", &arguments->words,
-                "Names of hulls or bodies, then the mesh (obj, off, stl, gltf)")
+                "Names of hulls or bodies, then the mesh (obj, off, stl, gltf, dae)")
       .Required()
-      .Completes(ValueKind::kHull);
+      .Completes(ValueKind::kPlaced);
   command.AddNumber(
       "--limit", 0, kAnyNumber,
       absl::StrCat("Triangles to list, the farthest first (default ", kDefaultLimit, ")"),

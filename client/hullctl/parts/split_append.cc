@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/hull_segment.h"
+#include "client/hullctl/body/hull_segment.h"
 #include "client/hullctl/parts/swell.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"

@@ -12,11 +12,6 @@ namespace {
 
 constexpr off_t kMostBytes = off_t{64} << 20;
 
-bool IsMeshFormat(PointFormat format) {
-  return format == PointFormat::kObj || format == PointFormat::kOff ||
-         format == PointFormat::kStl || format == PointFormat::kGltf;
-}
-
 }  // namespace
 
 std::string SwellText(std::optional<double> ratio) {

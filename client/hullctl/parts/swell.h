@@ -21,9 +21,8 @@ std::string SwellText(std::optional<double> ratio);
 // Warns where the hull is so much larger than the mesh that it stands badly for it.
 void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio);
 
-// The meshes of all files as one. Nothing where a file has none: another format than obj, off, stl
-// and gltf, an input that is read once, or no triangle; or where they are more than 64 MiB, which
-// would be held in memory.
+// The meshes of all files as one. Nothing where a file has none: not IsMeshFormat, an input that
+// is read once, or no triangle; or where they are more than 64 MiB, which would be held in memory.
 std::optional<TriangleMesh> MeshOf(const std::vector<ReadRequest>& files);
 
 // The volume of the hull over that of the mesh (see VolumeRatio). `text` is empty where there is

@@ -12,6 +12,7 @@
 #include "client/hullctl/command_line/arguments.h"
 #include "client/hullctl/command_line/interrupt.h"
 #include "client/hullctl/command_line/query_options.h"
+#include "client/hullctl/help/suggestion.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
 #include "client/hullctl/printing/progress_bar.h"
@@ -199,8 +200,13 @@ absl::StatusOr<RobotCheck::Waypoint> RobotCheck::GivenValues() const {
     const int joint = model_.robot.FindJoint(name);
     const auto place = std::find(free.begin(), free.end(), joint);
     if (joint < 0 || place == free.end()) {
+      std::vector<std::string> known;
+      for (const int index : free) {
+        known.push_back(model_.robot.joints[static_cast<size_t>(index)].name);
+      }
       return absl::InvalidArgumentError(absl::StrCat("--joint: ", Quoted(name), " is no joint of ",
-                                                     model_.robot.name, " with a value"));
+                                                     model_.robot.name, " with a value",
+                                                     Suggestion(name, known)));
     }
     double* const value = &values[static_cast<size_t>(place - free.begin())];
     const std::string text = equals == std::string::npos ? "" : given.substr(equals + 1);

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "client/formats/text_number.h"
-#include "client/hullctl/command_line/hull_segment.h"
+#include "client/hullctl/body/hull_segment.h"
 #include "client/point_messages.h"
 #include "client/robot/package_path.h"
 #include "client/robot/urdf_file.h"
@@ -20,8 +20,9 @@ const char kRobotHelp[] =
     "own frame: a mesh its convex hull, a box itself, and cylinders, spheres and capsules "
     "polyhedra\n"
     "around them; how far these reach beyond the shape is printed. The hulls are removed at the\n"
-    "end unless --prefix keeps them. Meshes are obj, stl, ply, off or gltf. A package://NAME/ is\n"
-    "found by --package, in ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and in the folders above "
+    "end unless --prefix keeps them. Meshes are obj, stl, ply, off, gltf or dae. A "
+    "package://NAME/\n"
+    "is found by --package, in ROS_PACKAGE_PATH, in AMENT_PREFIX_PATH, and in the folders above "
     "FILE.\n"
     "Metres and radians, as in URDF. Poses are computed in floating point; answers are exact for\n"
     "those poses.\n";

@@ -19,8 +19,8 @@ namespace hulld {
 enum class BodyForm {
   // As bodies of the server, where 'hullctl scene apply' puts them; poses compose exactly.
   kWhole,
-  // As the hulls of their pieces, named NAME/PIECE, at poses composed in floating point: for what
-  // takes hulls alone, which is TEXTBOOK_SAT and the viewer.
+  // As the hulls of their pieces, named NAME/PIECE, at poses composed in floating point: for
+  // TEXTBOOK_SAT, which takes hulls alone.
   kPieces
 };
 

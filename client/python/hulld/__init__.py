@@ -67,6 +67,7 @@ from hulld.answers.status import Limits, ServerStatus
 from hulld.appender import Appender
 from hulld.backup import Backup
 from hulld.calls.append_state import Appended, Opened
+from hulld.calls.freshness import Freshness
 from hulld.client import Client
 from hulld.collision_stream import CollisionStream
 from hulld.connection import DEFAULT_SERVER, Tls, read_token_file
@@ -142,6 +143,7 @@ __all__ = [
     "Durability",
     "FailedPreconditionError",
     "Feature",
+    "Freshness",
     "Header",
     "Hull",
     "HullChanges",

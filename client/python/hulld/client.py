@@ -32,6 +32,7 @@ from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
 from hulld.calls.attempts import Attempts
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
+from hulld.calls.freshness import Freshness
 from hulld.calls.requests import Call, SceneFilter
 from hulld.calls.told_pairs import WatchedPlacements
 from hulld.calls.wanted import Wanted
@@ -64,6 +65,9 @@ class Client:
     server that was lost. retry: how often calls that are safe to repeat are
     repeated. tls: encrypts. token: sent with each call; never unencrypted to another machine,
     unless `insecure` allows it.
+
+    freshness, of reads: how fresh the answer must be, where several servers serve one store (see
+    Freshness); None: it holds everything that was acknowledged before the call.
 
     Calls raise HulldError (see hulld.errors) where the server refuses them or cannot be reached,
     and ValueError or TypeError where an argument is wrong, before anything is sent. All but
@@ -260,13 +264,17 @@ class Client:
         *,
         audit: bool = False,
         facets: bool = True,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hull:
         """Sizes, counts and box of a hull. audit: the server also checks it by means independent of
         the builder. facets: False leaves out the counts of edges and facets, which take the
         canonical hull. NotFoundError: no such hull.
         """
-        return self._unary(requests.get_hull(hull_id, audit, facets, self._viewer), timeout)
+        return self._unary(
+            requests.as_fresh(requests.get_hull(hull_id, audit, facets, self._viewer), freshness),
+            timeout,
+        )
 
     def get_hull_mesh(
         self,
@@ -275,6 +283,7 @@ class Client:
         side: Literal["inside", "outside"] | None = None,
         max_vertices: int | None = None,
         max_error: float | None = None,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> HullMesh:
         """The canonical vertices and facets of a hull; with `side` a simpler hull inside it, or one
@@ -285,7 +294,12 @@ class Client:
         the mesh's `error`. One of the two is needed with `side`. InvalidArgumentError: a bound that
         cannot be met. NotFoundError: no such hull.
         """
-        return self._mesh(requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout)
+        return self._mesh(
+            requests.as_fresh(
+                requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
+            ),
+            timeout,
+        )
 
     def iter_hull_mesh(
         self,
@@ -294,22 +308,36 @@ class Client:
         side: Literal["inside", "outside"] | None = None,
         max_vertices: int | None = None,
         max_error: float | None = None,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Iterator[MeshPart]:
         """The same in parts of about 1 MiB, as they arrive: MeshHeader, then MeshVertices, then
         MeshFacets."""
-        return self._parts(requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout)
+        return self._parts(
+            requests.as_fresh(
+                requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
+            ),
+            timeout,
+        )
 
     def list_hulls(
-        self, prefix: str = "", *, page_size: int = 1000, timeout: float | None = None
+        self,
+        prefix: str = "",
+        *,
+        page_size: int = 1000,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
     ) -> Iterator[HullInfo]:
         """The hulls whose IDs start with `prefix`, in byte order of their IDs; fetched page by
         page. A hull present throughout appears exactly once. `timeout` is for each page."""
         token = ""
         while True:
-            page = self._unary(requests.list_hulls(prefix, page_size, token), timeout)
+            page = self._unary(
+                requests.as_fresh(requests.list_hulls(prefix, page_size, token), freshness), timeout
+            )
             yield from page.hulls
             token = page.next_page
+            freshness = freshness and freshness.for_next_page(page.header)
             if not token:
                 return
 
@@ -371,19 +399,30 @@ class Client:
         """
         return self._unary(requests.put_body(body_id, pieces, if_revision), timeout)
 
-    def get_body(self, body_id: str, *, timeout: float | None = None) -> Body:
+    def get_body(
+        self, body_id: str, *, freshness: Freshness | None = None, timeout: float | None = None
+    ) -> Body:
         """The pieces of a body. NotFoundError: no such body."""
-        return self._unary(requests.get_body(body_id), timeout)
+        return self._unary(requests.as_fresh(requests.get_body(body_id), freshness), timeout)
 
     def list_bodies(
-        self, prefix: str = "", *, page_size: int = 1000, timeout: float | None = None
+        self,
+        prefix: str = "",
+        *,
+        page_size: int = 1000,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
     ) -> Iterator[BodyInfo]:
         """The bodies whose IDs start with `prefix`, without their pieces; as list_hulls."""
         token = ""
         while True:
-            page = self._unary(requests.list_bodies(prefix, page_size, token), timeout)
+            page = self._unary(
+                requests.as_fresh(requests.list_bodies(prefix, page_size, token), freshness),
+                timeout,
+            )
             yield from page.bodies
             token = page.next_page
+            freshness = freshness and freshness.for_next_page(page.header)
             if not token:
                 return
 
@@ -412,6 +451,7 @@ class Client:
         clearance: float | None = None,
         tolerance: float = 0.0,
         method: Method = Method.UNSPECIFIED,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Collision:
         """The relation of one pair: exact, for the doubles given.
@@ -430,7 +470,10 @@ class Client:
         """
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._unary(
-            requests.check_collision(a, b, wanted, tolerance, method, self._viewer), timeout
+            requests.as_fresh(
+                requests.check_collision(a, b, wanted, tolerance, method, self._viewer), freshness
+            ),
+            timeout,
         )
 
     def check_collisions(
@@ -447,6 +490,7 @@ class Client:
         clearance: float | None = None,
         tolerance: float = 0.0,
         method: Method = Method.UNSPECIFIED,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Batch:
         """The relations of many pairs, in parallel (BatchCheckCollisions).
@@ -461,7 +505,9 @@ class Client:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         batch = BatchAssembly(asked, wanted)
         for data in self._received(
-            requests.check_collisions(packed, asked, wanted, tolerance, method),
+            requests.as_fresh(
+                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
+            ),
             self._seconds(timeout),
         ):
             read_answer(batch.add, data)
@@ -481,6 +527,7 @@ class Client:
         clearance: float | None = None,
         tolerance: float = 0.0,
         method: Method = Method.UNSPECIFIED,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Iterator[BatchPart]:
         """The same in parts, as they arrive: ascending ranges that cover every pair once."""
@@ -488,7 +535,10 @@ class Client:
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.check_collisions(packed, asked, wanted, tolerance, method), timeout
+            requests.as_fresh(
+                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
+            ),
+            timeout,
         )
 
     def find_collisions(
@@ -507,6 +557,7 @@ class Client:
         witness: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Scene:
         """The pairs of a scene that collide, or are within a clearance or tolerance. Pairs far
@@ -521,7 +572,10 @@ class Client:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         found = SceneAssembly(wanted)
         for data in self._received(
-            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
+            requests.as_fresh(
+                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
+                freshness,
+            ),
             self._seconds(timeout),
         ):
             read_answer(found.add, data)
@@ -543,6 +597,7 @@ class Client:
         witness: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Iterator[ScenePart]:
         """The same in parts, as pairs are found: ascending, each pair once. The last part holds the
@@ -550,7 +605,11 @@ class Client:
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance), timeout
+            requests.as_fresh(
+                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
+                freshness,
+            ),
+            timeout,
         )
 
     def stream_collisions(
@@ -567,6 +626,7 @@ class Client:
         witness: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> CollisionStream:
         """Opens a stream of pose changes, and answers every pair once. only_changes: answers
@@ -583,6 +643,7 @@ class Client:
             wanted,
             tolerance,
             only_changes,
+            freshness,
             self._seconds(timeout),
         )
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hulld.answers.assembly import StepAssembly
 from hulld.answers.collisions import StreamAnswer
 from hulld.calls.duplex import Duplex
+from hulld.calls.freshness import Freshness
 from hulld.calls.requests import open_stream, update_stream
 from hulld.calls.wanted import Wanted
 from hulld.errors import (
@@ -46,6 +47,7 @@ class CollisionStream:
         wanted: Wanted,
         tolerance: float,
         only_changes: bool,
+        freshness: Freshness | None,
         timeout: float | None,
     ) -> None:
         self._placements = len(placements)
@@ -55,7 +57,9 @@ class CollisionStream:
         self._count = 0
         self._failed: HulldError | None = None
         self._connection = Duplex(call, metadata)
-        self._opened = self._ask(open_stream(placements, pairs, wanted, tolerance, only_changes))
+        self._opened = self._ask(
+            open_stream(placements, pairs, wanted, tolerance, only_changes, freshness)
+        )
 
     @property
     def opened(self) -> StreamAnswer:

@@ -45,7 +45,7 @@ size_t EncodeProof(const PlacementTable& table, uint32_t a, uint32_t b,
 size_t AddProvenAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
-  const PlacedHull nothing = table.HullOfPiece(a, 0);
+  const QueryHull& nothing = table.HullOfPiece(a, 0);
   const PiecePair pieces = answer.of_body.pieces.value_or(PiecePair{0, 0});
   v1::AnswerColumns row;
   size_t bytes = AddAnswer(answer.answer, table.HullOfPiece(a, pieces.a),
@@ -81,7 +81,9 @@ absl::Status NameLimit(const PlacementTable& table, uint32_t a, uint32_t b,
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache) {
   if (!table.is_body(a) && !table.is_body(b)) {
-    return {CheckCollision(table.placed()[a], table.placed()[b], options, cache)};
+    std::optional<PlacedHull> made_a;
+    std::optional<PlacedHull> made_b;
+    return {CheckCollision(table.PlacedAt(a, &made_a), table.PlacedAt(b, &made_b), options, cache)};
   }
   if (absl::Status s = ValidateForBodies(options); !s.ok()) return {s};
   absl::StatusOr<BodyAnswer> found = CheckBodies(table.bodies()[a], table.bodies()[b], options);
@@ -93,7 +95,7 @@ size_t AddPlacedAnswer(const PlacementTable& table, uint32_t a, uint32_t b,
                        const PlacedAnswer& answer, const v1::Wanted& wanted,
                        v1::AnswerColumns* columns) {
   if (!table.has_bodies()) {
-    return AddAnswer(answer.answer, table.placed()[a], table.placed()[b], wanted, columns);
+    return AddAnswer(answer.answer, table.HullAt(a), table.HullAt(b), wanted, columns);
   }
   const bool is_proven =
       wanted.certificate() && answer.answer.ok() && (table.is_body(a) || table.is_body(b));

@@ -113,27 +113,26 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
 PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller& caller)
     : is_packed_(true), prefix_(caller.prefix) {
   std::vector<absl::Status> malformed(packed.hull_ids_size());
-  named_.resize(malformed.size());
+  named_.resize(malformed.size(), kNoHull);
   for (size_t k = 0; k < named_.size(); ++k) {
     const std::string& id = packed.hull_ids(static_cast<int>(k));
     malformed[k] =
         Prefixed("packed_placements.", CheckHullId(caller, id, absl::StrCat("hull_ids[", k, "]")));
     if (!malformed[k].ok()) continue;
-    named_[k] = ids_.size();
+    named_[k] = static_cast<uint32_t>(ids_.size());
     ids_.push_back(id);
   }
-  entries_.resize(packed.hulls_size());
-  for (size_t i = 0; i < entries_.size(); ++i) {
-    Entry& entry = entries_[i];
-    const uint32_t hull = packed.hulls(static_cast<int>(i));
-    entry.hull = named_[hull];
-    entry.malformed = malformed[hull];
-    if (!entry.malformed.ok()) continue;
-    const absl::StatusOr<Pose> pose = DecodePoseAt(packed.poses(), static_cast<int>(i));
-    if (pose.ok()) {
-      entry.pose = *pose;
+  const size_t count = packed.hulls_size();
+  hull_of_.reserve(count);
+  poses_.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    const uint32_t named = packed.hulls(static_cast<int>(i));
+    hull_of_.push_back(named_[named]);
+    if (HasHull(i)) {
+      SetPose(i, DecodePoseAt(packed.poses(), static_cast<int>(i)), "packed_placements.poses[",
+              "].");
     } else {
-      entry.malformed = Prefixed(absl::StrCat("packed_placements.poses[", i, "]."), pose.status());
+      malformed_.emplace(i, malformed[named]);
     }
   }
 }
@@ -141,26 +140,35 @@ PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller&
 PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                                const Caller& caller)
     : prefix_(caller.prefix) {
-  std::unordered_map<std::string, size_t> index_of;
-  entries_.resize(placements.size());
-  for (size_t i = 0; i < entries_.size(); ++i) {
+  std::unordered_map<std::string_view, uint32_t> index_of;
+  const size_t count = placements.size();
+  hull_of_.resize(count, kNoHull);
+  poses_.resize(count);
+  for (size_t i = 0; i < count; ++i) {
     const v1::Placement& placement = placements[static_cast<int>(i)];
-    Entry& entry = entries_[i];
     auto known = index_of.find(placement.hull_id());
     if (known == index_of.end()) {
-      entry.malformed = Prefixed(absl::StrCat("placements[", i, "]."),
-                                 CheckHullId(caller, placement.hull_id(), "hull_id"));
-      if (!entry.malformed.ok()) continue;
-      known = index_of.emplace(placement.hull_id(), ids_.size()).first;
+      const absl::Status status = CheckHullId(caller, placement.hull_id(), "hull_id");
+      if (!status.ok()) {
+        malformed_.emplace(i, Prefixed(absl::StrCat("placements[", i, "]."), status));
+        continue;
+      }
+      const auto next = static_cast<uint32_t>(ids_.size());
+      known = index_of.emplace(placement.hull_id(), next).first;
       ids_.push_back(placement.hull_id());
     }
-    entry.hull = known->second;
-    const absl::StatusOr<Pose> pose = DecodePose(placement.pose());
-    if (pose.ok()) {
-      entry.pose = *pose;
-    } else {
-      entry.malformed = Prefixed(absl::StrCat("placements[", i, "].pose."), pose.status());
-    }
+    hull_of_[i] = known->second;
+    SetPose(i, DecodePose(placement.pose()), "placements[", "].pose.");
+  }
+}
+
+// of, after: what an error says before and after the index.
+void PlacementTable::SetPose(size_t i, absl::StatusOr<Pose> pose, const char* of,
+                             const char* after) {
+  if (pose.ok()) {
+    poses_[i] = *pose;
+  } else {
+    malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), pose.status()));
   }
 }
 
@@ -168,16 +176,21 @@ size_t PlacementTable::MemoryBytes() const {
   size_t of_ids = 0;
   for (const std::string& id : ids_) of_ids += id.capacity();
   size_t of_errors = 0;
-  for (const Entry& entry : entries_) {
+  for (const auto& [i, status] : malformed_) {
+    // What it takes in the map; a guess.
+    constexpr size_t kNodeBytes = 64;
+    of_errors += kNodeBytes;
     // Placements share what is wrong with an ID that packed ones name.
-    if (!is_packed_ || entry.hull.has_value()) of_errors += ErrorBytes(entry.malformed);
+    if (!is_packed_ || HasHull(i)) of_errors += ErrorBytes(status);
   }
   for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
-  return entries_.size() * (sizeof(Entry) + sizeof(PlacedHull)) + named_.size() * sizeof named_[0] +
+  const size_t each =
+      2 * sizeof(uint32_t) + sizeof(Pose) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
+  return size() * each + named_.size() * sizeof named_[0] +
          ids_.size() *
              (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
-         entries_.size() * sizeof(uint32_t) + of_ids + of_errors + BodyBytes();
+         of_ids + of_errors + BodyBytes();
 }
 
 // Known once they are resolved.
@@ -220,7 +233,8 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
   absl::StatusOr<Resolved> resolved =
-      ResolvePlaced(registry, ids, LookupFor(options, {}), options.should_stop);
+      ResolvePlaced(registry, ids, LookupFor(options, {.freshness = Freshness::OfWhatIsHere()}),
+                    options.should_stop);
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
@@ -231,13 +245,13 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
     const QueryHull& query_hull = QueryHullOf(hulls_[k], options.WantsCanonical());
     changed_[k] = !IsSame(before, hulls_[k]);
     query_hull_changed_[k] = std::exchange(query_hulls_[k], &query_hull) != &query_hull;
-    for (const uint32_t i : placements_of(k)) placed_[i] = Place(i);
+    for (const uint32_t i : placements_of(k)) PlaceAgain(i);
     if (!has_bodies()) continue;
     TakeBody(k);
     for (const uint32_t i : placements_of(k)) bodies_[i] = PlaceBody(i);
   }
   if (!has_bodies()) TakeBodies();
-  store_revision_ = resolved->store_revision;
+  as_of_ = resolved->as_of();
   return absl::OkStatus();
 }
 
@@ -268,10 +282,12 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved,
   hulls_ = std::move(resolved.hulls);
   query_hulls_ = std::move(query_hulls);
   store_id_ = registry.store().id();
-  store_revision_ = resolved.store_revision;
+  as_of_ = resolved.as_of();
   placed_.clear();
-  placed_.reserve(entries_.size());
-  for (size_t i = 0; i < entries_.size(); ++i) placed_.push_back(Place(i));
+  if (!places_on_demand_) {
+    placed_.reserve(size());
+    for (size_t i = 0; i < size(); ++i) placed_.push_back(Place(i));
+  }
   TakeBodies();
   hulls_of_pieces_.clear();
   if (options.want_certificate) TakeHullsOfPieces();
@@ -289,8 +305,8 @@ void PlacementTable::TakeBodies() {
   bodies_of_hulls_.resize(ids_.size());
   query_bodies_.resize(ids_.size());
   for (size_t k = 0; k < ids_.size(); ++k) TakeBody(k);
-  bodies_.reserve(entries_.size());
-  for (size_t i = 0; i < entries_.size(); ++i) bodies_.push_back(PlaceBody(i));
+  bodies_.reserve(size());
+  for (size_t i = 0; i < size(); ++i) bodies_.push_back(PlaceBody(i));
 }
 
 void PlacementTable::TakeBody(size_t k) {
@@ -317,57 +333,59 @@ void PlacementTable::TakeHullsOfPieces() {
 
 PlacedBody PlacementTable::PlaceBody(size_t i) const {
   if (!is_answerable(i)) return PlacedBody(NoBody(), Pose());
-  return PlacedBody(*query_bodies_[*entries_[i].hull], entries_[i].pose);
+  return PlacedBody(*query_bodies_[hull_of_[i]], poses_[i]);
 }
 
 void PlacementTable::SortByHull() {
   by_hull_begin_.assign(ids_.size() + 1, 0);
-  for (const Entry& entry : entries_) {
-    if (entry.hull.has_value()) ++by_hull_begin_[*entry.hull];
+  for (const uint32_t k : hull_of_) {
+    if (k != kNoHull) ++by_hull_begin_[k];
   }
   size_t sum = 0;
   for (size_t& begin : by_hull_begin_) begin = sum += begin;
   by_hull_.resize(sum);
-  for (size_t i = entries_.size(); i-- > 0;) {
-    if (!entries_[i].hull.has_value()) continue;
-    by_hull_[--by_hull_begin_[*entries_[i].hull]] = static_cast<uint32_t>(i);
+  for (size_t i = size(); i-- > 0;) {
+    if (HasHull(i)) by_hull_[--by_hull_begin_[hull_of_[i]]] = static_cast<uint32_t>(i);
   }
+}
+
+const QueryHull& PlacementTable::HullAt(size_t i) const {
+  return is_answerable(i) ? *query_hulls_[hull_of_[i]] : NoHull();
 }
 
 PlacedHull PlacementTable::Place(size_t i) const {
   if (!is_answerable(i)) return PlacedHull(NoHull(), Pose());
-  const Entry& entry = entries_[i];
-  return PlacedHull(*query_hulls_[*entry.hull], entry.pose);
+  return PlacedHull(*query_hulls_[hull_of_[i]], poses_[i]);
+}
+
+void PlacementTable::PlaceAgain(size_t i) {
+  if (!places_on_demand_) placed_[i] = Place(i);
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {
-  const Entry& entry = entries_[i];
-  return entry.malformed.ok() ? hulls_[*entry.hull].status() : entry.malformed;
+  return IsMalformed(i) ? malformed_.at(i) : hulls_[hull_of_[i]].status();
 }
 
-bool PlacementTable::hull_changed(size_t i) const {
-  return entries_[i].hull.has_value() && changed_[*entries_[i].hull];
-}
+bool PlacementTable::hull_changed(size_t i) const { return HasHull(i) && changed_[hull_of_[i]]; }
 
 bool PlacementTable::query_hull_changed(size_t i) const {
-  return entries_[i].hull.has_value() && query_hull_changed_[*entries_[i].hull];
+  return HasHull(i) && query_hull_changed_[hull_of_[i]];
 }
 
 void PlacementTable::Move(size_t i, const Pose& X_WH) {
-  Entry& entry = entries_[i];
-  if (!entry.hull.has_value()) return;
-  entry.pose = X_WH;
-  entry.malformed = absl::OkStatus();
-  placed_[i] = Place(i);
+  if (!HasHull(i)) return;
+  poses_[i] = X_WH;
+  malformed_.erase(i);
+  PlaceAgain(i);
   if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
 void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
-  server::EncodeHeader(store, store_revision_, header);
+  server::EncodeHeader(store, as_of_, header);
 }
 
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
-  const size_t placements = named_.size() + entries_.size();
+  const size_t placements = named_.size() + size();
   size_t bytes = 0;
   size_t row = first;
   for (; row < table_rows() && bytes < Config::kReplyMessageBytes; ++row) {
@@ -390,9 +408,9 @@ size_t PlacementTable::EncodePlacement(size_t row, const RowFields& to) const {
   const size_t i = is_name ? 0 : row - named_.size();
   if (is_name || !is_packed_) {
     v1::HullVersion* const version = to.hulls->Add();
-    const std::optional<size_t> hull = is_name ? named_[row] : entries_[i].hull;
-    const bool known = hull.has_value() && hulls_[*hull].ok() && (is_name || problem(i).ok());
-    if (known) EncodeHull(*hull, version);
+    const uint32_t hull = is_name ? named_[row] : hull_of_[i];
+    const bool known = hull != kNoHull && hulls_[hull].ok() && (is_name || problem(i).ok());
+    if (known) EncodeHull(hull, version);
     bytes += version->ByteSizeLong();
   }
   if (is_name || problem(i).ok()) return bytes;

@@ -11,9 +11,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/query/body/placed_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
@@ -40,6 +42,10 @@ class PlacementTable {
       const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
+  // Placements are placed when they are asked for, each time: for a call that asks for each of them
+  // about once. Before Resolve.
+  void PlaceOnDemand() { places_on_demand_ = true; }
+
   // Resolves every hull and body once, all at one revision of the store, for queries that answer
   // with `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
   absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
@@ -51,13 +57,20 @@ class PlacementTable {
   // The same as Resolve, but false, at once, where it would have to wait or to make something.
   bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
 
-  size_t size() const { return entries_.size(); }
+  size_t size() const { return poses_.size(); }
   // How many hulls there are for them.
   size_t hull_count() const { return ids_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
-  // Of a body, an empty hull stands in.
-  std::span<const PlacedHull> placed() const { return placed_; }
+  // Of a body, an empty hull stands in. Requires that they are not placed on demand.
+  std::span<const PlacedHull> placed() const {
+    HULLD_DCHECK(!places_on_demand_);
+    return placed_;
+  }
+  // One of them; held by `made` where they are placed on demand.
+  const PlacedHull& PlacedAt(size_t i, std::optional<PlacedHull>* made) const {
+    return places_on_demand_ ? made->emplace(Place(i)) : placed_[i];
+  }
   // Whether a placement is a body, or was one; then bodies() holds every placement, hulls too.
   // Otherwise it is empty.
   bool has_bodies() const { return !bodies_.empty(); }
@@ -65,14 +78,16 @@ class PlacementTable {
   bool is_body(size_t i) const { return has_bodies() && !bodies_[i].body().is_hull(); }
   // A box about a placement, world frame: BoundingBox.
   Box BoxOf(size_t i) const {
-    return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed_[i]);
+    return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
-  // A hull, or the hull of a piece, for what it is made of alone: its pose means nothing.
-  PlacedHull HullOfPiece(size_t i, uint32_t piece) const {
+  // What is placed; of a body, or what cannot be answered for, an empty hull.
+  const QueryHull& HullAt(size_t i) const;
+  // The same, but of a body the hull of a piece.
+  const QueryHull& HullOfPiece(size_t i, uint32_t piece) const {
     const auto pieces = bodies_[i].body().pieces();
-    return piece < pieces.size() ? PlacedHull(*pieces[piece].hull, Pose()) : placed_[i];
+    return piece < pieces.size() ? *pieces[piece].hull : HullAt(i);
   }
-  bool is_answerable(size_t i) const { return problem(i).ok(); }
+  bool is_answerable(size_t i) const { return !IsMalformed(i) && hulls_[hull_of_[i]].ok(); }
   // Why not, else OK. Requires that the hulls were resolved.
   const absl::Status& problem(size_t i) const;
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one; of a
@@ -82,7 +97,8 @@ class PlacementTable {
   // name that one's points.
   bool query_hull_changed(size_t i) const;
 
-  // The same as Resolve for a few of hull_ids(), by index, each once; the others stay as they are.
+  // The same as Resolve for a few of hull_ids(), by index, each once, of which the registry told
+  // that they changed, so that they are taken as they are there; the others stay as they are.
   absl::Status ResolveSome(Registry& registry, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
@@ -99,10 +115,12 @@ class PlacementTable {
                                        by_hull_begin_[k + 1] - by_hull_begin_[k]);
   }
   // The hull of a placement; none when the ID is malformed or not the caller's.
-  std::optional<size_t> hull_of(size_t i) const { return entries_[i].hull; }
-  uint64_t store_revision() const { return store_revision_; }
+  std::optional<size_t> hull_of(size_t i) const {
+    return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
+  }
+  uint64_t store_revision() const { return as_of_.revision; }
 
-  // The store's revision of the last Resolve.
+  // What the last Resolve was of.
   void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
   // A version per placement, or per hull that packed placements name, and the problems; then, where
   // certificates are wanted, the hulls of pieces: the rows of a table, from row `first` on, as many
@@ -113,19 +131,14 @@ class PlacementTable {
     return EncodeRows(first, {message->mutable_hulls(), message->mutable_placement_problems(),
                               message->mutable_piece_hulls()});
   }
-  size_t table_rows() const { return named_.size() + entries_.size() + hulls_of_pieces_.size(); }
+  size_t table_rows() const { return named_.size() + size() + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
   // Requires that the placement is not answerable.
   void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
 
  private:
-  struct Entry {
-    // Index into hulls_; none when the ID is malformed or not the caller's.
-    std::optional<size_t> hull;
-    // What is wrong with the ID or the pose.
-    absl::Status malformed;
-    Pose pose;
-  };
+  // No index into hulls_.
+  static constexpr uint32_t kNoHull = UINT32_MAX;
 
   // Where the rows go.
   struct RowFields {
@@ -138,6 +151,9 @@ class PlacementTable {
                  const Caller& caller);
   PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
 
+  bool HasHull(size_t i) const { return hull_of_[i] != kNoHull; }
+  bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
+  void SetPose(size_t i, absl::StatusOr<Pose> pose, const char* of, const char* after);
   absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
                            const ReadPlan& plan);
   PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
@@ -151,12 +167,17 @@ class PlacementTable {
   PlacedBody PlaceBody(size_t i) const;
   void SortByHull();
   PlacedHull Place(size_t i) const;
+  void PlaceAgain(size_t i);
 
-  std::vector<Entry> entries_;
-  // Each hull that packed placements name, as an index into ids_; none when it is malformed or
-  // not the caller's.
+  // Of each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
+  // not the caller's; and its pose.
+  std::vector<uint32_t> hull_of_;
+  std::vector<Pose> poses_;
+  // What is wrong with the ID or the pose of a placement.
+  std::unordered_map<size_t, absl::Status> malformed_;
   bool is_packed_ = false;
-  std::vector<std::optional<size_t>> named_;
+  // Each hull that packed placements name, as such an index.
+  std::vector<uint32_t> named_;
   std::vector<std::string> ids_;
   // Parallel to ids_.
   std::vector<absl::StatusOr<HullView>> hulls_;
@@ -171,7 +192,9 @@ class PlacementTable {
   std::vector<size_t> by_hull_begin_;
   // Of the last Resolve.
   std::string store_id_;
-  uint64_t store_revision_ = 0;
+  AsOf as_of_;
+  bool places_on_demand_ = false;
+  // Empty where they are placed on demand.
   std::vector<PlacedHull> placed_;
 
   // The caller's.

@@ -87,11 +87,14 @@ absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& shou
   return absl::OkStatus();
 }
 
+ReadPlan PlanOf(const PlacedLookup& lookup) {
+  return lookup.canonical ? ReadPlan{.freshness = lookup.plan.freshness} : lookup.plan;
+}
+
 absl::StatusOr<Resolved> RefreshHulls(Registry& registry, std::span<const std::string> ids,
                                       KnownHulls& known, const PlacedLookup& lookup,
                                       const std::function<bool()>& should_stop) {
-  absl::StatusOr<Resolved> resolved =
-      registry.Refresh(ids, known, should_stop, lookup.canonical ? ReadPlan() : lookup.plan);
+  absl::StatusOr<Resolved> resolved = registry.Refresh(ids, known, should_stop, PlanOf(lookup));
   if (!resolved.ok() || !lookup.canonical) return resolved;
   if (absl::Status s = MakeCanonical(registry, should_stop, resolved->hulls); !s.ok()) return s;
   return resolved;
@@ -174,6 +177,7 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
   };
   Resolved resolved;
   resolved.store_revision = hulls->store_revision;
+  resolved.staleness = hulls->staleness;
   resolved.hulls.reserve(ids.size());
   for (size_t i = 0; i < ids.size(); ++i) {
     resolved.hulls.push_back(bodies[i] == nullptr
@@ -186,11 +190,13 @@ absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::
 std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
                                          const PlacedLookup& lookup) {
   if (!BodiesAmong(registry, ids).empty()) return std::nullopt;
-  std::optional<Resolved> resolved =
-      registry.TryResolve(ids, lookup.canonical ? ReadPlan() : lookup.plan);
-  if (!resolved.has_value() || !lookup.canonical) return resolved;
+  std::optional<Resolved> resolved = registry.TryResolve(ids, PlanOf(lookup));
+  if (!resolved.has_value()) return resolved;
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
-    if (hull.ok() && !hull->served->has_canonical_query_hull()) return std::nullopt;
+    // It may be a body since they were looked for.
+    if (absl::IsNotFound(hull.status()) && registry.has_bodies()) return std::nullopt;
+    if (!lookup.canonical || !hull.ok()) continue;
+    if (!hull->served->has_canonical_query_hull()) return std::nullopt;
   }
   return resolved;
 }

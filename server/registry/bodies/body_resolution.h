@@ -37,6 +37,7 @@ struct PlacedLookup {
   bool canonical = false;
   // What IDs must start with, those of pieces too; it is the caller's.
   std::string prefix;
+  // Canonical snapshots need nothing prepared.
   ReadPlan plan;
 };
 

@@ -4,10 +4,13 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <atomic>
+#include <mutex>
 #include <string>
 #include <utility>
 
 #include "core/numeric/orientation.h"
+#include "server/process/synchronization.h"
 #include "server/store/store_errors.h"
 
 namespace hulld::server {
@@ -41,12 +44,63 @@ absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& s
   return points;
 }
 
+// Hulls that several threads load: each takes the next one.
+class LoadJob {
+ public:
+  LoadJob(Store& store, std::span<const StoredHull> stored)
+      : store_(store),
+        stored_(stored.begin(), stored.end()),
+        loaded_(stored.size(), absl::CancelledError("the call was cancelled")) {}
+
+  size_t size() const { return stored_.size(); }
+
+  // Until none is left to begin. Once should_stop, which may be empty, says so, none is loaded.
+  void Work(const std::function<bool()>& should_stop) {
+    for (size_t i = next_++; i < size(); i = next_++) {
+      if (!is_stopped_) loaded_[i] = LoadLive(store_, stored_[i]);
+      if (should_stop && should_stop()) is_stopped_ = true;
+      const std::lock_guard lock(mutex_);
+      if (++ended_ == size()) all_ended_.notify_all();
+    }
+  }
+
+  // Waits for those that others began.
+  std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> Take() {
+    std::unique_lock lock(mutex_);
+    while (ended_ < size()) all_ended_.wait(lock);
+    return std::move(loaded_);
+  }
+
+ private:
+  Store& store_;
+  const std::vector<StoredHull> stored_;
+  // Each is written by the thread that took it, and read once all have ended.
+  std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> loaded_;
+  std::atomic<size_t> next_ = 0;
+  std::atomic<bool> is_stopped_ = false;
+  Mutex mutex_;
+  ConditionVariable all_ended_;
+  size_t ended_ = 0;
+};
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored) {
   absl::StatusOr<std::vector<Vector>> points = LoadPoints(store, stored);
   if (!points.ok()) return points.status();
   return std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
+}
+
+std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> LoadLives(
+    Store& store, std::span<const StoredHull> stored, WorkerPool& helpers,
+    const std::function<bool()>& should_stop) {
+  // So many small hulls take longer than to wake a thread.
+  constexpr size_t kWorthAThread = 8;
+  const auto job = std::make_shared<LoadJob>(store, stored);
+  const size_t shares = std::min<size_t>(helpers.threads(), stored.size() / kWorthAThread);
+  for (size_t i = 0; i < shares; ++i) helpers.Submit([job] { job->Work({}); });
+  job->Work(should_stop);
+  return job->Take();
 }
 
 absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,

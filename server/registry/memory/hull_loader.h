@@ -10,6 +10,7 @@
 
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
+#include "server/process/worker_pool.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -20,6 +21,13 @@ namespace hulld::server {
 // of them. DATA_LOSS naming the hull: the store is damaged. UNAVAILABLE: it cannot be read. Cost:
 // O(n), but that of building the hull where it is flat.
 absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored);
+
+// LoadLive of each, in their order, by this thread and by those of `helpers` that are free: it does
+// not wait for one that has not begun. CANCELLED for those that are left when should_stop, which
+// may be empty and is asked by this thread alone, says so.
+std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> LoadLives(
+    Store& store, std::span<const StoredHull> stored, WorkerPool& helpers,
+    const std::function<bool()>& should_stop);
 
 // A builder that holds the hull of these points; the result is never null. DATA_LOSS naming the
 // hull: they do not make what the record says. CANCELLED: should_stop, which may be empty, said so.

@@ -63,6 +63,8 @@ absl::Status PostgresStore::Superseded(std::string_view owner) {
 
 void PostgresStore::Keep() {
   bool failing = false;
+  int deaf_beats = 0;
+  bool said_deaf = false;
   std::unique_lock lock(mutex_);
   const auto period = options_.shared ? std::min(options_.look, options_.beat) : options_.beat;
   const int64_t looks_per_beat = options_.beat / period;
@@ -71,10 +73,22 @@ void PostgresStore::Keep() {
     // A database that is gone is not asked more often than that.
     if (keeper_session_ == nullptr && !is_beat) continue;
     lock.unlock();
+    if (is_beat) {
+      const bool is_deaf = notices_ != nullptr && notices_->is_listening() && !HearsOthers();
+      deaf_beats = is_deaf ? deaf_beats + 1 : 0;
+      said_deaf = said_deaf && is_deaf;
+    }
+    // Twice in a row is no accident.
+    if (deaf_beats == 2 && !std::exchange(said_deaf, true)) {
+      spdlog::warn(
+          "no notice comes of what other servers commit, although the session that listens is "
+          "there; until one does, it is asked for that every {} ms",
+          options_.look.count());
+    }
     absl::Status status;
     if (is_beat) status = Beat();
     if (status.ok() && is_beat && options_.shared) status = EndStuckTurns();
-    if (status.ok() && options_.shared) status = LookForOthers();
+    if (status.ok() && options_.shared && (is_beat || !HearsOthers())) status = LookForOthers();
     if (status.ok() && look % (looks_per_beat * kBeatsPerMeasure) == 0) status = MeasureDisk();
     if (!status.ok()) {
       keeper_session_ = nullptr;

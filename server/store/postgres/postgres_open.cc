@@ -187,9 +187,37 @@ absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptio
   const bool shared = store->options_.shared;
   const absl::Status made = shared ? store->MakeSharedSchema(keeper) : store->MakeSchema(keeper);
   if (!made.ok()) return OpenFailed(made);
-  if (absl::Status s = shared ? store->Join() : store->Begin(); !s.ok()) return OpenFailed(s);
+  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(s);
+  if (shared && store->options_.notices) store->StartNotices();
   store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
   return store;
+}
+
+// That it may connect is known by now, so what is lost here is lost for a while: as where sessions
+// of servers that were killed are still there, and the database gives no more.
+absl::Status PostgresStore::BeginPatiently() {
+  const auto deadline = std::chrono::steady_clock::now() + options_.patience;
+  // What was begun is not begun again: the store would take itself for one that was not closed.
+  bool has_begun = false;
+  for (auto pause = kFirstTurnPause;; pause = std::min(2 * pause, kLongestTurnPause)) {
+    absl::Status status;
+    if (!has_begun) status = options_.shared ? Join() : Begin();
+    has_begun = status.ok() || has_begun;
+    if (status.ok()) status = OpenFirstReaders();
+    if (!IsLost(status) || std::chrono::steady_clock::now() + pause >= deadline) return status;
+    if (options_.should_stop && options_.should_stop()) {
+      return absl::CancelledError("told to end before the database took it");
+    }
+    std::this_thread::sleep_for(pause);
+  }
+}
+
+// Those that loading takes.
+absl::Status PostgresStore::OpenFirstReaders() {
+  const Statement owner = {.name = "hulld_owner"};
+  const absl::Status status = readers_.Ask(std::span(&owner, 1)).status();
+  if (!status.ok() || !options_.shared) return status;
+  return follower_.Ask(std::span(&owner, 1)).status();
 }
 
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenSession(
@@ -217,6 +245,12 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
   const auto patience = 10 * options_.beat;
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET idle_session_timeout = ", patience.count()));
+}
+
+// What it sends waits for no disk: it says nothing that must last.
+absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
+  return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
+                                  "; SET synchronous_commit = off"));
 }
 
 // What the server is and how it commits.

@@ -2,6 +2,8 @@
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "server/store/postgres/postgres_store.h"
@@ -14,6 +16,30 @@ namespace {
 
 // Rows that are read at a time: some 100 bytes each, but for bodies of many pieces.
 constexpr uint32_t kRowsPerPortion = 4096;
+
+// The deltas of a hull after one revision and up to another.
+Statement AskForDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
+  return {.name = "hulld_deltas",
+          .parameters = {hull.hull_id, EncodeBigint(hull.create_revision), EncodeBigint(after),
+                         EncodeBigint(up_to)}};
+}
+
+// deltas: between the two versions.
+std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth& hull) {
+  const VertexLayout& before = hull.before.layout;
+  const VertexLayout& after = hull.after.layout;
+  if (before.delta_count + deltas.count() != after.delta_count) return std::nullopt;
+  std::vector<Vector> points;
+  for (int i = 0; i < deltas.count(); ++i) {
+    const std::string key = DeltaKey(hull.after.record.create_revision, deltas.bigint(i, 0));
+    const absl::StatusOr<std::string_view> value = Unseal(key, deltas.at(i, 1));
+    if (!value.ok() || !AppendVertices(*value, &points).ok()) return std::nullopt;
+  }
+  if (before.delta_vertices + points.size() != after.delta_vertices) return std::nullopt;
+  const bool is_finite =
+      std::ranges::all_of(points, [](const Vector& point) { return point.allFinite(); });
+  return is_finite ? std::optional(std::move(points)) : std::nullopt;
+}
 
 }  // namespace
 
@@ -67,13 +93,10 @@ absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
 absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {
   const std::string& id = hull.record.hull_id;
   const uint64_t incarnation = hull.record.create_revision;
-  const std::string incarnation_parameter = EncodeBigint(incarnation);
-  const std::string base_parameter = EncodeBigint(hull.layout.base_revision);
-  const absl::StatusOr<std::vector<Rows>> rows =
-      Read({{.name = "hulld_base", .parameters = {id, incarnation_parameter, base_parameter}},
-            {.name = "hulld_deltas",
-             .parameters = {id, incarnation_parameter, base_parameter,
-                            EncodeBigint(hull.record.revision)}}});
+  const absl::StatusOr<std::vector<Rows>> rows = Read(
+      {{.name = "hulld_base",
+        .parameters = {id, EncodeBigint(incarnation), EncodeBigint(hull.layout.base_revision)}},
+       AskForDeltas(hull.record, hull.layout.base_revision, hull.record.revision)});
   if (!rows.ok()) return rows.status();
   const Rows& base = (*rows)[0];
   const Rows& deltas = (*rows)[1];
@@ -94,6 +117,24 @@ absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull
   absl::StatusOr<std::vector<Vector>> vertices = std::move(assembly).Finish(std::move(status));
   if (!options_.shared || !absl::IsDataLoss(vertices.status())) return vertices;
   return WhyDamaged(hull, vertices.status());
+}
+
+// What is read here may be of a later moment than the versions; then it is not what they say.
+std::vector<std::optional<std::vector<Vector>>> PostgresStore::LoadGrowth(
+    std::span<const HullGrowth> hulls) {
+  std::vector<std::optional<std::vector<Vector>>> growth(hulls.size());
+  std::vector<Statement> statements;
+  for (const HullGrowth& hull : hulls) {
+    statements.push_back(
+        AskForDeltas(hull.after.record, hull.before.record.revision, hull.after.record.revision));
+  }
+  const absl::StatusOr<std::vector<Rows>> rows = follower_.Ask(statements);
+  if (!rows.ok()) {
+    ++read_failures_;
+    return growth;
+  }
+  for (size_t i = 0; i < hulls.size(); ++i) growth[i] = PointsOf((*rows)[i], hulls[i]);
+  return growth;
 }
 
 absl::StatusOr<uint64_t> PostgresStore::LoadSequence(const HullRecord& hull,

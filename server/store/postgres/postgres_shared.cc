@@ -1,6 +1,5 @@
 // Several active servers over one store: how they commit, and follow each other.
 #include <absl/status/status.h>
-#include <absl/strings/numbers.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
@@ -25,6 +24,10 @@ constexpr uint64_t kSchemaLock = 0x68756c6c65;
 // older ones are dropped.
 constexpr uint64_t kKeptBatches = 1 << 16;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
+// IDs that a server takes note of at a time, at most. So many took 0.2 s under the registry's mutex
+// (observed, with hulls that had come and gone, at load 6); they are one moment for readers, so
+// that they cannot be taken over in parts.
+constexpr int kMostFollowed = 1 << 17;
 constexpr std::chrono::milliseconds kFirstPause{10};
 constexpr std::chrono::milliseconds kLongestPause{500};
 
@@ -47,14 +50,15 @@ constexpr char kSharedTables[] = R"(
   ALTER TABLE hulld.store ADD COLUMN pruned bigint NOT NULL DEFAULT 0;
   COMMIT;)";
 
+// hulld_follow asks for one ID more than is taken note of. Its second parameter is that number.
 constexpr char kPrepareFollow[] = R"(
-    PREPARE hulld_follow(bigint) AS
+    PREPARE hulld_follow(bigint, bigint) AS
       SELECT s.batch, s.revision, s.epoch, s.pruned, s.owner, c.id, c.revision, c.ended_at,
         h.record, b.body, s.store_id
       FROM hulld.store s
       LEFT JOIN (
         SELECT id, max(revision) AS revision, max(ended_at) AS ended_at
-        FROM hulld.changes WHERE batch > $1 GROUP BY id) c ON true
+        FROM hulld.changes WHERE batch > $1 GROUP BY id LIMIT $2) c ON true
       LEFT JOIN hulld.hulls h ON h.hull_id = c.id
       LEFT JOIN hulld.bodies b ON b.body_id = c.id;
     PREPARE hulld_record(text) AS SELECT record FROM hulld.hulls WHERE hull_id = $1;
@@ -89,6 +93,12 @@ constexpr char kPrepareShared[] = R"(
     PREPARE hulld_prune(bigint) AS
       WITH pruned AS (UPDATE hulld.store SET pruned = $1)
       DELETE FROM hulld.changes WHERE batch <= $1;)";
+
+// What others did after this batch.
+Statement AskForOthers(uint64_t batch) {
+  return {.name = "hulld_follow",
+          .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
+}
 
 // What a batch tells the other servers.
 Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
@@ -194,6 +204,11 @@ absl::Status PostgresStore::CheckStore(const Rows& rows) {
     End(absl::UnavailableError(
         absl::StrCat("this server did not follow the others for more than ", kKeptBatches,
                      " batches: it ends; start it again to serve what there is")));
+  } else if (rows.count() > kMostFollowed) {
+    End(absl::UnavailableError(absl::StrCat(
+        "others changed more than ", kMostFollowed,
+        " hulls and bodies since this server followed them last: it ends; start it again to serve "
+        "what there is")));
   }
   return ended();
 }
@@ -226,7 +241,7 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
 
 absl::Status PostgresStore::Follow() {
   if (absl::Status s = ended(); !s.ok()) return s;
-  const Statement follow = {.name = "hulld_follow", .parameters = {EncodeBigint(batch_)}};
+  const Statement follow = AskForOthers(batch_);
   const absl::StatusOr<std::vector<Rows>> rows = follower_.Ask(std::span(&follow, 1));
   if (rows.ok()) {
     const absl::Status noted = NoteOthers(rows->front());
@@ -246,7 +261,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
   std::vector<Statement> turn;
   turn.push_back({.text = "BEGIN"});
   turn.push_back({.name = "hulld_turn"});
-  turn.push_back({.name = "hulld_follow", .parameters = {EncodeBigint(batch_)}});
+  turn.push_back(AskForOthers(batch_));
   const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(turn);
   absl::Status status = rows.ok() ? NoteOthers(rows->back()) : rows.status();
   std::vector<Change*> kept;
@@ -299,6 +314,7 @@ void PostgresStore::KeepShared(const SharedBatch& batch) {
   batch_ = batch.number;
   seen_batch_ = batch_;
   revision_ = batch.revision;
+  if (notices_ != nullptr) notices_->Send(batch.number);
 }
 
 // Whether our batch was committed. Takes the turn: the transaction that had it has ended then, and
@@ -383,19 +399,34 @@ absl::Status PostgresStore::EndStuckTurns() {
       .status();
 }
 
+void PostgresStore::StartNotices() {
+  const auto on_batch = [this](uint64_t batch) {
+    if (batch > seen_batch_) TellOfOthers();
+  };
+  notices_ = std::make_unique<BatchNotices>(
+      [this] { return OpenListener(); }, options_.beat, on_batch,
+      absl::StrCat("it is asked for that every ", options_.look.count(), " ms"));
+}
+
+// Whether notices come. The keeper looks at the store with each beat all the same; what it found
+// then, and nobody told it by now, was lost: then it looks more often, until it hears again.
+bool PostgresStore::HearsOthers() const {
+  return notices_ != nullptr && notices_->is_listening() && notices_->last_heard() >= looked_at_;
+}
+
 // Whether others have committed since this knew what they did; then it is told.
 absl::Status PostgresStore::LookForOthers() {
-  const absl::StatusOr<Rows> batch = keeper_session_->Run("SELECT batch FROM hulld.store");
+  const absl::StatusOr<uint64_t> batch = LastBatch(*keeper_session_);
   if (!batch.ok()) return batch.status();
-  uint64_t number = 0;
-  if (batch->count() != 1 || !absl::SimpleAtoi(std::string(batch->at(0, 0)), &number)) {
-    return absl::DataLossError("the row of hulld.store is missing");
-  }
-  if (number == seen_batch_) return absl::OkStatus();
-  // With the mutex, so that OnOthers waits until nobody calls the former one.
+  looked_at_ = *batch;
+  if (*batch != seen_batch_) TellOfOthers();
+  return absl::OkStatus();
+}
+
+// With the mutex, so that OnOthers waits until nobody calls the former one.
+void PostgresStore::TellOfOthers() {
   const std::lock_guard lock(mutex_);
   if (on_others_) on_others_();
-  return absl::OkStatus();
 }
 
 void PostgresStore::OnOthers(std::function<void()> others) {

@@ -52,6 +52,7 @@ PostgresStore::~PostgresStore() {
   }
   wake_.notify_all();
   if (keeper_.joinable()) keeper_.join();
+  notices_ = nullptr;
   if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
   if (options_.shared) Leave();
   // Who waits need not wait until the database sees that the session is closed.

@@ -18,6 +18,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/store/postgres/batch_notices.h"
 #include "server/store/postgres/conninfo.h"
 #include "server/store/postgres/session.h"
 #include "server/store/postgres/session_pool.h"
@@ -39,12 +40,15 @@ struct PostgresOptions {
   // How long nothing may come from the database while an answer is due. Longer than kLockTime.
   std::chrono::milliseconds answer_time{30'000};
   // How long a commit tries to find out what became of it, or to repeat what did not happen, when
-  // it has lost its session.
+  // it has lost its session; and how long Open tries to get the sessions after the first.
   std::chrono::milliseconds patience{10'000};
   // How often this looks whether it is still the active server, and the database whether this is
   // still there: ten times that after the last look.
   std::chrono::milliseconds beat{1000};
-  // Shared: how often this looks whether other servers committed.
+  // Shared: whether servers tell each other of their batches (BatchNotices).
+  bool notices = true;
+  // Shared: how often this looks whether other servers committed, where they do not tell; with
+  // each beat where they do.
   std::chrono::milliseconds look{100};
   // Shared: how long a session may hold the turn while the database waits for the rest of its
   // batch, as when its server stands still. It is ended then.
@@ -71,7 +75,8 @@ struct PostgresOptions {
 // together and belong to one epoch, so that they and a server that is active alone shut each other
 // out. A transaction takes the turn first, which is the lock of the row of the store, and is told
 // what others committed since this server knew of it; its revisions are the next after those.
-// Changes of IDs that others changed are left out, and made anew by the registry. COMMIT is sent
+// Changes of IDs that others changed are left out, and made anew by the registry. Whoever commits
+// tells the others to look (BatchNotices), and they look now and then as well. COMMIT is sent
 // only by a session that was given the turn, so none can arrive after the turn went on; a server
 // that lost the answer finds its batch, or does not, once it has the turn again.
 class PostgresStore : public Store {
@@ -93,6 +98,8 @@ class PostgresStore : public Store {
   bool is_shared() const override { return options_.shared; }
   absl::Status Follow() override;
   OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
+  std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
+      std::span<const HullGrowth> hulls) override;
   void OnOthers(std::function<void()> others) override;
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
@@ -134,12 +141,15 @@ class PostgresStore : public Store {
   absl::StatusOr<std::unique_ptr<Session>> OpenWriter() const;
   absl::StatusOr<std::unique_ptr<Session>> OpenReader() const;
   absl::StatusOr<std::unique_ptr<Session>> OpenKeeper() const;
+  absl::StatusOr<std::unique_ptr<Session>> OpenListener() const;
 
   // Opening, in this order.
   absl::Status CheckServer(Session& session);
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);
+  absl::Status BeginPatiently();
   absl::Status Begin();
+  absl::Status OpenFirstReaders();
 
   // Becoming active, and staying so.
   absl::StatusOr<bool> CheckFormat(Session& session) const;
@@ -179,7 +189,10 @@ class PostgresStore : public Store {
   absl::StatusOr<bool> FindSharedOutcome(uint64_t batch,
                                          std::chrono::steady_clock::time_point deadline);
   absl::Status EndStuckTurns();
+  void StartNotices();
+  bool HearsOthers() const;
   absl::Status LookForOthers();
+  void TellOfOthers();
   absl::StatusOr<std::string> ReadSequence(const HullRecord& hull, const std::string& writer_id);
   absl::Status WhyDamaged(const StoredHull& hull, const absl::Status& damage);
 
@@ -231,6 +244,10 @@ class PostgresStore : public Store {
   // The keeper's own, once it runs.
   std::unique_ptr<Session> keeper_session_;
   bool has_lock_ = false;
+  // Shared: the last batch that the keeper found.
+  uint64_t looked_at_ = 0;
+  // Shared: made before the keeper starts.
+  std::unique_ptr<BatchNotices> notices_;
   std::thread keeper_;
 };
 

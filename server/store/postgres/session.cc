@@ -206,6 +206,28 @@ absl::StatusOr<std::vector<Rows>> Session::Ask(std::span<const Statement> statem
   return rows;
 }
 
+absl::Status Session::AwaitNotices(int wake, std::chrono::milliseconds longest) {
+  if (!lost_.ok()) return lost_;
+  PGconn* const connection = connection_.get();
+  pollfd sources[] = {{PQsocket(connection), POLLIN, 0}, {wake, POLLIN, 0}};
+  const int ready = poll(sources, 2, static_cast<int>(longest.count()));
+  if (ready < 0 && errno != EINTR) return Lost(std::strerror(errno));
+  if (ready > 0 && sources[0].revents != 0 && PQconsumeInput(connection) == 0) {
+    return Lost(OneLine(PQerrorMessage(connection)));
+  }
+  return absl::OkStatus();
+}
+
+std::vector<std::string> Session::TakeNotices() {
+  std::vector<std::string> payloads;
+  while (true) {
+    const std::unique_ptr<PGnotify, decltype(&PQfreemem)> notice(PQnotifies(connection_.get()),
+                                                                 PQfreemem);
+    if (notice == nullptr) return payloads;
+    payloads.emplace_back(notice->extra);
+  }
+}
+
 absl::StatusOr<Rows> Session::Ask(Statement statement) {
   absl::StatusOr<std::vector<Rows>> rows = Ask(std::span<const Statement>(&statement, 1));
   if (!rows.ok()) return rows.status();

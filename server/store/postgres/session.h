@@ -59,6 +59,12 @@ class Session {
   absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
   absl::StatusOr<Rows> Ask(Statement statement);
 
+  // Waits until something comes from the database, `wake` can be read, or `longest` is over;
+  // negative: never. wake: a file descriptor.
+  absl::Status AwaitNotices(int wake, std::chrono::milliseconds longest);
+  // The payloads of the notices that came (LISTEN) since this was asked last.
+  std::vector<std::string> TakeNotices();
+
   // Whether PostgreSQL warned of anything since this was asked last.
   bool TakeWarned() { return std::exchange(warned_, false); }
   // As in 150018.

@@ -32,7 +32,7 @@ struct TradeArguments {
 void AddTradeOptions(CLI::App& command, TradeArguments& arguments) {
 #ifdef HULLD_HAVE_CLIENT
   command.add_option("files", arguments.files,
-                     "Point files to take hulls of: obj, off, ply, xyz, csv, pcd, stl, gltf");
+                     "Point files to take hulls of: obj, off, ply, xyz, csv, pcd, stl, gltf, dae");
   command.add_option("--hull", arguments.hull_ids, "Hulls of a running server, by ID");
   command.add_option("--server", arguments.server, "The server that keeps them: host:port")
       ->capture_default_str();

@@ -8,7 +8,9 @@
 namespace hulld {
 namespace {
 
+using testing::DoubleNear;
 using testing::ElementsAre;
+using testing::ElementsAreArray;
 using testing::HasSubstr;
 
 std::string Error(const absl::StatusOr<TriangleMesh>& mesh) {
@@ -65,7 +67,49 @@ TEST(MeshFile, StlIsReadAsTriangles) {
 
 TEST(MeshFile, FormatsWithoutFacesAreRefusedWithAdvice) {
   const TempFile file("a.xyz", "0 0 0\n");
-  EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr("convert it to obj, off, stl or gltf"));
+  EXPECT_THAT(Error(ReadMesh(file.path())), HasSubstr("convert it to obj, off, stl, gltf or dae"));
+}
+
+// A triangle in centimetres with Z up, which its node moves by 1 m.
+constexpr char kCollada[] = R"(<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+  <asset><unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+  <library_geometries><geometry id="plate-mesh" name="plate"><mesh>
+    <source id="at"><float_array id="numbers" count="9">0 0 0 200 0 0 0 0 50</float_array>
+      <technique_common><accessor source="#numbers" count="3" stride="3">
+        <param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+      </accessor></technique_common></source>
+    <vertices id="corners"><input semantic="POSITION" source="#at"/></vertices>
+    <triangles count="1"><input semantic="VERTEX" source="#corners" offset="0"/>
+      <p>0 1 2</p></triangles>
+  </mesh></geometry></library_geometries>
+  <library_visual_scenes><visual_scene id="scene">
+    <node id="plate"><translate>100 0 0</translate><instance_geometry url="#plate-mesh"/></node>
+  </visual_scene></library_visual_scenes>
+  <scene><instance_visual_scene url="#scene"/></scene>
+</COLLADA>
+)";
+
+TEST(MeshFile, ColladaComesInMetresWithItsAxesAsTheyAre) {
+  const TempFile file("plate.dae", kCollada);
+  const auto mesh = ReadMesh(file.path());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  const auto near = [](double x, double y, double z) {
+    return ElementsAre(DoubleNear(x, 1e-6), DoubleNear(y, 1e-6), DoubleNear(z, 1e-6));
+  };
+  EXPECT_THAT(mesh->vertices, ElementsAre(near(1, 0, 0), near(3, 0, 0), near(1, 0, 0.5)));
+  EXPECT_EQ(mesh->triangles.size(), 1u);
+  const PointsRead points = ReadFile(file.path(), PointFormat::kDae);
+  EXPECT_TRUE(points.status.ok()) << points.status;
+  EXPECT_THAT(points.xyz(), ElementsAreArray([&] {
+                std::vector<double> all;
+                for (const auto& p : mesh->vertices) all.insert(all.end(), p.begin(), p.end());
+                return all;
+              }()));
+  const auto parts = ReadParts(file.path(), SplitBy::kName);
+  ASSERT_TRUE(parts.ok()) << parts.status();
+  ASSERT_EQ(parts->size(), 1u);
+  EXPECT_EQ((*parts)[0].name, "plate");
 }
 
 }  // namespace

@@ -90,7 +90,7 @@ TEST_F(InvalidModel, IsRefusedByAppend) {
       EXPECT_THAT(err.str(), Not(HasSubstr("no known format")));
     } else {
       // Says which formats are taken.
-      EXPECT_THAT(err.str(), HasSubstr("obj, off, ply, xyz, csv, pcd, stl, gltf"));
+      EXPECT_THAT(err.str(), HasSubstr("obj, off, ply, xyz, csv, pcd, stl, gltf, glb, dae"));
     }
   }
 }

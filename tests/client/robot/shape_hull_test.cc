@@ -83,7 +83,7 @@ TEST(ShapeHull, MeshIsScaled) {
   EXPECT_THAT(MeshHull(mesh, file.path()).status().ToString(), HasSubstr("beyond the largest"));
   const TempFile empty("b.obj", "# nothing\n");
   EXPECT_THAT(MeshHull(mesh, empty.path()).status().ToString(), HasSubstr("holds no vertex"));
-  EXPECT_THAT(MeshHull(mesh, "a.dae").status().ToString(), HasSubstr("convert it"));
+  EXPECT_THAT(MeshHull(mesh, "a.3mf").status().ToString(), HasSubstr("convert it"));
 }
 
 }  // namespace

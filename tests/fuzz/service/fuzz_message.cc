@@ -86,6 +86,7 @@ class MessageFiller {
     }
     // Requests have placements in one form; programs pack them themselves.
     if (name == "packed_placements") return in_.OneOf(32);
+    if (name == "freshness") return in_.OneOf(8);
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return !in_.OneOf(8);
     return !in_.OneOf(32);
   }
@@ -217,6 +218,7 @@ class MessageFiller {
     const std::string& name = field.name();
     if (name == "sequence") return hints_.sequence;
     if (name == "if_revision") return in_.OneOf(4) ? in_.Below(40) : hints_.revision;
+    if (name == "at_least_revision") return in_.OneOf(4) ? in_.Below(40) : hints_.revision;
     if (name == "movers") return in_.Below(placements_ + 2);
     if (name == "max_vertices") return in_.Below(20);
     return in_.Below(12);
@@ -250,6 +252,7 @@ class MessageFiller {
       constexpr const char* kPrefixes[] = {"", "", "", "c", "cell-1", "cell-1/", "zz", "/"};
       return kPrefixes[in_.Below(std::size(kPrefixes))];
     }
+    if (name == "store_id" && !in_.OneOf(8)) return hints_.store_id;
     if (name == "page_token") {
       constexpr const char* kTokens[] = {"", "", "", "", "", "AGN1YmU=", "AGN1YmU", "!", "AA=="};
       return kTokens[in_.Below(std::size(kTokens))];

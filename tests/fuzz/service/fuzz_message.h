@@ -19,6 +19,8 @@ struct MessageHints {
   uint64_t sequence = 1;
   // How many placements the stream has.
   size_t placements = 0;
+  // The store, once a reply named it.
+  std::string store_id = {};
 };
 
 // Fills any message by reflection from bytes, field by field in the order of their numbers. Field

@@ -24,24 +24,22 @@ Codes CodesOf(Rpc rpc) {
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED, grpc::ALREADY_EXISTS};
     case Rpc::kGetHull:
     case Rpc::kGetHullMesh:
-      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
+    case Rpc::kCheckCollision:
+    case Rpc::kGetBody:
+      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::FAILED_PRECONDITION};
     case Rpc::kListHulls:
+    case Rpc::kListBodies:
     case Rpc::kBatchCheckCollisions:
     case Rpc::kStreamCollisions:
     case Rpc::kFindCollisions:
+      return {grpc::INVALID_ARGUMENT, grpc::FAILED_PRECONDITION};
     case Rpc::kWatchHulls:
     case Rpc::kWatchCollisions:
       return {grpc::INVALID_ARGUMENT};
     case Rpc::kDeleteHull:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
-    case Rpc::kCheckCollision:
-      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
     case Rpc::kPutBody:
       return {grpc::INVALID_ARGUMENT, grpc::ALREADY_EXISTS, grpc::ABORTED};
-    case Rpc::kGetBody:
-      return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND};
-    case Rpc::kListBodies:
-      return {grpc::INVALID_ARGUMENT};
     case Rpc::kDeleteBody:
       return {grpc::INVALID_ARGUMENT, grpc::NOT_FOUND, grpc::ABORTED};
     case Rpc::kSaveBackup:

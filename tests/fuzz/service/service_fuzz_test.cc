@@ -88,7 +88,7 @@ constexpr Goal kGoals[] = {
     {"body compared RELATION_TOUCHING", 10},
     {"body compared RELATION_OVERLAPPING", 10},
     {"WatchHulls told", 20},
-    {"WatchHulls change", 5},
+    {"WatchHulls change", 2},
     {"WatchHulls resumed", 10},
     {"WatchHulls INVALID_ARGUMENT", 20},
     {"WatchCollisions OK", 10},

@@ -288,7 +288,7 @@ void ServiceProgram::GetStatus() {
 
 v1::AppendPointsRequest ServiceProgram::NextAppendMessage(bool first, uint64_t* sequence) {
   v1::AppendPointsRequest request;
-  const MessageHints hints = {revision_, *sequence, 0};
+  const MessageHints hints = {revision_, *sequence, 0, service_.store_id_};
   if (in_.OneOf(24)) {
     FillMessage(in_, hints, &request);
   } else if (first) {
@@ -506,7 +506,7 @@ std::vector<v1::Relation> ServiceProgram::AskBatch(const v1::BatchCheckCollision
 
 v1::StreamCollisionsRequest ServiceProgram::NextCollisionMessage(bool first, size_t placements) {
   v1::StreamCollisionsRequest request;
-  const MessageHints hints = {revision_, 1, placements};
+  const MessageHints hints = {revision_, 1, placements, service_.store_id_};
   if (in_.OneOf(24)) {
     FillMessage(in_, hints, &request);
   } else if (first) {

@@ -71,7 +71,7 @@ class ServiceProgram {
   void AskAboutBody();
   void SendRaw();
 
-  MessageHints Hints() const { return {revision_, 1, 0}; }
+  MessageHints Hints() const { return {revision_, 1, 0, service_.store_id_}; }
   // Gives the call its deadline, rarely one that has passed.
   void Hurry(grpc::ClientContext& context, CallManner& manner);
   void Note(std::string finding);

@@ -132,7 +132,7 @@ void ServiceProgram::CompareWatched(const HullWatchCheck& check) {
 
 v1::WatchCollisionsRequest ServiceProgram::NextWatchMessage(bool first, size_t placements) {
   v1::WatchCollisionsRequest request;
-  const MessageHints hints = {revision_, 1, placements};
+  const MessageHints hints = {revision_, 1, placements, service_.store_id_};
   if (in_.OneOf(24)) {
     FillMessage(in_, hints, &request);
   } else if (first) {

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/client/collision_round.h"
 #include "tests/core/checks/point_sets.h"
 #include "tests/server/bodies/body_fixture.h"
 
@@ -68,17 +69,6 @@ class BodyWatches : public BodyTest {
       if (!message.ok() || message->events_size() > 0 || message->synced()) {
         return message.ok() ? *message : v1::WatchHullsResponse();
       }
-    }
-  }
-  // The messages up to the next that ends a round, as one.
-  static v1::WatchCollisionsResponse Round(CollisionWatch& watch) {
-    v1::WatchCollisionsResponse all;
-    while (true) {
-      const auto message = watch.Next();
-      EXPECT_TRUE(message.ok()) << message.status();
-      if (!message.ok()) return all;
-      all.MergeFrom(*message);
-      if (message->synced()) return all;
     }
   }
   // Rounds that tell nothing are marks.

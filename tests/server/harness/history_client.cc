@@ -127,6 +127,32 @@ bool HistoryClient::End(const std::string& hull_id, Operation& operation,
   return true;
 }
 
+void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshness) {
+  constexpr int kMostMilliseconds = 50;
+  if (!any_freshness_) return;
+  const bool is_at_least = Below(2) == 0 && last_header_.revision() > 0;
+  const bool is_bounded = Below(2) == 0;
+  if (is_at_least) {
+    freshness.set_at_least_revision(last_header_.revision());
+    freshness.set_store_id(last_header_.store_id());
+    operation.at_least_revision = last_header_.revision();
+  }
+  if (is_bounded) {
+    const int nanos = 1'000'000 * (1 + Below(kMostMilliseconds));
+    freshness.mutable_max_staleness()->set_nanos(nanos);
+    operation.max_staleness = nanos;
+  } else if (is_at_least) {
+    operation.max_staleness = std::nullopt;
+  }
+}
+
+void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation) {
+  operation.store_revision = header.revision();
+  operation.staleness = static_cast<uint64_t>(1'000'000'000 * header.staleness().seconds() +
+                                              header.staleness().nanos());
+  if (header.revision() > 0) last_header_ = header;
+}
+
 std::optional<uint64_t> HistoryClient::SomeRevision(const std::string& hull_id) {
   const auto known = revisions_.find(hull_id);
   if (known == revisions_.end() || Below(4) != 0) return std::nullopt;
@@ -143,7 +169,7 @@ bool HistoryClient::Create(const std::string& hull_id, bool if_absent) {
   const grpc::Status status = hulls_->CreateHull(NewContext().get(), request, &response);
   TakeRecord(response.hull(), operation);
   operation.created = response.created();
-  operation.store_revision = response.header().revision();
+  TakeHeader(response.header(), operation);
   return End(hull_id, operation, status);
 }
 
@@ -171,7 +197,7 @@ HistoryClient::Stream* HistoryClient::OpenStream(const std::string& hull_id, boo
   const v1::AppendOpened& opened = stream.appender->opened();
   TakeRecord(opened.hull(), operation);
   operation.last_sequence = opened.last_sequence();
-  operation.store_revision = opened.header().revision();
+  TakeHeader(opened.header(), operation);
   stream.incarnation = operation.create_revision;
   stream.next_sequence = operation.last_sequence + 1;
   *answered = End(hull_id, operation, grpc::Status::OK);
@@ -200,7 +226,7 @@ bool HistoryClient::Append(const std::string& hull_id) {
   }
   stream->next_sequence = operation.sequence + 1;
   operation.already_applied = ack->outcome() == v1::APPEND_OUTCOME_ALREADY_APPLIED;
-  operation.store_revision = ack->header().revision();
+  TakeHeader(ack->header(), operation);
   operation.revision = ack->hull_revision();
   operation.vertex_count = ack->vertex_count();
   operation.received = ack->counts().received();
@@ -242,7 +268,7 @@ bool HistoryClient::Replace(const std::string& hull_id) {
   }
   TakeRecord(response.hull(), operation);
   operation.created = response.created();
-  operation.store_revision = response.header().revision();
+  TakeHeader(response.header(), operation);
   return End(hull_id, operation, status);
 }
 
@@ -255,7 +281,8 @@ bool HistoryClient::Delete(const std::string& hull_id, bool if_known_revision) {
   request.set_hull_id(hull_id);
   if (operation.if_revision) request.set_if_revision(*operation.if_revision);
   const grpc::Status status = hulls_->DeleteHull(NewContext().get(), request, &response);
-  operation.store_revision = operation.revision = response.header().revision();
+  TakeHeader(response.header(), operation);
+  operation.revision = operation.store_revision;
   return End(hull_id, operation, status);
 }
 
@@ -264,9 +291,10 @@ bool HistoryClient::Get(const std::string& hull_id) {
   v1::GetHullRequest request;
   v1::GetHullResponse response;
   request.set_hull_id(hull_id);
+  ChooseFreshness(operation, *request.mutable_freshness());
   const grpc::Status status = hulls_->GetHull(NewContext().get(), request, &response);
   TakeRecord(response.hull(), operation);
-  operation.store_revision = response.header().revision();
+  TakeHeader(response.header(), operation);
   return End(hull_id, operation, status);
 }
 
@@ -274,13 +302,14 @@ bool HistoryClient::Mesh(const std::string& hull_id) {
   Operation operation = Begin(Kind::kMesh);
   v1::GetHullMeshRequest request;
   request.set_hull_id(hull_id);
+  ChooseFreshness(operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = hulls_->GetHullMesh(context.get(), request);
   v1::GetHullMeshResponse part;
   while (reader->Read(&part)) {
     if (part.has_header()) {
       TakeRecord(part.header().hull(), operation);
-      operation.store_revision = part.header().header().revision();
+      TakeHeader(part.header().header(), operation);
     }
     const auto& xyz = part.vertices().xyz();
     for (int i = 0; i + 2 < xyz.size(); i += 3) {
@@ -300,9 +329,10 @@ bool HistoryClient::Probe(const std::string& hull_id) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(hull_id);
   *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
+  ChooseFreshness(operation, *request.mutable_freshness());
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.revision = response.hull_a().revision();
-  operation.store_revision = response.header().revision();
+  TakeHeader(response.header(), operation);
   operation.touching = response.relation() == v1::RELATION_TOUCHING;
   return End(hull_id, operation, status);
 }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "tests/server/harness/hull_history.h"
 #include "tests/server/harness/test_server.h"
@@ -27,6 +28,10 @@ class HistoryClient {
   // name: its writer ID. The history must outlive this.
   HistoryClient(const std::shared_ptr<grpc::Channel>& channel, HullHistory& history,
                 std::string name, uint64_t seed);
+
+  // From now on reads ask for any freshness: the latest, the revision of the last answer, a bound
+  // of some milliseconds, or both. Otherwise for the latest.
+  void ReadAtAnyFreshness() { any_freshness_ = true; }
 
   // Makes kProbeHull; once per store.
   void MakeProbe();
@@ -64,6 +69,10 @@ class HistoryClient {
   Stream* OpenStream(const std::string& hull_id, bool* answered);
   // `count` points of the cloud, with repetition; tells the operation of them.
   Coordinates SomePoints(int count, Operation& operation);
+  // Tells request and operation of the same freshness, at random.
+  void ChooseFreshness(Operation& operation, v1::Freshness& freshness);
+  // What an answer says of the store.
+  void TakeHeader(const v1::ResponseHeader& header, Operation& operation);
   // Absent most times; else the revision last seen.
   std::optional<uint64_t> SomeRevision(const std::string& hull_id);
   int Below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
@@ -75,6 +84,9 @@ class HistoryClient {
   std::mt19937_64 random_;
   std::map<std::string, Stream> streams_;
   std::map<std::string, uint64_t> revisions_;
+  bool any_freshness_ = false;
+  // Of the last answer.
+  v1::ResponseHeader last_header_;
 };
 
 }  // namespace hulld::server

@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <unordered_set>
 #include <utility>
@@ -37,7 +38,57 @@ std::string Describe(const Operation& operation) {
   }
   absl::StrAppend(&text, ", points ", absl::Hex(operation.points), ", received ",
                   operation.received);
+  if (operation.max_staleness != 0) {
+    absl::StrAppend(&text, ", of store revision ", operation.store_revision, " and ",
+                    operation.staleness, " ns ago");
+  }
   return text;
+}
+
+bool IsRead(const Operation& operation) {
+  return operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
+         operation.kind == Kind::kProbe;
+}
+
+// From when on a call may have taken effect.
+uint64_t EarliestOf(const Operation& operation) {
+  // An answer that there is no hull does not say of when it is.
+  const std::optional<uint64_t> back =
+      operation.outcome == Outcome::kOk ? operation.staleness : operation.max_staleness;
+  if (!back.has_value() || *back > operation.invoked) return 0;
+  return operation.invoked - *back;
+}
+
+// The revision of the store at which an answered operation changed the hull; 0: it did not, or one
+// cannot tell.
+uint64_t ChangedAt(const Operation& operation) {
+  if (operation.outcome != Outcome::kOk) return 0;
+  switch (operation.kind) {
+    case Kind::kAppend:
+      return operation.already_applied || operation.outside == 0 ? 0 : operation.revision;
+    case Kind::kDelete:
+      return operation.store_revision;
+    case Kind::kCreate:
+    case Kind::kReplace:
+      return operation.kind == Kind::kReplace || operation.created ? operation.revision : 0;
+    default:
+      return 0;
+  }
+}
+
+// What is wrong with what an answer says of its own freshness.
+std::string FreshnessFault(const Operation& operation) {
+  if (!IsRead(operation) || operation.outcome != Outcome::kOk) return "";
+  if (operation.max_staleness.has_value() && operation.staleness > *operation.max_staleness) {
+    return absl::StrCat("an answer of ", operation.staleness, " ns ago to one who wants at most ",
+                        *operation.max_staleness, " ns: ", Describe(operation));
+  }
+  if (operation.store_revision < operation.at_least_revision) {
+    return absl::StrCat("an answer of revision ", operation.store_revision,
+                        " of the store to one who wants at least ", operation.at_least_revision,
+                        ": ", Describe(operation));
+  }
+  return "";
 }
 
 // How many operations before those that cannot be explained a fault shows.
@@ -48,6 +99,9 @@ class OrderSearch {
  public:
   explicit OrderSearch(std::vector<Operation> operations)
       : operations_(std::move(operations)), done_(operations_.size(), false) {
+    for (Operation& operation : operations_) {
+      if (IsRead(operation)) operation.invoked = EarliestOf(operation);
+    }
     std::sort(operations_.begin(), operations_.end(),
               [](const Operation& a, const Operation& b) { return a.invoked < b.invoked; });
     required_ = static_cast<size_t>(std::count_if(
@@ -121,6 +175,18 @@ class OrderSearch {
     return candidates;
   }
 
+  // Whether a read comes after all changes that it must hold.
+  bool HoldsAll(size_t i) const {
+    const Operation& read = operations_[i];
+    if (!IsRead(read)) return true;
+    const uint64_t revision = std::max(read.store_revision, read.at_least_revision);
+    for (size_t j = first_left_; j < operations_.size(); ++j) {
+      const uint64_t changed_at = done_[j] ? 0 : ChangedAt(operations_[j]);
+      if (changed_at > 0 && changed_at <= revision) return false;
+    }
+    return true;
+  }
+
   std::string Key(const SpecifiedHull& state) const {
     std::string key = absl::StrCat(state.Key(), ";", first_left_);
     // Beyond the first that is left, only what has been done matters.
@@ -167,7 +233,7 @@ class OrderSearch {
     }
     const size_t i = last.candidates[last.next++];
     SpecifiedHull next = last.state;
-    if (!Step(next, operations_[i])) return false;
+    if (!HoldsAll(i) || !Step(next, operations_[i])) return false;
     done_[i] = true;
     last_done_ = std::max(last.last_before, i);
     last.taken = i;
@@ -198,14 +264,9 @@ std::string StoreRevisionFault(const HullHistory& history) {
     for (const Operation& operation : operations) {
       if (operation.outcome != Outcome::kOk) continue;
       returned.push_back({operation.returned, operation.store_revision});
-      invoked.push_back({operation.invoked, operation.store_revision});
-      const bool changed = (operation.kind == Kind::kAppend && !operation.already_applied &&
-                            operation.outside > 0) ||
-                           operation.kind == Kind::kReplace || operation.kind == Kind::kDelete ||
-                           operation.created;
-      if (!changed) continue;
-      const uint64_t revision =
-          operation.kind == Kind::kDelete ? operation.store_revision : operation.revision;
+      invoked.push_back({EarliestOf(operation), operation.store_revision});
+      const uint64_t revision = ChangedAt(operation);
+      if (revision == 0) continue;
       const auto [other, inserted] = changes.emplace(revision, hull_id);
       if (!inserted) {
         return absl::StrCat("revision ", revision, " belongs to a change of ", other->second,
@@ -235,6 +296,15 @@ std::string StoreRevisionFault(const HullHistory& history) {
 
 }  // namespace
 
+uint64_t HullHistory::Tick() {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  const auto time = static_cast<uint64_t>(std::chrono::nanoseconds(now).count());
+  uint64_t last = clock_;
+  while (!clock_.compare_exchange_weak(last, std::max(last + 1, time))) {
+  }
+  return std::max(last + 1, time);
+}
+
 void HullHistory::Record(const std::string& hull_id, const Operation& operation) {
   HULLD_CHECK(operation.invoked < operation.returned);
   const std::lock_guard lock(mutex_);
@@ -259,6 +329,10 @@ size_t HullHistory::size() const {
 }
 
 std::string LinearizabilityFault(std::vector<Operation> operations) {
+  for (const Operation& operation : operations) {
+    const std::string fault = FreshnessFault(operation);
+    if (!fault.empty()) return fault;
+  }
   OrderSearch search(std::move(operations));
   return search.Run() ? "" : search.Fault();
 }

@@ -37,7 +37,7 @@ struct Operation {
 
   Kind kind = Kind::kGet;
   Outcome outcome = Outcome::kUnknown;
-  // Ticks of the history's clock: the call took effect between the two, if it did.
+  // Of the history's clock: the call took effect between the two, if it did.
   uint64_t invoked = 0;
   uint64_t returned = UINT64_MAX;
 
@@ -54,9 +54,15 @@ struct Operation {
   uint64_t sent = 0;
   PointSet points = 0;
   int probe = 0;
+  // Of a read that may be answered from the past: of any, or of at most this long ago, in
+  // nanoseconds; and not before this revision of the store.
+  std::optional<uint64_t> max_staleness = 0;
+  uint64_t at_least_revision = 0;
 
   // What was answered.
   uint64_t store_revision = 0;
+  // Of how long ago it may be, in nanoseconds.
+  uint64_t staleness = 0;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
   bool created = false;
@@ -72,8 +78,8 @@ struct Operation {
 // What clients did to hulls, by hull ID. Thread-safe while it is recorded.
 class HullHistory {
  public:
-  // The current tick, later than all before.
-  uint64_t Tick() { return ++clock_; }
+  // The time, in nanoseconds by the monotonic clock of the machine, which is later than all before.
+  uint64_t Tick();
   // Requires that invoked and returned are ticks of this clock, in this order, or that returned is
   // UINT64_MAX.
   void Record(const std::string& hull_id, const Operation& operation);
@@ -95,13 +101,19 @@ class HullHistory {
 // real time in which a hull that does one thing at a time, as hull.proto says, would have answered
 // the same. Empty when there is one; else what could not be explained.
 //
+// A read that may be answered from the past took effect between its answer and as long before its
+// call as that says, which is no longer than was asked for, and after every change up to the
+// revision that it asked for. Whatever it asked for, an answer holds every change up to the
+// revision of the store that it names.
+//
 // The store's revision is shared by all hulls, so that of a change is taken from the answer and
 // must be greater than all before. Search with memory of the states seen. Source: Wing and Gong
 // 1993, Testing and Verifying Concurrent Objects; Lowe 2017, Testing for Linearizability.
 std::string LinearizabilityFault(std::vector<Operation> operations);
 
 // The same for every hull, and that revisions of the store, which all hulls share, never fall from
-// one call to a later one, and that no two changes have the same.
+// one call to a later one, as far as that may not be answered from the past, and that no two
+// changes have the same.
 std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server

@@ -9,6 +9,8 @@
 #include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -87,6 +89,19 @@ class SharedStore : public GatedStore {
     ++follows;
     if (found_by_follow.revision > 0) others = std::exchange(found_by_follow, {});
     return can_follow;
+  }
+
+  std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
+      std::span<const HullGrowth> hulls) override {
+    std::vector<std::optional<std::vector<Vector>>> growth;
+    for (const HullGrowth& hull : hulls) {
+      if (hull.after.record.hull_id == "unreadable") {
+        growth.emplace_back();
+      } else {
+        growth.push_back(std::vector<Vector>{Vector(1, 2, 3)});
+      }
+    }
+    return growth;
   }
 
   OtherChanges others;
@@ -345,6 +360,44 @@ TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
   EXPECT_EQ(store.follows, 1);
   store.can_follow = absl::UnavailableError("no database");
   EXPECT_TRUE(absl::IsUnavailable(follow()));
+}
+
+// Others is told what hulls grew by where that was wanted and could be had.
+TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
+  SharedStore store;
+  FairMutex order;
+  std::vector<std::string> events;
+  Committer committer(store, order);
+  committer.SetOthers(
+      [&](Locked&, const OtherChanges& others) {
+        for (const auto& [id, other] : others.by_id) {
+          events.push_back(absl::StrCat(id, other.growth.has_value() ? " grew" : " changed"));
+        }
+      },
+      [&](Locked& locked, const OtherChanges& others) {
+        EXPECT_TRUE(locked.Holds(order));
+        EXPECT_EQ(others.by_id.size(), 3);
+        std::vector<HullGrowth> wanted(2);
+        wanted[0].after.record.hull_id = "wanted";
+        wanted[1].after.record.hull_id = "unreadable";
+        return wanted;
+      });
+  const auto follow = [&] {
+    store.found_by_follow.revision = 7;
+    for (const char* id : {"wanted", "unreadable", "other"}) store.found_by_follow.by_id[id];
+    std::promise<void> told;
+    {
+      const Locked locked(order);
+      committer.Follow(locked, [&](Locked&, const absl::Status&) { told.set_value(); });
+    }
+    told.get_future().get();
+    const std::lock_guard lock(order);
+    return std::exchange(events, {});
+  };
+  EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted grew"));
+  // What could not be asked is not asked again at once.
+  store.can_follow = absl::UnavailableError("no database");
+  EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted changed"));
 }
 
 TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {

@@ -1,5 +1,6 @@
 // Moments between two steps of one call in which another call comes.
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -259,6 +260,65 @@ TEST_F(RegistryInterleaving, ManyReadersOfOneHullReadItOnce) {
   }
   EXPECT_EQ(store_.loads, 1);
   EXPECT_EQ(registry_.Cache().loads, 1);
+}
+
+// While one of them is read, another thread reads the rest of a slice.
+TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
+  constexpr int kHulls = 300;
+  constexpr int kSlice = Registry::kMostLookupsPerHold - 1;
+  constexpr int kLost = 7;
+  std::vector<std::string> ids;
+  std::vector<AppendSession> sessions;
+  for (int i = 0; i < kHulls; ++i) {
+    ids.push_back(absl::StrCat(absl::Dec(i, absl::kZeroPad4)));
+    sessions.push_back(Open(ids.back(), "w"));
+    ASSERT_TRUE(Append(sessions.back(), 1, CubeCorners()).ok());
+  }
+  // A few at a time.
+  for (int i = 0; i < kHulls; ++i) DropAll();
+  store_.Lose(registry_.List(ids[kLost], "", 1).hulls[0].record);
+  Gate gate;
+  store_.before_load.Set([&] { gate.Stop(); });
+  auto reader = StartResolve(ids, {});
+  gate.WaitUntilReached();
+  // Does not end where one is read after the other.
+  while (store_.loads < kSlice) std::this_thread::yield();
+  // What was read is old.
+  for (int i = 0; i < kHulls; ++i) {
+    ASSERT_EQ(Append(sessions[i], 2, {{100, 0, 0}}).ok(), i != kLost);
+  }
+  gate.Open();
+  const auto resolved = reader.get();
+  ASSERT_TRUE(resolved.ok());
+  for (int i = 0; i < kHulls; ++i) {
+    const absl::StatusOr<HullView>& hull = resolved->hulls[i];
+    if (i == kLost) {
+      EXPECT_TRUE(absl::IsDataLoss(hull.status()));
+      continue;
+    }
+    ASSERT_TRUE(hull.ok()) << hull.status();
+    EXPECT_EQ(hull->record.counts.received, 9);
+    EXPECT_EQ(hull->served->high().x(), 100);
+  }
+  EXPECT_LE(registry_.Holds().most_lookups, Registry::kMostLookupsPerHold);
+}
+
+// Before it reads the next one.
+TEST_F(RegistryInterleaving, AReaderOfAFewHullsCanBeCancelled) {
+  // So few that no other thread helps.
+  constexpr int kHulls = 7;
+  std::vector<std::string> ids;
+  for (int i = 0; i < kHulls; ++i) {
+    ids.push_back(std::to_string(i));
+    ASSERT_TRUE(Append(Open(ids.back(), "w"), 1, CubeCorners()).ok());
+  }
+  for (int i = 0; i < kHulls; ++i) DropAll();
+  store_.loads = 0;
+  EXPECT_TRUE(absl::IsCancelled(registry_.Resolve(ids, [] { return true; }).status()));
+  EXPECT_EQ(store_.loads, 1);
+  const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
+  for (const auto& hull : resolved->hulls) EXPECT_TRUE(hull.ok());
+  EXPECT_EQ(store_.loads, kHulls);
 }
 
 // And what it read meanwhile is old.

@@ -32,6 +32,33 @@ TEST_F(RegistryMemory, HullsAreReadAtFirstUse) {
   EXPECT_EQ(hulls_->registry().Cache().hits, 1);
 }
 
+TEST_F(RegistryMemory, EachOfManyHullsIsReadOnce) {
+  Start();
+  std::vector<std::string> ids;
+  for (int i = 0; i < 500; ++i) {
+    ids.push_back(std::to_string(i));
+    ASSERT_TRUE(hulls_->Put(ids.back(), CubeCorners()).ok());
+  }
+  Start();
+  Registry& registry = hulls_->registry();
+  ASSERT_TRUE(registry.Resolve("250", {}).ok());
+  ids.push_back("17");
+  ids.push_back("missing");
+  for (int round = 0; round < 2; ++round) {
+    const absl::StatusOr<Resolved> resolved = registry.Resolve(ids, {});
+    ASSERT_TRUE(resolved.ok());
+    for (size_t i = 0; i < ids.size(); ++i) {
+      ASSERT_EQ(resolved->hulls[i].ok(), ids[i] != "missing");
+      if (!resolved->hulls[i].ok()) continue;
+      EXPECT_EQ(resolved->hulls[i]->record.hull_id, ids[i]);
+    }
+    EXPECT_EQ(registry.Cache().loads, 500);
+    EXPECT_EQ(registry.Cache().misses, 500);
+    EXPECT_EQ(registry.Cache().hits, round == 0 ? 1 : 501);
+  }
+  EXPECT_LE(registry.Holds().most_lookups, Registry::kMostLookupsPerHold);
+}
+
 TEST_F(RegistryMemory, AHullThatIsOnlyReadNeedsNoBuilder) {
   Start();
   const std::vector<Vector> sphere = SpherePoints(2000);

@@ -216,6 +216,10 @@ void Client::Replace() {
 void Client::List() {
   Call call = Begin(0);
   Scheduler::Current().Note("lists hulls");
+  if (const absl::Status fresh = simulation_.registry.AwaitOthers({}); !fresh.ok()) {
+    if (MayFail(call, fresh, false)) return;
+    Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
+  }
   const HullPage page = simulation_.registry.List("", "", kHulls);
   for (call.hull = 0; call.hull < kHulls; ++call.hull) {
     const auto listed = std::ranges::find_if(page.hulls, [&](const ListedHull& hull) {

@@ -36,6 +36,8 @@ void ExpectAllReached(const Reached& reached) {
   EXPECT_GT(reached.recovered, 100);
   EXPECT_GT(reached.kills, 100);
   EXPECT_GT(reached.revived, 20);
+  EXPECT_GT(reached.shared, 1000);
+  EXPECT_GT(reached.superseded, 1000);
 }
 
 TEST(RegistrySchedules, EachEndsAndKeepsToTheSpecification) {

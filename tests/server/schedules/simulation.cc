@@ -8,6 +8,7 @@
 #include "server/process/synchronization.h"
 #include "server/process/worker_pool.h"
 #include "tests/server/schedules/client.h"
+#include "tests/server/schedules/store/shared_store.h"
 #include "tests/server/schedules/watcher.h"
 
 namespace hulld::server {
@@ -79,6 +80,40 @@ void CountStore(const SimulatedStore::Counts& counts, Reached& reached) {
   reached.recovered += counts.recovered;
   reached.kills += counts.kills;
   reached.revived += counts.revived;
+  reached.superseded += counts.superseded;
+}
+
+// What others did is known here, too.
+void CatchUp(Registry& registry) {
+  absl::Status status = absl::UnavailableError("");
+  while (absl::IsUnavailable(status)) status = registry.AwaitOthers({});
+}
+
+void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reached) {
+  Limits limits;
+  limits.memory_limit = plan.memory_limit;
+  size_t working = plan.servers;
+  Event all_ended;
+  const auto serve = [&] {
+    SharedStore store(database);
+    WorkerPool writers(2);
+    Registry registry(store, limits, writers);
+    if (!registry.Load().ok())
+      Scheduler::Current().Fail("what the database keeps cannot be loaded");
+    Simulation simulation{plan, database, registry, reached};
+    RunClients(simulation);
+    if (--working == 0) all_ended.Set();
+    // Some end while others go on.
+    if (Scheduler::Current().random().OneIn(3)) return;
+    all_ended.Wait();
+    CatchUp(registry);
+    CheckAtRest(simulation);
+  };
+  std::vector<Thread> servers;
+  servers.reserve(plan.servers);
+  for (size_t i = 0; i < plan.servers; ++i) servers.emplace_back(serve, "server");
+  for (Thread& server : servers) server.join();
+  ++reached.shared;
 }
 
 }  // namespace
@@ -126,11 +161,21 @@ Plan::Plan(Random& random) {
   cancellations = rarely(2);
   preparations = random.OneIn(2) ? 0 : rarely(1);
   repetitions = rarely(2);
+  if (!random.OneIn(3)) return;
+  servers = 2;
+  // A watch may be told of several changes as one.
+  has_watch = false;
+  faults.damage = 0;
+  faults.killed_at_batch = 0;
 }
 
 void Simulate(Reached& reached) {
   const Plan plan(Scheduler::Current().random());
   SimulatedStore store(plan.faults);
+  if (plan.servers > 1) {
+    SimulateServers(plan, store, reached);
+    return CountStore(store.counts(), reached);
+  }
   Limits limits;
   limits.memory_limit = plan.memory_limit;
   const auto run = [&](const auto& body) {

@@ -6,7 +6,7 @@
 
 #include "server/registry/registry.h"
 #include "tests/server/schedules/scheduler.h"
-#include "tests/server/schedules/simulated_store.h"
+#include "tests/server/schedules/store/simulated_store.h"
 
 namespace hulld::server {
 
@@ -32,6 +32,9 @@ struct Reached {
   uint64_t recovered = 0;
   uint64_t kills = 0;
   uint64_t revived = 0;
+  // Schedules of several servers, and their changes that were made anew.
+  uint64_t shared = 0;
+  uint64_t superseded = 0;
 };
 
 // Something that happens once, and that threads wait for.
@@ -54,6 +57,8 @@ struct Plan {
   uint64_t memory_limit = 0;
   // Whether that is never reached but by pressure.
   bool has_memory = false;
+  // Over one database; and of each its clients.
+  size_t servers = 1;
   size_t clients = 0;
   size_t hulls = 0;
   size_t writers = 0;
@@ -84,7 +89,8 @@ struct Simulation {
 };
 
 // One schedule: a registry over a store with faults, and clients that call it; then a registry over
-// what the store kept. The body of Scheduler::Run.
+// what the store kept. Or several registries over one database, which start and end while others go
+// on. The body of Scheduler::Run.
 void Simulate(Reached& reached);
 
 }  // namespace hulld::server

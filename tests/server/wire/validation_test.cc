@@ -4,10 +4,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <optional>
+#include <string>
+#include <utility>
+
 #include "server/contract/hull_id.h"
 #include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/log.h"
+#include "server/store/memory_store.h"
+#include "server/wire/decode.h"
 #include "server/wire/page_token.h"
 
 namespace hulld::server {
@@ -38,6 +45,57 @@ TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
   expect("\xC3\xA4", "malformed at character 0");
   expect(std::string("a\0b", 3), "malformed at character 1");
   expect(std::string(257, 'a'), "holds 257 characters; the limit is 256");
+}
+
+TEST(FreshnessWords, ConditionsAreTakenAsTheyAre) {
+  using std::chrono::nanoseconds;
+  const MemoryStore store;
+  const auto began = SteadyClock::now();
+  v1::Freshness message;
+  auto freshness = DecodeFreshness(message, store, began);
+  ASSERT_TRUE(freshness.ok());
+  EXPECT_EQ(freshness->max_staleness, nanoseconds(0));
+  EXPECT_EQ(freshness->at_least_revision, 0);
+  EXPECT_EQ(freshness->began, began);
+  message.mutable_max_staleness()->set_seconds(2);
+  message.mutable_max_staleness()->set_nanos(5);
+  freshness = DecodeFreshness(message, store, began);
+  EXPECT_EQ(freshness->max_staleness, nanoseconds(2'000'000'005));
+  message.set_at_least_revision(7);
+  message.set_store_id(store.id());
+  freshness = DecodeFreshness(message, store, began);
+  EXPECT_EQ(freshness->max_staleness, nanoseconds(2'000'000'005));
+  EXPECT_EQ(freshness->at_least_revision, 7);
+  // The revision alone is content with any age.
+  message.clear_max_staleness();
+  freshness = DecodeFreshness(message, store, began);
+  EXPECT_EQ(freshness->max_staleness, std::nullopt);
+  // As long as can be said, without overflow.
+  message.mutable_max_staleness()->set_seconds(315'576'000'000);
+  freshness = DecodeFreshness(message, store, began);
+  EXPECT_GT(freshness->max_staleness, nanoseconds(std::chrono::hours(24 * 365)));
+}
+
+TEST(FreshnessWords, WhatIsMalformedOrOfAnotherStoreIsRefused) {
+  const MemoryStore store;
+  const auto expect = [&store](const v1::Freshness& message, absl::StatusCode code,
+                               const std::string& what) {
+    const absl::Status status = DecodeFreshness(message, store, SteadyClock::now()).status();
+    EXPECT_EQ(status.code(), code) << status;
+    EXPECT_THAT(std::string(status.message()), HasSubstr(what));
+  };
+  for (const auto& [seconds, nanos] :
+       {std::pair<int64_t, int32_t>{-1, 0}, {0, -1}, {0, 1'000'000'000}}) {
+    v1::Freshness message;
+    message.mutable_max_staleness()->set_seconds(seconds);
+    message.mutable_max_staleness()->set_nanos(nanos);
+    expect(message, absl::StatusCode::kInvalidArgument, "freshness.max_staleness is");
+  }
+  v1::Freshness message;
+  message.set_at_least_revision(1);
+  expect(message, absl::StatusCode::kInvalidArgument, "needs store_id");
+  message.set_store_id("another");
+  expect(message, absl::StatusCode::kFailedPrecondition, store.id());
 }
 
 TEST(ListenAddress, LoopbackAndUnixSocketsAreLocal) {

@@ -34,6 +34,7 @@ from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
 from hulld.calls.attempts import Attempts
+from hulld.calls.freshness import Freshness
 from hulld.calls.requests import Call, SceneFilter
 from hulld.calls.told_pairs import WatchedPlacements
 from hulld.calls.wanted import Wanted
@@ -221,10 +222,14 @@ class AsyncClient:
         *,
         audit: bool = False,
         facets: bool = True,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Hull:
         """As Client.get_hull."""
-        return await self._unary(requests.get_hull(hull_id, audit, facets, self._viewer), timeout)
+        return await self._unary(
+            requests.as_fresh(requests.get_hull(hull_id, audit, facets, self._viewer), freshness),
+            timeout,
+        )
 
     async def get_hull_mesh(
         self,
@@ -233,10 +238,13 @@ class AsyncClient:
         side: Literal["inside", "outside"] | None = None,
         max_vertices: int | None = None,
         max_error: float | None = None,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> HullMesh:
         """As Client.get_hull_mesh."""
-        call = requests.get_hull_mesh(hull_id, side, max_vertices, max_error)
+        call = requests.as_fresh(
+            requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
+        )
         attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
         while True:
             mesh = MeshAssembly()
@@ -255,21 +263,35 @@ class AsyncClient:
         side: Literal["inside", "outside"] | None = None,
         max_vertices: int | None = None,
         max_error: float | None = None,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> AsyncIterator[MeshPart]:
         """As Client.iter_hull_mesh."""
-        return self._parts(requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout)
+        return self._parts(
+            requests.as_fresh(
+                requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
+            ),
+            timeout,
+        )
 
     async def list_hulls(
-        self, prefix: str = "", *, page_size: int = 1000, timeout: float | None = None
+        self,
+        prefix: str = "",
+        *,
+        page_size: int = 1000,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
     ) -> AsyncIterator[HullInfo]:
         """As Client.list_hulls."""
         token = ""
         while True:
-            page = await self._unary(requests.list_hulls(prefix, page_size, token), timeout)
+            page = await self._unary(
+                requests.as_fresh(requests.list_hulls(prefix, page_size, token), freshness), timeout
+            )
             for hull in page.hulls:
                 yield hull
             token = page.next_page
+            freshness = freshness and freshness.for_next_page(page.header)
             if not token:
                 return
 
@@ -314,20 +336,31 @@ class AsyncClient:
         """As Client.put_body."""
         return await self._unary(requests.put_body(body_id, pieces, if_revision), timeout)
 
-    async def get_body(self, body_id: str, *, timeout: float | None = None) -> Body:
+    async def get_body(
+        self, body_id: str, *, freshness: Freshness | None = None, timeout: float | None = None
+    ) -> Body:
         """As Client.get_body."""
-        return await self._unary(requests.get_body(body_id), timeout)
+        return await self._unary(requests.as_fresh(requests.get_body(body_id), freshness), timeout)
 
     async def list_bodies(
-        self, prefix: str = "", *, page_size: int = 1000, timeout: float | None = None
+        self,
+        prefix: str = "",
+        *,
+        page_size: int = 1000,
+        freshness: Freshness | None = None,
+        timeout: float | None = None,
     ) -> AsyncIterator[BodyInfo]:
         """As Client.list_bodies."""
         token = ""
         while True:
-            page = await self._unary(requests.list_bodies(prefix, page_size, token), timeout)
+            page = await self._unary(
+                requests.as_fresh(requests.list_bodies(prefix, page_size, token), freshness),
+                timeout,
+            )
             for body in page.bodies:
                 yield body
             token = page.next_page
+            freshness = freshness and freshness.for_next_page(page.header)
             if not token:
                 return
 
@@ -353,12 +386,16 @@ class AsyncClient:
         clearance: float | None = None,
         tolerance: float = 0.0,
         method: Method = Method.UNSPECIFIED,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Collision:
         """As Client.check_collision."""
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return await self._unary(
-            requests.check_collision(a, b, wanted, tolerance, method, self._viewer), timeout
+            requests.as_fresh(
+                requests.check_collision(a, b, wanted, tolerance, method, self._viewer), freshness
+            ),
+            timeout,
         )
 
     async def check_collisions(
@@ -375,6 +412,7 @@ class AsyncClient:
         clearance: float | None = None,
         tolerance: float = 0.0,
         method: Method = Method.UNSPECIFIED,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Batch:
         """As Client.check_collisions."""
@@ -383,7 +421,9 @@ class AsyncClient:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         batch = BatchAssembly(asked, wanted)
         async for data in self._received(
-            requests.check_collisions(packed, asked, wanted, tolerance, method),
+            requests.as_fresh(
+                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
+            ),
             self._seconds(timeout),
         ):
             read_answer(batch.add, data)
@@ -403,6 +443,7 @@ class AsyncClient:
         clearance: float | None = None,
         tolerance: float = 0.0,
         method: Method = Method.UNSPECIFIED,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> AsyncIterator[BatchPart]:
         """As Client.iter_check_collisions."""
@@ -410,7 +451,10 @@ class AsyncClient:
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.check_collisions(packed, asked, wanted, tolerance, method), timeout
+            requests.as_fresh(
+                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
+            ),
+            timeout,
         )
 
     async def find_collisions(
@@ -429,6 +473,7 @@ class AsyncClient:
         witness: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> Scene:
         """As Client.find_collisions."""
@@ -436,7 +481,10 @@ class AsyncClient:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         found = SceneAssembly(wanted)
         async for data in self._received(
-            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
+            requests.as_fresh(
+                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
+                freshness,
+            ),
             self._seconds(timeout),
         ):
             read_answer(found.add, data)
@@ -458,13 +506,18 @@ class AsyncClient:
         witness: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> AsyncIterator[ScenePart]:
         """As Client.iter_find_collisions."""
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance), timeout
+            requests.as_fresh(
+                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
+                freshness,
+            ),
+            timeout,
         )
 
     def stream_collisions(
@@ -481,6 +534,7 @@ class AsyncClient:
         witness: bool = False,
         clearance: float | None = None,
         tolerance: float = 0.0,
+        freshness: Freshness | None = None,
         timeout: float | None = None,
     ) -> AsyncCollisionStream:
         """As Client.stream_collisions; entering it, or its first update, opens it."""
@@ -495,6 +549,7 @@ class AsyncClient:
             wanted,
             tolerance,
             only_changes,
+            freshness,
             self._seconds(timeout),
         )
 

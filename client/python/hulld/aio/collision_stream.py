@@ -13,6 +13,7 @@ import numpy.typing as npt
 from hulld.aio.duplex import AsyncDuplex
 from hulld.answers.assembly import StepAssembly
 from hulld.answers.collisions import StreamAnswer
+from hulld.calls.freshness import Freshness
 from hulld.calls.requests import open_stream, update_stream
 from hulld.calls.wanted import Wanted
 from hulld.collision_stream import Update, encode_update
@@ -40,11 +41,12 @@ class AsyncCollisionStream:
         wanted: Wanted,
         tolerance: float,
         only_changes: bool,
+        freshness: Freshness | None,
         timeout: float | None,
     ) -> None:
         self._call = call
         self._metadata = metadata
-        self._opening = open_stream(placements, pairs, wanted, tolerance, only_changes)
+        self._opening = open_stream(placements, pairs, wanted, tolerance, only_changes, freshness)
         self._placements = len(placements)
         self._pairs = pairs
         self._wanted = wanted

@@ -55,6 +55,7 @@ class BodyPage:
 
     bodies: Sequence[BodyInfo]
     next_page: str
+    header: Header
 
 
 def _info_of(message: Any) -> BodyInfo:
@@ -95,7 +96,11 @@ def decode_body(data: bytes) -> Body:
 
 def decode_page(data: bytes) -> BodyPage:
     message = body_pb2.ListBodiesResponse.FromString(data)
-    return BodyPage([_info_of(body) for body in message.bodies], message.next_page_token)
+    return BodyPage(
+        [_info_of(body) for body in message.bodies],
+        message.next_page_token,
+        header_of(message.header),
+    )
 
 
 def decode_deleted(data: bytes) -> Header:

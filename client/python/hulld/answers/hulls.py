@@ -18,10 +18,12 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 @dataclass(frozen=True)
 class Header:
     """The store, and its revision that a reply was answered from. Revisions of different stores
-    mean nothing to each other."""
+    mean nothing to each other. staleness: seconds; the answer to a read with a Freshness holds
+    everything that was committed up to that long before the call, at least."""
 
     store_id: str
     revision: int
+    staleness: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -280,7 +282,9 @@ def enum_or_zero(kind: Any, value: int) -> Any:
 
 
 def header_of(message: Any) -> Header:
-    return Header(message.store_id, message.revision)
+    return Header(
+        message.store_id, message.revision, message.staleness.ToNanoseconds() / 1_000_000_000
+    )
 
 
 def counts_of(message: Any) -> PointCounts:

@@ -4,7 +4,7 @@ safe to repeat."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, Literal, TypeVar
 
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from hulld.answers.bodies import Body, BodyPage, ReplacedBody
 from hulld.answers.collisions import BatchPart, Collision, Method, ScenePart
 from hulld.answers.hulls import CreatedHull, Header, Hull, HullChanges, HullInfo, MeshPart
 from hulld.answers.status import ServerStatus
+from hulld.calls.freshness import FIELD, Freshness
 from hulld.calls.wanted import Wanted
 from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, as_placement
 from hulld.geometry.poses import PoseLike, pack_pose
@@ -55,6 +56,17 @@ CHECK_HEALTH = "/grpc.health.v1.Health/Check"
 def is_serving(answer: bytes) -> bool:
     """Whether a HealthCheckResponse of grpc.health.v1 says SERVING: field 1 is 1."""
     return answer == b"\x08\x01"
+
+
+def as_fresh(call: Call[T], freshness: Freshness | None) -> Call[T]:
+    """The same read, whose answer must be as fresh."""
+    if freshness is None:
+        return call
+    return replace(call, request=call.request + _freshness_field(freshness))
+
+
+def _freshness_field(freshness: Freshness) -> bytes:
+    return MessageWriter().message(FIELD, freshness.message().SerializeToString()).finish()
 
 
 def create_hull(hull_id: str, if_absent: bool) -> Call[CreatedHull]:
@@ -112,6 +124,7 @@ class HullPage:
 
     hulls: Sequence[HullInfo]
     next_page: str
+    header: Header
 
 
 def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
@@ -119,7 +132,11 @@ def list_hulls(prefix: str, page_size: int, page_token: str) -> Call[HullPage]:
         message = hull_pb2.ListHullsResponse.FromString(data)
         if message.next_page_token and message.next_page_token == page_token:
             raise ValueError("the server answered a page that continues with itself")
-        return HullPage([hulls.info_of(hull) for hull in message.hulls], message.next_page_token)
+        return HullPage(
+            [hulls.info_of(hull) for hull in message.hulls],
+            message.next_page_token,
+            hulls.header_of(message.header),
+        )
 
     request = hull_pb2.ListHullsRequest(prefix=prefix, page_size=page_size, page_token=page_token)
     return Call(method_path("HullService", "ListHulls"), request.SerializeToString(), decode, True)
@@ -303,6 +320,7 @@ def open_stream(
     wanted: Wanted,
     tolerance: float,
     only_changes: bool,
+    freshness: Freshness | None,
 ) -> bytes:
     """The first message of StreamCollisions."""
     fixed = collision_pb2.CollisionStreamOpen(
@@ -314,6 +332,8 @@ def open_stream(
         .uint32s(2, pairs)
         .message(6, placements.packed())
     )
+    if freshness is not None:
+        opening.raw(_freshness_field(freshness))
     return MessageWriter().message(1, opening).finish()
 
 

@@ -64,6 +64,15 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
   EXPECT_THAT(parts, ElementsAre("arm/", ":"));
 }
 
+TEST_F(CompletionOnServer, BodiesAreOfferedWhereTheyAreTaken) {
+  Create("bolt");
+  ASSERT_EQ(RunTool({"body", "put", "bracket", "bolt", "--server", server_->address()}).code, 0);
+  EXPECT_THAT(Offers({"check", "b"}), ElementsAre("bolt", "bracket", ":"));
+  EXPECT_THAT(Offers({"view", "b"}), ElementsAre("bolt", "bracket", ":"));
+  EXPECT_THAT(Offers({"body", "get", ""}), ElementsAre("bracket", ":"));
+  EXPECT_THAT(Offers({"get", "b"}), ElementsAre("bolt", ":"));
+}
+
 TEST_F(CompletionOnServer, FailuresAreSilent) {
   for (const std::vector<std::string>& words :
        {std::vector<std::string>{"--server", "127.0.0.1:1", "get", ""},

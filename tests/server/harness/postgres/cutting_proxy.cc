@@ -54,6 +54,14 @@ std::optional<size_t> MessageSize(std::string_view bytes, bool has_letter) {
   return bytes.size() < start + length ? std::nullopt : std::optional<size_t>(start + length);
 }
 
+// Ends what is sent in one piece.
+constexpr char kEndOfPiece = 'S';
+
+// Whether a client's message is of the extended protocol, of which pieces are made.
+bool IsOfPiece(std::string_view message) {
+  return std::string_view("PBDECHS").find(message.front()) != std::string_view::npos;
+}
+
 // Whether a client's message asks for this statement by its text.
 bool Asks(std::string_view message, std::string_view text) {
   const std::string parsed = std::string(1, '\0').append(text).append(1, '\0');
@@ -67,6 +75,11 @@ struct CuttingProxy::Connection {
   int server = -1;
   bool started = false;
   bool holding = false;
+  // What came of one piece, and what it asks for.
+  std::string piece;
+  bool begins = false;
+  bool commits = false;
+  bool listens = false;
   std::string requests;
   std::string answers;
   std::thread thread;
@@ -119,6 +132,33 @@ int CuttingProxy::cuts() {
   return cuts_;
 }
 
+void CuttingProxy::CutListeners() {
+  const std::lock_guard lock(mutex_);
+  for (const Connection& connection : connections_) {
+    if (connection.client >= 0 && connection.listens) shutdown(connection.client, SHUT_RDWR);
+  }
+}
+
+void CuttingProxy::SetDeaf(bool deaf) {
+  const std::lock_guard lock(mutex_);
+  deaf_ = deaf;
+}
+
+void CuttingProxy::RefuseToListen() {
+  const std::lock_guard lock(mutex_);
+  refuses_to_listen_ = true;
+}
+
+uint64_t CuttingProxy::answered_bytes() {
+  const std::lock_guard lock(mutex_);
+  return answered_bytes_;
+}
+
+int CuttingProxy::Asked(const std::string& text) {
+  const std::lock_guard lock(mutex_);
+  return asked_[text];
+}
+
 void CuttingProxy::Accept() {
   while (true) {
     const int client = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
@@ -153,7 +193,12 @@ void CuttingProxy::Serve(Connection& connection) {
   }
   const std::lock_guard lock(mutex_);
   close(std::exchange(connection.client, -1));
-  if (connection.server != held_server_) close(connection.server);
+  if (connection.server >= 0) close(connection.server);
+}
+
+bool CuttingProxy::IsNext(Cut cut) {
+  const std::lock_guard lock(mutex_);
+  return next_ == cut;
 }
 
 bool CuttingProxy::CutsHere(Cut cut) {
@@ -170,28 +215,64 @@ bool CuttingProxy::CutsHere(Cut cut) {
   return true;
 }
 
+// message: a simple query, whose text ends with a zero byte.
+void CuttingProxy::NoteQuery(Connection& connection, std::string& message) {
+  constexpr size_t kStart = 5;
+  const std::string text = message.substr(kStart, message.size() - kStart - 1);
+  const std::lock_guard lock(mutex_);
+  ++asked_[text];
+  if (!text.starts_with("LISTEN ")) return;
+  connection.listens = true;
+  if (refuses_to_listen_) message[kStart] = 'X';
+}
+
+// Whether what the server sends is kept from the client.
+bool CuttingProxy::NoteAnswer(const Connection& connection, size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  answered_bytes_ += bytes;
+  return deaf_ && connection.listens;
+}
+
 // False: the connection is to be cut.
 bool CuttingProxy::PassRequests(Connection& connection) {
   std::string& bytes = connection.requests;
   while (const std::optional<size_t> size = MessageSize(bytes, connection.started)) {
-    const std::string message = bytes.substr(0, *size);
+    std::string message = bytes.substr(0, *size);
     bytes.erase(0, *size);
     const bool is_request = std::exchange(connection.started, true);
-    if (is_request && Asks(message, "BEGIN") && CutsHere(Cut::kHold)) connection.holding = true;
-    if (is_request && Asks(message, "COMMIT") && CutsHere(Cut::kBeforeCommit)) return false;
-    if (!connection.holding) {
-      if (!SendAll(connection.server, message)) return false;
-      continue;
-    }
-    const std::lock_guard lock(mutex_);
-    held_ += message;
-    // The end of what is sent in one piece.
-    if (message.front() == 'S') {
-      held_server_ = connection.server;
+    if (is_request && message.front() == 'Q') NoteQuery(connection, message);
+    if (is_request ? !PassRequest(connection, message) : !SendAll(connection.server, message)) {
       return false;
     }
   }
   return true;
+}
+
+bool CuttingProxy::PassRequest(Connection& connection, const std::string& message) {
+  if (Asks(message, "BEGIN") && CutsHere(Cut::kHold)) connection.holding = true;
+  if (Asks(message, "COMMIT") && CutsHere(Cut::kBeforeCommit)) return false;
+  const bool is_kept = connection.holding || !connection.piece.empty() || IsNext(Cut::kHoldCommit);
+  if (is_kept && IsOfPiece(message)) return PassPiece(connection, message);
+  return SendAll(connection.server, message);
+}
+
+// What comes in it decides whether a piece is held, so it is kept until its end.
+bool CuttingProxy::PassPiece(Connection& connection, const std::string& message) {
+  connection.piece += message;
+  connection.begins = connection.begins || Asks(message, "BEGIN");
+  connection.commits = connection.commits || Asks(message, "COMMIT");
+  if (message.front() != kEndOfPiece) return true;
+  const std::string piece = std::exchange(connection.piece, {});
+  const bool begins = std::exchange(connection.begins, false);
+  const bool commits = std::exchange(connection.commits, false);
+  const bool is_held = connection.holding || (commits && !begins && CutsHere(Cut::kHoldCommit));
+  if (!is_held) return SendAll(connection.server, piece);
+  const std::lock_guard lock(mutex_);
+  if (held_server_ >= 0) close(held_server_);
+  held_ = piece;
+  held_server_ = std::exchange(connection.server, -1);
+  is_held_.notify_all();
+  return false;
 }
 
 bool CuttingProxy::PassAnswers(Connection& connection) {
@@ -201,9 +282,20 @@ bool CuttingProxy::PassAnswers(Connection& connection) {
     bytes.erase(0, *size);
     const bool is_commit = message.front() == 'C' && message.find("COMMIT") != std::string::npos;
     if (is_commit && CutsHere(Cut::kAfterCommit)) return false;
+    if (NoteAnswer(connection, *size)) continue;
     if (!SendAll(connection.client, message)) return false;
   }
   return true;
+}
+
+void CuttingProxy::DeliverOnceHeld(std::chrono::milliseconds longest) {
+  {
+    std::unique_lock lock(mutex_);
+    const bool is_held = is_held_.wait_for(lock, longest, [this] { return held_server_ >= 0; });
+    if (!is_held) next_ = Cut::kNone;
+    if (!is_held) return;
+  }
+  Deliver();
 }
 
 void CuttingProxy::Deliver() {

@@ -1,8 +1,11 @@
 #ifndef HULLD_TESTS_SERVER_HARNESS_POSTGRES_CUTTING_PROXY_H_
 #define HULLD_TESTS_SERVER_HARNESS_POSTGRES_CUTTING_PROXY_H_
 
+#include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <list>
+#include <map>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -20,8 +23,11 @@ class CuttingProxy {
     kBeforeCommit,
     // PostgreSQL commits, and the connection is cut before its answer is passed on.
     kAfterCommit,
-    // The connection to hulld is cut, and all of the transaction is delivered by Deliver.
+    // The connection to hulld is cut, and what is sent in one piece with BEGIN is delivered by
+    // Deliver.
     kHold,
+    // The same of what is sent in one piece with COMMIT and without BEGIN.
+    kHoldCommit,
   };
 
   // socket_directory: of the server.
@@ -40,9 +46,20 @@ class CuttingProxy {
   void GoDownWithCut();
   // Cuts so far.
   int cuts();
+  // Cuts the connections that asked to LISTEN, once; or keeps from them, as long as it is set, all
+  // that the server sends, as a network does that lost a connection and tells nobody.
+  void CutListeners();
+  void SetDeaf(bool deaf);
+  // From now on LISTEN is a statement that the server does not know.
+  void RefuseToListen();
+  // What the server has answered so far, in bytes, and how often it was asked for this text.
+  uint64_t answered_bytes();
+  int Asked(const std::string& text);
   // What was held arrives at the server; returns when that has ended the connection or answered
   // all.
   void Deliver();
+  // The same as soon as something is held; where nothing was after so long, nothing is any more.
+  void DeliverOnceHeld(std::chrono::milliseconds longest);
 
  private:
   struct Connection;
@@ -50,7 +67,12 @@ class CuttingProxy {
   void Accept();
   void Serve(Connection& connection);
   bool PassRequests(Connection& connection);
+  bool PassRequest(Connection& connection, const std::string& message);
+  bool PassPiece(Connection& connection, const std::string& message);
   bool PassAnswers(Connection& connection);
+  bool IsNext(Cut cut);
+  void NoteQuery(Connection& connection, std::string& message);
+  bool NoteAnswer(const Connection& connection, size_t bytes);
   bool CutsHere(Cut cut);
 
   const std::string server_;
@@ -62,9 +84,15 @@ class CuttingProxy {
   Cut next_ = Cut::kNone;
   bool down_ = false;
   bool down_with_cut_ = false;
+  bool deaf_ = false;
+  bool refuses_to_listen_ = false;
   int cuts_ = 0;
+  uint64_t answered_bytes_ = 0;
+  // Simple queries, by their text.
+  std::map<std::string, int> asked_;
   std::string held_;
   int held_server_ = -1;
+  std::condition_variable is_held_;
   std::list<Connection> connections_;
 
   std::thread acceptor_;

@@ -24,6 +24,8 @@ namespace hulld::server {
 namespace {
 
 constexpr char kAdminPassword[] = "Wort-des-Verwalters-3c";
+// Far more than a standby takes to follow.
+constexpr int kMostAttempts = 10'000;
 
 [[noreturn]] void Fail(const std::string& what) {
   std::fprintf(stderr, "PostgresCluster: %s\n", what.c_str());
@@ -80,6 +82,13 @@ std::string Contents(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+// It must succeed.
+void RunToEnd(std::vector<std::string> arguments, const std::string& log) {
+  const pid_t pid = Spawn(std::move(arguments), log);
+  int status = 0;
+  if (waitpid(pid, &status, 0) != pid || status != 0) Fail(Contents(log));
+}
+
 }  // namespace
 
 bool PostgresCluster::IsInstalled() { return !ProgramDirectory().empty(); }
@@ -89,32 +98,75 @@ PostgresCluster& PostgresCluster::Shared() {
   return cluster;
 }
 
-PostgresCluster::PostgresCluster() {
+void PostgresCluster::GiveToServer(const std::string& path) {
+  if (geteuid() != 0) return;
+  const passwd* user = getpwnam("postgres");
+  if (user == nullptr) user = getpwnam("nobody");
+  if (user == nullptr || chown(path.c_str(), user->pw_uid, user->pw_gid) != 0) {
+    Fail(absl::StrCat("cannot give ", path, " to the user who runs PostgreSQL"));
+  }
+}
+
+void PostgresCluster::MakeDirectory() {
   // Short, as a socket's path holds 107 characters.
   std::string name = "/tmp/hulld-postgres-XXXXXX";
   directory_ = mkdtemp(name.data());
+  GiveToServer(directory_);
+  chmod(directory_.c_str(), 0755);
+}
+
+PostgresCluster::PostgresCluster(const WalIn& wal) {
+  MakeDirectory();
   const std::string password_file = directory_ + "/password";
   std::ofstream(password_file) << kAdminPassword << "\n";
-  if (geteuid() == 0) {
-    const passwd* user = getpwnam("postgres");
-    if (user == nullptr) user = getpwnam("nobody");
-    for (const std::string& path : {directory_, password_file}) {
-      if (user == nullptr || chown(path.c_str(), user->pw_uid, user->pw_gid) != 0) {
-        Fail("cannot give a directory to the user who runs PostgreSQL");
-      }
-    }
+  GiveToServer(password_file);
+  std::vector<std::string> initdb = {ProgramDirectory() + "/initdb",
+                                     "-D",
+                                     directory_ + "/data",
+                                     "-U",
+                                     "postgres",
+                                     "--pwfile",
+                                     password_file,
+                                     "--auth=scram-sha-256",
+                                     "--locale=C",
+                                     "--encoding=UTF8",
+                                     "--no-sync",
+                                     "--no-instructions"};
+  if (!wal.directory.empty()) {
+    initdb.insert(initdb.end(), {"--waldir", wal.directory, "--wal-segsize=1"});
   }
-  chmod(directory_.c_str(), 0755);
-  const std::string log = directory_ + "/initdb.log";
-  const pid_t initdb =
-      Spawn(AsServer({ProgramDirectory() + "/initdb", "-D", directory_ + "/data", "-U", "postgres",
-                      "--pwfile", password_file, "--auth=scram-sha-256", "--locale=C",
-                      "--encoding=UTF8", "--no-sync", "--no-instructions"}),
-            log);
-  int status = 0;
-  if (waitpid(initdb, &status, 0) != initdb || status != 0) Fail(Contents(log));
+  RunToEnd(AsServer(std::move(initdb)), directory_ + "/initdb.log");
   Start();
   Ask("postgres", absl::StrCat("CREATE ROLE hulld LOGIN PASSWORD '", kPassword, "'"));
+}
+
+PostgresCluster::PostgresCluster(const StandbyOf& standby) {
+  MakeDirectory();
+  Follow(standby.primary);
+}
+
+void PostgresCluster::Follow(PostgresCluster& primary) {
+  std::filesystem::remove_all(directory_ + "/data");
+  const std::string conninfo =
+      absl::StrCat("host=", primary.directory_, " user=postgres password=", kAdminPassword,
+                   " application_name=standby");
+  RunToEnd(AsServer({ProgramDirectory() + "/pg_basebackup", "--pgdata", directory_ + "/data",
+                     "--write-recovery-conf", "--wal-method", "stream", "--checkpoint", "fast",
+                     "--no-sync", "--dbname", conninfo}),
+           directory_ + "/basebackup.log");
+  Start();
+  // After the copy, which is not to wait for a standby when it is promoted.
+  primary.Ask("postgres", "ALTER SYSTEM SET synchronous_standby_names = 'standby'");
+  primary.Ask("postgres", "SELECT pg_reload_conf()");
+  const std::string is_followed = "SELECT 1 FROM pg_stat_replication WHERE sync_state = 'sync'";
+  for (int attempt = 0; primary.Ask("postgres", is_followed).empty(); ++attempt) {
+    if (attempt == kMostAttempts) Fail(Contents(directory_ + "/server.log"));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+}
+
+void PostgresCluster::Promote() {
+  if (Ask("postgres", "SELECT pg_promote()").front() != "t") Fail("the standby is not promoted");
 }
 
 PostgresCluster::~PostgresCluster() {
@@ -129,7 +181,8 @@ void PostgresCluster::Start() {
   while (true) {
     server_ = Spawn(AsServer({ProgramDirectory() + "/postgres", "-D", directory_ + "/data", "-k",
                               directory_, "-c", "listen_addresses=", "-c", "shared_buffers=16MB",
-                              "-c", "max_connections=200", "-c", "autovacuum=off"}),
+                              "-c", "max_connections=200", "-c", "autovacuum=off", "-c",
+                              "recovery_init_sync_method=syncfs"}),
                     log);
     int status = 0;
     while (waitpid(server_, &status, WNOHANG) == 0) {
@@ -157,17 +210,31 @@ void PostgresCluster::Kill() {
   WaitForEnd();
 }
 
-void PostgresCluster::SignalAll(bool stop) {
-  const int number = stop ? SIGSTOP : SIGCONT;
-  // First the one that would make more of them.
-  kill(server_, number);
+std::vector<pid_t> PostgresCluster::Children() const {
   std::ifstream children(absl::StrCat("/proc/", server_, "/task/", server_, "/children"));
-  for (pid_t child = 0; children >> child;) kill(child, number);
+  return {std::istream_iterator<pid_t>(children), {}};
 }
 
-std::string PostgresCluster::MakeDatabase() {
+void PostgresCluster::KillAll() {
+  Suspend();
+  for (const pid_t child : Children()) kill(child, SIGKILL);
+  Kill();
+}
+
+void PostgresCluster::Suspend() {
+  // First the one that would make more of them.
+  kill(server_, SIGSTOP);
+  for (const pid_t child : Children()) kill(child, SIGSTOP);
+}
+
+void PostgresCluster::Resume() {
+  for (const pid_t child : Children()) kill(child, SIGCONT);
+  kill(server_, SIGCONT);
+}
+
+std::string PostgresCluster::MakeDatabase(const std::string& tablespace) {
   const std::string name = absl::StrCat("test_", ++databases_);
-  Ask("postgres", absl::StrCat("CREATE DATABASE ", name, " OWNER hulld"));
+  Ask("postgres", absl::StrCat("CREATE DATABASE ", name, " OWNER hulld TABLESPACE ", tablespace));
   return name;
 }
 
@@ -176,10 +243,10 @@ std::string PostgresCluster::Conninfo(const std::string& database, const std::st
                       " user=hulld password=", kPassword);
 }
 
-std::string PostgresCluster::WriteConninfo(const std::string& database) const {
-  const std::string path = absl::StrCat(directory_, "/", database, ".conninfo");
+std::string PostgresCluster::WriteConninfo(const std::string& database, const std::string& host) {
+  const std::string path = absl::StrCat(directory_, "/conninfo_", ++files_);
   const int fd = open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  const std::string text = Conninfo(database) + "\n";
+  const std::string text = Conninfo(database, host) + "\n";
   if (write(fd, text.data(), text.size()) != static_cast<ssize_t>(text.size())) Fail(path);
   close(fd);
   return path;

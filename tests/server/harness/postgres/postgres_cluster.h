@@ -21,17 +21,29 @@ class PostgresCluster {
   // Made at first use.
   static PostgresCluster& Shared();
 
-  PostgresCluster();
+  PostgresCluster() : PostgresCluster(WalIn{}) {}
+  // Keeps its log in a directory of its own, which belongs to the server (GiveToServer) and is
+  // empty, in segments of 1 MiB.
+  struct WalIn {
+    std::string directory;
+  };
+  explicit PostgresCluster(const WalIn& wal);
+  // A standby of `primary`, which has to live on.
+  struct StandbyOf {
+    PostgresCluster& primary;
+  };
+  explicit PostgresCluster(const StandbyOf& standby);
   PostgresCluster(const PostgresCluster&) = delete;
   PostgresCluster& operator=(const PostgresCluster&) = delete;
   ~PostgresCluster();
 
   // An empty database that belongs to the role hulld; returns its name.
-  std::string MakeDatabase();
+  std::string MakeDatabase(const std::string& tablespace = "pg_default");
   // Of the role hulld, which is no superuser. host: of a proxy; empty: of the server itself.
   std::string Conninfo(const std::string& database, const std::string& host = "") const;
-  // In a file of ours, as --postgres-conninfo-file wants it; it goes with this.
-  std::string WriteConninfo(const std::string& database) const;
+  // In a file of ours, as --postgres-conninfo-file wants it; it goes with this. host: as above, or
+  // several, separated by commas.
+  std::string WriteConninfo(const std::string& database, const std::string& host = "");
   const std::string& socket_directory() const { return directory_; }
   static constexpr char kPassword[] = "Wort-der-Rolle-7f";
 
@@ -40,21 +52,33 @@ class PostgresCluster {
 
   // Waits until it answers.
   void Start();
+  // Copies `primary` in the place of all that is here, and follows it as its synchronous standby:
+  // from then on what is committed there is on both.
+  void Follow(PostgresCluster& primary);
+  // A standby goes on by itself, and takes changes.
+  void Promote();
   // All its processes at once, as pg_ctl stop -m immediate, which asks nobody and saves nothing.
   void StopImmediately();
   // kill -9 of the server's first process; the others follow.
   void Kill();
+  // kill -9 of all its processes, as when its machine is gone.
+  void KillAll();
   // SIGSTOP and SIGCONT of all its processes.
-  void Suspend() { SignalAll(true); }
-  void Resume() { SignalAll(false); }
+  void Suspend();
+  void Resume();
+
+  // Lets the user who runs PostgreSQL write what is at this path.
+  static void GiveToServer(const std::string& path);
 
  private:
-  void SignalAll(bool stop);
+  void MakeDirectory();
+  std::vector<pid_t> Children() const;
   void WaitForEnd();
 
   std::string directory_;
   pid_t server_ = -1;
   int databases_ = 0;
+  int files_ = 0;
 };
 
 }  // namespace hulld::server

@@ -38,6 +38,7 @@ class PostgresShared : public PostgresTest {
     options_ = through_proxy;
     return server;
   }
+  void LookOnlyWhenAsked() { options_.look = options_.beat = std::chrono::hours(1); }
   static uint64_t Received(PostgresRegistry& server, const std::string& id) {
     const auto view = server.View(id);
     return view.ok() ? view->record.counts.received : 0;
@@ -59,6 +60,31 @@ class PostgresShared : public PostgresTest {
       server.registry().PutBody(std::move(body), if_revision, std::move(done));
     });
   }
+  // As the store keeps it now.
+  StoredHull KeptHull(const std::string& id) {
+    StoredHull kept;
+    const absl::Status read =
+        hulls_->store().ForEachHull([&](const std::string& hull_id, const auto& hull) {
+          if (hull_id == id && hull.ok()) kept = *hull;
+        });
+    EXPECT_TRUE(read.ok()) << read;
+    return kept;
+  }
+  // Wait until the database has a session of which this holds, or none; for a minute at most.
+  void AwaitSession(const std::string& condition) const { AwaitCount(condition, true); }
+  void AwaitNoSession(const std::string& condition) const { AwaitCount(condition, false); }
+  void AwaitCount(const std::string& condition, bool is_some) const {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+    const std::string ask =
+        "SELECT 1 FROM pg_stat_activity WHERE pid <> pg_backend_pid() AND " + condition;
+    while (Ask(ask).empty() == is_some) {
+      if (std::chrono::steady_clock::now() > end) {
+        ADD_FAILURE() << (is_some ? "no session comes to " : "a session stays at ") << condition;
+        return;
+      }
+      std::this_thread::yield();
+    }
+  }
   static std::vector<std::string> Listed(PostgresRegistry& server) {
     EXPECT_TRUE(server.registry().AwaitOthers({}).ok());
     std::vector<std::string> ids;
@@ -69,7 +95,9 @@ class PostgresShared : public PostgresTest {
   }
 };
 
+// However seldom it looks by itself what others did.
 TEST_F(PostgresShared, WhatOneServerAcknowledgedTheOtherAnswers) {
+  LookOnlyWhenAsked();
   Start();
   const Server other = StartBeside();
   ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
@@ -302,7 +330,8 @@ TEST_F(PostgresShared, WhatAnOpenStreamsHullLostFromMemoryIsReadAnew) {
 
 // Both changes of an ID are told as one. A watch of hulls alone is told of the hull.
 TEST_F(PostgresShared, WatchesAreToldWhereAnIdBecameABodyOrAHull) {
-  options_.look = std::chrono::hours(1);
+  options_.notices = false;
+  options_.look = options_.beat = std::chrono::hours(1);
   Start();
   const Server other = StartBeside();
   ASSERT_TRUE(other->Create("was-hull").ok());
@@ -390,6 +419,176 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
     EXPECT_EQ(again->already_applied, cut == Cut::kAfterCommit);
     EXPECT_EQ(Received(*hulls_, id), 10);
     EXPECT_EQ(Received(*other, id), 10);
+  }
+}
+
+// The transaction has the turn, and its COMMIT is on its way. Who asks what became of it waits for
+// the turn.
+TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  proxy_->CutNext(Cut::kHoldCommit);
+  auto put = std::async(std::launch::async, [this] { return hulls_->Put("h", {{9, 9, 9}}); });
+  AwaitSession("datname = current_database() AND wait_event_type = 'Lock'");
+  proxy_->Deliver();
+  const auto result = put.get();
+  ASSERT_TRUE(result.ok()) << result.status();
+  EXPECT_FALSE(result->already_applied);
+  EXPECT_EQ(proxy_->cuts(), 1);
+  EXPECT_EQ(Received(*other, "h"), 9);
+  EXPECT_EQ(Received(*hulls_, "h"), 9);
+}
+
+TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  proxy_->CutNext(Cut::kHoldCommit);
+  auto put = std::async(std::launch::async, [this] { return hulls_->Put("h", {{9, 9, 9}}); });
+  AwaitSession("datname = current_database() AND wait_event_type = 'Lock'");
+  // As it does itself once nothing has come for ten seconds.
+  EndSessions("state = 'idle in transaction'");
+  ASSERT_TRUE(put.get().ok());
+  ASSERT_TRUE(other->Put("h", {{10, 9, 9}}, "v").ok());
+  const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
+  proxy_->Deliver();
+  EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
+  EXPECT_EQ(Received(*hulls_, "h"), 10);
+  EXPECT_EQ(Received(*other, "h"), 10);
+}
+
+TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  proxy_->CutNext(Cut::kHold);
+  ASSERT_TRUE(hulls_->Put("h", {{9, 9, 9}}).ok());
+  EXPECT_EQ(proxy_->cuts(), 1);
+  const std::string before = Ask("SELECT s::text FROM hulld.store s").front();
+  proxy_->Deliver();
+  EXPECT_EQ(Ask("SELECT s::text FROM hulld.store s").front(), before);
+  ASSERT_TRUE(other->Put("h", {{10, 9, 9}}, "v").ok());
+  EXPECT_EQ(Received(*hulls_, "h"), 10);
+}
+
+// Of a creation and of a deletion nothing tells, when they are made again, that they were there.
+TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
+  Start();
+  const Server other = StartBeside();
+  proxy_->CutNext(Cut::kAfterCommit);
+  const auto created = hulls_->Create("h");
+  EXPECT_TRUE(created.ok()) << created.status();
+  proxy_->CutNext(Cut::kAfterCommit);
+  const auto replaced = Replace(*hulls_, "h", CubeCorners(), created->hull.revision);
+  EXPECT_TRUE(replaced.ok()) << replaced.status();
+  proxy_->CutNext(Cut::kAfterCommit);
+  const auto deleted = hulls_->Delete("h");
+  EXPECT_TRUE(deleted.ok()) << deleted.status();
+  EXPECT_EQ(proxy_->cuts(), 3);
+  EXPECT_TRUE(absl::IsNotFound(other->View("h").status()));
+}
+
+// What belongs to a record is not given to who has another one.
+TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
+  LookOnlyWhenAsked();
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+  const StoredHull former = KeptHull("h");
+  PostgresStore& store = hulls_->store();
+  EXPECT_EQ(*store.LoadSequence(former.record, "w"), 1);
+  // No vertex, hence no revision; but a sequence.
+  ASSERT_TRUE(other->Put("h", {{0.5, 0.5, 0.5}}).ok());
+  EXPECT_TRUE(absl::IsAborted(store.LoadSequence(former.record, "w").status()));
+  EXPECT_EQ(*store.LoadSequence(KeptHull("h").record, "w"), 2);
+  EXPECT_TRUE(store.LoadVertices(former).ok());
+  ASSERT_TRUE(Replace(*other, "h", SpherePoints(20)).ok());
+  EXPECT_TRUE(absl::IsAborted(store.LoadVertices(former).status()));
+  ASSERT_TRUE(other->Delete("h").ok());
+  EXPECT_TRUE(absl::IsAborted(store.LoadVertices(former).status()));
+  EXPECT_TRUE(absl::IsAborted(store.LoadSequence(former.record, "w").status()));
+}
+
+// What it knows of the hull is not the last, so each of these would be answered wrongly from it.
+TEST_F(PostgresShared, ChangesAreDecidedByWhatOthersDid) {
+  LookOnlyWhenAsked();
+  Start();
+  const Server other = StartBeside();
+  ASSERT_TRUE(hulls_->Create("h").ok());
+  ASSERT_TRUE(other->Delete("h").ok());
+  EXPECT_TRUE(hulls_->Create("h").ok());
+  ASSERT_TRUE(other->Delete("h").ok());
+  EXPECT_TRUE(absl::IsNotFound(hulls_->Delete("h").status()));
+  ASSERT_TRUE(other->Create("h").ok());
+  EXPECT_TRUE(hulls_->Delete("h").ok());
+  const auto replaced = Replace(*other, "h", CubeCorners());
+  ASSERT_TRUE(replaced.ok());
+  EXPECT_TRUE(Replace(*hulls_, "h", SpherePoints(20), replaced->hull.revision).ok());
+  ASSERT_TRUE(other->Put("h", {{9, 9, 9}}).ok());
+  EXPECT_EQ(hulls_->Open("h", "w", false)->last_sequence, 1);
+  // The chunks that are repeated, and what follows them.
+  const auto opened = hulls_->Open("h");
+  ASSERT_TRUE(other->Put("h", {{10, 9, 9}}).ok());
+  EXPECT_TRUE(hulls_->Append(opened->session, 2, {{10, 9, 9}})->already_applied);
+  ASSERT_TRUE(other->Put("h", {{11, 9, 9}}).ok());
+  const auto next = hulls_->Append(opened->session, 4, {{12, 9, 9}});
+  EXPECT_TRUE(next.ok()) << next.status();
+  EXPECT_EQ(Received(*other, "h"), 24);
+}
+
+TEST_F(PostgresShared, ServersThatStartAtOnceMakeOneStore) {
+  constexpr size_t kServers = 8;
+  for (int round = 0; round < 2; ++round) {
+    options_.conninfo = cluster().Conninfo(cluster().MakeDatabase());
+    std::vector<std::future<absl::StatusOr<std::unique_ptr<PostgresStore>>>> opening;
+    for (size_t i = 0; i < kServers; ++i) {
+      opening.push_back(std::async(std::launch::async, [this] { return Open(); }));
+    }
+    std::vector<Server> servers;
+    for (auto& each : opening) {
+      auto store = each.get();
+      ASSERT_TRUE(store.ok()) << store.status();
+      servers.push_back(std::make_unique<PostgresRegistry>(*std::move(store)));
+      ASSERT_TRUE(servers.back()->loaded().ok()) << servers.back()->loaded();
+      EXPECT_EQ(servers.back()->store().id(), servers.front()->store().id());
+      EXPECT_EQ(servers.back()->store().epoch(), 1);
+    }
+    std::vector<std::string> ids;
+    for (size_t i = 0; i < kServers; ++i) {
+      ids.push_back(absl::StrCat("h", i));
+      ASSERT_TRUE(servers[i]->Create(ids.back()).ok());
+    }
+    for (const Server& server : servers) {
+      EXPECT_THAT(Listed(*server), ::testing::ElementsAreArray(ids));
+    }
+  }
+}
+
+// As where those of servers that were killed are still there.
+TEST_F(PostgresShared, AServerThatFindsNoRoomForItsSessionsWaits) {
+  for (const int room : {1, 3}) {
+    const std::string role = absl::StrCat("narrow_", room);
+    const std::string database = cluster().MakeDatabase();
+    Ask(absl::StrCat("CREATE ROLE ", role, " LOGIN PASSWORD 'narrow' CONNECTION LIMIT ", room));
+    Ask(absl::StrCat("ALTER DATABASE ", database, " OWNER TO ", role));
+    options_.conninfo = absl::StrCat("host=", cluster().socket_directory(), " dbname=", database,
+                                     " user=", role, " password=narrow");
+    options_.patience = std::chrono::milliseconds(0);
+    const absl::Status refused = Open().status();
+    EXPECT_TRUE(absl::IsUnavailable(refused)) << refused;
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("too many connections"));
+    AwaitNoSession(absl::StrCat("usename = '", role, "'"));
+    bool has_waited = false;
+    options_.should_stop = [&] {
+      Ask(absl::StrCat("ALTER ROLE ", role, " CONNECTION LIMIT -1"));
+      has_waited = true;
+      return false;
+    };
+    options_.patience = std::chrono::seconds(10);
+    const auto opened = Open();
+    EXPECT_TRUE(opened.ok()) << opened.status();
+    EXPECT_TRUE(has_waited);
   }
 }
 

@@ -1,4 +1,4 @@
-#include "client/hullctl/command_line/hull_segment.h"
+#include "client/hullctl/body/hull_segment.h"
 
 #include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>

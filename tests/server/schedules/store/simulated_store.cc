@@ -1,4 +1,4 @@
-#include "tests/server/schedules/simulated_store.h"
+#include "tests/server/schedules/store/simulated_store.h"
 
 #include <absl/status/status.h>
 
@@ -151,6 +151,8 @@ void SimulatedStore::Reopen(const StoreFaults& faults) {
 void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
   if (auto fault = ledger_.Keep(change, nobody_waits)) Scheduler::Current().Fail(*fault);
   const HullRecord& record = change.hull.record;
+  const bool ends = change.deleted || change.replaced.has_value();
+  log_.push_back({record.hull_id, change.revision, ends ? change.revision : 0});
   if (change.deleted) {
     hulls_.erase(record.hull_id);
     return;

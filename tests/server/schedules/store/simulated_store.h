@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_SCHEDULES_SIMULATED_STORE_H_
-#define HULLD_TESTS_SERVER_SCHEDULES_SIMULATED_STORE_H_
+#ifndef HULLD_TESTS_SERVER_SCHEDULES_STORE_SIMULATED_STORE_H_
+#define HULLD_TESTS_SERVER_SCHEDULES_STORE_SIMULATED_STORE_H_
 
 #include <cstdint>
 #include <map>
@@ -8,10 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "server/process/synchronization.h"
 #include "server/store/store.h"
 #include "tests/server/schedules/ledger.h"
 
 namespace hulld::server {
+
+class SharedStore;
 
 // How often something fails: once in so many calls; 0: never.
 struct StoreFaults {
@@ -45,6 +48,8 @@ class SimulatedStore : public Store {
     uint64_t sequences = 0;
     uint64_t kills = 0;
     uint64_t revived = 0;
+    // Changes that another server's superseded (SharedStore).
+    uint64_t superseded = 0;
   };
 
   explicit SimulatedStore(const StoreFaults& faults) : faults_(faults) {}
@@ -67,7 +72,7 @@ class SimulatedStore : public Store {
   Ledger& ledger() { return ledger_; }
   const Counts& counts() const { return counts_; }
   // Failures that calls may have been answered with by now; and with them one that they may yet.
-  uint64_t answered_failures() const { return failed() - (is_failing_ ? 1 : 0); }
+  uint64_t answered_failures() const { return failed() - (is_failing_ ? 1 : 0) - failing_servers_; }
   uint64_t failed() const { return counts_.refused + counts_.unknown + counts_.failed_reads; }
   bool was_full() const { return was_full_; }
   bool is_damaged(uint64_t create_revision) const { return damaged_.contains(create_revision); }
@@ -78,12 +83,23 @@ class SimulatedStore : public Store {
   void Reopen(const StoreFaults& faults);
 
  private:
+  // As which several servers have it.
+  friend class SharedStore;
+
   // What is kept of a hull.
   struct Kept {
     StoredHull stored;
     // Each with the revision that brought it.
     std::vector<std::pair<uint64_t, Vector>> vertices;
     std::map<std::string, uint64_t> sequences;
+  };
+
+  // A change that was kept: of which hull, at which revision, and whether an incarnation ended
+  // then.
+  struct Logged {
+    std::string hull_id;
+    uint64_t revision = 0;
+    uint64_t ended_at = 0;
   };
 
   absl::Status RefuseBatch(std::span<const Change* const> changes);
@@ -101,8 +117,14 @@ class SimulatedStore : public Store {
   bool is_failing_ = false;
   bool was_full_ = false;
   bool is_dead_ = false;
+
+  std::vector<Logged> log_;
+  // Of SharedStore: whose last batch failed; and all of them, guarded by the mutex.
+  uint64_t failing_servers_ = 0;
+  Mutex servers_mutex_;
+  std::vector<SharedStore*> servers_;
 };
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_SCHEDULES_SIMULATED_STORE_H_
+#endif  // HULLD_TESTS_SERVER_SCHEDULES_STORE_SIMULATED_STORE_H_

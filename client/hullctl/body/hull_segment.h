@@ -1,5 +1,5 @@
-#ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_HULL_SEGMENT_H_
-#define HULLD_CLIENT_HULLCTL_COMMAND_LINE_HULL_SEGMENT_H_
+#ifndef HULLD_CLIENT_HULLCTL_BODY_HULL_SEGMENT_H_
+#define HULLD_CLIENT_HULLCTL_BODY_HULL_SEGMENT_H_
 
 #include <set>
 #include <string>
@@ -16,4 +16,4 @@ std::string UniqueHullSegment(const std::string& name, std::set<std::string>* ta
 
 }  // namespace hulld
 
-#endif  // HULLD_CLIENT_HULLCTL_COMMAND_LINE_HULL_SEGMENT_H_
+#endif  // HULLD_CLIENT_HULLCTL_BODY_HULL_SEGMENT_H_

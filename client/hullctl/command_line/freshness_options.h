@@ -1,0 +1,15 @@
+#ifndef HULLD_CLIENT_HULLCTL_COMMAND_LINE_FRESHNESS_OPTIONS_H_
+#define HULLD_CLIENT_HULLCTL_COMMAND_LINE_FRESHNESS_OPTIONS_H_
+
+#include "client/hullctl/command_line/command.h"
+#include "client/hullctl/command_line/invocation.h"
+
+namespace hulld {
+
+// Declares --max-staleness and --at-least for a command that reads; they fill
+// invocation->freshness, which all reads of the command take.
+void AddFreshnessOptions(Command command, Invocation* invocation);
+
+}  // namespace hulld
+
+#endif  // HULLD_CLIENT_HULLCTL_COMMAND_LINE_FRESHNESS_OPTIONS_H_

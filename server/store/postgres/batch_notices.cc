@@ -1,0 +1,140 @@
+#include "server/store/postgres/batch_notices.h"
+
+#include <absl/strings/numbers.h>
+#include <absl/strings/str_cat.h>
+#include <poll.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "core/base/check.h"
+
+namespace hulld::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Of a database there is one store, so its channel needs no more of a name.
+constexpr char kListen[] = "LISTEN hulld_batches";
+constexpr char kNotify[] = "NOTIFY hulld_batches";
+constexpr std::chrono::milliseconds kForEver{-1};
+// Before a database that refused to listen is asked again.
+constexpr std::chrono::minutes kRefusedRetry{1};
+
+// How long it is until then, at least 0.
+std::chrono::milliseconds UpTo(Clock::time_point end) {
+  return std::max(std::chrono::milliseconds(0),
+                  std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now()));
+}
+
+}  // namespace
+
+absl::StatusOr<uint64_t> LastBatch(Session& session) {
+  const absl::StatusOr<Rows> batch = session.Run("SELECT batch FROM hulld.store");
+  if (!batch.ok()) return batch.status();
+  uint64_t number = 0;
+  if (batch->count() != 1 || !absl::SimpleAtoi(std::string(batch->at(0, 0)), &number)) {
+    return absl::DataLossError("the row of hulld.store is missing");
+  }
+  return number;
+}
+
+BatchNotices::BatchNotices(Opener open, std::chrono::milliseconds retry,
+                           std::function<void(uint64_t batch)> on_batch, std::string fallback)
+    : open_(std::move(open)),
+      retry_(retry),
+      on_batch_(std::move(on_batch)),
+      fallback_(std::move(fallback)),
+      wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  HULLD_CHECK(wake_ >= 0);
+  thread_ = std::thread([this] { Run(); });
+}
+
+BatchNotices::~BatchNotices() {
+  ending_ = true;
+  eventfd_write(wake_, 1);
+  thread_.join();
+  close(wake_);
+}
+
+void BatchNotices::Send(uint64_t batch) {
+  to_send_ = batch;
+  eventfd_write(wake_, 1);
+}
+
+void BatchNotices::Run() {
+  bool failing = false;
+  while (!ending_) {
+    const absl::Status status = Serve();
+    const bool was_listening = is_listening_.exchange(false);
+    if (ending_) return;
+    const bool is_refused = !was_listening && !SqlState(status).empty();
+    const bool was_failing = std::exchange(failing, true);
+    if (was_listening || !was_failing) {
+      spdlog::warn("{} ({}); until that changes, {}",
+                   is_refused ? "the database does not tell when other servers commit"
+                              : "lost the session that hears when other servers commit",
+                   std::string(status.message()), fallback_);
+    }
+    AwaitRetry(is_refused ? kRefusedRetry : retry_);
+  }
+}
+
+// Listens and sends until the session is lost, or this is to end.
+absl::Status BatchNotices::Serve() {
+  absl::StatusOr<std::unique_ptr<Session>> opened = open_();
+  if (!opened.ok()) return opened.status();
+  Session& session = **opened;
+  if (absl::Status s = session.Run(kListen).status(); !s.ok()) return s;
+  // Of what comes later a notice is heard.
+  const absl::StatusOr<uint64_t> last = LastBatch(session);
+  if (!last.ok()) return last.status();
+  is_listening_ = true;
+  Hear(*last);
+  Clock::time_point next = Clock::now();
+  while (!ending_) {
+    ClearWake();
+    const uint64_t batch = to_send_;
+    if (batch != sent_ && Clock::now() >= next) {
+      const absl::Status sent = session.Run(absl::StrCat(kNotify, ", '", batch, "'")).status();
+      if (!sent.ok()) return sent;
+      sent_ = batch;
+      next = Clock::now() + kLeastPause;
+    }
+    // They also come beside the answer to what was asked.
+    for (const std::string& payload : session.TakeNotices()) {
+      uint64_t heard = 0;
+      if (absl::SimpleAtoi(payload, &heard)) Hear(heard);
+    }
+    const auto longest = to_send_ == sent_ ? kForEver : UpTo(next);
+    if (absl::Status s = session.AwaitNotices(wake_, longest); !s.ok()) return s;
+  }
+  return absl::OkStatus();
+}
+
+void BatchNotices::Hear(uint64_t batch) {
+  // Those of two servers may come in another order than their commits.
+  last_heard_ = std::max(last_heard_.load(), batch);
+  on_batch_(batch);
+}
+
+void BatchNotices::ClearWake() const {
+  eventfd_t count = 0;
+  eventfd_read(wake_, &count);
+}
+
+// What is sent meanwhile is sent once there is a session.
+void BatchNotices::AwaitRetry(std::chrono::milliseconds pause) const {
+  const Clock::time_point end = Clock::now() + pause;
+  while (!ending_ && Clock::now() < end) {
+    pollfd wake = {wake_, POLLIN, 0};
+    poll(&wake, 1, static_cast<int>(UpTo(end).count()));
+    ClearWake();
+  }
+}
+
+}  // namespace hulld::server

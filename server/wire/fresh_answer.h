@@ -1,0 +1,34 @@
+#ifndef HULLD_SERVER_WIRE_FRESH_ANSWER_H_
+#define HULLD_SERVER_WIRE_FRESH_ANSWER_H_
+
+#include <absl/status/status.h>
+#include <absl/status/statusor.h>
+
+#include <chrono>
+#include <utility>
+
+#include "server/process/worker_pool.h"
+#include "server/registry/registry.h"
+#include "server/wire/decode.h"
+
+namespace hulld::server {
+
+// Ends a unary call (UnaryCall) whose request has a freshness with what `answer` gives, once the
+// registry is as fresh: at once where it is, otherwise on `pool`. answer: takes how stale that may
+// be; quick.
+template <typename UnaryCall, typename Answer>
+void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answer) {
+  const absl::StatusOr<Freshness> freshness =
+      DecodeFreshness(call->request().freshness(), registry.store(), call->call().arrival());
+  if (!freshness.ok()) return call->End(freshness.status());
+  if (const auto staleness = registry.TryFresh(*freshness)) return call->End(answer(*staleness));
+  call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
+    const absl::StatusOr<std::chrono::nanoseconds> staleness =
+        registry.AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+    return staleness.ok() ? answer(*staleness) : staleness.status();
+  });
+}
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_WIRE_FRESH_ANSWER_H_

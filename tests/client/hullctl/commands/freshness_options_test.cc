@@ -1,0 +1,79 @@
+// --max-staleness and --at-least: which commands take them, and that each read carries them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "tests/client/hullctl/hullctl_on_server.h"
+
+namespace hulld {
+namespace {
+
+using ::testing::HasSubstr;
+
+class FreshnessOptions : public HullctlOnServer {
+ protected:
+  void SetUp() override {
+    HullctlOnServer::SetUp();
+    Put("cube", server::Cube());
+    ASSERT_EQ(Ask({"body", "put", "body", "cube"}).code, 0);
+  }
+
+  static std::string WriteFile(const std::string& name, const std::string& text) {
+    const std::string path = ::testing::TempDir() + "freshness_options_" + name;
+    std::ofstream(path) << text;
+    return path;
+  }
+
+  // Each command that reads.
+  const std::vector<std::vector<std::string>> reads_ = {
+      {"get", "cube"},
+      {"list"},
+      {"mesh", "cube"},
+      {"check", "cube", "body"},
+      {"batch", WriteFile("pairs.json", R"({"placements":[{"hullId":"cube"},{"hullId":"body"}],)"
+                                        R"("pairs":[0,1]})")},
+      {"scene", WriteFile("scene.json", R"({"placements":[{"hullId":"cube"},{"hullId":"body"}]})")},
+      {"stream", WriteFile("stream.json", R"({"placements":[{"hullId":"cube"},{"hullId":"body"}],)"
+                                          R"("pairs":[0,1]})")},
+      {"body", "get", "body"},
+      {"body", "list"},
+      {"bench", "load", "--requests", "1", "--hulls", "1"}};
+
+  Ran AskWith(std::vector<std::string> read, const std::vector<std::string>& options) {
+    read.insert(read.end(), options.begin(), options.end());
+    return Ask(read);
+  }
+};
+
+TEST_F(FreshnessOptions, EachReadCarriesThem) {
+  const auto hull = MessagesIn<v1::GetHullResponse>(AskJson({"get", "cube"}).out);
+  ASSERT_EQ(hull.size(), 1);
+  const v1::ResponseHeader& header = hull.front().header();
+  for (const std::vector<std::string>& read : reads_) {
+    const Ran fresh = AskWith(read, {"--max-staleness", "200ms", "--at-least",
+                                     header.store_id() + ":" + std::to_string(header.revision())});
+    EXPECT_EQ(fresh.code, 0) << read.front() << ": " << fresh.err;
+    const Ran other = AskWith(read, {"--at-least", "another:1"});
+    EXPECT_EQ(other.code, 1) << read.front();
+    EXPECT_THAT(other.out + other.err, HasSubstr("is not that of this store")) << read.front();
+  }
+  const Ran future = Ask({"get", "cube", "--at-least", header.store_id() + ":1000"});
+  EXPECT_EQ(future.code, 1);
+  EXPECT_THAT(future.err, HasSubstr("at_least_revision is 1000"));
+}
+
+TEST_F(FreshnessOptions, WhatIsNoTimeOrRevisionIsRefused) {
+  for (const char* const text : {"7", "store:", ":7", "store:x", "store:-1"}) {
+    const Ran ran = Ask({"get", "cube", "--at-least", text});
+    EXPECT_EQ(ran.code, 2) << text;
+    EXPECT_THAT(ran.err, HasSubstr("is not STORE:REVISION")) << text;
+  }
+  EXPECT_EQ(Ask({"get", "cube", "--max-staleness", "-1s"}).code, 2);
+  EXPECT_EQ(Ask({"delete", "cube", "--max-staleness", "1s"}).code, 2);
+}
+
+}  // namespace
+}  // namespace hulld

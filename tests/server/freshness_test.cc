@@ -1,0 +1,222 @@
+// Several servers over one PostgreSQL database, and reads that say how fresh their answers must be.
+#include <absl/strings/str_cat.h>
+#include <gmock/gmock.h>
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <memory>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "hulld/v1/body.grpc.pb.h"
+#include "hulld/v1/collision.grpc.pb.h"
+#include "hulld/v1/hull.grpc.pb.h"
+#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/hulld_process.h"
+#include "tests/server/harness/postgres/postgres_cluster.h"
+#include "tests/server/harness/test_server.h"
+
+namespace hulld::server {
+namespace {
+
+class FreshReads : public ::testing::Test {
+ protected:
+  static constexpr int kServers = 3;
+
+  void SetUp() override {
+    if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+    PostgresCluster& cluster = PostgresCluster::Shared();
+    const std::string conninfo = cluster.WriteConninfo(cluster.MakeDatabase());
+    for (int i = 0; i < kServers; ++i) {
+      servers_.push_back(std::make_unique<Process>(std::vector<std::string>{
+          "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file", conninfo,
+          "--postgres-servers", "many"}));
+    }
+    for (const auto& server : servers_) {
+      const std::string line = server->ReadLineWith("listening on ");
+      ASSERT_FALSE(line.empty());
+      addresses_.push_back(AddressIn(line));
+    }
+  }
+
+  std::shared_ptr<grpc::Channel> Connect(size_t server, int channel = 0) const {
+    grpc::ChannelArguments own;
+    own.SetInt("hulld.test.channel", channel);
+    return grpc::CreateCustomChannel(addresses_[server], grpc::InsecureChannelCredentials(), own);
+  }
+  // Appends a point through this server; the header of its acknowledgement.
+  v1::ResponseHeader Append(size_t server, const std::string& hull_id, uint64_t sequence) const {
+    const auto stub = v1::HullService::NewStub(Connect(server));
+    Appender appender(*stub, hull_id, "w", true);
+    const auto ack = appender.Append(sequence, {static_cast<double>(sequence), 0, 0});
+    EXPECT_TRUE(ack.has_value());
+    EXPECT_TRUE(appender.Finish().ok());
+    return ack.has_value() ? ack->header() : v1::ResponseHeader();
+  }
+
+  bool Knows(size_t server, const std::string& hull_id) const {
+    const auto stub = v1::HullService::NewStub(Connect(server));
+    grpc::ClientContext context;
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id(hull_id);
+    return stub->GetHull(&context, request, &response).ok();
+  }
+
+  std::vector<std::unique_ptr<Process>> servers_;
+  std::vector<std::string> addresses_;
+};
+
+// What a server was told to remember, the next one has seen.
+TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
+  for (uint64_t sequence = 1; sequence <= 20; ++sequence) {
+    const v1::ResponseHeader header = Append(sequence % kServers, "h", sequence);
+    for (size_t server = 0; server < kServers; ++server) {
+      const auto stub = v1::HullService::NewStub(Connect(server));
+      grpc::ClientContext context;
+      v1::GetHullRequest request;
+      v1::GetHullResponse response;
+      request.set_hull_id("h");
+      request.mutable_freshness()->set_at_least_revision(header.revision());
+      request.mutable_freshness()->set_store_id(header.store_id());
+      const grpc::Status status = stub->GetHull(&context, request, &response);
+      ASSERT_TRUE(status.ok()) << status.error_message();
+      EXPECT_GE(response.header().revision(), header.revision());
+      EXPECT_EQ(response.hull().counts().received(), sequence);
+    }
+  }
+}
+
+// Every call that reads takes it: a revision that nobody was told of, and another store, are told
+// apart from each other and from what is malformed.
+TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
+  const v1::ResponseHeader header = Append(0, "h", 1);
+  const auto channel = Connect(1);
+  const auto hulls = v1::HullService::NewStub(channel);
+  const auto bodies = v1::BodyService::NewStub(channel);
+  const auto collisions = v1::CollisionService::NewStub(channel);
+  // Nothing comes before the refusal.
+  const auto finish = [](const auto& reader) { return reader->Finish(); };
+  const auto expect_refusal = [&](const v1::Freshness& freshness, grpc::StatusCode code,
+                                  const std::string& text) {
+    const auto expect = [&](const char* call, const grpc::Status& status) {
+      EXPECT_EQ(status.error_code(), code) << call << ": " << status.error_message();
+      EXPECT_THAT(status.error_message(), ::testing::HasSubstr(text)) << call;
+    };
+    const auto ask = [&](auto request, const auto& call) {
+      grpc::ClientContext context;
+      *request.mutable_freshness() = freshness;
+      return call(&context, request);
+    };
+    const auto with_hull = [](auto request) {
+      request.set_hull_id("h");
+      return request;
+    };
+    v1::CheckCollisionRequest pair;
+    pair.mutable_a()->set_hull_id("h");
+    pair.mutable_b()->set_hull_id("h");
+    v1::GetHullResponse hull;
+    expect("GetHull", ask(with_hull(v1::GetHullRequest()), [&](auto* context, const auto& request) {
+             return hulls->GetHull(context, request, &hull);
+           }));
+    expect("GetHullMesh",
+           ask(with_hull(v1::GetHullMeshRequest()), [&](auto* context, const auto& request) {
+             return finish(hulls->GetHullMesh(context, request));
+           }));
+    v1::ListHullsResponse list;
+    expect("ListHulls", ask(v1::ListHullsRequest(), [&](auto* context, const auto& request) {
+             return hulls->ListHulls(context, request, &list);
+           }));
+    v1::GetBodyRequest body;
+    body.set_body_id("b");
+    v1::GetBodyResponse got;
+    expect("GetBody", ask(body, [&](auto* context, const auto& request) {
+             return bodies->GetBody(context, request, &got);
+           }));
+    v1::ListBodiesResponse body_list;
+    expect("ListBodies", ask(v1::ListBodiesRequest(), [&](auto* context, const auto& request) {
+             return bodies->ListBodies(context, request, &body_list);
+           }));
+    v1::CheckCollisionResponse answer;
+    expect("CheckCollision", ask(pair, [&](auto* context, const auto& request) {
+             return collisions->CheckCollision(context, request, &answer);
+           }));
+    v1::BatchCheckCollisionsRequest batch;
+    batch.add_placements()->set_hull_id("h");
+    expect("BatchCheckCollisions", ask(batch, [&](auto* context, const auto& request) {
+             return finish(collisions->BatchCheckCollisions(context, request));
+           }));
+    v1::FindCollisionsRequest scene;
+    scene.add_placements()->set_hull_id("h");
+    expect("FindCollisions", ask(scene, [&](auto* context, const auto& request) {
+             return finish(collisions->FindCollisions(context, request));
+           }));
+    v1::StreamCollisionsRequest open;
+    open.mutable_open()->add_placements()->set_hull_id("h");
+    *open.mutable_open()->mutable_freshness() = freshness;
+    grpc::ClientContext context;
+    const auto stream = collisions->StreamCollisions(&context);
+    stream->Write(open);
+    stream->WritesDone();
+    expect("StreamCollisions", stream->Finish());
+  };
+  v1::Freshness freshness;
+  freshness.set_store_id(header.store_id());
+  freshness.set_at_least_revision(header.revision() + 1);
+  expect_refusal(freshness, grpc::StatusCode::FAILED_PRECONDITION,
+                 absl::StrCat("at_least_revision is ", header.revision() + 1));
+  freshness.set_store_id("another");
+  expect_refusal(freshness, grpc::StatusCode::FAILED_PRECONDITION, "is not that of this store");
+  freshness.clear_store_id();
+  expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "needs store_id");
+  freshness.Clear();
+  freshness.mutable_max_staleness()->set_seconds(-1);
+  expect_refusal(freshness, grpc::StatusCode::INVALID_ARGUMENT, "it is at least 0");
+}
+
+TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {
+  constexpr int kClients = 6;
+  constexpr int kCalls = 120;
+  const char* const given = std::getenv("HULLD_MANY_RUNS");
+  const int runs = given == nullptr ? 2 : std::atoi(given);
+  size_t from_the_past = 0;
+  size_t of_a_revision = 0;
+  for (int run = 0; run < runs; ++run) {
+    HullHistory history;
+    HistoryClient(Connect(0), history, "probe", 0).MakeProbe();
+    // No server goes back behind this, so the probe is never missing.
+    for (size_t server = 0; server < kServers; ++server) ASSERT_TRUE(Knows(server, kProbeHull));
+    const std::string prefix = absl::StrCat("run-", run);
+    std::vector<std::thread> clients;
+    for (int i = 0; i < kClients; ++i) {
+      clients.emplace_back([&, i] {
+        std::mt19937_64 random(100 * run + i);
+        HistoryClient client(Connect(i % kServers, i), history, absl::StrCat("client-", i),
+                             1000 * run + i);
+        client.ReadAtAnyFreshness();
+        for (int call = 0; call < kCalls; ++call) {
+          client.CallAtRandom(prefix + (call % 3 == 0 ? "/a" : "/b"));
+          if (random() % 3 == 0) client.Connect(Connect(random() % kServers, i));
+        }
+      });
+    }
+    for (std::thread& client : clients) client.join();
+    ASSERT_EQ(HistoryFault(history), "") << "run " << run;
+    for (const auto& [hull_id, operations] : history.operations()) {
+      for (const Operation& operation : operations) {
+        from_the_past += operation.staleness > 0;
+        of_a_revision += operation.at_least_revision > 0;
+      }
+    }
+  }
+  // They hold what they are to test.
+  EXPECT_GT(from_the_past, static_cast<size_t>(runs) * 20);
+  EXPECT_GT(of_a_revision, static_cast<size_t>(runs) * 20);
+}
+
+}  // namespace
+}  // namespace hulld::server

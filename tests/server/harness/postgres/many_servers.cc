@@ -1,0 +1,187 @@
+#include "tests/server/harness/postgres/many_servers.h"
+
+#include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
+#include <signal.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <random>
+#include <utility>
+
+#include "hulld/v1/hull.grpc.pb.h"
+#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/postgres/postgres_cluster.h"
+
+namespace hulld::server {
+namespace {
+
+constexpr const char* kHulls[] = {"shared/a", "shared/b"};
+// Between questions of a client that was not answered, and how many it asks: for a minute.
+constexpr std::chrono::milliseconds kPause(5);
+constexpr int kMostQuestions = 12'000;
+constexpr std::chrono::milliseconds kWhile(200);
+
+}  // namespace
+
+void ManyServersTest::SetUp() {
+  if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+}
+
+ManyServersTest::Server::Server(const std::string& conninfo_file)
+    : process(std::make_unique<Process>(std::vector<std::string>{
+          "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file",
+          conninfo_file, "--postgres-servers", "many"})) {}
+
+void ManyServersTest::Server::AwaitListening() {
+  const std::string line = process->ReadLineWith("listening on ");
+  if (line.empty()) {
+    std::fprintf(stderr, "hulld ended with %d; it said:\n%s", process->Wait(),
+                 absl::StrJoin(process->lines(), "").c_str());
+    std::abort();
+  }
+  address = AddressIn(line);
+  reader = std::thread([this] { process->ReadToEnd(); });
+}
+
+ManyServersTest::Server::~Server() {
+  process->Signal(SIGKILL);
+  process->Wait();
+  if (reader.joinable()) reader.join();
+}
+
+void ManyServersTest::Begin(const std::vector<std::string>& conninfo_files) {
+  servers_.clear();
+  addresses_.clear();
+  conninfo_files_ = conninfo_files;
+  for (const std::string& file : conninfo_files_) {
+    servers_.push_back(std::make_unique<Server>(file));
+    servers_.back()->AwaitListening();
+    addresses_.push_back(servers_.back()->address);
+  }
+}
+
+void ManyServersTest::BeginAtOnce(const std::vector<std::string>& conninfo_files) {
+  servers_.clear();
+  addresses_.clear();
+  conninfo_files_ = conninfo_files;
+  for (const std::string& file : conninfo_files_) {
+    servers_.push_back(std::make_unique<Server>(file));
+  }
+  for (const auto& server : servers_) {
+    server->AwaitListening();
+    addresses_.push_back(server->address);
+  }
+}
+
+void ManyServersTest::Begin() {
+  PostgresCluster& cluster = PostgresCluster::Shared();
+  Begin(std::vector<std::string>(kServers, cluster.WriteConninfo(cluster.MakeDatabase())));
+}
+
+std::string ManyServersTest::address(size_t i) {
+  const std::lock_guard lock(mutex_);
+  return addresses_[i];
+}
+
+void ManyServersTest::Replace(size_t i) {
+  servers_[i] = nullptr;
+  servers_[i] = std::make_unique<Server>(conninfo_files_[i]);
+  servers_[i]->AwaitListening();
+  const std::lock_guard lock(mutex_);
+  addresses_[i] = servers_[i]->address;
+}
+
+std::shared_ptr<grpc::Channel> ManyServersTest::Connect(size_t server) {
+  const std::lock_guard lock(mutex_);
+  grpc::ChannelArguments own;
+  own.SetInt("hulld.test.channel", ++channels_);
+  return grpc::CreateCustomChannel(addresses_[server], grpc::InsecureChannelCredentials(), own);
+}
+
+void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& history,
+                           const std::function<void()>& answered) {
+  std::mt19937_64 random(100 * calls.seed + number);
+  const size_t name = calls.share_writers ? number % (kClients / 2) : number;
+  HistoryClient client(Connect(number % servers_.size()), history, absl::StrCat("client-", name),
+                       100 * calls.seed + number);
+  const auto move_on = [&] { client.Connect(Connect(random() % servers_.size())); };
+  for (int call = 0; call < calls.each; ++call) {
+    const char* const hull = kHulls[call % 3 == 0 ? 0 : 1];
+    if (!client.CallAtRandom(hull)) {
+      // Questions alone, so that the history holds few changes of which nobody knows.
+      int questions = 0;
+      do {
+        if (++questions == kMostQuestions) {
+          ADD_FAILURE() << "no server answers client " << number << ", seed " << calls.seed;
+          return answered();
+        }
+        std::this_thread::sleep_for(kPause);
+        move_on();
+      } while (!client.ReadAtRandom(hull));
+    }
+    if (random() % 5 == 0) move_on();
+    answered();
+  }
+}
+
+void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
+                          HullHistory& history) {
+  HistoryClient(Connect(0), history, "probe", 0).MakeProbe();
+  std::atomic<size_t> made = 0;
+  std::atomic<size_t> ended = 0;
+  std::vector<std::thread> clients;
+  for (size_t i = 0; i < kClients; ++i) {
+    clients.emplace_back([&, i] {
+      Call(i, calls, history, [&] {
+        ++made;
+        made.notify_one();
+      });
+      // Nobody waits for more of it.
+      if (++ended == kClients) {
+        made = kClients * static_cast<size_t>(calls.each);
+        made.notify_one();
+      }
+    });
+  }
+  for (size_t fault = 0; fault < faults.size(); ++fault) {
+    const size_t enough =
+        kClients * static_cast<size_t>(calls.each) * (fault + 1) / (faults.size() + 1);
+    for (size_t seen = made; seen < enough; seen = made) made.wait(seen);
+    faults[fault]();
+  }
+  for (std::thread& client : clients) client.join();
+  for (size_t i = 0; i < servers_.size(); ++i) {
+    HistoryClient last(Connect(i), history, "last", i);
+    for (const char* hull : kHulls) {
+      EXPECT_TRUE(last.Get(hull)) << "server " << i << " does not answer, seed " << calls.seed;
+      EXPECT_TRUE(last.Mesh(hull)) << "server " << i << " does not answer, seed " << calls.seed;
+    }
+  }
+}
+
+void ManyServersTest::ExpectNoAnswer(size_t server) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kWhile);
+  v1::CreateHullRequest request;
+  v1::CreateHullResponse response;
+  request.set_hull_id("unanswered");
+  const auto stub = v1::HullService::NewStub(Connect(server));
+  EXPECT_FALSE(stub->CreateHull(&context, request, &response).ok());
+}
+
+void ManyServersTest::ExpectLinearizable(const HullHistory& history, uint64_t seed) {
+  const std::string fault = HistoryFault(history);
+  if (fault.empty()) return;
+  std::string said;
+  for (const auto& each : servers_) {
+    each->process->Signal(SIGKILL);
+    if (each->reader.joinable()) each->reader.join();
+    absl::StrAppend(&said, "a server said:\n", absl::StrJoin(each->process->lines(), ""));
+  }
+  ADD_FAILURE() << "seed " << seed << ": " << fault << "\n" << said;
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,203 @@
+#include "tests/server/schedules/store/shared_store.h"
+
+#include <absl/status/status.h>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+#include "server/store/change_revisions.h"
+#include "tests/server/schedules/scheduler.h"
+
+namespace hulld::server {
+namespace {
+
+Random& Dice() { return Scheduler::Current().random(); }
+
+absl::Status Moved() { return absl::AbortedError("another server changed the hull"); }
+
+}  // namespace
+
+SharedStore::SharedStore(SimulatedStore& database)
+    : database_(database), seen_(database.log_.size()), revision_(database.ledger_.revision()) {
+  const std::lock_guard lock(database_.servers_mutex_);
+  database_.servers_.push_back(this);
+}
+
+SharedStore::~SharedStore() {
+  NoteEnd(false);
+  const std::lock_guard lock(database_.servers_mutex_);
+  std::erase(database_.servers_, this);
+}
+
+void SharedStore::Begin(const char* what, uint64_t number) {
+  Scheduler& scheduler = Scheduler::Current();
+  if (is_busy_) scheduler.Fail("two calls use the turn, or ask for others, at the same time");
+  is_busy_ = true;
+  scheduler.Note(what, number);
+}
+
+absl::Status SharedStore::End(const char* what, const absl::Status& status) {
+  Scheduler::Current().Note(status.ok() ? what : "database: refuses", revision_, seen_);
+  is_busy_ = false;
+  return status;
+}
+
+// Not of one moment.
+absl::Status SharedStore::ForEachHull(const StoredHullVisitor& visit) {
+  std::string last;
+  while (true) {
+    Scheduler::Current().Note("database: reads the next hull");
+    const auto next = database_.hulls_.upper_bound(last);
+    if (next == database_.hulls_.end()) return absl::OkStatus();
+    last = next->first;
+    visit(last, next->second.stored);
+  }
+}
+
+const SimulatedStore::Kept* SharedStore::Find(const HullRecord& record) const {
+  const auto found = database_.hulls_.find(record.hull_id);
+  if (found == database_.hulls_.end()) return nullptr;
+  const HullRecord& now = found->second.stored.record;
+  return now.create_revision == record.create_revision ? &found->second : nullptr;
+}
+
+absl::StatusOr<std::vector<Vector>> SharedStore::LoadVertices(const StoredHull& hull) {
+  Scheduler& scheduler = Scheduler::Current();
+  ++database_.counts_.loads;
+  scheduler.Note("database: reads points of a hull at revision", hull.record.revision);
+  if (Dice().OneIn(database_.faults_.read)) {
+    ++database_.counts_.failed_reads;
+    return absl::UnavailableError("the database does not answer");
+  }
+  const SimulatedStore::Kept* const kept = Find(hull.record);
+  // A base takes the place of all that was before.
+  if (kept == nullptr || kept->stored.layout.base_revision != hull.layout.base_revision) {
+    scheduler.Note("database: finds another hull than that of revision", hull.record.revision);
+    return Moved();
+  }
+  std::vector<Vector> points;
+  for (const auto& [revision, point] : kept->vertices) {
+    if (revision <= hull.record.revision) points.push_back(point);
+  }
+  scheduler.Note("database: has read points:", points.size());
+  return points;
+}
+
+absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
+                                                   const std::string& writer_id) {
+  Scheduler& scheduler = Scheduler::Current();
+  ++database_.counts_.sequences;
+  scheduler.Note("database: reads a sequence of a hull at revision", hull.revision);
+  if (Dice().OneIn(database_.faults_.read)) {
+    ++database_.counts_.failed_reads;
+    return absl::UnavailableError("the database does not answer");
+  }
+  const SimulatedStore::Kept* const kept = Find(hull);
+  absl::StatusOr<uint64_t> sequence = Moved();
+  if (kept != nullptr && kept->stored.record == hull) {
+    const auto writer = kept->sequences.find(writer_id);
+    sequence = writer == kept->sequences.end() ? 0 : writer->second;
+  }
+  scheduler.Note("database: has read a sequence", sequence.ok() ? *sequence : 0);
+  return sequence;
+}
+
+// What others did since this knew of it, up to now.
+void SharedStore::NoteOthers() {
+  revision_ = database_.ledger_.revision();
+  for (; seen_ < database_.log_.size(); ++seen_) {
+    const SimulatedStore::Logged& logged = database_.log_[seen_];
+    OtherChange& other = others_.by_id[logged.hull_id];
+    other.revision = logged.revision;
+    other.ended_at = std::max(other.ended_at, logged.ended_at);
+    other.hull.reset();
+    const auto found = database_.hulls_.find(logged.hull_id);
+    if (found == database_.hulls_.end()) continue;
+    other.hull = found->second.stored;
+    other.revision = found->second.stored.record.revision;
+  }
+  if (!others_.by_id.empty()) others_.revision = revision_;
+}
+
+absl::Status SharedStore::Follow() {
+  Begin("database: is asked what others did since change", seen_);
+  absl::Status status;
+  // A server that cannot ask when it starts ends.
+  if (std::exchange(has_followed_, true) && Dice().OneIn(database_.faults_.read)) {
+    ++database_.counts_.failed_reads;
+    status = absl::UnavailableError("the database does not answer");
+  } else {
+    NoteOthers();
+  }
+  return End("database: has told what others did up to revision, change", status);
+}
+
+absl::Status SharedStore::Commit(std::span<Change* const> changes) {
+  Begin("database: is to commit changes:", changes.size());
+  if (is_failing_) Scheduler::Current().Fail("a batch comes after an error without Recover");
+  ++database_.counts_.batches;
+  const absl::Status status = CommitInTurn(changes);
+  NoteEnd(!status.ok());
+  if (status.ok()) TellTheOthers();
+  return End("database: has committed up to revision, change", status);
+}
+
+// From the turn to its end nobody else commits, so this is one step.
+absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
+  const StoreFaults& faults = database_.faults_;
+  const auto refuse = [&](absl::Status status) {
+    ++database_.counts_.refused;
+    return status;
+  };
+  if (Dice().OneIn(faults.refused)) return refuse(absl::UnavailableError("it cannot be reached"));
+  NoteOthers();
+  std::vector<Change*> kept;
+  for (Change* change : changes) {
+    if (!others_.by_id.contains(change->id())) kept.push_back(change);
+  }
+  database_.counts_.superseded += changes.size() - kept.size();
+  if (kept.empty()) return absl::OkStatus();
+  NumberChanges(kept, revision_);
+  if (Dice().OneIn(faults.refused)) return refuse(absl::UnavailableError("the session ended"));
+  if (Dice().OneIn(faults.full)) {
+    database_.was_full_ = true;
+    return refuse(absl::ResourceExhaustedError("the disk of the database is full"));
+  }
+  const bool is_unknown = Dice().OneIn(faults.unknown);
+  if (is_unknown) ++database_.counts_.unknown;
+  if (!is_unknown || Dice().OneIn(2)) {
+    for (const Change* change : kept) database_.Keep(*change, is_unknown);
+  }
+  if (is_unknown) return absl::UnavailableError("nobody can tell whether it was committed");
+  seen_ = database_.log_.size();
+  revision_ = database_.ledger_.revision();
+  return absl::OkStatus();
+}
+
+absl::Status SharedStore::Recover() {
+  Begin("database: is to be used again", 0);
+  NoteEnd(false);
+  ++database_.counts_.recovered;
+  return End("database: can be used again", absl::OkStatus());
+}
+
+void SharedStore::NoteEnd(bool failed) {
+  if (failed && !is_failing_) ++database_.failing_servers_;
+  if (!failed && is_failing_) --database_.failing_servers_;
+  is_failing_ = failed;
+}
+
+void SharedStore::TellTheOthers() {
+  const std::lock_guard lock(database_.servers_mutex_);
+  for (SharedStore* server : database_.servers_) {
+    if (server != this && server->on_others_ && Dice().OneIn(2)) server->on_others_();
+  }
+}
+
+void SharedStore::OnOthers(std::function<void()> others) {
+  const std::lock_guard lock(database_.servers_mutex_);
+  on_others_ = std::move(others);
+}
+
+}  // namespace hulld::server

@@ -1,0 +1,201 @@
+// The disk of the database is full: that of its tables, or that of its log.
+#include <absl/strings/str_cat.h>
+#include <fcntl.h>
+#include <sys/mount.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/server/store/postgres/postgres_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A file system of its own that can be filled, where this process may mount one.
+class SmallDisk {
+ public:
+  explicit SmallDisk(int mebibytes) {
+    std::string name = "/tmp/hulld-disk-XXXXXX";
+    path_ = mkdtemp(name.data());
+    is_mounted_ = mount("none", path_.c_str(), "tmpfs", 0,
+                        absl::StrCat("size=", mebibytes, "m").c_str()) == 0;
+    mkdir(directory().c_str(), 0700);
+    PostgresCluster::GiveToServer(directory());
+    chmod(path_.c_str(), 0755);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+  ~SmallDisk() {
+    if (is_mounted_) umount2(path_.c_str(), MNT_DETACH);
+    std::filesystem::remove_all(path_);
+  }
+
+  bool is_mounted() const { return is_mounted_; }
+  // Empty, and the server's.
+  std::string directory() const { return path_ + "/server"; }
+  // Leaves no room.
+  void Fill() const {
+    const int file = open(filler().c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    const std::vector<char> block(4096);
+    while (write(file, block.data(), block.size()) > 0) {
+    }
+    close(file);
+  }
+  void Free() const { std::filesystem::remove(filler()); }
+
+  static constexpr char kNoMount[] = "nothing may be mounted here";
+
+ private:
+  std::string filler() const { return path_ + "/filler"; }
+
+  std::string path_;
+  bool is_mounted_ = false;
+};
+
+// For one server, and for several.
+class PostgresDisk : public ::testing::TestWithParam<bool> {
+ protected:
+  using Server = std::unique_ptr<PostgresRegistry>;
+
+  // A database whose log is on one small disk, and whose tablespace "small" is on another.
+  struct Machine {
+    SmallDisk log{128};
+    SmallDisk tables{64};
+    std::unique_ptr<PostgresCluster> cluster;
+  };
+
+  static void SetUpTestSuite() {
+    if (!PostgresCluster::IsInstalled()) return;
+    machine_ = new Machine;
+    if (!machine_->log.is_mounted() || !machine_->tables.is_mounted()) return;
+    machine_->cluster =
+        std::make_unique<PostgresCluster>(PostgresCluster::WalIn{machine_->log.directory()});
+    cluster().Ask("postgres", absl::StrCat("CREATE TABLESPACE small LOCATION '",
+                                           machine_->tables.directory(), "'"));
+  }
+  static void TearDownTestSuite() { delete std::exchange(machine_, nullptr); }
+  static PostgresCluster& cluster() { return *machine_->cluster; }
+
+  void SetUp() override {
+    if (machine_ == nullptr) GTEST_SKIP() << PostgresCluster::kMissing;
+    if (machine_->cluster == nullptr) GTEST_SKIP() << SmallDisk::kNoMount;
+  }
+  void Start(const std::string& tablespace) {
+    options_.conninfo = cluster().Conninfo(cluster().MakeDatabase(tablespace));
+    options_.shared = GetParam();
+    hulls_ = MakeServer();
+    if (GetParam()) other_ = MakeServer();
+  }
+  Server MakeServer() const {
+    absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(options_);
+    if (!store.ok()) {
+      ADD_FAILURE() << store.status();
+      std::abort();
+    }
+    return std::make_unique<PostgresRegistry>(*std::move(store));
+  }
+  // Before the database does.
+  void EndServers() {
+    hulls_ = nullptr;
+    other_ = nullptr;
+  }
+  // Another server, or this one started anew.
+  PostgresRegistry& Other() {
+    if (GetParam()) return *other_;
+    hulls_ = nullptr;
+    hulls_ = MakeServer();
+    return *hulls_;
+  }
+  static std::string Name(int i) { return absl::StrCat("h", i); }
+  // As large as a chunk of a thousand points gets, of points that do not compress.
+  absl::Status PutNext() {
+    std::uniform_real_distribution<double> angle(-1, 1);
+    std::vector<Vector> points;
+    for (int i = 0; i < 1000; ++i) {
+      points.push_back(Vector(angle(random_), angle(random_), angle(random_)).normalized());
+    }
+    const absl::Status put = hulls_->Put(Name(acknowledged_), std::move(points)).status();
+    if (put.ok()) ++acknowledged_;
+    return put;
+  }
+  // All that was acknowledged is there, and what was refused is not but for the hull that the
+  // opening of its stream made.
+  void ExpectAcknowledged(PostgresRegistry& server) {
+    for (int i = 0; i < acknowledged_; ++i) {
+      const auto view = server.View(Name(i));
+      ASSERT_TRUE(view.ok()) << view.status();
+      EXPECT_EQ(view->record.counts.received, 1000);
+    }
+    const auto refused = server.View(Name(acknowledged_));
+    if (refused.ok()) {
+      EXPECT_EQ(refused->record.counts.received, 0);
+    } else {
+      EXPECT_TRUE(absl::IsNotFound(refused.status())) << refused.status();
+    }
+  }
+
+  static Machine* machine_;
+  PostgresOptions options_;
+  Server hulls_;
+  Server other_;
+  std::mt19937_64 random_{1};
+  int acknowledged_ = 0;
+};
+
+PostgresDisk::Machine* PostgresDisk::machine_ = nullptr;
+
+INSTANTIATE_TEST_SUITE_P(Servers, PostgresDisk, ::testing::Bool(), [](const auto& shared) {
+  return std::string(shared.param ? "Many" : "One");
+});
+
+TEST_P(PostgresDisk, TablesThatDoNotFitAreSaidToAndNothingOfTheChangeStays) {
+  Start("small");
+  ASSERT_TRUE(PutNext().ok());
+  machine_->tables.Fill();
+  absl::Status refused;
+  for (int i = 0; i < 200 && refused.ok(); ++i) refused = PutNext();
+  EXPECT_TRUE(absl::IsResourceExhausted(refused)) << refused;
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("nothing was changed"));
+  // Questions go on.
+  ExpectAcknowledged(*hulls_);
+  if (GetParam()) ExpectAcknowledged(*other_);
+  machine_->tables.Free();
+  const absl::Status put = PutNext();
+  EXPECT_TRUE(put.ok()) << put;
+  ExpectAcknowledged(Other());
+  EndServers();
+}
+
+// PostgreSQL ends all its processes then, recovers, and ends for good if that needs room, too.
+TEST_P(PostgresDisk, ALogThatDoesNotFitLosesNothing) {
+  options_.patience = std::chrono::milliseconds(500);
+  Start("pg_default");
+  ASSERT_TRUE(PutNext().ok());
+  machine_->log.Fill();
+  absl::Status refused;
+  for (int i = 0; i < 2000 && refused.ok(); ++i) refused = PutNext();
+  EXPECT_TRUE(absl::IsUnavailable(refused)) << refused;
+  machine_->log.Free();
+  cluster().StopImmediately();
+  cluster().Start();
+  // One whose outcome was not known is there, or not.
+  if (const auto last = Other().View(Name(acknowledged_));
+      last.ok() && last->record.counts.received > 0) {
+    ++acknowledged_;
+  }
+  ExpectAcknowledged(*hulls_);
+  const absl::Status put = PutNext();
+  EXPECT_TRUE(put.ok()) << put;
+  ExpectAcknowledged(Other());
+  EndServers();
+}
+
+}  // namespace
+}  // namespace hulld::server

@@ -1,0 +1,418 @@
+// Several servers over one database: what it costs a server to follow the others, and how soon it
+// does.
+#include <absl/strings/str_cat.h>
+
+#include <functional>
+#include <future>
+#include <random>
+#include <thread>
+
+#include "tests/server/harness/captured_log.h"
+#include "tests/server/store/postgres/postgres_fixture.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::ElementsAreArray;
+using ::testing::HasSubstr;
+using Server = std::unique_ptr<PostgresRegistry>;
+
+constexpr std::chrono::hours kNever{1};
+constexpr char kLook[] = "SELECT batch FROM hulld.store";
+// Whoever waits so long waits for something that does not come.
+constexpr std::chrono::seconds kLong{60};
+
+class PostgresFollow : public PostgresTest {
+ protected:
+  void SetUp() override {
+    PostgresTest::SetUp();
+    options_.shared = true;
+  }
+
+  // A server follows the others when it is called, and only then.
+  void FollowWhenCalled() {
+    options_.notices = false;
+    options_.look = options_.beat = kNever;
+  }
+  // One that reaches the database without the proxy.
+  Server StartBeside() {
+    const PostgresOptions through_proxy = options_;
+    options_.conninfo = cluster().Conninfo(database_, cluster().socket_directory());
+    Server server = MakeRegistry();
+    options_ = through_proxy;
+    return server;
+  }
+  // The second has read the hull, of points on a sphere, and its next answers come from memory.
+  void StartWithHull(int vertices) {
+    Start();
+    other_ = StartBeside();
+    ASSERT_TRUE(other_->Put("h", SpherePoints(vertices)).ok());
+    ASSERT_TRUE(hulls_->View("h").ok());
+    ASSERT_EQ(hulls_->registry().Cache().loads, 1);
+  }
+  void EndAll() {
+    other_ = nullptr;
+    hulls_ = nullptr;
+  }
+  // What a server says of "h" is what one says that starts now and reads it anew.
+  void ExpectAsReadAnew(PostgresRegistry& server) {
+    const Server fresh = StartBeside();
+    const auto view = server.View("h");
+    const auto expected = fresh->View("h");
+    ASSERT_TRUE(view.ok() && expected.ok()) << view.status() << expected.status();
+    EXPECT_EQ(view->record, expected->record);
+    EXPECT_EQ(view->served->low(), expected->served->low());
+    EXPECT_EQ(view->served->high(), expected->served->high());
+    EXPECT_EQ(Canonical(server, *view), Canonical(*fresh, *expected));
+  }
+  // Empty: there is none.
+  static std::vector<Vector> Canonical(PostgresRegistry& server, const HullView& view) {
+    const auto hull = server.registry().Canonical(view, {});
+    if (!hull.ok()) {
+      ADD_FAILURE() << hull.status();
+      return {};
+    }
+    return {(*hull)->vertices().begin(), (*hull)->vertices().end()};
+  }
+
+  Server other_;
+};
+
+// A point outside of the sphere of radius 1, further out each time, so that all stay vertices.
+Vector PointOutside(int i) {
+  const double angle = 0.1 * i;
+  return (1.1 + 0.001 * i) * Vector(std::cos(angle), std::sin(angle), 0.01 * i);
+}
+
+TEST_F(PostgresFollow, WhatAnotherServerAddsCostsWhatItAdds) {
+  FollowWhenCalled();
+  constexpr int kAppends = 20;
+  uint64_t bytes_of_the_smallest = 0;
+  for (const int vertices : {500, 5000, 20'000}) {
+    EndAll();
+    database_ = cluster().MakeDatabase();
+    options_.conninfo = cluster().Conninfo(database_, proxy_->directory());
+    StartWithHull(vertices);
+    const uint64_t before = proxy_->answered_bytes();
+    for (int i = 0; i < kAppends; ++i) {
+      ASSERT_TRUE(other_->Put("h", {PointOutside(i)}).ok());
+      const auto view = hulls_->View("h");
+      ASSERT_TRUE(view.ok()) << view.status();
+      EXPECT_EQ(view->record.counts.received, vertices + i + 1);
+      EXPECT_EQ(view->served->query_hull().point_count(), vertices + i + 1);
+    }
+    const uint64_t bytes = proxy_->answered_bytes() - before;
+    EXPECT_EQ(hulls_->registry().Cache().loads, 1);
+    EXPECT_EQ(hulls_->registry().Cache().grown, kAppends);
+    if (bytes_of_the_smallest == 0) bytes_of_the_smallest = bytes;
+    // The same messages; numbers are of one size.
+    EXPECT_EQ(bytes, bytes_of_the_smallest) << vertices << " vertices";
+    EXPECT_LT(bytes, kAppends * 2048);
+    ExpectAsReadAnew(*hulls_);
+  }
+}
+
+// Points that take others in, points inside, several batches at a time, and a reader who holds what
+// was before.
+TEST_F(PostgresFollow, AHullThatGrewIsAsIfItWasReadAnew) {
+  FollowWhenCalled();
+  StartWithHull(300);
+  const HullView first = *hulls_->View("h");
+  const std::vector<Vector> first_vertices = Canonical(*hulls_, first);
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  for (int round = 0; round < 30; ++round) {
+    for (int batch = 0; batch < 1 + round % 3; ++batch) {
+      std::vector<Vector> points;
+      for (int i = 0; i < 1 + round % 5; ++i) {
+        points.emplace_back(normal(random), normal(random), normal(random));
+      }
+      ASSERT_TRUE(other_->Put("h", points).ok());
+    }
+    const auto view = hulls_->View("h");
+    ASSERT_TRUE(view.ok()) << view.status();
+    EXPECT_EQ(view->record, other_->View("h")->record);
+    if (round % 10 == 9) ExpectAsReadAnew(*hulls_);
+  }
+  EXPECT_EQ(hulls_->registry().Cache().loads, 1);
+  EXPECT_GT(hulls_->registry().Cache().grown, 10);
+  EXPECT_EQ(hulls_->registry().Sizes().vertex_count, hulls_->View("h")->record.vertex_count);
+  EXPECT_THAT(Canonical(*hulls_, first), ElementsAreArray(first_vertices));
+  EXPECT_EQ(first.served->query_hull().point_count(), 300);
+}
+
+// Both append in turn: the builders are kept, and given what they lack.
+TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
+  FollowWhenCalled();
+  StartWithHull(1000);
+  const auto here = hulls_->Open("h", "here");
+  const auto there = other_->Open("h", "there");
+  ASSERT_TRUE(here.ok() && there.ok());
+  uint64_t outside = 0;
+  for (int i = 0; i < 20; ++i) {
+    const auto added = other_->Append(there->session, i + 1, {PointOutside(2 * i)});
+    ASSERT_TRUE(added.ok()) << added.status();
+    // Whoever follows before it builds is not superseded.
+    ASSERT_TRUE(hulls_->View("h").ok());
+    const auto result = hulls_->Append(here->session, i + 1, {PointOutside(2 * i + 1)});
+    ASSERT_TRUE(result.ok()) << result.status();
+    outside += result->counts.outside;
+  }
+  EXPECT_EQ(outside, 20);
+  EXPECT_EQ(hulls_->registry().Cache().loads, 1);
+  EXPECT_EQ(hulls_->registry().Cache().grown, 20);
+  ExpectAsReadAnew(*hulls_);
+  ExpectAsReadAnew(*other_);
+}
+
+// Both append at the same time, so that chunks that are being built, or on their way, are
+// superseded and built again.
+TEST_F(PostgresFollow, ChunksOnTheirWayAreMadeAnewOfWhatTheHullGrewInto) {
+  StartWithHull(1000);
+  constexpr uint64_t kChunks = 40;
+  std::vector<std::thread> writers;
+  for (PostgresRegistry* server : {hulls_.get(), other_.get()}) {
+    writers.emplace_back([&, server] {
+      const bool is_here = server == hulls_.get();
+      const auto opened = server->Open("h", is_here ? "here" : "there");
+      ASSERT_TRUE(opened.ok()) << opened.status();
+      std::vector<std::future<absl::StatusOr<ChunkResult>>> results;
+      for (uint64_t i = 0; i < kChunks; ++i) {
+        const auto done = std::make_shared<std::promise<absl::StatusOr<ChunkResult>>>();
+        results.push_back(done->get_future());
+        server->registry().Append(
+            opened->session,
+            {i + 1, {PointOutside(static_cast<int>(2 * i + is_here))}, std::nullopt}, {}, {},
+            [done](absl::StatusOr<ChunkResult> result) { done->set_value(std::move(result)); });
+      }
+      for (auto& result : results) {
+        const auto chunk = result.get();
+        EXPECT_TRUE(chunk.ok()) << chunk.status();
+      }
+    });
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_EQ(hulls_->View("h")->record.counts.outside, 1000 + 2 * kChunks);
+  ExpectAsReadAnew(*hulls_);
+  ExpectAsReadAnew(*other_);
+}
+
+TEST_F(PostgresFollow, AHullWithANewBaseIsReadAnew) {
+  FollowWhenCalled();
+  StartWithHull(1000);
+  // More than its base.
+  ASSERT_TRUE(other_->Put("h", SpherePoints(3500, 2)).ok());
+  ASSERT_EQ(Ask("SELECT count(*) FROM hulld.deltas").front(), "0");
+  ASSERT_TRUE(hulls_->View("h").ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, 2);
+  EXPECT_EQ(hulls_->registry().Cache().grown, 0);
+  ExpectAsReadAnew(*hulls_);
+}
+
+TEST_F(PostgresFollow, AHullThatGrewByMuchIsReadAnew) {
+  FollowWhenCalled();
+  StartWithHull(20'000);
+  ASSERT_TRUE(other_->Put("h", SpherePoints(4097, 2)).ok());
+  ASSERT_EQ(Ask("SELECT count(*) FROM hulld.deltas").front(), "1");
+  ASSERT_TRUE(hulls_->View("h").ok());
+  EXPECT_EQ(hulls_->registry().Cache().loads, 2);
+  EXPECT_EQ(hulls_->registry().Cache().grown, 0);
+}
+
+// As without them: whoever asks is told.
+TEST_F(PostgresFollow, DamagedDeltasAreFoundOut) {
+  FollowWhenCalled();
+  StartWithHull(1000);
+  ASSERT_TRUE(other_->Put("h", {PointOutside(0)}).ok());
+  Ask("UPDATE hulld.deltas SET vertices = set_byte(vertices, 0, get_byte(vertices, 0) # 1)");
+  EXPECT_TRUE(absl::IsDataLoss(hulls_->View("h").status()));
+  EXPECT_EQ(hulls_->registry().Cache().grown, 0);
+}
+
+// Nothing of what another server added outlives what it was added to.
+TEST_F(PostgresFollow, AHullThatGrewAndWentIsGone) {
+  FollowWhenCalled();
+  StartWithHull(500);
+  ASSERT_TRUE(other_->Put("h", {PointOutside(0)}).ok());
+  ASSERT_TRUE(hulls_->View("h").ok());
+  ASSERT_TRUE(other_->Put("h", {PointOutside(1)}).ok());
+  ASSERT_TRUE(other_->Delete("h").ok());
+  ASSERT_TRUE(other_->Put("h", CubeCorners()).ok());
+  EXPECT_EQ(hulls_->View("h")->record.vertex_count, 8);
+  ExpectAsReadAnew(*hulls_);
+}
+
+// What a server keeps in memory of what it has not followed yet is bounded.
+TEST_F(PostgresFollow, WhoIsBehindByTooManyHullsEnds) {
+  FollowWhenCalled();
+  Start();
+  const auto change = [&](int count) {
+    Ask(absl::StrCat("UPDATE hulld.store SET batch = batch + 1, revision = revision + ", count,
+                     "; INSERT INTO hulld.changes SELECT batch, 'h' || n, revision - ", count,
+                     " + n, revision - ", count, " + n FROM hulld.store, generate_series(1, ",
+                     count, ") n"));
+  };
+  bool ended = false;
+  hulls_->store().OnEnded([&] { ended = true; });
+  change(1 << 17);
+  EXPECT_TRUE(hulls_->registry().AwaitOthers({}).ok());
+  EXPECT_EQ(hulls_->registry().Sizes().store_revision, 1 << 17);
+  EXPECT_FALSE(ended);
+  change((1 << 17) + 1);
+  EXPECT_TRUE(absl::IsUnavailable(hulls_->registry().AwaitOthers({})));
+  EXPECT_TRUE(ended);
+}
+
+// Waits until a watch of all hulls is told of something.
+class Watcher {
+ public:
+  explicit Watcher(Registry& registry) : registry_(registry) {
+    watch_ = *registry.OpenWatch(WatchTarget(), {}, [this] {
+      const std::lock_guard lock(mutex_);
+      is_ready_ = true;
+      ready_.notify_all();
+    });
+  }
+  ~Watcher() { registry_.CloseWatch(watch_); }
+
+  // Whether it was told of this hull.
+  bool IsToldOf(const std::string& id) {
+    while (true) {
+      const auto piece = registry_.TakeChanges(*watch_);
+      if (!piece.ok()) return false;
+      for (const HullChange& change : piece->changes) {
+        if (change.record.hull_id == id) return true;
+      }
+      if (!piece->waits) continue;
+      std::unique_lock lock(mutex_);
+      if (!ready_.wait_for(lock, kLong, [this] { return is_ready_; })) return false;
+      is_ready_ = false;
+    }
+  }
+
+ private:
+  Registry& registry_;
+  std::shared_ptr<ChangeWatch> watch_;
+  std::mutex mutex_;
+  std::condition_variable ready_;
+  bool is_ready_ = false;
+};
+
+// Whether it comes to be.
+bool Comes(const std::function<bool()>& what) {
+  const auto end = std::chrono::steady_clock::now() + kLong;
+  while (!what()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::yield();
+  }
+  return true;
+}
+
+// None of them looks by itself.
+TEST_F(PostgresFollow, WhoIsToldOfABatchLooksAtOnce) {
+  options_.look = options_.beat = kNever;
+  Start();
+  const Server other = StartBeside();
+  Watcher here(hulls_->registry());
+  Watcher there(other->registry());
+  for (int i = 0; i < 20; ++i) {
+    const std::string id = absl::StrCat("h", i);
+    ASSERT_TRUE((i % 2 == 0 ? other : hulls_)->Create(id).ok());
+    ASSERT_TRUE(here.IsToldOf(id)) << i;
+    ASSERT_TRUE(there.IsToldOf(id)) << i;
+  }
+  EXPECT_EQ(proxy_->Asked(kLook), 1);
+}
+
+TEST_F(PostgresFollow, WithoutNoticesServersLook) {
+  options_.notices = false;
+  options_.look = std::chrono::milliseconds(10);
+  Start();
+  const Server other = StartBeside();
+  Watcher watcher(hulls_->registry());
+  ASSERT_TRUE(other->Create("h").ok());
+  EXPECT_TRUE(watcher.IsToldOf("h"));
+}
+
+// It comes back by itself, and hears again.
+TEST_F(PostgresFollow, ASessionThatListensAndIsLostIsOpenedAgain) {
+  const CapturedLog log;
+  options_.look = options_.beat = std::chrono::milliseconds(20);
+  Start();
+  other_ = StartBeside();
+  {
+    Watcher watcher(hulls_->registry());
+    for (int i = 1; i <= 3; ++i) {
+      const int listened = proxy_->Asked("LISTEN hulld_batches");
+      EXPECT_GE(listened, i);
+      proxy_->CutListeners();
+      const std::string id = absl::StrCat("h", i);
+      ASSERT_TRUE(other_->Create(id).ok());
+      EXPECT_TRUE(watcher.IsToldOf(id));
+      ASSERT_TRUE(Comes([&] { return proxy_->Asked("LISTEN hulld_batches") > listened; }));
+    }
+  }
+  EndAll();
+  EXPECT_THAT(log.text(), HasSubstr("lost the session that hears when other servers commit"));
+  EXPECT_THAT(log.text(), HasSubstr("it is asked for that every 20 ms"));
+}
+
+// The connection stands, and nothing comes: the keeper finds with a beat what nobody told it, and
+// looks more often from then on, until it hears again.
+TEST_F(PostgresFollow, WhoHearsNothingLooksMoreOften) {
+  const CapturedLog log;
+  options_.look = std::chrono::milliseconds(5);
+  options_.beat = std::chrono::milliseconds(500);
+  Start();
+  other_ = StartBeside();
+  auto watcher = std::make_unique<Watcher>(hulls_->registry());
+  const auto looks = [&] { return proxy_->Asked(kLook); };
+  const auto beats = [&] { return proxy_->Asked("SELECT owner FROM hulld.store"); };
+  ASSERT_TRUE(other_->Create("heard").ok());
+  ASSERT_TRUE(watcher->IsToldOf("heard"));
+  proxy_->SetDeaf(true);
+  ASSERT_TRUE(other_->Create("unheard").ok());
+  EXPECT_TRUE(watcher->IsToldOf("unheard"));
+  const int beats_then = beats();
+  EXPECT_TRUE(Comes([&] { return beats() > beats_then + 3; }));
+  EXPECT_GT(looks(), 3 * beats());
+  proxy_->SetDeaf(false);
+  ASSERT_TRUE(other_->Create("heard again").ok());
+  EXPECT_TRUE(watcher->IsToldOf("heard again"));
+  // With two beats come two looks, and one was perhaps under way.
+  EXPECT_TRUE(Comes([&] {
+    const int looks_before = looks();
+    const int beats_before = beats();
+    return Comes([&] { return beats() >= beats_before + 2; }) && looks() - looks_before <= 3;
+  }));
+  watcher = nullptr;
+  EndAll();
+  EXPECT_THAT(log.text(), HasSubstr("no notice comes of what other servers commit"));
+}
+
+// A database that speaks PostgreSQL's protocol and knows no LISTEN. It is said once.
+TEST_F(PostgresFollow, WhereTheDatabaseRefusesToListenServersLook) {
+  const CapturedLog log;
+  options_.look = options_.beat = std::chrono::milliseconds(10);
+  proxy_->RefuseToListen();
+  Start();
+  other_ = StartBeside();
+  {
+    Watcher watcher(hulls_->registry());
+    for (int i = 0; i < 3; ++i) {
+      const std::string id = absl::StrCat("h", i);
+      ASSERT_TRUE(other_->Create(id).ok());
+      EXPECT_TRUE(watcher.IsToldOf(id));
+    }
+  }
+  EndAll();
+  const std::string text = log.text();
+  const std::string told = "the database does not tell when other servers commit";
+  const size_t first = text.find(told);
+  ASSERT_NE(first, std::string::npos) << text;
+  EXPECT_EQ(text.find(told, first + 1), std::string::npos) << text;
+  EXPECT_EQ(proxy_->Asked("LISTEN hulld_batches"), 1);
+}
+
+}  // namespace
+}  // namespace hulld::server
