@@ -40,6 +40,11 @@ constexpr int kSharedHulls = 3;
 constexpr int kCallsPerRound = 120;
 // The first rounds fill caches and pools.
 constexpr int kWarmRounds = 2;
+#ifdef HULLD_SANITIZED
+constexpr int kRounds = 6;
+#else
+constexpr int kRounds = 12;
+#endif
 
 int NumberIn(const char* name, int otherwise) {
   const char* const given = std::getenv(name);
@@ -550,7 +555,7 @@ class Endurance : public RestartableServer {
 
 TEST_F(Endurance, AllAnswersAreRightAndNothingCreepsUp) {
   const auto seed = static_cast<uint64_t>(NumberIn("HULLD_TEST_SEED", 1));
-  const int rounds = NumberIn("HULLD_ENDURANCE_ROUNDS", 12);
+  const int rounds = NumberIn("HULLD_ENDURANCE_ROUNDS", kRounds);
   ClientOptions options;
   options.timeout = std::chrono::seconds(60);
   options.retry.max_attempts = 1000;

@@ -141,7 +141,7 @@ Plan::Plan(Random& random) {
     faults.full = rarely(8);
     faults.recover = rarely(2);
     faults.read = rarely(4);
-    if (random.OneIn(8)) faults.damage = rarely(2);
+    if (random.OneIn(3)) faults.damage = rarely(2);
     if (random.OneIn(2)) faults.killed_at_batch = 1 + random.Below(8);
   }
   memory_limit = random.OneIn(2) ? kPlentyOfMemory : uint64_t{1000} << random.Below(6);
