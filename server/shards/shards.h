@@ -54,8 +54,7 @@ class Shards {
   Shards(const Shards&) = delete;
   Shards& operator=(const Shards&) = delete;
 
-  // Registry::Load of each. FAILED_PRECONDITION: a store holds a hull or body whose slot is another
-  // shard's.
+  // Registry::Load of each.
   absl::Status Load();
 
   size_t size() const { return registries_.size(); }
@@ -133,8 +132,8 @@ class Shards {
   std::optional<StoreDisk> disk() const;
   void SetMetrics(StoreMetrics& metrics);
 
-  // For tests: called between two looks of a read of several shards.
-  void OnLook(std::function<void()> on_look) { on_look_ = std::move(on_look); }
+  // For tests: called each time when a read of several shards has looked up hulls of one.
+  void OnPart(std::function<void()> on_part) { on_part_ = std::move(on_part); }
 
  private:
   using Part = KnownInShards::Part;
@@ -164,7 +163,7 @@ class Shards {
   const ShardOfSlot shard_of_slot_;
   std::vector<std::string> store_ids_;
   std::atomic<size_t> next_budget_ = 0;
-  std::function<void()> on_look_;
+  std::function<void()> on_part_;
   std::vector<std::unique_ptr<Registry>> registries_;
 };
 

@@ -155,6 +155,7 @@ absl::StatusOr<Shards::Look> Shards::LookOnce(KnownInShards& known,
     if (!resolved.ok()) return resolved.status();
     look.parts.push_back(*std::move(resolved));
     look.lookups.push_back(part.known.lookups());
+    if (on_part_) on_part_();
   }
   if (holds && !holds()) return absl::AbortedError("bodies changed meanwhile");
   return look;
@@ -180,7 +181,6 @@ absl::StatusOr<Shards::Look> Shards::LookUntilOneInstant(KnownInShards& known, L
   // Those that changed before the look that is `before`; at first, nothing is known of that.
   std::vector<bool> changed_before(parts, true);
   while (true) {
-    if (on_look_) on_look_();
     if (Stopped(should_stop)) return Cancelled();
     // The question is to be asked after the last look.
     plan.freshness.began = SteadyClock::now();
@@ -272,13 +272,13 @@ std::optional<ShardsResolved> Shards::TryResolve(std::span<const std::string> id
       if (!resolved.has_value()) return false;
       look->staleness = std::max(look->staleness, resolved->staleness);
       look->parts.push_back(*std::move(resolved));
+      if (on_part_) on_part_();
     }
     return true;
   };
   Look look;
   if (!try_look(&look)) return std::nullopt;
   if (is_linearizable) {
-    if (on_look_) on_look_();
     Look again;
     if (!try_look(&again)) return std::nullopt;
     for (size_t i = 0; i < look.parts.size(); ++i) {
