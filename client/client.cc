@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
+#include "client/calls/revisions.h"
 #include "client/server_address.h"
 
 namespace hulld {
@@ -78,7 +79,8 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
   Request request;
   if (freshness.has_value()) *request.mutable_freshness() = *freshness;
   const bool is_linearizable =
-      !request.freshness().has_max_staleness() && request.freshness().at_least_revision() == 0;
+      !request.freshness().has_max_staleness() && request.freshness().at_least_revision() == 0 &&
+      request.freshness().at_least().empty();
   request.set_prefix(prefix);
   const auto count = [&] { return static_cast<uint64_t>(items(all)->size()); };
   do {
@@ -93,10 +95,7 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
     }
     all.set_next_page_token(page->next_page_token());
     // Otherwise what is on no page yet could be missing on the next.
-    if (!is_linearizable && page->header().revision() > 0) {
-      request.mutable_freshness()->set_at_least_revision(page->header().revision());
-      request.mutable_freshness()->set_store_id(page->header().store_id());
-    }
+    if (!is_linearizable) AskForAtLeast(page->header(), request.mutable_freshness());
     request.set_page_token(page->next_page_token());
   } while (!request.page_token().empty() && (limit == 0 || count() < limit));
   return all;

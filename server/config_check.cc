@@ -14,6 +14,7 @@
 #include "server/contract/status_map.h"
 #include "server/process/listen_address.h"
 #include "server/process/metrics_endpoint.h"
+#include "server/shards/slots.h"
 #include "server/store/postgres/conninfo.h"
 
 namespace hulld::server {
@@ -35,7 +36,15 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
   if (config.store == "rocksdb" && !config.data_dir.empty()) {
     if (absl::Status s = CheckDataDir(config.data_dir); !s.ok()) return s;
   }
-  if (config.store == "postgres") {
+  if (config.store == "postgres" && !config.postgres_shards.empty()) {
+    const absl::StatusOr<ShardFile> file =
+        ReadShardFile(config.postgres_shards, "--postgres-shards");
+    if (!file.ok()) return file.status();
+    for (const ShardFile::Shard& shard : file->shards) {
+      if (absl::Status s = CheckConninfoFile(shard.conninfo_file); !s.ok()) return s;
+    }
+    findings.push_back(absl::StrCat(file->shards.size(), " shards"));
+  } else if (config.store == "postgres") {
     if (absl::Status s = CheckConninfoFile(config.postgres_conninfo_file); !s.ok()) return s;
   }
   if (config.has_tls()) {

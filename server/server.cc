@@ -1,6 +1,7 @@
 #include "server/server.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/str_cat.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <spdlog/spdlog.h>
 
@@ -14,6 +15,7 @@
 #include "server/access/secret_file.h"
 #include "server/call/transport.h"
 #include "server/config_check.h"
+#include "server/contract/status_map.h"
 #include "server/process/descriptors.h"
 #include "server/process/listen_address.h"
 #include "server/settings/cpu_limit.h"
@@ -44,19 +46,28 @@ int AnswerThreads(const Config& config) {
   return config.threads > 0 ? config.threads : DefaultThreads();
 }
 
+// slots: which the database holds; empty: all.
+absl::StatusOr<std::unique_ptr<Store>> OpenPostgres(const Config& config,
+                                                    const std::string& conninfo_file,
+                                                    const char* setting, const std::string& slots,
+                                                    const std::function<bool()>& should_stop) {
+  absl::StatusOr<std::string> conninfo = ReadSecretFile(conninfo_file, setting);
+  if (!conninfo.ok()) return conninfo.status();
+  PostgresOptions options;
+  options.conninfo = *std::move(conninfo);
+  options.take_over = config.take_over;
+  options.shared = config.postgres_servers == "many";
+  options.slots = slots;
+  options.should_stop = should_stop;
+  return PostgresStore::Open(std::move(options));
+}
+
 absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
-                                                 std::function<bool()> should_stop) {
+                                                 const std::function<bool()>& should_stop) {
   if (config.store == "memory") return std::make_unique<MemoryStore>();
   if (config.store == "postgres") {
-    absl::StatusOr<std::string> conninfo =
-        ReadSecretFile(config.postgres_conninfo_file, "--postgres-conninfo-file");
-    if (!conninfo.ok()) return conninfo.status();
-    PostgresOptions options;
-    options.conninfo = *std::move(conninfo);
-    options.take_over = config.take_over;
-    options.shared = config.postgres_servers == "many";
-    options.should_stop = std::move(should_stop);
-    return PostgresStore::Open(std::move(options));
+    return OpenPostgres(config, config.postgres_conninfo_file, "--postgres-conninfo-file", "",
+                        should_stop);
   }
   RocksDbOptions options;
   options.data_dir = config.data_dir;
@@ -68,22 +79,62 @@ absl::StatusOr<std::unique_ptr<Store>> OpenStore(const Config& config,
 
 }  // namespace
 
-Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store)
+absl::StatusOr<Server::Stores> Server::OpenStores(const Config& config,
+                                                  const std::function<bool()>& should_stop) {
+  Stores opened;
+  if (config.postgres_shards.empty()) {
+    absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config, should_stop);
+    if (!store.ok()) return store.status();
+    opened.stores.push_back(*std::move(store));
+    return opened;
+  }
+  const absl::StatusOr<ShardFile> file = ReadShardFile(config.postgres_shards, "--postgres-shards");
+  if (!file.ok()) return file.status();
+  opened.shard_of_slot = file->shard_of;
+  for (const ShardFile::Shard& shard : file->shards) {
+    absl::StatusOr<std::unique_ptr<Store>> store =
+        OpenPostgres(config, shard.conninfo_file, "--postgres-shards", shard.slots, should_stop);
+    if (!store.ok()) {
+      return Prefixed(absl::StrCat("shard ", shard.conninfo_file, ": "), store.status());
+    }
+    for (const auto& other : opened.stores) {
+      if (other->id() != (*store)->id()) continue;
+      return absl::InvalidArgumentError(
+          absl::StrCat("--postgres-shards: ", shard.conninfo_file,
+                       " leads to the database of another line; each shard has one of its own"));
+    }
+    opened.stores.push_back(*std::move(store));
+  }
+  return opened;
+}
+
+namespace {
+
+std::vector<Store*> Pointers(const std::vector<std::unique_ptr<Store>>& stores) {
+  std::vector<Store*> pointers;
+  pointers.reserve(stores.size());
+  for (const auto& store : stores) pointers.push_back(store.get());
+  return pointers;
+}
+
+}  // namespace
+
+Server::Server(const Config& config, std::unique_ptr<Guard> guard, Stores stores)
     : guard_(std::move(guard)),
       admission_(config.limits, metrics_),
-      store_(std::move(store)),
+      stores_(std::move(stores.stores)),
       writers_(PoolThreads(), metrics_.AddPool("writers")),
-      registry_(*store_, config.limits, writers_, metrics_.AddPool("preparers"),
-                metrics_.AddPool("loaders")),
+      shards_(Pointers(stores_), stores.shard_of_slot, config.limits, writers_,
+              metrics_.AddPool("preparers"), metrics_.AddPool("loaders")),
       readers_(PoolThreads(), metrics_.AddPool("readers")),
       long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
       executor_(pool_.threads(), metrics_.AddPool("executor")),
-      hull_service_(registry_, admission_, writers_, readers_, long_readers_),
-      body_service_(registry_, admission_, readers_),
-      collision_service_(registry_, admission_, readers_, long_readers_, pool_, executor_),
-      status_service_(registry_, admission_),
-      maintenance_service_(*store_, registry_, admission_, long_readers_),
+      hull_service_(shards_, admission_, writers_, readers_, long_readers_),
+      body_service_(shards_, admission_, readers_),
+      collision_service_(shards_, admission_, readers_, long_readers_, pool_, executor_),
+      status_service_(shards_, admission_),
+      maintenance_service_(*stores_.front(), shards_, admission_, long_readers_),
       reflection_service_(admission_, AllServices()) {
   admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this](Rpc rpc) {
@@ -99,19 +150,19 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_p
 }
 
 void Server::AddSizesToMetrics() {
-  registry_.SetMetrics(metrics_.store());
+  shards_.SetMetrics(metrics_.store());
   metrics_.AddRefresh([this] {
     const auto advance = [](prometheus::Counter& counter, uint64_t now) {
       const double passed = static_cast<double>(now) - counter.Value();
       if (passed > 0) counter.Increment(passed);
     };
     const StoreMetrics& store = metrics_.store();
-    const CacheStatistics cache = registry_.Cache();
+    const CacheStatistics cache = shards_.Cache();
     advance(store.cache_hits, cache.hits);
     advance(store.cache_misses, cache.misses);
     advance(store.cache_evictions, cache.evictions);
     advance(store.damaged_records, cache.damaged);
-    const StoreFailures failures = store_->failures();
+    const StoreFailures failures = shards_.failures();
     advance(store.write_failures, failures.write);
     advance(store.sync_failures, failures.sync);
     advance(store.read_failures, failures.read);
@@ -119,8 +170,8 @@ void Server::AddSizesToMetrics() {
     store.cache_reading_bytes.Set(static_cast<double>(cache.reading_bytes));
     store.cache_writing_bytes.Set(static_cast<double>(cache.writing_bytes));
     store.cache_limit_bytes.Set(static_cast<double>(cache.limit_bytes));
-    store.read_only.Set(registry_.Commits().failing ? 1 : 0);
-    if (const std::optional<StoreDisk> disk = store_->disk(); disk.has_value()) {
+    store.read_only.Set(shards_.Commits().failing ? 1 : 0);
+    if (const std::optional<StoreDisk> disk = shards_.disk(); disk.has_value()) {
       store.disk_bytes.Set(static_cast<double>(disk->bytes));
       store.log_bytes.Set(static_cast<double>(disk->log_bytes));
       // Not a number is less than nothing, as an alert needs it.
@@ -131,27 +182,27 @@ void Server::AddSizesToMetrics() {
     }
   });
   metrics_.AddGauge("hulld_hulls", "Hulls in the store.",
-                    [this] { return static_cast<double>(registry_.Sizes().hull_count); });
+                    [this] { return static_cast<double>(shards_.Sizes().hull_count); });
   metrics_.AddGauge("hulld_bodies", "Bodies in the store.",
-                    [this] { return static_cast<double>(registry_.Sizes().body_count); });
+                    [this] { return static_cast<double>(shards_.Sizes().body_count); });
   metrics_.AddGauge("hulld_registry_lock_hold_max_seconds",
                     "Longest hold of the registry's lock within the last one to two minutes.",
                     [this] {
-                      const std::chrono::duration<double> longest = registry_.Holds().longest;
+                      const std::chrono::duration<double> longest = shards_.Holds().longest;
                       return longest.count();
                     });
   metrics_.AddGauge("hulld_vertices", "Vertices of all hulls.",
-                    [this] { return static_cast<double>(registry_.Sizes().vertex_count); });
+                    [this] { return static_cast<double>(shards_.Sizes().vertex_count); });
 }
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const Config& config,
                                                       std::function<bool()> should_stop) {
   absl::StatusOr<std::unique_ptr<Guard>> guard = Guard::Load(config);
   if (!guard.ok()) return guard.status();
-  absl::StatusOr<std::unique_ptr<Store>> store = OpenStore(config, std::move(should_stop));
-  if (!store.ok()) return store.status();
-  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(store)));
-  if (absl::Status s = server->registry_.Load(); !s.ok()) return s;
+  absl::StatusOr<Stores> stores = OpenStores(config, should_stop);
+  if (!stores.ok()) return stores.status();
+  std::unique_ptr<Server> server(new Server(config, *std::move(guard), *std::move(stores)));
+  if (absl::Status s = server->shards_.Load(); !s.ok()) return s;
   if (absl::Status s = server->Listen(config); !s.ok()) return s;
   return server;
 }
@@ -205,7 +256,7 @@ void Server::AddDescriptorsToMetrics() {
 void Server::BeginDrain() {
   grpc_server_->GetHealthCheckService()->SetServingStatus(false);
   admission_.BeginDrain();
-  registry_.EndWatches();
+  shards_.EndWatches();
 }
 
 bool Server::WaitIdle(std::chrono::milliseconds timeout) {
@@ -226,7 +277,7 @@ Server::~Server() {
   guard_->OnTokensChanged(nullptr);
   if (grpc_server_ == nullptr) return;
   admission_.BeginDrain();
-  registry_.EndWatches();
+  shards_.EndWatches();
   // Cancels what still runs; core polls for that, so the calls end soon.
   grpc_server_->Shutdown(std::chrono::system_clock::now());
   admission_.WaitIdle(std::chrono::steady_clock::time_point::max());

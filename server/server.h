@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/access/guard.h"
 #include "server/admin/maintenance_service.h"
@@ -23,13 +24,13 @@
 #include "server/process/metrics_endpoint.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
-// A running server: store -> registry -> services -> gRPC.
+// A running server: stores -> registries -> services -> gRPC.
 class Server {
  public:
   // Opens the store and listens as `config` says. INVALID_ARGUMENT: --listen is malformed or needs
@@ -58,7 +59,9 @@ class Server {
   void ReloadFiles() { guard_->Reload(); }
 
   // Store::OnEnded: this server is to end, without draining.
-  void OnStoreEnded(std::function<void()> ended) { store_->OnEnded(std::move(ended)); }
+  void OnStoreEnded(const std::function<void()>& ended) {
+    for (const auto& store : stores_) store->OnEnded(ended);
+  }
 
   // Turns health to NOT_SERVING and refuses new calls with UNAVAILABLE; running ones go on.
   void BeginDrain();
@@ -72,7 +75,15 @@ class Server {
   bool Drain(std::chrono::milliseconds timeout);
 
  private:
-  Server(const Config& config, std::unique_ptr<Guard> guard, std::unique_ptr<Store> store);
+  // The stores of a server, by shard, and which of them has which slot.
+  struct Stores {
+    std::vector<std::unique_ptr<Store>> stores;
+    Shards::ShardOfSlot shard_of_slot{};
+  };
+  static absl::StatusOr<Stores> OpenStores(const Config& config,
+                                           const std::function<bool()>& should_stop);
+
+  Server(const Config& config, std::unique_ptr<Guard> guard, Stores stores);
 
   absl::Status Listen(const Config& config);
   void AddSizesToMetrics();
@@ -83,11 +94,11 @@ class Server {
   Metrics metrics_;
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
-  std::unique_ptr<Store> store_;
+  std::vector<std::unique_ptr<Store>> stores_;
   // Chunks and replacements, and what may wait for the store. Three pools, so that readers never
   // wait for writers, nor those of microseconds for those of seconds.
   WorkerPool writers_;
-  Registry registry_;
+  Shards shards_;
   WorkerPool readers_;
   WorkerPool long_readers_;
   // Answers.

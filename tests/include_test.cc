@@ -89,6 +89,7 @@ constexpr std::string_view kRooms[] = {
     "server/registry",
     "server/registry/bodies",
     "server/access",
+    "server/shards",
     "server/migration",
     "server/call",
     "server/wire",

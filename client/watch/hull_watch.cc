@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/calls/grpc_status.h"
+#include "client/calls/revisions.h"
 
 namespace hulld {
 
@@ -30,11 +31,10 @@ absl::StatusOr<v1::WatchHullsResponse> HullWatch::Next() {
     v1::WatchHullsResponse message;
     if (call->reader->Read(&message)) {
       // A call that resumed nothing tells everything, but not what went meanwhile.
-      if (is_new && told_ && request_.after_revision() == 0) message.set_anew(true);
+      if (is_new && told_ && !IsResumed(request_)) message.set_anew(true);
       connected_ = true;
       told_ = told_ || message.events_size() > 0;
-      request_.set_after_revision(message.header().revision());
-      request_.set_store_id(message.header().store_id());
+      ResumeAfter(message.header(), &request_);
       return message;
     }
     const absl::Status status = Close();

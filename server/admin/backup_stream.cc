@@ -28,10 +28,10 @@ absl::Status CheckSeesAll(const Caller& caller) {
 }  // namespace
 
 WriteReactor* BackupStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Store& store, const Registry& registry, WorkerPool& readers,
+                                  Store& store, const Shards& shards, WorkerPool& readers,
                                   const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BackupStream>(
-      new BackupStream(context, admission, store, registry, readers, request)));
+      new BackupStream(context, admission, store, shards, readers, request)));
 }
 
 BackupStream::~BackupStream() {
@@ -64,7 +64,7 @@ absl::Status BackupStream::Begin() {
   std::sort(files_.rbegin(), files_.rend());
   spdlog::info("a backup of the store is being saved");
   v1::BackupBegin* begin = reply().mutable_begin();
-  EncodeHeader(store_, registry_.Sizes().store_revision, begin->mutable_header());
+  EncodeHeader(shards_.store_ids(), ShardsAsOf{shards_.Sizes().revisions}, begin->mutable_header());
   begin->set_version(HULLD_VERSION);
   begin->set_store_format(kStoreFormat);
   return absl::OkStatus();

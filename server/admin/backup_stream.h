@@ -13,7 +13,7 @@
 #include "hulld/v1/maintenance.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
@@ -27,15 +27,15 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   ~BackupStream() override;
 
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Store& store, const Registry& registry, WorkerPool& readers,
+                             Store& store, const Shards& shards, WorkerPool& readers,
                              const grpc::ByteBuffer& request);
 
  private:
   BackupStream(grpc::CallbackServerContext& context, Admission& admission, Store& store,
-               const Registry& registry, WorkerPool& readers, const grpc::ByteBuffer& request)
+               const Shards& shards, WorkerPool& readers, const grpc::ByteBuffer& request)
       : RequestStream(request, context, admission, Rpc::kSaveBackup),
         store_(store),
-        registry_(registry),
+        shards_(shards),
         readers_(readers) {}
 
   void Open() override;
@@ -48,7 +48,7 @@ class BackupStream : public RequestStream<PulledStream<WriteReactor, v1::SaveBac
   absl::StatusOr<bool> NextPiece();
 
   Store& store_;
-  const Registry& registry_;
+  const Shards& shards_;
   WorkerPool& readers_;
   std::string directory_;
   // Relative to directory_; the last is sent first.

@@ -8,7 +8,7 @@
 #include "hulld/v1/status.grpc.pb.h"
 #include "server/access/caller.h"
 #include "server/call/admission.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -16,8 +16,8 @@ namespace hulld::server {
 class StatusService
     : public v1::StatusService::WithRawCallbackMethod_GetStatus<v1::StatusService::Service> {
  public:
-  StatusService(Registry& registry, Admission& admission)
-      : registry_(registry), admission_(admission) {}
+  StatusService(Shards& shards, Admission& admission)
+      : shards_(shards), admission_(admission) {}
 
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
                                       const grpc::ByteBuffer* request,
@@ -26,7 +26,7 @@ class StatusService
  private:
   void Fill(const Caller& caller, v1::GetStatusResponse* response) const;
 
-  Registry& registry_;
+  Shards& shards_;
   Admission& admission_;
   const std::chrono::system_clock::time_point started_ = std::chrono::system_clock::now();
   const std::chrono::steady_clock::time_point started_steady_ = std::chrono::steady_clock::now();

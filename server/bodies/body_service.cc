@@ -10,7 +10,7 @@
 #include "server/access/caller.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
-#include "server/registry/bodies/body_resolution.h"
+#include "server/shards/body_resolution.h"
 #include "server/registry/body.h"
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
@@ -105,7 +105,7 @@ grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* c
                                                   grpc::ByteBuffer* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
-        EndFresh(registry_, readers_, call, [this, call](std::chrono::nanoseconds staleness) {
+        EndFresh(shards_, readers_, call, [this, call](std::chrono::nanoseconds staleness) {
           return List(call->request(), call->call(), staleness, &call->response());
         });
       });
@@ -121,16 +121,17 @@ grpc::ServerUnaryReactor* BodyService::DeleteBody(grpc::CallbackServerContext* c
 void BodyService::Put(PutCall* call) {
   if (call->call().ShouldStop()) return call->End(call->call().StopStatus());
   absl::StatusOr<StoredBody> body =
-      DecodeBody(call->request(), call->call().caller(), registry_.limits().max_pieces_per_body);
+      DecodeBody(call->request(), call->call().caller(), shards_.limits().max_pieces_per_body);
   if (!body.ok()) return call->End(body.status());
-  registry_.PutBody(*std::move(body), IfRevision(call->request()),
-                    [this, call](const absl::StatusOr<PutBodyResult>& result) {
+  Registry& registry = shards_.of(body->record.body_id);
+  registry.PutBody(*std::move(body), IfRevision(call->request()),
+                    [&registry, call](const absl::StatusOr<PutBodyResult>& result) {
                       if (!result.ok()) return call->End(result.status());
                       const BodyRecord& record = result->body;
                       call->call().LogChange(result->created ? "body created" : "body replaced",
                                              {"body", record.body_id}, record.revision);
                       v1::PutBodyResponse& response = call->response();
-                      EncodeHeader(registry_.store(), result->store_revision,
+                      EncodeHeader(registry.store(), result->store_revision,
                                    response.mutable_header());
                       v1::BodyInfo* const info = response.mutable_body();
                       info->set_body_id(record.body_id);
@@ -138,7 +139,7 @@ void BodyService::Put(PutCall* call) {
                       info->set_revision(record.revision);
                       info->set_piece_count(result->piece_count);
                       response.set_created(result->created);
-                      response.set_durability(EncodeDurability(registry_.store().durability()));
+                      response.set_durability(EncodeDurability(registry.store().durability()));
                       call->End(absl::OkStatus());
                     });
 }
@@ -147,17 +148,20 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
                               v1::GetBodyResponse* response) {
   const std::string& id = request.body_id();
   if (absl::Status s = CheckHullId(call.caller(), id, "body_id"); !s.ok()) return s;
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request.freshness(), registry_.store(), call.arrival());
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(request.freshness(), shards_.store_ids(), call.arrival());
   if (!freshness.ok()) return freshness.status();
-  const auto staleness = registry_.AwaitFresh(*freshness, [&call] { return call.ShouldStop(); });
+  const size_t shard = shards_.shard_of(id);
+  Registry& registry = shards_.at(shard);
+  const auto staleness =
+      registry.AwaitFresh(freshness->Of(shard), [&call] { return call.ShouldStop(); });
   if (!staleness.ok()) return staleness.status();
-  const FoundBodies found = registry_.FindBodies(std::span(&id, 1));
+  const FoundBodies found = registry.FindBodies(std::span(&id, 1));
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
   if (absl::Status s = CheckPiecePrefix(*body, call.caller().prefix); !s.ok()) return s;
-  EncodeHeader(registry_.store(), AsOf{found.store_revision, *staleness},
+  EncodeHeader(registry.store(), AsOf{found.store_revision, *staleness},
                response->mutable_header());
   EncodeBody(*body, response->mutable_body());
   response->mutable_pieces()->Reserve(static_cast<int>(body->pieces().size()));
@@ -177,9 +181,10 @@ absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call&
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const BodyPage page =
-      registry_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize));
-  EncodeHeader(registry_.store(), AsOf{page.store_revision, staleness}, response->mutable_header());
+  const ShardsBodyPage page =
+      shards_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize));
+  EncodeHeader(shards_.store_ids(), ShardsAsOf{page.revisions, staleness},
+               response->mutable_header());
   for (const std::shared_ptr<const Body>& body : page.bodies) {
     EncodeBody(*body, response->add_bodies());
   }
@@ -194,11 +199,12 @@ void BodyService::Delete(DeleteCall* call) {
   if (absl::Status s = CheckHullId(call->call().caller(), id, "body_id"); !s.ok()) {
     return call->End(s);
   }
-  registry_.DeleteBody(
-      id, IfRevision(call->request()), [this, call](const absl::StatusOr<uint64_t>& revision) {
+  Registry& registry = shards_.of(id);
+  registry.DeleteBody(
+      id, IfRevision(call->request()), [&registry, call](const absl::StatusOr<uint64_t>& revision) {
         if (!revision.ok()) return call->End(revision.status());
         call->call().LogChange("body deleted", {"body", call->request().body_id()}, *revision);
-        EncodeHeader(registry_.store(), *revision, call->response().mutable_header());
+        EncodeHeader(registry.store(), *revision, call->response().mutable_header());
         call->End(absl::OkStatus());
       });
 }

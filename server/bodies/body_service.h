@@ -11,7 +11,7 @@
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -21,12 +21,12 @@ using BodyServiceOfBytes =
         v1::BodyService::WithRawCallbackMethod_ListBodies<
             v1::BodyService::WithRawCallbackMethod_DeleteBody<v1::BodyService::Service>>>>;
 
-// hulld.v1.BodyService: the contract in body.proto over the registry. Calls that look into records
+// hulld.v1.BodyService: the contract in body.proto over the shards. Calls that look into records
 // are answered where they arrive; those with pieces, of which there may be many, on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
-  BodyService(Registry& registry, Admission& admission, WorkerPool& readers)
-      : registry_(registry), admission_(admission), readers_(readers) {}
+  BodyService(Shards& shards, Admission& admission, WorkerPool& readers)
+      : shards_(shards), admission_(admission), readers_(readers) {}
 
   grpc::ServerUnaryReactor* PutBody(grpc::CallbackServerContext* context,
                                     const grpc::ByteBuffer* request,
@@ -55,7 +55,7 @@ class BodyService : public BodyServiceOfBytes {
                     std::chrono::nanoseconds staleness, v1::ListBodiesResponse* response);
   void Delete(DeleteCall* call);
 
-  Registry& registry_;
+  Shards& shards_;
   Admission& admission_;
   WorkerPool& readers_;
 };

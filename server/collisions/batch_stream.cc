@@ -33,16 +33,16 @@ void Append(const v1::BatchCheckCollisionsResponse& next,
 }  // namespace
 
 WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry, WorkerPool& readers, TaskPool& pool,
+                                 Shards& shards, WorkerPool& readers, TaskPool& pool,
                                  Executor& executor, const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BatchStream>(
-      new BatchStream(context, admission, registry, readers, pool, executor, request)));
+      new BatchStream(context, admission, shards, readers, pool, executor, request)));
 }
 
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Registry& registry, WorkerPool& readers, TaskPool& pool,
+                         Shards& shards, WorkerPool& readers, TaskPool& pool,
                          Executor& executor, const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, registry,
+    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, shards,
                     {readers, pool}, {kFirstPairs, kMostPairs}),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()) {}
@@ -55,10 +55,10 @@ bool BatchStream::IsShort() const {
 absl::Status BatchStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(request().method(), request().wanted(), request().tolerance(),
-                       registry().limits(), call().lifetime());
+                       shards().limits(), call().lifetime());
   if (!options.ok()) return options.status();
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(request().freshness(), shards().store_ids(), call().arrival());
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   options_ = *std::move(options);
@@ -66,7 +66,7 @@ absl::Status BatchStream::Validate() {
   team_options_.threads = team_threads_;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           registry().limits().max_placements, "the batch");
+                           shards().limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
@@ -75,20 +75,20 @@ absl::Status BatchStream::Validate() {
   const bool is_textbook = options_.method == Method::kTextbookSat;
   if (!is_textbook && pair_count_ <= table_.size()) table_.PlaceOnDemand();
   call().AddPairs(pair_count_);
-  return ValidatePairs(request().pairs(), table_.size(), registry().limits().max_pairs_per_batch,
+  return ValidatePairs(request().pairs(), table_.size(), shards().limits().max_pairs_per_batch,
                        "the batch");
 }
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
-  const ReadPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
+  const ShardsPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
                          freshness_};
-  if (!may_wait) return table_.TryResolve(registry(), options_, plan);
-  if (absl::Status s = table_.Resolve(registry(), options_, plan); !s.ok()) return s;
+  if (!may_wait) return table_.TryResolve(shards(), options_, plan);
+  if (absl::Status s = table_.Resolve(shards(), options_, plan); !s.ok()) return s;
   return true;
 }
 
 bool BatchStream::QueueHead() {
-  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head_.mutable_header());
+  if (next_row_ == 0) table_.EncodeHeader(shards(), head_.mutable_header());
   next_row_ = table_.EncodeHulls(next_row_, &head_);
   if (next_row_ == table_.table_rows()) {
     has_head_ = true;
@@ -174,7 +174,7 @@ absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point 
   if (!piece.check.has_value()) {
     const bool is_for_team = IsForTeam(pair);
     if (is_for_team) {
-      if (absl::Status s = registry().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+      if (absl::Status s = shards().CheckMemory(MemoryUse::kReading); !s.ok()) return s;
     }
     absl::StatusOr<TextbookCheck> begun = TextbookCheck::Begin(
         table_.placed()[pair.a], table_.placed()[pair.b], is_for_team ? team_options_ : options_);

@@ -18,7 +18,7 @@
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 #include "server/wire/batch_columns.h"
 
 namespace hulld::server {
@@ -36,11 +36,11 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, WorkerPool& readers, TaskPool& pool,
+                             Shards& shards, WorkerPool& readers, TaskPool& pool,
                              Executor& executor, const grpc::ByteBuffer& request);
 
  private:
-  BatchStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+  BatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
               WorkerPool& readers, TaskPool& pool, Executor& executor,
               const grpc::ByteBuffer& request);
 
@@ -77,7 +77,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
 
   // Written before the first piece.
   uint64_t pair_count_ = 0;
-  Freshness freshness_;
+  ShardsFreshness freshness_;
   QueryOptions options_;
   // The same for a pair that is worth the team.
   QueryOptions team_options_;

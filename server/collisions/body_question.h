@@ -11,7 +11,7 @@
 #include "core/query/terms/query_options.h"
 #include "server/process/fair_queue.h"
 #include "server/process/task_pool.h"
-#include "server/registry/bodies/body_resolution.h"
+#include "server/shards/body_resolution.h"
 
 namespace hulld::server {
 

@@ -25,7 +25,7 @@
 #include "server/collisions/watch/collision_watch.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
-#include "server/registry/bodies/body_resolution.h"
+#include "server/shards/body_resolution.h"
 #include "server/settings/config.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
@@ -50,8 +50,12 @@ std::array<std::string, 2> HullIds(const v1::CheckCollisionRequest& request) {
   return {request.a().hull_id(), request.b().hull_id()};
 }
 
+void EncodeVersion(const Shards& shards, const HullRecord& record, v1::HullVersion* message) {
+  EncodeVersion(shards.store_id_of(record.hull_id), record, message);
+}
+
 // The first reason why there is no answer.
-absl::Status FirstProblem(const absl::StatusOr<Resolved>& resolved) {
+absl::Status FirstProblem(const absl::StatusOr<ShardsResolved>& resolved) {
   if (!resolved.ok()) return resolved.status();
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
     if (!hull.ok()) return hull.status();
@@ -66,11 +70,11 @@ const QueryHull& NoHull() {
   return no_hull;
 }
 
-void EncodeVersions(const Store& store, const AsOf& as_of, const HullView& a, const HullView& b,
-                    v1::CheckCollisionResponse* response) {
-  EncodeHeader(store, as_of, response->mutable_header());
-  EncodeVersion(store.id(), a.record, response->mutable_hull_a());
-  EncodeVersion(store.id(), b.record, response->mutable_hull_b());
+void EncodeVersions(const Shards& shards, const ShardsAsOf& as_of, const HullView& a,
+                    const HullView& b, v1::CheckCollisionResponse* response) {
+  EncodeHeader(shards.store_ids(), as_of, response->mutable_header());
+  EncodeVersion(shards, a.record, response->mutable_hull_a());
+  EncodeVersion(shards, b.record, response->mutable_hull_b());
 }
 
 // a, b: the hulls that decided. They are canonical where the answer names vertices.
@@ -91,10 +95,10 @@ absl::Status EncodeAnswer(const Answer& answer, const QueryHull& a, const QueryH
   return EncodeAxis(*answer.axis, a.hull(), b.hull(), response->mutable_axis());
 }
 
-void EncodePiece(const std::string& store_id, const BodyQuestion::Side& side, uint32_t piece,
+void EncodePiece(const Shards& shards, const BodyQuestion::Side& side, uint32_t piece,
                  v1::DecidingPiece* message) {
   message->set_index(piece);
-  EncodeVersion(store_id, side.view().body->hull_of(piece).record, message->mutable_hull());
+  EncodeVersion(shards, side.view().body->hull_of(piece).record, message->mutable_hull());
 }
 
 const QueryHull& HullOfPiece(const BodyQuestion::Side& side, uint32_t piece) {
@@ -102,24 +106,24 @@ const QueryHull& HullOfPiece(const BodyQuestion::Side& side, uint32_t piece) {
 }
 
 // The hulls of all pieces, each once; of a hull, itself.
-void EncodeHulls(const std::string& store_id, const BodyQuestion::Side& side,
+void EncodeHulls(const Shards& shards, const BodyQuestion::Side& side,
                  std::set<std::string_view>* known, v1::CheckCollisionResponse* response) {
   const auto encode = [&](const HullView& view) {
     if (!known->insert(view.record.hull_id).second) return;
-    EncodeVersion(store_id, view.record, response->add_piece_hulls());
+    EncodeVersion(shards, view.record, response->add_piece_hulls());
   };
   if (!side.is_body()) return encode(side.view());
   for (const HullView& view : side.view().body->hulls) encode(view);
 }
 
 // What the relation of bodies follows from. RESOURCE_EXHAUSTED: it is too much for a reply.
-absl::Status EncodeProof(const std::string& store_id,
+absl::Status EncodeProof(const Shards& shards,
                          const std::vector<PieceCertificate>& certificates,
                          const BodyQuestion::Side& a, const BodyQuestion::Side& b,
                          v1::CheckCollisionResponse* response) {
   std::set<std::string_view> known;
-  EncodeHulls(store_id, a, &known, response);
-  EncodeHulls(store_id, b, &known, response);
+  EncodeHulls(shards, a, &known, response);
+  EncodeHulls(shards, b, &known, response);
   size_t bytes = response->ByteSizeLong();
   for (const PieceCertificate& certificate : certificates) {
     // Tag and length.
@@ -134,7 +138,7 @@ absl::Status EncodeProof(const std::string& store_id,
   return ProofTooLarge(certificates.size(), Config::kMaxProofBytes);
 }
 
-absl::Status EncodeBodyAnswer(const std::string& store_id, const BodyAnswer& answer,
+absl::Status EncodeBodyAnswer(const Shards& shards, const BodyAnswer& answer,
                               const BodyQuestion::Side& a, const BodyQuestion::Side& b,
                               const v1::Wanted& wanted, v1::CheckCollisionResponse* response) {
   absl::Status encoded;
@@ -142,13 +146,13 @@ absl::Status EncodeBodyAnswer(const std::string& store_id, const BodyAnswer& ans
     encoded = EncodeAnswer(answer.answer, NoHull(), NoHull(), wanted, response);
   } else {
     const PiecePair pieces = *answer.pieces;
-    if (a.is_body()) EncodePiece(store_id, a, pieces.a, response->mutable_piece_a());
-    if (b.is_body()) EncodePiece(store_id, b, pieces.b, response->mutable_piece_b());
+    if (a.is_body()) EncodePiece(shards, a, pieces.a, response->mutable_piece_a());
+    if (b.is_body()) EncodePiece(shards, b, pieces.b, response->mutable_piece_b());
     encoded = EncodeAnswer(answer.answer, HullOfPiece(a, pieces.a), HullOfPiece(b, pieces.b),
                            wanted, response);
   }
   if (!encoded.ok() || !wanted.certificate()) return encoded;
-  return EncodeProof(store_id, answer.certificates, a, b, response);
+  return EncodeProof(shards, answer.certificates, a, b, response);
 }
 
 }  // namespace
@@ -161,7 +165,7 @@ struct CollisionService::PairQuery {
 
   // Takes the hulls that were found for it, of which none is a body, and gives the response their
   // versions.
-  void Place(const Registry& registry, Resolved resolved, v1::CheckCollisionResponse* response);
+  void Place(const Shards& shards, ShardsResolved resolved, v1::CheckCollisionResponse* response);
 
   // Requires that Place succeeded.
   bool IsQuick() const {
@@ -204,7 +208,7 @@ absl::StatusOr<CollisionService::PairQuery> CollisionService::PairQuery::Read(
   return query;
 }
 
-void CollisionService::PairQuery::Place(const Registry& registry, Resolved resolved,
+void CollisionService::PairQuery::Place(const Shards& shards, ShardsResolved resolved,
                                         v1::CheckCollisionResponse* response) {
   views = std::move(resolved.hulls);
   const bool canonical = options.WantsCanonical();
@@ -213,18 +217,18 @@ void CollisionService::PairQuery::Place(const Registry& registry, Resolved resol
   };
   a = PlacedHull(query_hull(*views[0]), X_WA);
   b = PlacedHull(query_hull(*views[1]), X_WB);
-  EncodeVersions(registry.store(), resolved.as_of(), *views[0], *views[1], response);
+  EncodeVersions(shards, resolved.as_of, *views[0], *views[1], response);
 }
 
 struct CollisionService::TextbookQuery {
-  TextbookQuery(Registry& registry, PairQuery given_pair, bool for_team)
+  TextbookQuery(Shards& shards, PairQuery given_pair, bool for_team)
       : pair(std::move(given_pair)),
         is_for_team(for_team),
-        charge(registry.memory(), MemoryUse::kReading) {}
+        charge(shards.memory(), MemoryUse::kReading) {}
 
   // RESOURCE_EXHAUSTED: there is no room for what a large pair holds from slice to slice, or it has
   // too many axes.
-  absl::Status Begin(Registry& registry);
+  absl::Status Begin(Shards& shards);
 
   PairQuery pair;
   const bool is_for_team;
@@ -233,9 +237,9 @@ struct CollisionService::TextbookQuery {
   MemoryCharge charge;
 };
 
-absl::Status CollisionService::TextbookQuery::Begin(Registry& registry) {
+absl::Status CollisionService::TextbookQuery::Begin(Shards& shards) {
   if (is_for_team) {
-    if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+    if (absl::Status s = shards.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   }
   absl::StatusOr<TextbookCheck> begun =
       TextbookCheck::Begin(pair.placed_a(), pair.placed_b(), pair.options);
@@ -265,16 +269,16 @@ grpc::ServerUnaryReactor* CollisionService::CheckCollision(grpc::CallbackServerC
 void CollisionService::Check(CheckCall* call) {
   pool_.NoteSingleCall();
   const v1::CheckCollisionRequest& request = call->request();
-  absl::StatusOr<PairQuery> query = PairQuery::Read(registry_.limits(), call->call(), request);
+  absl::StatusOr<PairQuery> query = PairQuery::Read(shards_.limits(), call->call(), request);
   if (!query.ok()) return call->End(query.status());
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request.freshness(), registry_.store(), call->call().arrival());
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(request.freshness(), shards_.store_ids(), call->call().arrival());
   if (!freshness.ok()) return call->End(freshness.status());
   PlacedLookup lookup;
   lookup.plan.freshness = *freshness;
   lookup.canonical = query->options.WantsCanonical();
   lookup.prefix = call->call().caller().prefix;
-  std::optional<Resolved> ready = TryResolvePlaced(registry_, HullIds(request), lookup);
+  std::optional<ShardsResolved> ready = TryResolvePlaced(shards_, HullIds(request), lookup);
   if (ready.has_value()) return AnswerPair(*std::move(query), *std::move(ready), call);
   // Waits for the store, or for canonical snapshots or boxes of pieces to be made.
   const ClientId client = call->call().client();
@@ -282,24 +286,24 @@ void CollisionService::Check(CheckCall* call) {
       [this, call, lookup, query = *std::move(query)]() mutable {
         AnswerPair(
             std::move(query),
-            ResolvePlaced(registry_, HullIds(call->request()), lookup, query.options.should_stop),
+            ResolvePlaced(shards_, HullIds(call->request()), lookup, query.options.should_stop),
             call);
       },
       client);
 }
 
-void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved,
+void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved,
                                   CheckCall* call) {
   if (absl::Status problem = FirstProblem(resolved); !problem.ok()) return call->End(problem);
   const bool has_body = resolved->hulls[0]->body != nullptr || resolved->hulls[1]->body != nullptr;
   if (has_body) return AnswerBodies(query, *std::move(resolved), call);
-  query.Place(registry_, *std::move(resolved), &call->response());
+  query.Place(shards_, *std::move(resolved), &call->response());
   Compute(std::move(query), call);
 }
 
-void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call) {
+void CollisionService::AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call) {
   if (absl::Status s = ValidateForBodies(query.options); !s.ok()) return call->End(s);
-  EncodeVersions(registry_.store(), resolved.as_of(), *resolved.hulls[0], *resolved.hulls[1],
+  EncodeVersions(shards_, resolved.as_of, *resolved.hulls[0], *resolved.hulls[1],
                  &call->response());
   BodyQuestion::Start(pool_, *std::move(resolved.hulls[0]), query.X_WA,
                       *std::move(resolved.hulls[1]), query.X_WB, query.options,
@@ -310,7 +314,7 @@ void CollisionService::AnswerBodies(const PairQuery& query, Resolved resolved, C
                         RungCounts counts;
                         counts.Add(answer->answer.rung);
                         call->call().metrics().CountPairs(counts);
-                        call->End(EncodeBodyAnswer(registry_.store().id(), *answer, a, b,
+                        call->End(EncodeBodyAnswer(shards_, *answer, a, b,
                                                    call->request().wanted(), &call->response()));
                       });
 }
@@ -322,7 +326,7 @@ void CollisionService::Compute(PairQuery query, CheckCall* call) {
   if (query.options.method == Method::kTextbookSat) {
     const bool is_for_team = query.IsForTeam();
     if (is_for_team) query.options.threads = executor_.threads();
-    return SubmitPiece(std::make_shared<TextbookQuery>(registry_, std::move(query), is_for_team),
+    return SubmitPiece(std::make_shared<TextbookQuery>(shards_, std::move(query), is_for_team),
                        call);
   }
   // `wanted` lives until the call ends.
@@ -343,7 +347,7 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
         const auto end = std::chrono::steady_clock::now() +
                          (query->is_for_team ? Executor::kSliceTime : TaskPool::kSliceTime);
         if (!query->check.has_value()) {
-          if (absl::Status s = query->Begin(registry_); !s.ok()) return call->End(s);
+          if (absl::Status s = query->Begin(shards_); !s.ok()) return call->End(s);
         }
         const absl::StatusOr<bool> done = query->check->Advance(end);
         if (!done.ok()) return call->End(done.status());
@@ -356,21 +360,21 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
                                                      const grpc::ByteBuffer* request) {
-  return BatchStream::Start(*context, admission_, registry_, long_readers_, pool_, executor_,
+  return BatchStream::Start(*context, admission_, shards_, long_readers_, pool_, executor_,
                             *request);
 }
 
 BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
+  return CollisionStream::Start(*context, admission_, shards_, readers_, long_readers_, pool_);
 }
 
 WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request) {
-  return SceneStream::Start(*context, admission_, registry_, long_readers_, pool_, *request);
+  return SceneStream::Start(*context, admission_, shards_, long_readers_, pool_, *request);
 }
 
 BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
-  return CollisionWatch::Start(*context, admission_, registry_, readers_, long_readers_, pool_);
+  return CollisionWatch::Start(*context, admission_, shards_, readers_, long_readers_, pool_);
 }
 
 }  // namespace hulld::server

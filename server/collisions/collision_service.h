@@ -12,7 +12,7 @@
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -33,9 +33,9 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
 // whose loop over axes is worth a team of threads go to the executor.
 class CollisionService : public CollisionServiceOfBytes {
  public:
-  CollisionService(Registry& registry, Admission& admission, WorkerPool& readers,
+  CollisionService(Shards& shards, Admission& admission, WorkerPool& readers,
                    WorkerPool& long_readers, TaskPool& pool, Executor& executor)
-      : registry_(registry),
+      : shards_(shards),
         admission_(admission),
         readers_(readers),
         long_readers_(long_readers),
@@ -57,8 +57,8 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
-  void AnswerPair(PairQuery query, absl::StatusOr<Resolved> resolved, CheckCall* call);
-  void AnswerBodies(const PairQuery& query, Resolved resolved, CheckCall* call);
+  void AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved, CheckCall* call);
+  void AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call);
   // Answers the query on the thread that suits it.
   void Compute(PairQuery query, CheckCall* call);
   // The next piece of a query for the textbook, which lasts as long as its hulls are large: others
@@ -66,7 +66,7 @@ class CollisionService : public CollisionServiceOfBytes {
   struct TextbookQuery;
   void SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCall* call);
 
-  Registry& registry_;
+  Shards& shards_;
   Admission& admission_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;

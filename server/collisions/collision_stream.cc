@@ -30,10 +30,10 @@ constexpr size_t kIndexBytes = 5;
 }  // namespace
 
 BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                    Registry& registry, WorkerPool& readers,
+                                    Shards& shards, WorkerPool& readers,
                                     WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionStream>(
-      new CollisionStream(context, admission, registry, readers, long_readers, pool)));
+      new CollisionStream(context, admission, shards, readers, long_readers, pool)));
 }
 
 void CollisionStream::OnMessage() {
@@ -87,7 +87,7 @@ void CollisionStream::Handle() {
   request().Clear();
   std::sort(asked_.begin(), asked_.end());
   for (const uint32_t pair : asked_) is_asked_[pair] = false;
-  table_.EncodeHeader(registry_.store(), reply().mutable_header());
+  table_.EncodeHeader(shards_, reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(asked_.size());
   AnswerSlice();
@@ -114,19 +114,19 @@ absl::Status CollisionStream::HandleMessage() {
 absl::Status CollisionStream::HandleOpen() {
   const v1::CollisionStreamOpen& open = request().open();
   absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), registry_.limits(),
+      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), shards_.limits(),
                        call().lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(open.freshness(), registry_.store(), call().message_arrival());
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(open.freshness(), shards_.store_ids(), call().message_arrival());
   if (!freshness.ok()) return Prefixed("open: ", freshness.status());
   freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(open.placements(), open.packed_placements(), call().caller(),
-                           registry_.limits().max_placements, "the stream");
+                           shards_.limits().max_placements, "the stream");
   if (!table.ok()) return Prefixed("open: ", table.status());
   const absl::Status valid = ValidatePairs(open.pairs(), table->size(),
-                                           registry_.limits().max_pairs_per_batch, "the stream");
+                                           shards_.limits().max_pairs_per_batch, "the stream");
   if (!valid.ok()) return Prefixed("open: ", valid);
   options_ = *std::move(options);
   wanted_ = open.wanted();
@@ -165,7 +165,7 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
   // A pair among the pairs of two placements, and among those that are asked about.
   constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
   charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
-  return registry_.CheckMemory(MemoryUse::kReading);
+  return shards_.CheckMemory(MemoryUse::kReading);
 }
 
 // Checks all of the update before it applies any.
@@ -182,10 +182,10 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   return absl::OkStatus();
 }
 
-absl::Status CollisionStream::Refresh(ReadPlan plan) {
+absl::Status CollisionStream::Refresh(ShardsPlan plan) {
   plan.freshness = freshness_;
   plan.freshness.began = call().message_arrival();
-  if (absl::Status s = table_.Refresh(registry_, options_, plan); !s.ok()) return s;
+  if (absl::Status s = table_.Refresh(shards_, options_, plan); !s.ok()) return s;
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;
   }

@@ -17,7 +17,7 @@
 #include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -31,7 +31,7 @@ class CollisionStream
                            v1::StreamCollisionsRequest> {
  public:
   static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry, WorkerPool& readers, WorkerPool& long_readers,
+                            Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
                             TaskPool& pool);
 
  private:
@@ -44,15 +44,15 @@ class CollisionStream
     v1::Relation relation = v1::RELATION_UNSPECIFIED;
   };
 
-  CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+  CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
                   WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
       : ReadingStream(context, admission, Rpc::kStreamCollisions),
-        registry_(registry),
+        shards_(shards),
         readers_(readers),
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
-        charge_(registry.memory(), MemoryUse::kReading) {}
+        charge_(shards.memory(), MemoryUse::kReading) {}
 
   void Open() override { Read(); }
   void OnMessage() override;
@@ -65,14 +65,14 @@ class CollisionStream
   absl::Status HandleOpen();
   absl::Status ChargeFor(size_t pairs);
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
-  absl::Status Refresh(ReadPlan plan);
+  absl::Status Refresh(ShardsPlan plan);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
   void AnswerSlice();
   void SendPart(bool last);
 
-  Registry& registry_;
+  Shards& shards_;
   WorkerPool& readers_;
   WorkerPool& long_readers_;
   TaskPool& pool_;
@@ -88,7 +88,7 @@ class CollisionStream
   // From `open`.
   bool open_ = false;
   bool only_changes_ = false;
-  Freshness freshness_;
+  ShardsFreshness freshness_;
   v1::Wanted wanted_;
   QueryOptions options_;
   PlacementTable table_;

@@ -18,7 +18,7 @@
 #include "server/call/queued_stream.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -92,15 +92,15 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   };
 
   PiecedReplies(const grpc::ByteBuffer& request, grpc::CallbackServerContext& context,
-                Admission& admission, Rpc rpc, Registry& registry, const Threads& threads,
+                Admission& admission, Rpc rpc, Shards& shards, const Threads& threads,
                 const Shape& shape)
       : Base(request, context, admission, rpc),
-        registry_(registry),
+        shards_(shards),
         readers_(threads.readers),
         lane_(threads.pool),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
-        charge_(registry.memory(), MemoryUse::kReading),
+        charge_(shards.memory(), MemoryUse::kReading),
         piece_units_(shape.first_units) {}
 
   // Whether preparing takes about a slice when nothing has to be waited for.
@@ -114,7 +114,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // steps.
   virtual size_t HeldBytes() const = 0;
 
-  Registry& registry() { return registry_; }
+  Shards& shards() { return shards_; }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
   // without the mutex, on any thread, by one thread at a time for each piece.
@@ -222,7 +222,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     fixed_bytes_ = HeldBytes();
     charge_.Set(fixed_bytes_);
     if (fixed_bytes_ <= kSmallBytes) return absl::OkStatus();
-    return registry_.CheckMemory(MemoryUse::kReading);
+    return shards_.CheckMemory(MemoryUse::kReading);
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
@@ -281,7 +281,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
     piece_units_ = static_cast<uint64_t>(std::clamp(wished, 1.0, static_cast<double>(most_units_)));
   }
 
-  Registry& registry_;
+  Shards& shards_;
   WorkerPool& readers_;
   TaskPool::Lane lane_;
   const size_t most_pieces_;

@@ -52,16 +52,16 @@ void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
 }  // namespace
 
 WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry, WorkerPool& readers, TaskPool& pool,
+                                 Shards& shards, WorkerPool& readers, TaskPool& pool,
                                  const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<SceneStream>(
-      new SceneStream(context, admission, registry, readers, pool, request)));
+      new SceneStream(context, admission, shards, readers, pool, request)));
 }
 
 SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Registry& registry, WorkerPool& readers, TaskPool& pool,
+                         Shards& shards, WorkerPool& readers, TaskPool& pool,
                          const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, registry, {readers, pool},
+    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, shards, {readers, pool},
                     {kFirstPlacements, kMostPlacements}) {}
 
 bool SceneStream::IsShort() const {
@@ -72,15 +72,15 @@ bool SceneStream::IsShort() const {
 absl::Status SceneStream::Validate() {
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, request().wanted(), request().tolerance(),
-                       registry().limits(), call().lifetime());
+                       shards().limits(), call().lifetime());
   if (!options.ok()) return options.status();
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request().freshness(), registry().store(), call().arrival());
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(request().freshness(), shards().store_ids(), call().arrival());
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
       PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           registry().limits().max_placements, "the scene");
+                           shards().limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
@@ -94,10 +94,10 @@ absl::Status SceneStream::Validate() {
 
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
   // The box of each placement, and at least a pair of it.
-  const ReadPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
+  const ShardsPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
                          freshness_};
-  if (!may_wait) return table_.TryResolve(registry(), options_.query, plan);
-  if (absl::Status s = table_.Resolve(registry(), options_.query, plan); !s.ok()) return s;
+  if (!may_wait) return table_.TryResolve(shards(), options_.query, plan);
+  if (absl::Status s = table_.Resolve(shards(), options_.query, plan); !s.ok()) return s;
   return true;
 }
 
@@ -117,7 +117,7 @@ size_t SceneStream::HeldBytes() const {
 
 bool SceneStream::QueueHead() {
   v1::FindCollisionsResponse head;
-  if (next_row_ == 0) table_.EncodeHeader(registry().store(), head.mutable_header());
+  if (next_row_ == 0) table_.EncodeHeader(shards(), head.mutable_header());
   next_row_ = table_.EncodeHulls(next_row_, &head);
   const size_t bytes = head.ByteSizeLong();
   Queue(std::move(head), bytes);

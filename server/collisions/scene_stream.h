@@ -16,7 +16,7 @@
 #include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -39,11 +39,11 @@ class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, WorkerPool& readers, TaskPool& pool,
+                             Shards& shards, WorkerPool& readers, TaskPool& pool,
                              const grpc::ByteBuffer& request);
 
  private:
-  SceneStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+  SceneStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
               WorkerPool& readers, TaskPool& pool, const grpc::ByteBuffer& request);
 
   bool IsShort() const override;
@@ -65,7 +65,7 @@ class SceneStream
 
   // Written before the first piece.
   SceneOptions options_;
-  Freshness freshness_;
+  ShardsFreshness freshness_;
   std::vector<GroupPair> ignored_groups_;
   PlacementTable table_;
   std::optional<SceneSearch> search_;

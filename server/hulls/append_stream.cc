@@ -35,8 +35,8 @@ void AddTo(v1::PointCounts* sums, const PointCounts& counts) {
 }  // namespace
 
 BidiReactor* AppendStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Registry& registry) {
-  return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, registry)));
+                                 Shards& shards) {
+  return Launch(std::shared_ptr<AppendStream>(new AppendStream(context, admission, shards)));
 }
 
 void AppendStream::Open() {
@@ -49,7 +49,7 @@ void AppendStream::OnDone() {
   Locked([this] {
     if (!session_.has_value()) return;
     LogApplied();
-    registry_.CloseAppend(*session_);
+    registry().CloseAppend(*session_);
   });
 }
 
@@ -96,7 +96,8 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
     auto& self = static_cast<AppendStream&>(*stream);
     self.Locked([&] { self.Fail(reason); });
   };
-  registry_.OpenAppend(
+  hull_id_ = open.hull_id();
+  registry().OpenAppend(
       open.hull_id(), writer_id_, open.create_if_absent(), on_gone,
       [this, self = shared_from_this()](const absl::StatusOr<OpenResult>& opened) {
         Locked([&] {
@@ -110,14 +111,13 @@ void AppendStream::HandleOpen(const v1::AppendOpen& open) {
 void AppendStream::HandleOpened(const absl::StatusOr<OpenResult>& opened) {
   if (!opened.ok()) return Fail(opened.status());
   session_ = opened->session;
-  hull_id_ = opened->hull.hull_id;
   if (session_->created_hull) {
     call().LogChange("hull created", {"hull", opened->hull.hull_id}, opened->hull.revision);
   }
   if (end().has_value()) return;
   v1::AppendPointsResponse opened_reply;
   v1::AppendOpened* reply = opened_reply.mutable_opened();
-  EncodeHeader(registry_.store(), opened->store_revision, reply->mutable_header());
+  EncodeHeader(registry().store(), opened->store_revision, reply->mutable_header());
   EncodeRecord(opened->hull, reply->mutable_hull());
   reply->set_writer_id(writer_id_);
   reply->set_last_sequence(opened->last_sequence);
@@ -128,7 +128,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   if (!session_.has_value()) {
     return Fail(absl::InvalidArgumentError("the first message must be open, not a chunk"));
   }
-  absl::StatusOr<Chunk> chunk = DecodeChunk(message, registry_.limits().max_points_per_chunk);
+  absl::StatusOr<Chunk> chunk = DecodeChunk(message, shards_.limits().max_points_per_chunk);
   if (!chunk.ok()) return Fail(chunk.status());
   request().Clear();
   ++unbuilt_;
@@ -137,7 +137,7 @@ void AppendStream::HandleChunk(const v1::AppendChunk& message) {
   const auto self = shared_from_this();
   const uint64_t sequence = chunk->sequence;
   const auto arrival = std::chrono::steady_clock::now();
-  registry_.Append(
+  registry().Append(
       *session_, *std::move(chunk), [this, self] { return call().ShouldStop(); },
       [this, self] { Locked([this] { --unbuilt_; }); },
       [this, self, sequence, arrival](const absl::StatusOr<ChunkResult>& result) {
@@ -163,13 +163,13 @@ void AppendStream::HandleResult(uint64_t sequence, const absl::StatusOr<ChunkRes
   if (LastWaiting() == nullptr) Queue({});
   HULLD_CHECK(!LastWaiting()->has_opened());
   v1::AppendAck* ack = LastWaiting()->mutable_ack();
-  EncodeHeader(registry_.store(), result->store_revision, ack->mutable_header());
+  EncodeHeader(registry().store(), result->store_revision, ack->mutable_header());
   ack->set_sequence(std::max(ack->sequence(), sequence));
   if (ack->outcome() != v1::APPEND_OUTCOME_APPLIED) {
     ack->set_outcome(result->already_applied ? v1::APPEND_OUTCOME_ALREADY_APPLIED
                                              : v1::APPEND_OUTCOME_APPLIED);
   }
-  ack->set_durability(EncodeDurability(registry_.store().durability()));
+  ack->set_durability(EncodeDurability(registry().store().durability()));
   ack->set_hull_revision(result->hull_revision);
   ack->set_vertex_count(result->vertex_count);
   AddTo(ack->mutable_counts(), result->counts);

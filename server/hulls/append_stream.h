@@ -11,11 +11,11 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/queued_stream.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
-// One AppendPoints call. It reads a chunk, queues it at the registry, and reads ahead one chunk at
+// One AppendPoints call. It reads a chunk, queues it at the shards, and reads ahead one chunk at
 // most of the one that is being built, so that a fast client fills gRPC's window and not our
 // memory; what was built waits for its commit without its points. An ack that cannot be sent yet
 // because the one before is still on its way is merged with the next. Reading does not wait for
@@ -24,11 +24,11 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
                                           v1::AppendPointsRequest> {
  public:
   static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry);
+                            Shards& shards);
 
  private:
-  AppendStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry)
-      : ReadingStream(context, admission, Rpc::kAppendPoints), registry_(registry) {}
+  AppendStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards)
+      : ReadingStream(context, admission, Rpc::kAppendPoints), shards_(shards) {}
 
   void Open() override;
   void OnDone() override;
@@ -42,11 +42,13 @@ class AppendStream : public ReadingStream<QueuedStream<BidiReactor, v1::AppendPo
   void HandleChunk(const v1::AppendChunk& message);
   void HandleOpened(const absl::StatusOr<OpenResult>& opened);
   void HandleResult(uint64_t sequence, const absl::StatusOr<ChunkResult>& result);
+  // Once the hull is named.
+  Registry& registry() { return shards_.of(hull_id_); }
   void LogApplied();
   void Fail(const absl::Status& status);
   void FailAt(uint64_t sequence, const absl::Status& status);
 
-  Registry& registry_;
+  Shards& shards_;
   std::optional<AppendSession> session_;
   std::string hull_id_;
   std::string writer_id_;

@@ -11,7 +11,7 @@
 #include "server/call/call_stream.h"
 #include "server/call/unary_call.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -26,7 +26,7 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
                             v1::HullService::WithRawCallbackMethod_WatchHulls<
                                 v1::HullService::Service>>>>>>>>;
 
-// hulld.v1.HullService: the contract in hull.proto over the registry. Calls that only look into
+// hulld.v1.HullService: the contract in hull.proto over the shards. Calls that only look into
 // records are answered where they arrive; those that need a snapshot, on `readers`,
 // meshes and audits, which may take long, on `long_readers`, and replacements are built on
 // `writers`, as the registry builds chunks.
@@ -34,9 +34,9 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
 // `readers`.
 class HullService : public HullServiceOfBytes {
  public:
-  HullService(Registry& registry, Admission& admission, WorkerPool& writers, WorkerPool& readers,
+  HullService(Shards& shards, Admission& admission, WorkerPool& writers, WorkerPool& readers,
               WorkerPool& long_readers)
-      : registry_(registry),
+      : shards_(shards),
         admission_(admission),
         writers_(writers),
         readers_(readers),
@@ -76,7 +76,7 @@ class HullService : public HullServiceOfBytes {
                     std::chrono::nanoseconds staleness, v1::ListHullsResponse* response);
   void Delete(DeleteCall* call);
 
-  Registry& registry_;
+  Shards& shards_;
   Admission& admission_;
   WorkerPool& writers_;
   WorkerPool& readers_;

@@ -21,10 +21,10 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 }  // namespace
 
 WriteReactor* MeshStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                Registry& registry, WorkerPool& readers,
+                                Shards& shards, WorkerPool& readers,
                                 const grpc::ByteBuffer& request) {
   return Launch(
-      std::shared_ptr<MeshStream>(new MeshStream(context, admission, registry, readers, request)));
+      std::shared_ptr<MeshStream>(new MeshStream(context, admission, shards, readers, request)));
 }
 
 void MeshStream::Open() {
@@ -40,12 +40,15 @@ absl::Status MeshStream::MakeHeader() {
   absl::Status valid = CheckHullId(call().caller(), request().hull_id(), "hull_id");
   if (!valid.ok()) return valid;
   const auto should_stop = [this] { return call().ShouldStop(); };
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(request().freshness(), registry_.store(), call().arrival());
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(request().freshness(), shards_.store_ids(), call().arrival());
   if (!freshness.ok()) return freshness.status();
-  const auto resolved = registry_.Resolve(request().hull_id(), should_stop, *freshness);
+  const size_t shard = shards_.shard_of(request().hull_id());
+  Registry& registry = shards_.at(shard);
+  const auto resolved =
+      registry.Resolve(request().hull_id(), should_stop, freshness->Of(shard));
   if (!resolved.ok()) return resolved.status();
-  const absl::StatusOr<const Hull*> hull = registry_.Canonical(resolved->second, should_stop);
+  const absl::StatusOr<const Hull*> hull = registry.Canonical(resolved->second, should_stop);
   if (!hull.ok()) return hull.status();
   mesh_ = std::shared_ptr<const Hull>(resolved->second.served, *hull);
   v1::MeshHeader* header = reply().mutable_header();
@@ -53,7 +56,7 @@ absl::Status MeshStream::MakeHeader() {
     const absl::Status simplified = Simplify(request().simplification(), header);
     if (!simplified.ok()) return Prefixed("simplification: ", simplified);
   }
-  EncodeHeader(registry_.store(), resolved->first, header->mutable_header());
+  EncodeHeader(registry.store(), resolved->first, header->mutable_header());
   EncodeRecord(resolved->second.record, header->mutable_hull());
   header->set_facet_count(mesh_->facet_count());
   header->set_vertex_count(mesh_->vertices().size());

@@ -11,7 +11,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -20,14 +20,14 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
                                         v1::GetHullMeshRequest> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Registry& registry, WorkerPool& readers,
+                             Shards& shards, WorkerPool& readers,
                              const grpc::ByteBuffer& request);
 
  private:
-  MeshStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+  MeshStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
              WorkerPool& readers, const grpc::ByteBuffer& request)
       : RequestStream(request, context, admission, Rpc::kGetHullMesh),
-        registry_(registry),
+        shards_(shards),
         readers_(readers) {}
 
   void Open() override;
@@ -40,7 +40,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
   void FillVertices(v1::MeshVertices* message);
   void FillFacets(v1::MeshFacets* message);
 
-  Registry& registry_;
+  Shards& shards_;
   WorkerPool& readers_;
   // What is sent: the hull itself, or what stands for it.
   std::shared_ptr<const Hull> mesh_;

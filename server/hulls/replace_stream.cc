@@ -13,10 +13,10 @@
 namespace hulld::server {
 
 ReadReactor* ReplaceStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Registry& registry, WorkerPool& writers,
+                                  Shards& shards, WorkerPool& writers,
                                   grpc::ByteBuffer* response) {
   return Launch(std::shared_ptr<ReplaceStream>(
-      new ReplaceStream(context, admission, registry, writers, response)));
+      new ReplaceStream(context, admission, shards, writers, response)));
 }
 
 void ReplaceStream::OnNoMessage(const absl::Status& why) {
@@ -76,7 +76,7 @@ absl::Status ReplaceStream::HandleOpen(const v1::ReplaceOpen& open) {
 
 absl::Status ReplaceStream::Build() {
   const std::string name = absl::StrCat("message ", messages_, ": ");
-  const Limits& limits = registry_.limits();
+  const Limits& limits = shards_.limits();
   const absl::StatusOr<std::vector<Vector>> points =
       DecodePoints(request().points(), limits.max_points_per_chunk);
   if (!points.ok()) return Prefixed(name, points.status());
@@ -86,7 +86,7 @@ absl::Status ReplaceStream::Build() {
     return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
-  if (absl::Status s = registry_.CheckMemory(MemoryUse::kWriting); !s.ok())
+  if (absl::Status s = shards_.CheckMemory(MemoryUse::kWriting); !s.ok())
     return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
@@ -103,7 +103,9 @@ absl::Status ReplaceStream::Build() {
 
 void ReplaceStream::Commit() {
   // The registry answers on another thread, when the change is committed.
-  registry_.Replace(std::move(replacement_), [this](const absl::StatusOr<ReplaceResult>& result) {
+  Registry& registry = shards_.of(replacement_.hull_id);
+  const Store& store = registry.store();
+  const auto done = [this, &store](const absl::StatusOr<ReplaceResult>& result) {
     // Counted twice for the moment since the registry took it, which at worst drops a snapshot.
     charge_.Set(0);
     if (!result.ok()) return FinishCall(result.status());
@@ -111,13 +113,14 @@ void ReplaceStream::Commit() {
                      {"hull", result->hull.hull_id}, result->hull.revision);
     call().metrics().CountPoints(result->hull.counts);
     v1::ReplaceHullResponse response;
-    EncodeHeader(registry_.store(), result->store_revision, response.mutable_header());
+    EncodeHeader(store, result->store_revision, response.mutable_header());
     EncodeRecord(result->hull, response.mutable_hull());
     response.set_created(result->created);
-    response.set_durability(EncodeDurability(registry_.store().durability()));
+    response.set_durability(EncodeDurability(store.durability()));
     *response_ = SerializeReply(response);
     FinishCall(absl::OkStatus());
-  });
+  };
+  registry.Replace(std::move(replacement_), done);
 }
 
 }  // namespace hulld::server

@@ -11,7 +11,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/call_stream.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -22,16 +22,16 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
  public:
   // response: as gRPC holds it until the call ends.
   static ReadReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Registry& registry, WorkerPool& writers, grpc::ByteBuffer* response);
+                            Shards& shards, WorkerPool& writers, grpc::ByteBuffer* response);
 
  private:
-  ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Registry& registry,
+  ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
                 WorkerPool& writers, grpc::ByteBuffer* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
-        registry_(registry),
+        shards_(shards),
         writers_(writers),
         response_(response),
-        charge_(registry.memory(), MemoryUse::kWriting) {}
+        charge_(shards.memory(), MemoryUse::kWriting) {}
 
   void Open() override { Read(); }
   void OnMessage() override;
@@ -42,7 +42,7 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   absl::Status Build();
   void Commit();
 
-  Registry& registry_;
+  Shards& shards_;
   WorkerPool& writers_;
   grpc::ByteBuffer* const response_;
   // Covers the builder until the registry has it.

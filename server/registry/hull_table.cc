@@ -66,6 +66,7 @@ void HullTable::AddResting(const StoredHull& stored) {
   const auto [place, is_new] = entries_.try_emplace(stored.record.hull_id);
   HULLD_CHECK(is_new);
   place->second.resting_ = RestingHull(stored);
+  ++held_;
 }
 
 HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullState& state) {
@@ -78,12 +79,14 @@ void HullTable::Insert(const HullPointer& hull) {
   const auto [place, is_new] = entries_.try_emplace(hull->committed.record.hull_id);
   HULLD_CHECK(is_new);
   place->second.awake_ = hull;
+  ++held_;
 }
 
 void HullTable::Erase(const HullPointer& hull) {
   const auto found = entries_.find(hull->committed.record.hull_id);
   HULLD_CHECK(found != entries_.end() && found->second.awake_ == hull);
   entries_.erase(found);
+  --held_;
 }
 
 // Whether nothing would be lost with it but what its record says.

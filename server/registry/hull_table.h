@@ -1,6 +1,7 @@
 #ifndef HULLD_SERVER_REGISTRY_HULL_TABLE_H_
 #define HULLD_SERVER_REGISTRY_HULL_TABLE_H_
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -73,6 +74,8 @@ class HullTable {
 
   bool empty() const { return entries_.empty(); }
   size_t size() const { return entries_.size(); }
+  // The same for who does not have the mutex.
+  size_t held() const { return held_.load(std::memory_order_relaxed); }
   bool contains(const std::string& id) const { return entries_.contains(id); }
   bool IsVisible(const std::string& id) const;
   // For walks in the byte order of the IDs.
@@ -98,6 +101,7 @@ class HullTable {
   const bool readable_;
   MemoryBudget& budget_;
   Entries entries_;
+  std::atomic<size_t> held_ = 0;
   // After the last hull that RestSome looked at.
   std::string hand_;
 };

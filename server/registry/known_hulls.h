@@ -58,6 +58,9 @@ class KnownHulls {
 
   // Hulls by index: each ID once.
   size_t size() const { return hulls_.size(); }
+  // How many were looked up so far; where it is the same as before, nothing of them has changed
+  // meanwhile, what there is none of included.
+  uint64_t lookups() const { return lookups_; }
 
  private:
   friend class Registry;
@@ -93,6 +96,7 @@ class KnownHulls {
   std::vector<absl::StatusOr<HullView>> Views(std::span<const std::string> ids) const;
 
   bool has_begun_ = false;
+  uint64_t lookups_ = 0;
   std::vector<Known> hulls_;
   // The hull of each ID asked for.
   std::vector<uint32_t> hull_of_;

@@ -111,9 +111,11 @@ void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Statu
 }
 
 absl::Status Registry::CheckHullCount() const {
-  if (hulls_.size() + bodies_.size() < limits_.max_hulls) return absl::OkStatus();
+  const uint64_t elsewhere = held_elsewhere_ ? held_elsewhere_() : 0;
+  if (hulls_.size() + bodies_.size() + elsewhere < limits_.max_hulls) return absl::OkStatus();
   std::string held = absl::StrCat("the store holds ", hulls_.size(), " hulls");
   if (!bodies_.empty()) absl::StrAppend(&held, " and ", bodies_.size(), " bodies");
+  if (elsewhere > 0) absl::StrAppend(&held, ", and other shards ", elsewhere);
   return LimitExceeded(held, limits_.max_hulls, "max-hulls");
 }
 

@@ -149,6 +149,18 @@ class Registry {
                                                       const std::function<bool()>& should_stop);
   // The same, but nullopt, at once, where it would have to wait.
   std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
+  // Has what other servers had committed by now taken over, and calls `done` then, once, on this
+  // or another thread, without any lock: for who asks several registries at once. UNAVAILABLE: as
+  // AwaitOthers. Cost: as that, but nobody waits.
+  void StartFollow(std::function<void(const absl::Status&)> done);
+
+  // Hulls and bodies of other registries, which count against --max-hulls with those that are here.
+  // Called under the mutex, and takes none. Before any other call.
+  void CountAlso(std::function<uint64_t()> held_elsewhere) {
+    held_elsewhere_ = std::move(held_elsewhere);
+  }
+  // How many hulls and bodies are here. Takes no lock.
+  uint64_t held() const { return hulls_.held() + body_count_.load(std::memory_order_relaxed); }
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -368,6 +380,8 @@ class Registry {
   std::map<std::string, RegisteredBody> bodies_;
   // What goes on once all that other servers did is taken over.
   std::vector<std::function<void(Locked&)>> after_others_;
+  // May be empty.
+  std::function<uint64_t()> held_elsewhere_;
   // As many as bodies_ holds.
   std::atomic<size_t> body_count_ = 0;
   // Those of hulls_ whose creation is not committed yet.

@@ -48,6 +48,15 @@ absl::Status Registry::AwaitOthers(Locked& locked, const std::function<bool()>& 
   return *wait->status;
 }
 
+void Registry::StartFollow(std::function<void(const absl::Status&)> done) {
+  Locked locked(mutex_);
+  const auto tell = [done = std::move(done)](Locked& later, const absl::Status& status) {
+    later.Afterwards([done, status] { done(status); });
+  };
+  if (!store_.is_shared()) return tell(locked, absl::OkStatus());
+  committer_.Follow(locked, tell);
+}
+
 // Goes on with something that the answer to a call depends on, at once or once what other servers
 // had committed by now is taken over.
 void Registry::WhenFresh(Refusal refuse, std::function<void(Locked&)> next) {
@@ -113,6 +122,8 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
   // Not what was read when the store was loaded.
   const bool is_news = other.revision > revision_;
   if (is_news) Publish(other.revision);
+  // Also of what came and went, for who has to know that there was nothing all the while.
+  if (is_news) recent_changes_.Note(id);
   const std::shared_ptr<const Body> former_body = FindBody(id);
   TakeOverBody(locked, id, other);
   const std::shared_ptr<const Body> body = FindBody(id);

@@ -111,6 +111,7 @@ absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> id
       if (!status.ok()) return status;
       due.is_due = false;
       known.due_.pop_back();
+      ++known.lookups_;
     } else {
       return absl::OkStatus();
     }

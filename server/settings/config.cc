@@ -151,6 +151,8 @@ class Parser {
         ->check(CLI::IsMember({"sync", "relaxed"}));
     Add("postgres-conninfo-file", config_.postgres_conninfo_file,
         "File of the connection string of --store postgres, which only hulld may read");
+    Add("postgres-shards", config_.postgres_shards,
+        "Instead: a file that spreads hulls over several databases, with --postgres-servers many");
     Add("postgres-servers", config_.postgres_servers,
         "With --store postgres: one server at a time is active over a database, and others wait, "
         "or many are at once, all with this setting")
@@ -281,9 +283,23 @@ std::string DefaultDataDir(const Environment& environment) {
 // What settings of the store say together.
 absl::Status CheckStore(const Config& config) {
   const bool is_postgres = config.store == "postgres";
-  if (is_postgres && config.postgres_conninfo_file.empty()) {
+  const bool is_sharded = !config.postgres_shards.empty();
+  if (is_postgres && config.postgres_conninfo_file.empty() && !is_sharded) {
     return absl::InvalidArgumentError(
-        "--store postgres needs --postgres-conninfo-file, which tells where the database is");
+        "--store postgres needs --postgres-conninfo-file, which tells where the database is, or "
+        "--postgres-shards, which names several");
+  }
+  if (is_sharded && !is_postgres) {
+    return absl::InvalidArgumentError("--postgres-shards is for --store postgres");
+  }
+  if (is_sharded && !config.postgres_conninfo_file.empty()) {
+    return absl::InvalidArgumentError(
+        "--postgres-shards takes the place of --postgres-conninfo-file; give one of them");
+  }
+  if (is_sharded && config.postgres_servers != "many") {
+    return absl::InvalidArgumentError(
+        "--postgres-shards needs --postgres-servers many: servers that wait for each other's end "
+        "would each take a part of the databases");
   }
   if (is_postgres && config.durability != "sync") {
     return absl::InvalidArgumentError(

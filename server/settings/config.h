@@ -84,6 +84,8 @@ struct Config {
   std::string data_dir;
   // The file that holds the connection string of "postgres".
   std::string postgres_conninfo_file;
+  // Instead: the file that spreads IDs over several databases.
+  std::string postgres_shards;
   // Whether this takes the store of "postgres" from the server that is active, instead of waiting;
   // on the command line alone, as servers that always did would take it from each other.
   bool take_over = false;

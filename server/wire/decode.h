@@ -5,6 +5,7 @@
 #include <google/protobuf/repeated_field.h>
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/registry/registry.h"
+#include "server/shards/shard_types.h"
 
 namespace hulld::server {
 
@@ -38,10 +40,11 @@ inline constexpr int kPoseNumbers = 7;
 absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i);
 
 // How fresh the answer to a read must be that began at this time; an empty message, as an absent
-// one is: linearizable. INVALID_ARGUMENT: a negative or malformed duration, or a revision without
-// the store. FAILED_PRECONDITION: the revision is of another store.
-absl::StatusOr<Freshness> DecodeFreshness(const v1::Freshness& message, const Store& store,
-                                          SteadyClock::time_point began);
+// one is: linearizable. store_ids: of all shards. INVALID_ARGUMENT: a negative or malformed
+// duration, or a revision without the store. FAILED_PRECONDITION: a revision is of another store.
+absl::StatusOr<ShardsFreshness> DecodeFreshness(const v1::Freshness& message,
+                                                std::span<const std::string> store_ids,
+                                                SteadyClock::time_point began);
 
 // INVALID_ARGUMENT: a number that means no method.
 absl::StatusOr<Method> DecodeMethod(v1::Method method);

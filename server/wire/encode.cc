@@ -75,6 +75,21 @@ void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* mes
   if (as_of.staleness.count() > 0) EncodeDuration(as_of.staleness, message->mutable_staleness());
 }
 
+void EncodeHeader(std::span<const std::string> store_ids, const ShardsAsOf& as_of,
+                  v1::ResponseHeader* message) {
+  if (as_of.revisions.size() == 1) {
+    message->set_store_id(store_ids[as_of.revisions.front().shard]);
+    message->set_revision(as_of.revisions.front().revision);
+  } else {
+    for (const ShardRevision& part : as_of.revisions) {
+      v1::ShardRevision* const shard = message->add_shards();
+      shard->set_store_id(store_ids[part.shard]);
+      shard->set_revision(part.revision);
+    }
+  }
+  if (as_of.staleness.count() > 0) EncodeDuration(as_of.staleness, message->mutable_staleness());
+}
+
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message) {
   message->set_hull_id(record.hull_id);
   message->set_create_revision(record.create_revision);

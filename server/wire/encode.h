@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 
 #include <chrono>
+#include <span>
 #include <string>
 
 #include "core/hull/hull.h"
@@ -14,6 +15,7 @@
 #include "hulld/v1/geometry.pb.h"
 #include "hulld/v1/hull.pb.h"
 #include "server/registry/registry.h"
+#include "server/shards/shard_types.h"
 
 namespace hulld::server {
 
@@ -22,6 +24,9 @@ void EncodeCounts(const PointCounts& counts, v1::PointCounts* message);
 void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message);
 // The same of a read.
 void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* message);
+// The same of one shard or several. store_ids: of all shards.
+void EncodeHeader(std::span<const std::string> store_ids, const ShardsAsOf& as_of,
+                  v1::ResponseHeader* message);
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message);
 // store_id: the ID of the store that keeps the hull.
 void EncodeVersion(const std::string& store_id, const HullRecord& record, v1::HullVersion* message);

@@ -8,23 +8,23 @@
 #include <utility>
 
 #include "server/process/worker_pool.h"
-#include "server/registry/registry.h"
+#include "server/shards/shards.h"
 #include "server/wire/decode.h"
 
 namespace hulld::server {
 
 // Ends a unary call (UnaryCall) whose request has a freshness with what `answer` gives, once the
-// registry is as fresh: at once where it is, otherwise on `pool`. answer: takes how stale that may
-// be; quick.
+// shards are as fresh, all of them: at once where they are, otherwise on `pool`. answer: takes how
+// stale that may be; quick.
 template <typename UnaryCall, typename Answer>
-void EndFresh(Registry& registry, WorkerPool& pool, UnaryCall* call, Answer answer) {
-  const absl::StatusOr<Freshness> freshness =
-      DecodeFreshness(call->request().freshness(), registry.store(), call->call().arrival());
+void EndFresh(Shards& shards, WorkerPool& pool, UnaryCall* call, Answer answer) {
+  const absl::StatusOr<ShardsFreshness> freshness =
+      DecodeFreshness(call->request().freshness(), shards.store_ids(), call->call().arrival());
   if (!freshness.ok()) return call->End(freshness.status());
-  if (const auto staleness = registry.TryFresh(*freshness)) return call->End(answer(*staleness));
-  call->EndOn(pool, [&registry, call, freshness = *freshness, answer = std::move(answer)] {
+  if (const auto staleness = shards.TryFresh(*freshness)) return call->End(answer(*staleness));
+  call->EndOn(pool, [&shards, call, freshness = *freshness, answer = std::move(answer)] {
     const absl::StatusOr<std::chrono::nanoseconds> staleness =
-        registry.AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
+        shards.AwaitFresh(freshness, [call] { return call->call().ShouldStop(); });
     return staleness.ok() ? answer(*staleness) : staleness.status();
   });
 }

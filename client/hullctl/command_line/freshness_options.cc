@@ -40,8 +40,16 @@ absl::Status TakeRevision(const std::string& text, v1::Freshness* freshness) {
                      " is not STORE:REVISION, the storeId and the revision of an answer's header "
                      "(--output json)"));
   }
-  freshness->set_store_id(text.substr(0, colon));
-  freshness->set_at_least_revision(revision);
+  const std::string store_id = text.substr(0, colon);
+  // The first goes where a server looks that knows one store alone.
+  if (freshness->store_id().empty()) {
+    freshness->set_store_id(store_id);
+    freshness->set_at_least_revision(revision);
+    return absl::OkStatus();
+  }
+  v1::ShardRevision* const least = freshness->add_at_least();
+  least->set_store_id(store_id);
+  least->set_revision(revision);
   return absl::OkStatus();
 }
 
@@ -64,7 +72,7 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
             return TakeRevision(text, FreshnessOf(invocation));
           },
           "Be content with this revision of the store, or a later one, as the header of an earlier "
-          "answer names it")
+          "answer names it; repeated, of several stores")
       .ValueName("STORE:REVISION");
 }
 

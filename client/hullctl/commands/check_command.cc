@@ -8,6 +8,7 @@
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_text.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/store_text.h"
 #include "client/hullctl/printing/table.h"
 #include "client/verify/answer_check.h"
 
@@ -114,8 +115,8 @@ void PrintTable(const Invocation& run, const v1::CheckCollisionRequest& request,
     AddAnalysis(response.analysis(), &table);
   }
   if (run.wide()) {
-    table.Row({"store", response.header().store_id()})
-        .Row({"store revision", std::to_string(response.header().revision())});
+    table.Row({"store", StoresText(response.header())})
+        .Row({"store revision", RevisionsText(response.header())});
     if (response.header().has_staleness()) {
       table.Row({"stale by at most", DurationText(response.header().staleness())});
     }

@@ -14,6 +14,7 @@
 #include "client/hullctl/commands/commands.h"
 #include "client/hullctl/printing/answer_row.h"
 #include "client/hullctl/printing/json.h"
+#include "client/hullctl/printing/store_text.h"
 #include "client/hullctl/scene/scene_file.h"
 
 namespace hulld {
@@ -62,7 +63,7 @@ void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
   for (const v1::HullEvent& event : message.events()) {
     run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
   }
-  if (message.synced()) run.out << "# synced at revision " << message.header().revision() << "\n";
+  if (message.synced()) run.out << "# synced at revision " << RevisionsText(message.header()) << "\n";
 }
 
 // A watch that ends at Ctrl-C.
@@ -173,7 +174,7 @@ ExitCode WatchScene(const Invocation& run, const WatchOptions& options) {
     }
     const bool was_synced = std::exchange(is_synced, is_synced || message.synced());
     if (is_synced && !was_synced && !run.json()) {
-      run.out << "# synced at revision " << message.header().revision() << "\n";
+      run.out << "# synced at revision " << RevisionsText(message.header()) << "\n";
     }
     events += static_cast<uint64_t>(message.events_size());
     return (options.events > 0 && events >= options.events) || (options.until_synced && is_synced);

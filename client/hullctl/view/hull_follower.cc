@@ -5,6 +5,8 @@
 #include <chrono>
 #include <utility>
 
+#include "client/calls/revisions.h"
+
 namespace hulld {
 namespace {
 
@@ -102,8 +104,7 @@ void HullFollower::Take(const v1::WatchHullsResponse& response) {
     }
     told_anew_.clear();
   }
-  request_.set_after_revision(response.header().revision());
-  request_.set_store_id(response.header().store_id());
+  ResumeAfter(response.header(), &request_);
 }
 
 }  // namespace hulld

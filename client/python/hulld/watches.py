@@ -65,7 +65,8 @@ class WatchPosition:
     def take(self, changes: HullChanges, first: bool) -> HullChanges:
         """`first`: of its connection. A call that resumed nothing tells everything, but not what
         went meanwhile."""
-        if first and self._told and (self.after is None or self.after.revision == 0):
+        resumed = self.after is not None and (self.after.revision > 0 or bool(self.after.shards))
+        if first and self._told and not resumed:
             changes = dataclasses.replace(changes, anew=True)
         self.connected = True
         self._told = self._told or bool(changes.events)

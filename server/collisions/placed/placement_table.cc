@@ -203,37 +203,37 @@ size_t PlacementTable::BodyBytes() const {
   return bytes;
 }
 
-PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ReadPlan& plan) const {
+PlacedLookup PlacementTable::LookupFor(const QueryOptions& options, const ShardsPlan& plan) const {
   return {options.WantsCanonical(), prefix_, plan};
 }
 
-absl::Status PlacementTable::Resolve(Registry& registry, const QueryOptions& options,
-                                     const ReadPlan& plan) {
+absl::Status PlacementTable::Resolve(Shards& shards, const QueryOptions& options,
+                                     const ShardsPlan& plan) {
   KnownPlaced known;
-  return ResolveFrom(registry, known, options, plan);
+  return ResolveFrom(shards, known, options, plan);
 }
 
-absl::Status PlacementTable::Refresh(Registry& registry, const QueryOptions& options,
-                                     const ReadPlan& plan) {
-  return ResolveFrom(registry, known_, options, plan);
+absl::Status PlacementTable::Refresh(Shards& shards, const QueryOptions& options,
+                                     const ShardsPlan& plan) {
+  return ResolveFrom(shards, known_, options, plan);
 }
 
-absl::Status PlacementTable::ResolveFrom(Registry& registry, KnownPlaced& known,
-                                         const QueryOptions& options, const ReadPlan& plan) {
-  absl::StatusOr<Resolved> resolved =
-      RefreshPlaced(registry, ids_, known, LookupFor(options, plan), options.should_stop);
+absl::Status PlacementTable::ResolveFrom(Shards& shards, KnownPlaced& known,
+                                         const QueryOptions& options, const ShardsPlan& plan) {
+  absl::StatusOr<ShardsResolved> resolved =
+      RefreshPlaced(shards, ids_, known, LookupFor(options, plan), options.should_stop);
   if (!resolved.ok()) return resolved.status();
-  Take(registry, *std::move(resolved), options);
+  Take(shards, *std::move(resolved), options);
   return absl::OkStatus();
 }
 
-absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions& options,
+absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& options,
                                          std::span<const size_t> hulls) {
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
-  absl::StatusOr<Resolved> resolved =
-      ResolvePlaced(registry, ids, LookupFor(options, {.freshness = Freshness::OfWhatIsHere()}),
+  absl::StatusOr<ShardsResolved> resolved =
+      ResolvePlaced(shards, ids, LookupFor(options, {.freshness = ShardsFreshness::OfWhatIsHere()}),
                     options.should_stop);
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);
@@ -251,20 +251,20 @@ absl::Status PlacementTable::ResolveSome(Registry& registry, const QueryOptions&
     for (const uint32_t i : placements_of(k)) bodies_[i] = PlaceBody(i);
   }
   if (!has_bodies()) TakeBodies();
-  as_of_ = resolved->as_of();
+  as_of_ = resolved->as_of;
   return absl::OkStatus();
 }
 
-bool PlacementTable::TryResolve(Registry& registry, const QueryOptions& options,
-                                const ReadPlan& plan) {
-  std::optional<Resolved> resolved = TryResolvePlaced(registry, ids_, LookupFor(options, plan));
+bool PlacementTable::TryResolve(Shards& shards, const QueryOptions& options,
+                                const ShardsPlan& plan) {
+  std::optional<ShardsResolved> resolved = TryResolvePlaced(shards, ids_, LookupFor(options, plan));
   if (!resolved.has_value()) return false;
-  Take(registry, *std::move(resolved), options);
+  Take(shards, *std::move(resolved), options);
   return true;
 }
 
 // Where the options need canonical snapshots, all that were found have one, and that is asked.
-void PlacementTable::Take(const Registry& registry, Resolved resolved,
+void PlacementTable::Take(const Shards& shards, ShardsResolved resolved,
                           const QueryOptions& options) {
   std::vector<const QueryHull*> query_hulls;
   query_hulls.reserve(ids_.size());
@@ -281,8 +281,8 @@ void PlacementTable::Take(const Registry& registry, Resolved resolved,
   const std::vector<absl::StatusOr<HullView>> before = std::move(hulls_);
   hulls_ = std::move(resolved.hulls);
   query_hulls_ = std::move(query_hulls);
-  store_id_ = registry.store().id();
-  as_of_ = resolved.as_of();
+  shards_ = &shards;
+  as_of_ = resolved.as_of;
   placed_.clear();
   if (!places_on_demand_) {
     placed_.reserve(size());
@@ -380,8 +380,8 @@ void PlacementTable::Move(size_t i, const Pose& X_WH) {
   if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
-void PlacementTable::EncodeHeader(const Store& store, v1::ResponseHeader* header) const {
-  server::EncodeHeader(store, as_of_, header);
+void PlacementTable::EncodeHeader(const Shards& shards, v1::ResponseHeader* header) const {
+  server::EncodeHeader(shards.store_ids(), as_of_, header);
 }
 
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
@@ -395,7 +395,8 @@ size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
       continue;
     }
     v1::HullVersion* const version = to.piece_hulls->Add();
-    EncodeVersion(store_id_, *hulls_of_pieces_[row - placements], version);
+    const HullRecord& hull = *hulls_of_pieces_[row - placements];
+    EncodeVersion(shards_->store_id_of(hull.hull_id), hull, version);
     bytes += version->ByteSizeLong();
   }
   return row;
@@ -420,7 +421,7 @@ size_t PlacementTable::EncodePlacement(size_t row, const RowFields& to) const {
 }
 
 void PlacementTable::EncodeHull(size_t k, v1::HullVersion* version) const {
-  EncodeVersion(store_id_, hulls_[k]->record, version);
+  EncodeVersion(shards_->store_id_of(ids_[k]), hulls_[k]->record, version);
 }
 
 void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) const {

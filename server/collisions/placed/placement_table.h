@@ -23,8 +23,8 @@
 #include "core/query/terms/query_options.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/access/caller.h"
-#include "server/registry/bodies/body_resolution.h"
-#include "server/registry/registry.h"
+#include "server/shards/body_resolution.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -48,14 +48,14 @@ class PlacementTable {
 
   // Resolves every hull and body once, all at one revision of the store, for queries that answer
   // with `options`. Not for gRPC's threads. CANCELLED: options.should_stop said so.
-  absl::Status Resolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
+  absl::Status Resolve(Shards& shards, const QueryOptions& options, const ShardsPlan& plan);
 
   // The same for a caller that does so again and again: only hulls that changed since are looked
   // up.
-  absl::Status Refresh(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
+  absl::Status Refresh(Shards& shards, const QueryOptions& options, const ShardsPlan& plan);
 
   // The same as Resolve, but false, at once, where it would have to wait or to make something.
-  bool TryResolve(Registry& registry, const QueryOptions& options, const ReadPlan& plan);
+  bool TryResolve(Shards& shards, const QueryOptions& options, const ShardsPlan& plan);
 
   size_t size() const { return poses_.size(); }
   // How many hulls there are for them.
@@ -99,7 +99,7 @@ class PlacementTable {
 
   // The same as Resolve for a few of hull_ids(), by index, each once, of which the registry told
   // that they changed, so that they are taken as they are there; the others stay as they are.
-  absl::Status ResolveSome(Registry& registry, const QueryOptions& options,
+  absl::Status ResolveSome(Shards& shards, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
   // Requires a valid pose, which is checked where the hull is placed.
@@ -118,10 +118,10 @@ class PlacementTable {
   std::optional<size_t> hull_of(size_t i) const {
     return HasHull(i) ? std::optional<size_t>(hull_of_[i]) : std::nullopt;
   }
-  uint64_t store_revision() const { return as_of_.revision; }
+  const ShardRevisions& revisions() const { return as_of_.revisions; }
 
   // What the last Resolve was of.
-  void EncodeHeader(const Store& store, v1::ResponseHeader* header) const;
+  void EncodeHeader(const Shards& shards, v1::ResponseHeader* header) const;
   // A version per placement, or per hull that packed placements name, and the problems; then, where
   // certificates are wanted, the hulls of pieces: the rows of a table, from row `first` on, as many
   // as fill a message. Returns where the next message goes on, which is table_rows() after the
@@ -154,10 +154,10 @@ class PlacementTable {
   bool HasHull(size_t i) const { return hull_of_[i] != kNoHull; }
   bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
   void SetPose(size_t i, absl::StatusOr<Pose> pose, const char* of, const char* after);
-  absl::Status ResolveFrom(Registry& registry, KnownPlaced& known, const QueryOptions& options,
-                           const ReadPlan& plan);
-  PlacedLookup LookupFor(const QueryOptions& options, const ReadPlan& plan) const;
-  void Take(const Registry& registry, Resolved resolved, const QueryOptions& options);
+  absl::Status ResolveFrom(Shards& shards, KnownPlaced& known, const QueryOptions& options,
+                           const ShardsPlan& plan);
+  PlacedLookup LookupFor(const QueryOptions& options, const ShardsPlan& plan) const;
+  void Take(const Shards& shards, ShardsResolved resolved, const QueryOptions& options);
   void TakeBodies();
   void TakeBody(size_t k);
   void TakeHullsOfPieces();
@@ -191,8 +191,8 @@ class PlacementTable {
   std::vector<uint32_t> by_hull_;
   std::vector<size_t> by_hull_begin_;
   // Of the last Resolve.
-  std::string store_id_;
-  AsOf as_of_;
+  const Shards* shards_ = nullptr;
+  ShardsAsOf as_of_;
   bool places_on_demand_ = false;
   // Empty where they are placed on demand.
   std::vector<PlacedHull> placed_;

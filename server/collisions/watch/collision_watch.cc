@@ -12,7 +12,7 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/contract/status_map.h"
-#include "server/registry/bodies/body_resolution.h"
+#include "server/shards/body_resolution.h"
 #include "server/settings/config.h"
 #include "server/wire/encode.h"
 
@@ -49,20 +49,32 @@ v1::CollisionEventKind KindOf(const WatchedPair& before, v1::Relation relation, 
   return v1::COLLISION_EVENT_KIND_UNSPECIFIED;
 }
 
+// Takes what is later in some shard; whether anything is. Both ascend by shard.
+bool TakeLater(const ShardRevisions& from, ShardRevisions* to) {
+  bool is_later = false;
+  for (const ShardRevision& now : from) {
+    auto place = std::ranges::lower_bound(*to, now.shard, {}, &ShardRevision::shard);
+    if (place == to->end() || place->shard != now.shard) place = to->insert(place, {now.shard, 0});
+    is_later |= now.revision > place->revision;
+    place->revision = std::max(place->revision, now.revision);
+  }
+  return is_later;
+}
+
 }  // namespace
 
 BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                   Registry& registry, WorkerPool& readers,
+                                   Shards& shards, WorkerPool& readers,
                                    WorkerPool& long_readers, TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionWatch>(
-      new CollisionWatch(context, admission, registry, readers, long_readers, pool)));
+      new CollisionWatch(context, admission, shards, readers, long_readers, pool)));
 }
 
 void CollisionWatch::OnDone() {
   const auto self = shared_from_this();
   ReadingStream::OnDone();
   if (watch_ == nullptr) return;
-  registry_.CloseWatch(watch_);
+  watch_->Close();
   watch_.reset();
 }
 
@@ -138,7 +150,7 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
   }
   v1::Wanted wanted;
   if (open.has_clearance()) wanted.set_clearance(open.clearance());
-  const Limits& limits = registry_.limits();
+  const Limits& limits = shards_.limits();
   absl::StatusOr<QueryOptions> options =
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
   if (!options.ok()) return options.status();
@@ -169,9 +181,9 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
   // It is worth the wait, as each hull is asked about again and again.
   const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
   const absl::Status resolved =
-      table_.Resolve(registry_, options_, {kExpectedRounds * per_hull, true});
+      table_.Resolve(shards_, options_, {kExpectedRounds * per_hull, true});
   if (!resolved.ok()) return resolved;
-  revision_ = table_.store_revision();
+  revisions_ = table_.revisions();
   for (const size_t k : all_hulls) {
     if (table_.hull(k).ok()) TellOf(k);
   }
@@ -196,7 +208,7 @@ absl::Status CollisionWatch::WatchHulls() {
   }
   // No hull has this ID; the watch ends when the server drains, like any other.
   if (target.ids.empty()) target.ids.emplace_back();
-  absl::StatusOr<std::shared_ptr<ChangeWatch>> watch = registry_.OpenWatch(
+  absl::StatusOr<std::shared_ptr<ShardsWatch>> watch = shards_.OpenWatch(
       target, {}, [this, self = shared_from_this()] { Locked([this] { are_hulls_due_ = true; }); });
   if (!watch.ok()) return watch.status();
   watch_ = *std::move(watch);
@@ -207,14 +219,14 @@ absl::Status CollisionWatch::WatchHulls() {
 // From now on changes of the hulls of pieces are noticed, of those of the table's that are bodies.
 // A body that changes after this is noticed itself: then it is followed, and resolved, once more.
 void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
-  if (!registry_.has_bodies() && pieces_.MemoryBytes() == 0) return;
+  if (!shards_.has_bodies() && pieces_.MemoryBytes() == 0) return;
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(table_.hull_ids()[k]);
-  const FoundBodies found = registry_.FindBodies(ids);
+  const std::vector<std::shared_ptr<const Body>> found = shards_.FindBodies(ids);
   FollowedPieces::Difference difference;
   for (size_t n = 0; n < hulls.size(); ++n) {
-    const std::shared_ptr<const Body>& body = found.bodies[n];
+    const std::shared_ptr<const Body>& body = found[n];
     const bool is_asked = body != nullptr && CheckPiecePrefix(*body, call().caller().prefix).ok();
     pieces_.Set(hulls[n], is_asked ? body->hull_ids() : std::vector<std::string>(), &difference);
   }
@@ -224,7 +236,7 @@ void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   std::erase_if(difference.added, is_placed);
   std::erase_if(difference.dropped, is_placed);
   if (difference.added.empty() && difference.dropped.empty()) return;
-  registry_.WatchAlso(*watch_, difference.added, difference.dropped);
+  watch_->WatchAlso(difference.added, difference.dropped);
 }
 
 // The client is to hear of a hull, or of a body and the hulls of its pieces.
@@ -260,7 +272,7 @@ absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update
 }
 
 void CollisionWatch::TakeChanges() {
-  const absl::StatusOr<WatchPiece> piece = registry_.TakeChanges(*watch_);
+  const absl::StatusOr<ShardsWatchPiece> piece = watch_->TakeChanges();
   if (!piece.ok()) return EndWork(piece.status());
   if (piece->waits) return EndWork(absl::OkStatus());
   // There may be more.
@@ -273,7 +285,7 @@ void CollisionWatch::TakeChanges() {
 }
 
 // Hulls and bodies of the table, each once.
-std::vector<size_t> CollisionWatch::ConcernedBy(const WatchPiece& piece) const {
+std::vector<size_t> CollisionWatch::ConcernedBy(const ShardsWatchPiece& piece) const {
   if (piece.anew) {
     // Which of them changed is not known.
     std::vector<size_t> all(table_.hull_ids().size());
@@ -289,12 +301,12 @@ std::vector<size_t> CollisionWatch::ConcernedBy(const WatchPiece& piece) const {
   return {hulls.begin(), hulls.end()};
 }
 
-absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
+absl::Status CollisionWatch::HandleChanges(const ShardsWatchPiece& piece) {
   const std::vector<size_t> hulls = ConcernedBy(piece);
-  if (hulls.empty() && piece.revision <= revision_) return absl::OkStatus();
+  const bool has_moved_on = TakeLater(piece.revisions, &revisions_);
+  if (hulls.empty() && !has_moved_on) return absl::OkStatus();
   FollowPieces(hulls);
-  if (absl::Status s = table_.ResolveSome(registry_, options_, hulls); !s.ok()) return s;
-  revision_ = std::max(revision_, piece.revision);
+  if (absl::Status s = table_.ResolveSome(shards_, options_, hulls); !s.ok()) return s;
   std::vector<uint32_t> changed;
   for (const size_t k : hulls) {
     const std::span<const uint32_t> placements = table_.placements_of(k);
@@ -318,7 +330,7 @@ absl::Status CollisionWatch::HandleChanges(const WatchPiece& piece) {
 absl::Status CollisionWatch::AskAbout(const std::vector<uint32_t>& changed) {
   if (absl::Status s = pairs_.AskAbout(changed, table_); !s.ok()) return s;
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes() + pieces_.MemoryBytes());
-  if (absl::Status s = registry_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  if (absl::Status s = shards_.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   call().AddPairs(pairs_.asked().size());
   next_hull_ = next_piece_hull_ = next_problem_ = next_pair_ = 0;
   is_telling_ = true;
@@ -347,7 +359,7 @@ void CollisionWatch::Tell() {
     problems_to_tell_.clear();
     if (answers_message_) call().EndMessage();
   }
-  EncodeHeader(registry_.store(), revision_, reply_.mutable_header());
+  EncodeHeader(shards_.store_ids(), ShardsAsOf{revisions_}, reply_.mutable_header());
   reply_.set_update(messages_);
   reply_.set_synced(is_told);
   Locked([&] {
@@ -370,7 +382,8 @@ bool CollisionWatch::TellHulls() {
       reply_bytes_ += kEntryBytes + version->ByteSizeLong();
     } else if (next_piece_hull_ < piece_hulls_to_tell_.size()) {
       v1::HullVersion* const version = reply_.add_piece_hulls();
-      EncodeVersion(registry_.store().id(), piece_hulls_to_tell_[next_piece_hull_++], version);
+      const HullRecord& hull = piece_hulls_to_tell_[next_piece_hull_++];
+      EncodeVersion(shards_.store_id_of(hull.hull_id), hull, version);
       reply_bytes_ += kEntryBytes + version->ByteSizeLong();
     } else {
       v1::PlacementProblem* const problem = reply_.add_placement_problems();
@@ -415,8 +428,8 @@ void CollisionWatch::AddEvent(v1::CollisionEventKind kind, const WatchedPair& pa
     const auto encode_piece = [this](const HullView& view, uint32_t piece,
                                      v1::DecidingPiece* message) {
       message->set_index(piece);
-      EncodeVersion(registry_.store().id(), view.body->hull_of(piece).record,
-                    message->mutable_hull());
+      const HullRecord& hull = view.body->hull_of(piece).record;
+      EncodeVersion(shards_.store_id_of(hull.hull_id), hull, message->mutable_hull());
     };
     if (pieces && a.body != nullptr) encode_piece(a, pieces->a, event->mutable_piece_a());
     if (pieces && b.body != nullptr) encode_piece(b, pieces->b, event->mutable_piece_b());

@@ -176,6 +176,8 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
                         Locked& later, const absl::Status& status, Change& committed) {
                       const std::shared_ptr<const Body> former = bodies_.at(id).committed;
                       if (status.ok()) Publish(committed.revision);
+                      // Where readers look for a hull with this ID.
+                      if (status.ok()) recent_changes_.Note(id);
                       finish(later, status, committed);
                       RegisteredBody& body = bodies_.at(id);
                       if (status.ok() && body.committed != nullptr) {

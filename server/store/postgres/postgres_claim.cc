@@ -42,6 +42,63 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
                                                     " at most; run the hulld that wrote it"));
 }
 
+// Whether the database holds the slots that this is to serve. A database that holds nothing yet, and
+// all slots so far, takes the ones that it is given.
+absl::Status PostgresStore::CheckSlots(Session& session) {
+  const absl::StatusOr<Rows> column = session.Run(
+      "SELECT 1 FROM pg_attribute WHERE attrelid = 'hulld.store'::regclass AND attname = 'slots'");
+  if (!column.ok()) return column.status();
+  std::string held;
+  if (column->count() > 0) {
+    const absl::StatusOr<Rows> slots = session.Run("SELECT coalesce(slots, '') FROM hulld.store");
+    if (!slots.ok()) return slots.status();
+    if (slots->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
+    held = std::string(slots->at(0, 0));
+  }
+  if (held == options_.slots) return absl::OkStatus();
+  if (held.empty()) return TakeSlots(session);
+  if (options_.slots.empty()) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "this database is one of several shards, and holds slots ", held,
+        ": start hulld with the file that names them all (--postgres-shards)"));
+  }
+  return absl::FailedPreconditionError(absl::StrCat(
+      "this database holds slots ", held, ", and the file of --postgres-shards gives it ",
+      options_.slots,
+      ": start hulld with the file that it was filled with; to move slots, end all servers and copy "
+      "the hulls to other databases (hulld migrate)"));
+}
+
+// Servers that are active over it with all slots, which know nothing of this, are shut out.
+absl::Status PostgresStore::TakeSlots(Session& session) {
+  const absl::StatusOr<Rows> locked = session.Run("BEGIN; SELECT 1 FROM hulld.store FOR UPDATE");
+  absl::StatusOr<Rows> held =
+      !locked.ok() ? locked.status()
+                   : session.Run(
+                         "SELECT revision > 0 OR EXISTS (SELECT 1 FROM hulld.hulls) OR EXISTS "
+                         "(SELECT 1 FROM hulld.bodies) FROM hulld.store");
+  absl::Status status = held.status();
+  if (held.ok() && held->at(0, 0) != "f") {
+    status = absl::FailedPreconditionError(absl::StrCat(
+        "this database holds hulls of all slots, and the file of --postgres-shards gives it ",
+        options_.slots,
+        ": end all servers and copy them to other databases, which that file names (hulld "
+        "migrate)"));
+  }
+  if (status.ok()) {
+    status = session
+                 .Run(absl::StrCat("ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS slots text; "
+                                   "UPDATE hulld.store SET slots = '",
+                                   options_.slots, "', format = ", kFormat,
+                                   ", owner = '', epoch = epoch + 1, written_in = epoch + 1; "
+                                   "INSERT INTO hulld.epochs (epoch, owner, batch, revision) "
+                                   "SELECT epoch, owner, batch, revision FROM hulld.store; COMMIT"))
+                 .status();
+  }
+  if (!status.ok()) session.Run("ROLLBACK").status().IgnoreError();
+  return status;
+}
+
 absl::StatusOr<bool> PostgresStore::TryLock(Session& session) const {
   const absl::StatusOr<Rows> locked = session.Run(absl::StrCat(
       "SELECT pg_try_advisory_lock", options_.shared ? "_shared" : "", "(", kLock, ")"));

@@ -26,6 +26,8 @@ constexpr std::chrono::milliseconds kLongestTurnPause{250};
 // own epoch as `written_in`, and store_fence refuses it when that is not the same. `relaxed`: with
 // synchronous_commit = off, from the start of a server until it ends in order.
 //
+// From format 2 on there is a column `slots`, the slots of IDs that the database holds.
+//
 // hulld.migration is there while a migration fills the store, and names its source.
 //
 // hulld.epochs tells what each epoch began with. The other tables hold what store_keys.h lists, by
@@ -274,8 +276,13 @@ absl::Status PostgresStore::CheckServer(Session& session) {
   return CheckFormat(session).status();
 }
 
-// What a server that is killed meanwhile leaves is nothing, or all.
 absl::Status PostgresStore::MakeSchema(Session& session) {
+  if (absl::Status s = MakeTables(session); !s.ok()) return s;
+  return CheckSlots(session);
+}
+
+// What a server that is killed meanwhile leaves is nothing, or all.
+absl::Status PostgresStore::MakeTables(Session& session) {
   const absl::StatusOr<bool> exists = CheckFormat(session);
   if (!exists.ok()) return exists.status();
   if (*exists) return absl::OkStatus();
@@ -287,7 +294,7 @@ absl::Status PostgresStore::MakeSchema(Session& session) {
           .Run(absl::StrCat("BEGIN;", schema->count() == 0 ? "CREATE SCHEMA hulld;" : "", kTables,
                             "INSERT INTO hulld.store (format, store_id, revision, batch, epoch, "
                             "owner, written_in, relaxed) VALUES (",
-                            kFormat, ", '", RandomId(), "', 0, 0, 0, '', 0, false); COMMIT;"))
+                            kFormatWithoutSlots, ", '", RandomId(), "', 0, 0, 0, '', 0, false); COMMIT;"))
           .status();
   if (!made.ok()) session.Run("ROLLBACK").status().IgnoreError();
   return made;

@@ -35,6 +35,9 @@ struct PostgresOptions {
   bool migrating = false;
   // Other servers may be active over the same database. Not with take_over.
   bool shared = false;
+  // Which slots of IDs this database holds, as a text that is the same for the same slots; empty:
+  // all. The database remembers it once it is opened with some.
+  std::string slots;
   // Asked while this waits for the active server; may be empty.
   std::function<bool()> should_stop;
   // How long nothing may come from the database while an answer is due. Longer than kLockTime.
@@ -84,7 +87,8 @@ class PostgresStore : public Store {
   // Waits while another server is active, unless take_over. Makes the schema where there is none.
   // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld made the schema, or
   // the database is too old. CANCELLED: should_stop said so. DATA_LOSS: the row of the store is not
-  // there. UNAVAILABLE: it cannot connect, or may not do what it must.
+  // there. UNAVAILABLE: it cannot connect, or may not do what it must. FAILED_PRECONDITION also: the
+  // database holds other slots.
   static absl::StatusOr<std::unique_ptr<PostgresStore>> Open(PostgresOptions options);
 
   ~PostgresStore() override;
@@ -118,8 +122,10 @@ class PostgresStore : public Store {
   absl::StatusOr<std::string> MakeCopy() override;
   void OnEnded(std::function<void()> ended) override;
 
-  // The version of the tables.
-  static constexpr uint64_t kFormat = 1;
+  // The version of the tables. Those of a database that holds all slots stay in the former one, so
+  // that a hulld that knows nothing of slots opens these alone.
+  static constexpr uint64_t kFormat = 2;
+  static constexpr uint64_t kFormatWithoutSlots = 1;
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
 
@@ -147,6 +153,9 @@ class PostgresStore : public Store {
   absl::Status CheckServer(Session& session);
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);
+  absl::Status MakeTables(Session& session);
+  absl::Status CheckSlots(Session& session);
+  absl::Status TakeSlots(Session& session);
   absl::Status BeginPatiently();
   absl::Status Begin();
   absl::Status OpenFirstReaders();

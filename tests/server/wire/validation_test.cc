@@ -50,37 +50,39 @@ TEST(HullId, AnythingElseIsRefusedWithItsPlace) {
 TEST(FreshnessWords, ConditionsAreTakenAsTheyAre) {
   using std::chrono::nanoseconds;
   const MemoryStore store;
+  const std::vector<std::string> ids = {store.id()};
   const auto began = SteadyClock::now();
   v1::Freshness message;
-  auto freshness = DecodeFreshness(message, store, began);
+  auto freshness = DecodeFreshness(message, ids, began);
   ASSERT_TRUE(freshness.ok());
   EXPECT_EQ(freshness->max_staleness, nanoseconds(0));
   EXPECT_EQ(freshness->at_least_revision, 0);
   EXPECT_EQ(freshness->began, began);
   message.mutable_max_staleness()->set_seconds(2);
   message.mutable_max_staleness()->set_nanos(5);
-  freshness = DecodeFreshness(message, store, began);
+  freshness = DecodeFreshness(message, ids, began);
   EXPECT_EQ(freshness->max_staleness, nanoseconds(2'000'000'005));
   message.set_at_least_revision(7);
   message.set_store_id(store.id());
-  freshness = DecodeFreshness(message, store, began);
+  freshness = DecodeFreshness(message, ids, began);
   EXPECT_EQ(freshness->max_staleness, nanoseconds(2'000'000'005));
   EXPECT_EQ(freshness->at_least_revision, 7);
   // The revision alone is content with any age.
   message.clear_max_staleness();
-  freshness = DecodeFreshness(message, store, began);
+  freshness = DecodeFreshness(message, ids, began);
   EXPECT_EQ(freshness->max_staleness, std::nullopt);
   // As long as can be said, without overflow.
   message.mutable_max_staleness()->set_seconds(315'576'000'000);
-  freshness = DecodeFreshness(message, store, began);
+  freshness = DecodeFreshness(message, ids, began);
   EXPECT_GT(freshness->max_staleness, nanoseconds(std::chrono::hours(24 * 365)));
 }
 
 TEST(FreshnessWords, WhatIsMalformedOrOfAnotherStoreIsRefused) {
   const MemoryStore store;
-  const auto expect = [&store](const v1::Freshness& message, absl::StatusCode code,
+  const std::vector<std::string> ids = {store.id()};
+  const auto expect = [&ids](const v1::Freshness& message, absl::StatusCode code,
                                const std::string& what) {
-    const absl::Status status = DecodeFreshness(message, store, SteadyClock::now()).status();
+    const absl::Status status = DecodeFreshness(message, ids, SteadyClock::now()).status();
     EXPECT_EQ(status.code(), code) << status;
     EXPECT_THAT(std::string(status.message()), HasSubstr(what));
   };

@@ -18,12 +18,15 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 @dataclass(frozen=True)
 class Header:
     """The store, and its revision that a reply was answered from. Revisions of different stores
-    mean nothing to each other. staleness: seconds; the answer to a read with a Freshness holds
+    mean nothing to each other. Of several stores (shards) that a reply was answered from, `shards`
+    names each with its revision; store_id and revision are empty then. staleness: seconds; the answer to a read with a Freshness holds
     everything that was committed up to that long before the call, at least."""
 
     store_id: str
     revision: int
     staleness: float = 0.0
+    #: (store_id, revision), where there are several.
+    shards: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -245,13 +248,15 @@ class HullEventKind(IntEnum):
 class HullEvent:
     """hull: as of its revision; DELETED: only hull_id, and in revision that of the deletion. box:
     as in Hull. is_body: it is about a body, of which `hull` holds ID, revisions and whether it is
-    damaged, and piece_count how many pieces it has."""
+    damaged, and piece_count how many pieces it has. store_id: whose revisions these are, where the
+    header names several stores."""
 
     kind: HullEventKind
     hull: HullInfo
     box: npt.NDArray[np.float64] | None
     is_body: bool = False
     piece_count: int = 0
+    store_id: str = ""
 
 
 @dataclass(frozen=True)
@@ -283,7 +288,10 @@ def enum_or_zero(kind: Any, value: int) -> Any:
 
 def header_of(message: Any) -> Header:
     return Header(
-        message.store_id, message.revision, message.staleness.ToNanoseconds() / 1_000_000_000
+        message.store_id,
+        message.revision,
+        message.staleness.ToNanoseconds() / 1_000_000_000,
+        tuple((shard.store_id, shard.revision) for shard in message.shards),
     )
 
 
@@ -348,6 +356,7 @@ def decode_changes(data: bytes) -> HullChanges:
             _box_of(event),
             event.is_body,
             event.piece_count,
+            event.store_id,
         )
         for event in message.events
     )

@@ -42,6 +42,8 @@ class Freshness:
         if self.at_least is not None:
             message.at_least_revision = self.at_least.revision
             message.store_id = self.at_least.store_id
+            for store_id, revision in self.at_least.shards:
+                message.at_least.add(store_id=store_id, revision=revision)
         if self.max_staleness is not None:
             # Never more than was said.
             message.max_staleness.FromNanoseconds(math.floor(self.max_staleness * 1e9))

@@ -216,6 +216,8 @@ def watch_hulls(
         after_revision=after.revision if after else 0,
         store_id=after.store_id if after else "",
     )
+    for store_id, revision in after.shards if after else ():
+        request.after.add(store_id=store_id, revision=revision)
     return Call(
         method_path("HullService", "WatchHulls"),
         request.SerializeToString(),

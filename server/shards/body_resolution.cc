@@ -1,4 +1,4 @@
-#include "server/registry/bodies/body_resolution.h"
+#include "server/shards/body_resolution.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
@@ -38,15 +38,15 @@ absl::Status WhyNoPiece(const Body& body, size_t hull, const absl::Status& cause
 // What was resolved of a hull, by ID.
 using FindHull = std::function<const absl::StatusOr<HullView>&(const std::string&)>;
 
-absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<const Body>& body,
+absl::StatusOr<HullView> ServeBody(Shards& shards, const std::shared_ptr<const Body>& body,
                                    const PlacedLookup& lookup, const FindHull& find_hull) {
   if (!body->damage().ok()) return body->damage();
   if (absl::Status s = CheckPiecePrefix(*body, lookup.prefix); !s.ok()) return s;
   constexpr size_t kPerHull = sizeof(HullView) + sizeof(const QueryHull*) + 2 * sizeof(uint64_t);
   MemoryCharge charge(
-      registry.memory(), MemoryUse::kReading,
+      shards.memory(), MemoryUse::kReading,
       body->pieces().size() * sizeof(BodyPiece) + body->hull_ids().size() * kPerHull);
-  if (absl::Status s = registry.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  if (absl::Status s = shards.CheckMemory(MemoryUse::kReading); !s.ok()) return s;
   std::vector<HullView> hulls;
   std::vector<const QueryHull*> query_hulls;
   std::vector<uint64_t> revisions;
@@ -76,34 +76,25 @@ absl::StatusOr<HullView> ServeBody(Registry& registry, const std::shared_ptr<con
 }
 
 // Canonical snapshots of what was found. CANCELLED: should_stop said so.
-absl::Status MakeCanonical(Registry& registry, const std::function<bool()>& should_stop,
+absl::Status MakeCanonical(Shards& shards, const std::function<bool()>& should_stop,
                            std::vector<absl::StatusOr<HullView>>& hulls) {
   for (absl::StatusOr<HullView>& hull : hulls) {
     if (!hull.ok()) continue;
-    const absl::Status made = registry.Canonical(*hull, should_stop).status();
+    const absl::Status made = shards.Canonical(*hull, should_stop).status();
     if (absl::IsCancelled(made)) return made;
     if (!made.ok()) hull = made;
   }
   return absl::OkStatus();
 }
 
-ReadPlan PlanOf(const PlacedLookup& lookup) {
-  return lookup.canonical ? ReadPlan{.freshness = lookup.plan.freshness} : lookup.plan;
-}
-
-absl::StatusOr<Resolved> RefreshHulls(Registry& registry, std::span<const std::string> ids,
-                                      KnownHulls& known, const PlacedLookup& lookup,
-                                      const std::function<bool()>& should_stop) {
-  absl::StatusOr<Resolved> resolved = registry.Refresh(ids, known, should_stop, PlanOf(lookup));
-  if (!resolved.ok() || !lookup.canonical) return resolved;
-  if (absl::Status s = MakeCanonical(registry, should_stop, resolved->hulls); !s.ok()) return s;
-  return resolved;
+ShardsPlan PlanOf(const PlacedLookup& lookup) {
+  return lookup.canonical ? ShardsPlan{.freshness = lookup.plan.freshness} : lookup.plan;
 }
 
 // The bodies among the IDs; empty where there are none.
-Bodies BodiesAmong(const Registry& registry, std::span<const std::string> ids) {
-  if (!registry.has_bodies()) return {};
-  Bodies bodies = registry.FindBodies(ids).bodies;
+Bodies BodiesAmong(const Shards& shards, std::span<const std::string> ids) {
+  if (!shards.has_bodies()) return {};
+  Bodies bodies = shards.FindBodies(ids);
   if (std::ranges::all_of(bodies, [](const auto& body) { return body == nullptr; })) return {};
   return bodies;
 }
@@ -131,7 +122,7 @@ void KnownPlaced::AddHull(const std::string& id) {
 
 size_t KnownPlaced::BodyBytes() const {
   // An ID twice, and a node of the map.
-  constexpr size_t kPerHull = 2 * sizeof(std::string) + 4 * sizeof(size_t) + KnownHulls::kBytesEach;
+  constexpr size_t kPerHull = 2 * sizeof(std::string) + 4 * sizeof(size_t) + KnownInShards::kBytesEach;
   size_t bytes = bodies_.capacity() * sizeof(bodies_[0]) + hull_ids_.size() * kPerHull;
   for (const std::string& id : hull_ids_) bytes += 2 * id.capacity();
   return bytes;
@@ -149,52 +140,63 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
+absl::StatusOr<ShardsResolved> ResolvePlaced(Shards& shards, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop) {
   KnownPlaced known;
-  return RefreshPlaced(registry, ids, known, lookup, should_stop);
+  return RefreshPlaced(shards, ids, known, lookup, should_stop);
 }
 
 // Bodies are looked for before and after the hulls. Where they are the same, they were current all
 // the while, so at the revision at which the hulls were, too.
-absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
-                                       KnownPlaced& known, const PlacedLookup& lookup,
-                                       const std::function<bool()>& should_stop) {
-  Bodies bodies = BodiesAmong(registry, ids);
-  absl::StatusOr<Resolved> hulls;
-  while (true) {
+absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std::string> ids,
+                                             KnownPlaced& known, const PlacedLookup& lookup,
+                                             const std::function<bool()>& should_stop) {
+  Bodies bodies = BodiesAmong(shards, ids);
+  absl::StatusOr<ShardsResolved> hulls;
+  bool have_changed = true;
+  while (have_changed) {
+    have_changed = false;
     known.SetBodies(ids, std::move(bodies));
-    const auto hull_ids = known.has_bodies() ? std::span<const std::string>(known.hull_ids_) : ids;
-    hulls = RefreshHulls(registry, hull_ids, known.hulls_, lookup, should_stop);
-    if (!hulls.ok()) return hulls;
-    bodies = BodiesAmong(registry, ids);
-    if (bodies == known.bodies_) break;
+    const auto holds = [&] {
+      bodies = BodiesAmong(shards, ids);
+      have_changed = bodies != known.bodies_;
+      return !have_changed;
+    };
+    // The shards of the bodies belong to the call, too.
+    const bool has_bodies = known.has_bodies();
+    hulls = shards.Refresh(has_bodies ? std::span<const std::string>(known.hull_ids_) : ids,
+                           known.hulls_, should_stop, PlanOf(lookup),
+                           has_bodies ? ids : std::span<const std::string>(), holds);
+  }
+  if (!hulls.ok()) return hulls;
+  // What was found stays what it was, however long that takes.
+  if (lookup.canonical) {
+    if (absl::Status s = MakeCanonical(shards, should_stop, hulls->hulls); !s.ok()) return s;
   }
   if (!known.has_bodies()) return hulls;
   const FindHull find_hull = [&](const std::string& id) -> const absl::StatusOr<HullView>& {
     return hulls->hulls[known.index_of_.at(id)];
   };
-  Resolved resolved;
-  resolved.store_revision = hulls->store_revision;
-  resolved.staleness = hulls->staleness;
+  ShardsResolved resolved;
+  resolved.as_of = hulls->as_of;
   resolved.hulls.reserve(ids.size());
   for (size_t i = 0; i < ids.size(); ++i) {
-    resolved.hulls.push_back(bodies[i] == nullptr
+    resolved.hulls.push_back(known.bodies_[i] == nullptr
                                  ? find_hull(ids[i])
-                                 : ServeBody(registry, bodies[i], lookup, find_hull));
+                                 : ServeBody(shards, known.bodies_[i], lookup, find_hull));
   }
   return resolved;
 }
 
-std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
+std::optional<ShardsResolved> TryResolvePlaced(Shards& shards, std::span<const std::string> ids,
                                          const PlacedLookup& lookup) {
-  if (!BodiesAmong(registry, ids).empty()) return std::nullopt;
-  std::optional<Resolved> resolved = registry.TryResolve(ids, PlanOf(lookup));
+  if (!BodiesAmong(shards, ids).empty()) return std::nullopt;
+  std::optional<ShardsResolved> resolved = shards.TryResolve(ids, PlanOf(lookup));
   if (!resolved.has_value()) return resolved;
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {
     // It may be a body since they were looked for.
-    if (absl::IsNotFound(hull.status()) && registry.has_bodies()) return std::nullopt;
+    if (absl::IsNotFound(hull.status()) && shards.has_bodies()) return std::nullopt;
     if (!lookup.canonical || !hull.ok()) continue;
     if (!hull->served->has_canonical_query_hull()) return std::nullopt;
   }

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_BODIES_BODY_RESOLUTION_H_
-#define HULLD_SERVER_REGISTRY_BODIES_BODY_RESOLUTION_H_
+#ifndef HULLD_SERVER_SHARDS_BODY_RESOLUTION_H_
+#define HULLD_SERVER_SHARDS_BODY_RESOLUTION_H_
 
 #include <absl/status/statusor.h>
 
@@ -14,8 +14,8 @@
 
 #include "core/query/body/query_body.h"
 #include "server/registry/body.h"
-#include "server/registry/known_hulls.h"
-#include "server/registry/registry.h"
+#include "server/shards/known_in_shards.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -38,17 +38,17 @@ struct PlacedLookup {
   // What IDs must start with, those of pieces too; it is the caller's.
   std::string prefix;
   // Canonical snapshots need nothing prepared.
-  ReadPlan plan;
+  ShardsPlan plan;
 };
 
 // What a reader that asks again and again for the same IDs keeps in between. Not thread-safe.
 class KnownPlaced {
  public:
-  // What it holds of bodies, in bytes; of hulls, KnownHulls::kBytesEach for each ID.
+  // What it holds of bodies, in bytes; of hulls, KnownInShards::kBytesEach for each ID.
   size_t BodyBytes() const;
 
  private:
-  friend absl::StatusOr<Resolved> RefreshPlaced(Registry&, std::span<const std::string>,
+  friend absl::StatusOr<ShardsResolved> RefreshPlaced(Shards&, std::span<const std::string>,
                                                 KnownPlaced&, const PlacedLookup&,
                                                 const std::function<bool()>&);
 
@@ -64,27 +64,28 @@ class KnownPlaced {
   // Where there are bodies: the IDs of hulls, then those of pieces, each once.
   std::vector<std::string> hull_ids_;
   std::unordered_map<std::string, size_t> index_of_;
-  KnownHulls hulls_;
+  KnownInShards hulls_;
 };
 
-// Hulls and bodies by ID, all current at one revision of the store; a body has no answer where the
+// Hulls and bodies by ID, all current at one revision of their store; over several stores, at one
+// instant where the read is linearizable. A body has no answer where the
 // hull of a piece has none: NOT_FOUND (PIECE_NOT_FOUND), PERMISSION_DENIED or DATA_LOSS names body
 // and piece; RESOURCE_EXHAUSTED: --memory-limit has no room for its pieces. Without bodies among
-// them it is Registry::Resolve. Boxes of pieces are made here, not on gRPC's threads. CANCELLED
+// them it is Shards::Refresh. Boxes of pieces are made here, not on gRPC's threads. CANCELLED
 // when should_stop said so.
-absl::StatusOr<Resolved> ResolvePlaced(Registry& registry, std::span<const std::string> ids,
+absl::StatusOr<ShardsResolved> ResolvePlaced(Shards& shards, std::span<const std::string> ids,
                                        const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
 
 // As ResolvePlaced, for a reader that asks for the same IDs again and again: `known` is kept in
 // between, and only hulls that changed since are looked up.
-absl::StatusOr<Resolved> RefreshPlaced(Registry& registry, std::span<const std::string> ids,
+absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std::string> ids,
                                        KnownPlaced& known, const PlacedLookup& lookup,
                                        const std::function<bool()>& should_stop);
 
 // The same, but nullopt, at once, where it would have to read, to prepare or to make something, or
 // where there is a body among the IDs.
-std::optional<Resolved> TryResolvePlaced(Registry& registry, std::span<const std::string> ids,
+std::optional<ShardsResolved> TryResolvePlaced(Shards& shards, std::span<const std::string> ids,
                                          const PlacedLookup& lookup);
 
 // PERMISSION_DENIED, naming the piece, where the hull of one is outside of a caller's prefix.
@@ -92,4 +93,4 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_BODIES_BODY_RESOLUTION_H_
+#endif  // HULLD_SERVER_SHARDS_BODY_RESOLUTION_H_
