@@ -18,7 +18,8 @@ namespace hulld::server {
 Committer::Committer(Store& store, FairMutex& order)
     : store_(store), order_(order), thread_([this] { Run(); }) {}
 
-Committer::~Committer() {
+void Committer::End() {
+  if (!thread_.joinable()) return;
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;

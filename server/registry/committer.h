@@ -69,8 +69,11 @@ class Committer {
   Committer(Store& store, FairMutex& order);
   Committer(const Committer&) = delete;
   Committer& operator=(const Committer&) = delete;
-  // Commits what is queued, then ends.
-  ~Committer();
+  ~Committer() { End(); }
+
+  // Commits what is queued, then ends its thread: nobody is told anything afterwards. Requires that
+  // nothing is submitted any more.
+  void End();
 
   // Queues a change that follows all changes submitted before. Requires that `locked` holds
   // `order`. Cost: O(1).

@@ -53,6 +53,8 @@ Registry::~Registry() {
     const std::lock_guard lock(mutex_);
     ending_ = true;
   }
+  // Its thread takes over what other servers did, into what is closed here.
+  committer_.End();
   preparers_.reset();
   loaders_.reset();
   // Closed sessions may hold hulls for longer.

@@ -143,6 +143,7 @@ class Thread {
   Thread& operator=(Thread&&) = delete;
   ~Thread() { HULLD_CHECK(!is_joinable_); }
 
+  bool joinable() const { return is_joinable_; }
   void join() {
     HULLD_CHECK(std::exchange(is_joinable_, false));
     Scheduler::Current().JoinThread(number_);
