@@ -66,8 +66,8 @@ bool HasMovedOn(const ShardRevisions& told, const ShardRevisions& now) {
 WriteReactor* WatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
                                  Shards& shards, WorkerPool& readers,
                                  const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<WatchStream>(
-      new WatchStream(context, admission, shards, readers, request)));
+  return Launch(
+      std::shared_ptr<WatchStream>(new WatchStream(context, admission, shards, readers, request)));
 }
 
 void WatchStream::Open() {
@@ -154,8 +154,10 @@ absl::Status WatchStream::LoadBoxes(ShardsWatchPiece* piece) {
   loaded.reserve(piece->changes.size());
   for (HullChange& change : piece->changes) {
     if (WantsBox(change)) {
-      const auto resolved = shards_.at(piece->shard).Resolve(
-          change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::OfWhatIsHere());
+      const auto resolved = shards_.at(piece->shard)
+                                .Resolve(
+                                    change.record.hull_id, [this] { return call().ShouldStop(); },
+                                    Freshness::OfWhatIsHere());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
       if (!status.ok() && !absl::IsDataLoss(status)) return status;

@@ -33,9 +33,7 @@ absl::Status VisitSorted(std::span<Store* const> stores, const ShardedSource::Ha
 }  // namespace
 
 ShardedSource::ShardedSource(std::span<Store* const> stores, HasId has, StoreOfId store_of)
-    : stores_(stores.begin(), stores.end()),
-      has_(std::move(has)),
-      store_of_(std::move(store_of)) {}
+    : stores_(stores.begin(), stores.end()), has_(std::move(has)), store_of_(std::move(store_of)) {}
 
 std::string ShardedSource::id() const {
   std::string id;

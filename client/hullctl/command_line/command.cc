@@ -156,8 +156,7 @@ Option Command::AddParsedEach(const std::string& name,
   };
   OptionDescription* const description = Describe(name, help);
   description->value_name = "TEXT";
-  CLI::Option* const option =
-      app_->add_option_function<std::vector<std::string>>(name, take, help);
+  CLI::Option* const option = app_->add_option_function<std::vector<std::string>>(name, take, help);
   option->allow_extra_args(false);
   return Option(option, description);
 }

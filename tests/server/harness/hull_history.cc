@@ -21,8 +21,8 @@ using Outcome = Operation::Outcome;
 bool IsOptional(const Operation& operation) { return operation.outcome == Outcome::kUnknown; }
 
 const char* Name(Kind kind) {
-  constexpr const char* kNames[] = {"create", "open", "append", "replace",
-                                    "delete", "get",  "mesh",   "probe", "pair"};
+  constexpr const char* kNames[] = {"create", "open", "append", "replace", "delete",
+                                    "get",    "mesh", "probe",  "pair"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -124,9 +124,9 @@ class OrderSearch {
 
   // The longest order found, and what could not follow it.
   std::string Fault() const {
-    std::string fault =
-        absl::StrCat("no order explains more than ", best_count_, " of ", required_,
-                     " answers; the hull was then ", KeyOf(best_state_), "; none of these follows:");
+    std::string fault = absl::StrCat("no order explains more than ", best_count_, " of ", required_,
+                                     " answers; the hull was then ", KeyOf(best_state_),
+                                     "; none of these follows:");
     for (const size_t i : best_candidates_) {
       absl::StrAppend(&fault, "\n  ", Describe(operations_[i]));
     }

@@ -126,9 +126,9 @@ std::string LinearizabilityFault(std::vector<Operation> operations);
 std::string JointLinearizabilityFault(
     const std::map<std::string, std::vector<Operation>>& operations);
 
-// The same for every hull, or for all together where pairs were asked for, and that revisions of the store, which all hulls share, never fall from
-// one call to a later one, as far as that may not be answered from the past, and that no two
-// changes have the same; of each store by itself.
+// The same for every hull, or for all together where pairs were asked for, and that revisions of
+// the store, which all hulls share, never fall from one call to a later one, as far as that may not
+// be answered from the past, and that no two changes have the same; of each store by itself.
 std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server

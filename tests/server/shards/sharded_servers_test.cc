@@ -113,8 +113,8 @@ TEST_F(ShardedServers, AreLinearizableAlsoForPairsOverTwoShards) {
   ExpectLinearizable(history, 1);
   size_t pairs = 0;
   for (const Operation& operation : history.operations().at(kFirst)) {
-    pairs += operation.kind == Operation::Kind::kPair &&
-             operation.outcome == Operation::Outcome::kOk;
+    pairs +=
+        operation.kind == Operation::Kind::kPair && operation.outcome == Operation::Outcome::kOk;
   }
   EXPECT_GT(pairs, 10);
 }
@@ -199,10 +199,11 @@ TEST_F(ShardedServers, AServerWhoseFileSaysOtherwiseIsRefused) {
   EXPECT_THAT(Refuse("--postgres-shards", WriteShards("swapped", {{"0-511", conninfos_[1]},
                                                                   {"512-1023", conninfos_[0]}})),
               HasSubstr("holds slots 512-1023, and the file of --postgres-shards gives it 0-511"));
-  EXPECT_THAT(Refuse("--postgres-shards", WriteShards("three", {{"0-511", conninfos_[0]},
-                                                                {"512-1000", conninfos_[1]},
-                                                                {"1001-1023", third}})),
-              HasSubstr("holds slots 512-1023, and the file of --postgres-shards gives it 512-1000"));
+  EXPECT_THAT(
+      Refuse("--postgres-shards", WriteShards("three", {{"0-511", conninfos_[0]},
+                                                        {"512-1000", conninfos_[1]},
+                                                        {"1001-1023", third}})),
+      HasSubstr("holds slots 512-1023, and the file of --postgres-shards gives it 512-1000"));
   EXPECT_THAT(Refuse("--postgres-shards", WriteShards("hole", {{"0-511", conninfos_[0]}})),
               HasSubstr("no line names slot 512-1023"));
   // The server that is there was not disturbed.
@@ -240,9 +241,8 @@ TEST_F(ShardedServers, MoveFromOneDatabaseToTwoAndBack) {
     const auto mesh = client.GetHullMesh(id);
     EXPECT_TRUE(hull.ok() && hull->audit().ok()) << id;
     EXPECT_TRUE(mesh.ok());
-    return hull.ok() && mesh.ok()
-               ? absl::StrCat(hull->hull().SerializeAsString(), mesh->xyz.size())
-               : "";
+    return hull.ok() && mesh.ok() ? absl::StrCat(hull->hull().SerializeAsString(), mesh->xyz.size())
+                                  : "";
   };
   for (int i = 0; i < 40; ++i) {
     const std::string id = absl::StrCat("moved/", i);
@@ -284,14 +284,15 @@ TEST_F(ShardedServers, MoveFromOneDatabaseToTwoAndBack) {
   end();
   // And to other shards.
   const std::string other = WriteShards(
-      "other", {{"0-99", MakeConninfo()}, {"100-799", MakeConninfo()}, {"800-1023", MakeConninfo()}});
+      "other",
+      {{"0-99", MakeConninfo()}, {"100-799", MakeConninfo()}, {"800-1023", MakeConninfo()}});
   Migrate({"--from-postgres-shards", file_, "--to-postgres-shards", other});
   Begin({other});
   expect_all();
   end();
   // What is there already is not overwritten.
-  Process refused({"migrate", "--from-postgres-conninfo-file", single, "--to-postgres-shards",
-                   file_});
+  Process refused(
+      {"migrate", "--from-postgres-conninfo-file", single, "--to-postgres-shards", file_});
   refused.ReadToEnd();
   EXPECT_EQ(refused.Wait(), 2);
 }
