@@ -80,7 +80,10 @@ void WatchStream::Open() {
 
 // What the server has acknowledged by now, or another one over the same store, is told.
 void WatchStream::Begin(const WatchTarget& target, const ShardsWatchStart& start) {
-  const absl::Status fresh = shards_.AwaitOthers([this] { return call().ShouldStop(); });
+  const auto should_stop = [this] { return call().ShouldStop(); };
+  const absl::Status fresh = target.ids.empty()
+                                 ? shards_.AwaitOthers(should_stop)
+                                 : shards_.of(target.ids.front()).AwaitOthers(should_stop);
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!fresh.ok()) return FinishCall(fresh);
   absl::StatusOr<std::shared_ptr<ShardsWatch>> watch =
