@@ -78,9 +78,9 @@ absl::StatusOr<Response> ListAll(const std::string& prefix, uint64_t limit,
   Response all;
   Request request;
   if (freshness.has_value()) *request.mutable_freshness() = *freshness;
-  const bool is_linearizable =
-      !request.freshness().has_max_staleness() && request.freshness().at_least_revision() == 0 &&
-      request.freshness().at_least().empty();
+  const bool is_linearizable = !request.freshness().has_max_staleness() &&
+                               request.freshness().at_least_revision() == 0 &&
+                               request.freshness().at_least().empty();
   request.set_prefix(prefix);
   const auto count = [&] { return static_cast<uint64_t>(items(all)->size()); };
   do {

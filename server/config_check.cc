@@ -41,7 +41,8 @@ absl::StatusOr<std::vector<std::string>> CheckConfig(const Config& config,
         ReadShardFile(config.postgres_shards, "--postgres-shards");
     if (!file.ok()) return file.status();
     for (const ShardFile::Shard& shard : file->shards) {
-      if (absl::Status s = CheckConninfoFile(shard.conninfo_file); !s.ok()) return s;
+      const absl::Status valid = CheckConninfoFile(shard.conninfo_file, "--postgres-shards");
+      if (!valid.ok()) return valid;
     }
     findings.push_back(absl::StrCat(file->shards.size(), " shards"));
   } else if (config.store == "postgres") {
@@ -84,8 +85,7 @@ absl::Status CheckDataDir(const std::string& path) {
   return absl::OkStatus();
 }
 
-absl::Status CheckConninfoFile(const std::string& path) {
-  const char* const setting = "--postgres-conninfo-file";
+absl::Status CheckConninfoFile(const std::string& path, const char* setting) {
   const absl::StatusOr<std::string> text = ReadSecretFile(path, setting);
   if (!text.ok()) return text.status();
   return Prefixed(absl::StrCat(setting, " ", path, ": "), Conninfo::Parse(*text).status());

@@ -27,9 +27,10 @@ absl::Status CheckListening(const Config& config);
 absl::Status CheckDataDir(const std::string& path);
 
 // OK when this file holds a connection string for PostgreSQL that only we may read; whether the
-// database is there is not asked. INVALID_ARGUMENT names --postgres-conninfo-file, and quotes
-// nothing of what the file holds.
-absl::Status CheckConninfoFile(const std::string& path);
+// database is there is not asked. INVALID_ARGUMENT names the setting that led to the file, and
+// quotes nothing of what that holds.
+absl::Status CheckConninfoFile(const std::string& path,
+                               const char* setting = "--postgres-conninfo-file");
 
 // What an operator should know about who can reach the server, a sentence each. Requires a valid
 // config.listen.

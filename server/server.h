@@ -24,8 +24,8 @@
 #include "server/process/metrics_endpoint.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
 #include "server/settings/config.h"
+#include "server/shards/shards.h"
 #include "server/store/store.h"
 
 namespace hulld::server {

@@ -17,8 +17,7 @@ class MaintenanceService : public v1::MaintenanceService::WithRawCallbackMethod_
                                v1::MaintenanceService::Service> {
  public:
   // Backups are read on `readers`. All must outlive this.
-  MaintenanceService(Store& store, const Shards& shards, Admission& admission,
-                     WorkerPool& readers)
+  MaintenanceService(Store& store, const Shards& shards, Admission& admission, WorkerPool& readers)
       : store_(store), shards_(shards), admission_(admission), readers_(readers) {}
 
   WriteReactor* SaveBackup(grpc::CallbackServerContext* context,

@@ -16,8 +16,7 @@ namespace hulld::server {
 class StatusService
     : public v1::StatusService::WithRawCallbackMethod_GetStatus<v1::StatusService::Service> {
  public:
-  StatusService(Shards& shards, Admission& admission)
-      : shards_(shards), admission_(admission) {}
+  StatusService(Shards& shards, Admission& admission) : shards_(shards), admission_(admission) {}
 
   grpc::ServerUnaryReactor* GetStatus(grpc::CallbackServerContext* context,
                                       const grpc::ByteBuffer* request,

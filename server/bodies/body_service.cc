@@ -10,9 +10,9 @@
 #include "server/access/caller.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
-#include "server/shards/body_resolution.h"
 #include "server/registry/body.h"
 #include "server/settings/config.h"
+#include "server/shards/body_resolution.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 #include "server/wire/fresh_answer.h"
@@ -125,23 +125,23 @@ void BodyService::Put(PutCall* call) {
   if (!body.ok()) return call->End(body.status());
   Registry& registry = shards_.of(body->record.body_id);
   registry.PutBody(*std::move(body), IfRevision(call->request()),
-                    [&registry, call](const absl::StatusOr<PutBodyResult>& result) {
-                      if (!result.ok()) return call->End(result.status());
-                      const BodyRecord& record = result->body;
-                      call->call().LogChange(result->created ? "body created" : "body replaced",
-                                             {"body", record.body_id}, record.revision);
-                      v1::PutBodyResponse& response = call->response();
-                      EncodeHeader(registry.store(), result->store_revision,
-                                   response.mutable_header());
-                      v1::BodyInfo* const info = response.mutable_body();
-                      info->set_body_id(record.body_id);
-                      info->set_create_revision(record.create_revision);
-                      info->set_revision(record.revision);
-                      info->set_piece_count(result->piece_count);
-                      response.set_created(result->created);
-                      response.set_durability(EncodeDurability(registry.store().durability()));
-                      call->End(absl::OkStatus());
-                    });
+                   [&registry, call](const absl::StatusOr<PutBodyResult>& result) {
+                     if (!result.ok()) return call->End(result.status());
+                     const BodyRecord& record = result->body;
+                     call->call().LogChange(result->created ? "body created" : "body replaced",
+                                            {"body", record.body_id}, record.revision);
+                     v1::PutBodyResponse& response = call->response();
+                     EncodeHeader(registry.store(), result->store_revision,
+                                  response.mutable_header());
+                     v1::BodyInfo* const info = response.mutable_body();
+                     info->set_body_id(record.body_id);
+                     info->set_create_revision(record.create_revision);
+                     info->set_revision(record.revision);
+                     info->set_piece_count(result->piece_count);
+                     response.set_created(result->created);
+                     response.set_durability(EncodeDurability(registry.store().durability()));
+                     call->End(absl::OkStatus());
+                   });
 }
 
 absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& call,

@@ -39,9 +39,9 @@ WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission
       new BatchStream(context, admission, shards, readers, pool, executor, request)));
 }
 
-BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Shards& shards, WorkerPool& readers, TaskPool& pool,
-                         Executor& executor, const grpc::ByteBuffer& request)
+BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+                         WorkerPool& readers, TaskPool& pool, Executor& executor,
+                         const grpc::ByteBuffer& request)
     : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, shards,
                     {readers, pool}, {kFirstPairs, kMostPairs}),
       team_threads_(executor.threads()),
@@ -81,7 +81,7 @@ absl::Status BatchStream::Validate() {
 
 absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
   const ShardsPlan plan = {2 * pair_count_ / std::max<uint64_t>(1, table_.hull_count()), true,
-                         freshness_};
+                           freshness_};
   if (!may_wait) return table_.TryResolve(shards(), options_, plan);
   if (absl::Status s = table_.Resolve(shards(), options_, plan); !s.ok()) return s;
   return true;

@@ -25,8 +25,8 @@
 #include "server/collisions/watch/collision_watch.h"
 #include "server/contract/error_info.h"
 #include "server/contract/status_map.h"
-#include "server/shards/body_resolution.h"
 #include "server/settings/config.h"
+#include "server/shards/body_resolution.h"
 #include "server/wire/decode.h"
 #include "server/wire/encode.h"
 
@@ -117,8 +117,7 @@ void EncodeHulls(const Shards& shards, const BodyQuestion::Side& side,
 }
 
 // What the relation of bodies follows from. RESOURCE_EXHAUSTED: it is too much for a reply.
-absl::Status EncodeProof(const Shards& shards,
-                         const std::vector<PieceCertificate>& certificates,
+absl::Status EncodeProof(const Shards& shards, const std::vector<PieceCertificate>& certificates,
                          const BodyQuestion::Side& a, const BodyQuestion::Side& b,
                          v1::CheckCollisionResponse* response) {
   std::set<std::string_view> known;
@@ -301,7 +300,8 @@ void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved
   Compute(std::move(query), call);
 }
 
-void CollisionService::AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call) {
+void CollisionService::AnswerBodies(const PairQuery& query, ShardsResolved resolved,
+                                    CheckCall* call) {
   if (absl::Status s = ValidateForBodies(query.options); !s.ok()) return call->End(s);
   EncodeVersions(shards_, resolved.as_of, *resolved.hulls[0], *resolved.hulls[1],
                  &call->response());
@@ -314,8 +314,8 @@ void CollisionService::AnswerBodies(const PairQuery& query, ShardsResolved resol
                         RungCounts counts;
                         counts.Add(answer->answer.rung);
                         call->call().metrics().CountPairs(counts);
-                        call->End(EncodeBodyAnswer(shards_, *answer, a, b,
-                                                   call->request().wanted(), &call->response()));
+                        call->End(EncodeBodyAnswer(shards_, *answer, a, b, call->request().wanted(),
+                                                   &call->response()));
                       });
 }
 

@@ -30,8 +30,8 @@ constexpr size_t kIndexBytes = 5;
 }  // namespace
 
 BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                    Shards& shards, WorkerPool& readers,
-                                    WorkerPool& long_readers, TaskPool& pool) {
+                                    Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
+                                    TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionStream>(
       new CollisionStream(context, admission, shards, readers, long_readers, pool)));
 }
@@ -113,9 +113,8 @@ absl::Status CollisionStream::HandleMessage() {
 
 absl::Status CollisionStream::HandleOpen() {
   const v1::CollisionStreamOpen& open = request().open();
-  absl::StatusOr<QueryOptions> options =
-      MakeQueryOptions(v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), shards_.limits(),
-                       call().lifetime());
+  absl::StatusOr<QueryOptions> options = MakeQueryOptions(
+      v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), shards_.limits(), call().lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
   const absl::StatusOr<ShardsFreshness> freshness =
       DecodeFreshness(open.freshness(), shards_.store_ids(), call().message_arrival());

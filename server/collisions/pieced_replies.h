@@ -18,8 +18,8 @@
 #include "server/call/queued_stream.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
-#include "server/shards/shards.h"
 #include "server/settings/config.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 

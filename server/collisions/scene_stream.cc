@@ -58,9 +58,8 @@ WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission
       new SceneStream(context, admission, shards, readers, pool, request)));
 }
 
-SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission,
-                         Shards& shards, WorkerPool& readers, TaskPool& pool,
-                         const grpc::ByteBuffer& request)
+SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
+                         WorkerPool& readers, TaskPool& pool, const grpc::ByteBuffer& request)
     : PiecedReplies(request, context, admission, Rpc::kFindCollisions, shards, {readers, pool},
                     {kFirstPlacements, kMostPlacements}) {}
 
@@ -95,7 +94,7 @@ absl::Status SceneStream::Validate() {
 absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
   // The box of each placement, and at least a pair of it.
   const ShardsPlan plan = {2 * table_.size() / std::max<size_t>(1, table_.hull_count()), true,
-                         freshness_};
+                           freshness_};
   if (!may_wait) return table_.TryResolve(shards(), options_.query, plan);
   if (absl::Status s = table_.Resolve(shards(), options_.query, plan); !s.ok()) return s;
   return true;

@@ -90,20 +90,20 @@ void HullService::Create(CreateCall* call) {
     return call->End(s);
   }
   Registry& registry = shards_.of(request.hull_id());
-  registry.Create(
-      request.hull_id(), request.if_absent(),
-      [&registry, call](const absl::StatusOr<CreateResult>& created) {
-        if (!created.ok()) return call->End(created.status());
-        const HullRecord& hull = created->hull;
-        if (created->created) {
-          call->call().LogChange("hull created", {"hull", hull.hull_id}, hull.revision);
-        }
-        v1::CreateHullResponse& response = call->response();
-        EncodeHeader(registry.store(), created->store_revision, response.mutable_header());
-        EncodeRecord(hull, response.mutable_hull());
-        response.set_created(created->created);
-        call->End(absl::OkStatus());
-      });
+  registry.Create(request.hull_id(), request.if_absent(),
+                  [&registry, call](const absl::StatusOr<CreateResult>& created) {
+                    if (!created.ok()) return call->End(created.status());
+                    const HullRecord& hull = created->hull;
+                    if (created->created) {
+                      call->call().LogChange("hull created", {"hull", hull.hull_id}, hull.revision);
+                    }
+                    v1::CreateHullResponse& response = call->response();
+                    EncodeHeader(registry.store(), created->store_revision,
+                                 response.mutable_header());
+                    EncodeRecord(hull, response.mutable_hull());
+                    response.set_created(created->created);
+                    call->End(absl::OkStatus());
+                  });
 }
 
 absl::Status HullService::Get(const v1::GetHullRequest& request, const Call& call,

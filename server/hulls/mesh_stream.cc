@@ -45,8 +45,7 @@ absl::Status MeshStream::MakeHeader() {
   if (!freshness.ok()) return freshness.status();
   const size_t shard = shards_.shard_of(request().hull_id());
   Registry& registry = shards_.at(shard);
-  const auto resolved =
-      registry.Resolve(request().hull_id(), should_stop, freshness->Of(shard));
+  const auto resolved = registry.Resolve(request().hull_id(), should_stop, freshness->Of(shard));
   if (!resolved.ok()) return resolved.status();
   const absl::StatusOr<const Hull*> hull = registry.Canonical(resolved->second, should_stop);
   if (!hull.ok()) return hull.status();

@@ -20,8 +20,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
                                         v1::GetHullMeshRequest> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, WorkerPool& readers,
-                             const grpc::ByteBuffer& request);
+                             Shards& shards, WorkerPool& readers, const grpc::ByteBuffer& request);
 
  private:
   MeshStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,

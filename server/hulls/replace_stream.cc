@@ -13,8 +13,7 @@
 namespace hulld::server {
 
 ReadReactor* ReplaceStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Shards& shards, WorkerPool& writers,
-                                  grpc::ByteBuffer* response) {
+                                  Shards& shards, WorkerPool& writers, grpc::ByteBuffer* response) {
   return Launch(std::shared_ptr<ReplaceStream>(
       new ReplaceStream(context, admission, shards, writers, response)));
 }
@@ -86,8 +85,7 @@ absl::Status ReplaceStream::Build() {
     return LimitExceeded(absl::StrCat(name, "the hull would have taken ", received, " points"),
                          limits.max_points_per_hull, "max-points-per-hull");
   }
-  if (absl::Status s = shards_.CheckMemory(MemoryUse::kWriting); !s.ok())
-    return Prefixed(name, s);
+  if (absl::Status s = shards_.CheckMemory(MemoryUse::kWriting); !s.ok()) return Prefixed(name, s);
   const absl::StatusOr<PointCounts> added = replacement_.builder->Add(
       *points,
       {static_cast<size_t>(limits.max_vertices_per_hull), [this] { return call().ShouldStop(); }});

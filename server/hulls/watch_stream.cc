@@ -66,8 +66,8 @@ bool HasMovedOn(const ShardRevisions& told, const ShardRevisions& now) {
 WriteReactor* WatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
                                  Shards& shards, WorkerPool& readers,
                                  const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<WatchStream>(
-      new WatchStream(context, admission, shards, readers, request)));
+  return Launch(
+      std::shared_ptr<WatchStream>(new WatchStream(context, admission, shards, readers, request)));
 }
 
 void WatchStream::Open() {
@@ -80,7 +80,10 @@ void WatchStream::Open() {
 
 // What the server has acknowledged by now, or another one over the same store, is told.
 void WatchStream::Begin(const WatchTarget& target, const ShardsWatchStart& start) {
-  const absl::Status fresh = shards_.AwaitOthers([this] { return call().ShouldStop(); });
+  const auto should_stop = [this] { return call().ShouldStop(); };
+  const absl::Status fresh = target.ids.empty()
+                                 ? shards_.AwaitOthers(should_stop)
+                                 : shards_.of(target.ids.front()).AwaitOthers(should_stop);
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (!fresh.ok()) return FinishCall(fresh);
   absl::StatusOr<std::shared_ptr<ShardsWatch>> watch =
@@ -154,8 +157,10 @@ absl::Status WatchStream::LoadBoxes(ShardsWatchPiece* piece) {
   loaded.reserve(piece->changes.size());
   for (HullChange& change : piece->changes) {
     if (WantsBox(change)) {
-      const auto resolved = shards_.at(piece->shard).Resolve(
-          change.record.hull_id, [this] { return call().ShouldStop(); }, Freshness::OfWhatIsHere());
+      const auto resolved = shards_.at(piece->shard)
+                                .Resolve(
+                                    change.record.hull_id, [this] { return call().ShouldStop(); },
+                                    Freshness::OfWhatIsHere());
       const absl::Status& status = resolved.status();
       if (absl::IsNotFound(status)) continue;
       if (!status.ok() && !absl::IsDataLoss(status)) return status;

@@ -22,8 +22,7 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
                                          v1::WatchHullsRequest> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, WorkerPool& readers,
-                             const grpc::ByteBuffer& request);
+                             Shards& shards, WorkerPool& readers, const grpc::ByteBuffer& request);
 
  private:
   WatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,

@@ -43,8 +43,9 @@ class MigrationTarget {
 
 // INVALID_ARGUMENT, FAILED_PRECONDITION, UNAVAILABLE: as RocksDbStore::Open.
 absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenRocksDbTarget(const std::string& data_dir);
-// As PostgresStore::Open; CANCELLED: a server is active over it.
-absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo);
+// As PostgresStore::Open; CANCELLED: a server is active over it. slots: as PostgresOptions::slots.
+absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo,
+                                                                    const std::string& slots = "");
 
 }  // namespace hulld::server
 

@@ -101,12 +101,14 @@ class PostgresTarget : public MigrationTarget {
 
 }  // namespace
 
-absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo) {
+absl::StatusOr<std::unique_ptr<MigrationTarget>> OpenPostgresTarget(const std::string& conninfo,
+                                                                    const std::string& slots) {
   const absl::StatusOr<Conninfo> parsed = Conninfo::Parse(conninfo);
   if (!parsed.ok()) return parsed.status();
   PostgresOptions options;
   options.conninfo = conninfo;
   options.migrating = true;
+  options.slots = slots;
   options.should_stop = [] { return true; };
   absl::StatusOr<std::unique_ptr<PostgresStore>> store = PostgresStore::Open(std::move(options));
   if (!store.ok()) return store.status();

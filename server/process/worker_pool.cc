@@ -32,8 +32,11 @@ void WorkerPool::Submit(std::function<void()> task, ClientId client) {
 }
 
 void WorkerPool::NoteWaiting() {
-  waiting_.store(tasks_.size(), std::memory_order_relaxed);
-  if (metrics_.has_value()) metrics_->waiting.Set(static_cast<double>(tasks_.size()));
+  const size_t before = waiting_.exchange(tasks_.size(), std::memory_order_relaxed);
+  // Other pools may report to the same gauge, which tells their sum.
+  if (metrics_.has_value()) {
+    metrics_->waiting.Increment(static_cast<double>(tasks_.size()) - static_cast<double>(before));
+  }
 }
 
 void WorkerPool::Work() {

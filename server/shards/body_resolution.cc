@@ -122,7 +122,8 @@ void KnownPlaced::AddHull(const std::string& id) {
 
 size_t KnownPlaced::BodyBytes() const {
   // An ID twice, and a node of the map.
-  constexpr size_t kPerHull = 2 * sizeof(std::string) + 4 * sizeof(size_t) + KnownInShards::kBytesEach;
+  constexpr size_t kPerHull =
+      2 * sizeof(std::string) + 4 * sizeof(size_t) + KnownInShards::kBytesEach;
   size_t bytes = bodies_.capacity() * sizeof(bodies_[0]) + hull_ids_.size() * kPerHull;
   for (const std::string& id : hull_ids_) bytes += 2 * id.capacity();
   return bytes;
@@ -141,8 +142,8 @@ absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix) {
 }
 
 absl::StatusOr<ShardsResolved> ResolvePlaced(Shards& shards, std::span<const std::string> ids,
-                                       const PlacedLookup& lookup,
-                                       const std::function<bool()>& should_stop) {
+                                             const PlacedLookup& lookup,
+                                             const std::function<bool()>& should_stop) {
   KnownPlaced known;
   return RefreshPlaced(shards, ids, known, lookup, should_stop);
 }
@@ -190,7 +191,7 @@ absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std
 }
 
 std::optional<ShardsResolved> TryResolvePlaced(Shards& shards, std::span<const std::string> ids,
-                                         const PlacedLookup& lookup) {
+                                               const PlacedLookup& lookup) {
   if (!BodiesAmong(shards, ids).empty()) return std::nullopt;
   std::optional<ShardsResolved> resolved = shards.TryResolve(ids, PlanOf(lookup));
   if (!resolved.has_value()) return resolved;

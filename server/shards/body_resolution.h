@@ -49,8 +49,8 @@ class KnownPlaced {
 
  private:
   friend absl::StatusOr<ShardsResolved> RefreshPlaced(Shards&, std::span<const std::string>,
-                                                KnownPlaced&, const PlacedLookup&,
-                                                const std::function<bool()>&);
+                                                      KnownPlaced&, const PlacedLookup&,
+                                                      const std::function<bool()>&);
 
   using Bodies = std::vector<std::shared_ptr<const Body>>;
 
@@ -74,19 +74,19 @@ class KnownPlaced {
 // them it is Shards::Refresh. Boxes of pieces are made here, not on gRPC's threads. CANCELLED
 // when should_stop said so.
 absl::StatusOr<ShardsResolved> ResolvePlaced(Shards& shards, std::span<const std::string> ids,
-                                       const PlacedLookup& lookup,
-                                       const std::function<bool()>& should_stop);
+                                             const PlacedLookup& lookup,
+                                             const std::function<bool()>& should_stop);
 
 // As ResolvePlaced, for a reader that asks for the same IDs again and again: `known` is kept in
 // between, and only hulls that changed since are looked up.
 absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std::string> ids,
-                                       KnownPlaced& known, const PlacedLookup& lookup,
-                                       const std::function<bool()>& should_stop);
+                                             KnownPlaced& known, const PlacedLookup& lookup,
+                                             const std::function<bool()>& should_stop);
 
 // The same, but nullopt, at once, where it would have to read, to prepare or to make something, or
 // where there is a body among the IDs.
 std::optional<ShardsResolved> TryResolvePlaced(Shards& shards, std::span<const std::string> ids,
-                                         const PlacedLookup& lookup);
+                                               const PlacedLookup& lookup);
 
 // PERMISSION_DENIED, naming the piece, where the hull of one is outside of a caller's prefix.
 absl::Status CheckPiecePrefix(const Body& body, const std::string& prefix);

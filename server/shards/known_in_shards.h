@@ -16,9 +16,9 @@ namespace hulld::server {
 // for the same IDs keeps it (Shards::Refresh). Not thread-safe.
 class KnownInShards {
  public:
-  // About what it holds of each ID, in bytes, the hull and one copy of the ID apart.
-  static constexpr size_t kBytesEach =
-      KnownHulls::kBytesEach + sizeof(std::string) + 2 * sizeof(uint32_t);
+  // About what it holds of each ID, in bytes, the ID and the hull apart. (Of IDs in several shards
+  // it holds one more copy, which is not counted.)
+  static constexpr size_t kBytesEach = KnownHulls::kBytesEach;
 
  private:
   friend class Shards;

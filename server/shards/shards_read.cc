@@ -267,8 +267,7 @@ std::optional<ShardsResolved> Shards::TryResolve(std::span<const std::string> id
   const auto try_look = [&](Look* look) {
     for (const Part& part : known.parts_) {
       if (is_linearizable && at(part.shard).store().is_shared()) return false;
-      std::optional<Resolved> resolved =
-          at(part.shard).TryResolve(part.ids, plan.Of(part.shard));
+      std::optional<Resolved> resolved = at(part.shard).TryResolve(part.ids, plan.Of(part.shard));
       if (!resolved.has_value()) return false;
       look->staleness = std::max(look->staleness, resolved->staleness);
       look->parts.push_back(*std::move(resolved));

@@ -56,9 +56,8 @@ absl::Status TakeSlots(std::string_view text, size_t line, uint16_t shard,
     const std::optional<size_t> last =
         dash == std::string::npos ? first : ParseSlot(std::string_view(part).substr(dash + 1));
     if (!first.has_value() || !last.has_value() || *first > *last) {
-      return Malformed(line,
-                       absl::StrCat("\"", part, "\" is no slot from 0 to ", kSlots - 1,
-                                    ", nor a range of them such as 0-511"));
+      return Malformed(line, absl::StrCat("\"", part, "\" is no slot from 0 to ", kSlots - 1,
+                                          ", nor a range of them such as 0-511"));
     }
     for (size_t slot = *first; slot <= *last; ++slot) {
       uint16_t& holder = file->shard_of[slot];

@@ -144,6 +144,23 @@ Option Command::AddParsed(const std::string& name,
   return Option(app_->add_option_function<std::string>(name, take, help), description);
 }
 
+Option Command::AddParsedEach(const std::string& name,
+                              std::function<absl::Status(const std::string&)> parse,
+                              const std::string& help) {
+  const auto take = [name = LongName(name),
+                     parse = std::move(parse)](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) {
+      const absl::Status parsed = parse(text);
+      if (!parsed.ok()) throw CLI::ValidationError(name, std::string(parsed.message()));
+    }
+  };
+  OptionDescription* const description = Describe(name, help);
+  description->value_name = "TEXT";
+  CLI::Option* const option = app_->add_option_function<std::vector<std::string>>(name, take, help);
+  option->allow_extra_args(false);
+  return Option(option, description);
+}
+
 Option Command::AddNumber(const std::string& name, uint64_t least, uint64_t most,
                           const std::string& help, std::function<void(uint64_t)> take) {
   const auto parse = [least, most, take = std::move(take)](const std::string& text) {

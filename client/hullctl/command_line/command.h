@@ -74,6 +74,10 @@ class Command {
   // `parse` takes the value; the message of its error is shown behind the option's name.
   Option AddParsed(const std::string& name, std::function<absl::Status(const std::string&)> parse,
                    const std::string& help);
+  // The same, and it may be given again and again, one value each time.
+  Option AddParsedEach(const std::string& name,
+                       std::function<absl::Status(const std::string&)> parse,
+                       const std::string& help);
   // A decimal whole number from `least` to `most`. (CLI11 itself reads 010 as eight.)
   Option AddNumber(const std::string& name, uint64_t least, uint64_t most, const std::string& help,
                    std::function<void(uint64_t)> take);

@@ -66,7 +66,7 @@ void AddFreshnessOptions(Command command, Invocation* invocation) {
           "one store (default: all that was acknowledged)")
       .ValueName("TIME");
   command
-      .AddParsed(
+      .AddParsedEach(
           "--at-least",
           [invocation](const std::string& text) {
             return TakeRevision(text, FreshnessOf(invocation));

@@ -63,7 +63,8 @@ void Print(const v1::WatchHullsResponse& message, const Invocation& run) {
   for (const v1::HullEvent& event : message.events()) {
     run.out << (run.names() ? event.hull().hull_id() : EventText(event)) << "\n";
   }
-  if (message.synced()) run.out << "# synced at revision " << RevisionsText(message.header()) << "\n";
+  if (message.synced())
+    run.out << "# synced at revision " << RevisionsText(message.header()) << "\n";
 }
 
 // A watch that ends at Ctrl-C.

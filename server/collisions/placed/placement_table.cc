@@ -188,7 +188,7 @@ size_t PlacementTable::MemoryBytes() const {
       2 * sizeof(uint32_t) + sizeof(Pose) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
   return size() * each + named_.size() * sizeof named_[0] +
          ids_.size() *
-             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownHulls::kBytesEach +
+             (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownInShards::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
          of_ids + of_errors + BodyBytes();
 }

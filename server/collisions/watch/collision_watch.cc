@@ -12,8 +12,8 @@
 #include "server/collisions/placed/query_settings.h"
 #include "server/collisions/placed/scene_groups.h"
 #include "server/contract/status_map.h"
-#include "server/shards/body_resolution.h"
 #include "server/settings/config.h"
+#include "server/shards/body_resolution.h"
 #include "server/wire/encode.h"
 
 namespace hulld::server {
@@ -64,8 +64,8 @@ bool TakeLater(const ShardRevisions& from, ShardRevisions* to) {
 }  // namespace
 
 BidiReactor* CollisionWatch::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                   Shards& shards, WorkerPool& readers,
-                                   WorkerPool& long_readers, TaskPool& pool) {
+                                   Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
+                                   TaskPool& pool) {
   return Launch(std::shared_ptr<CollisionWatch>(
       new CollisionWatch(context, admission, shards, readers, long_readers, pool)));
 }

@@ -42,8 +42,8 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
                                                     " at most; run the hulld that wrote it"));
 }
 
-// Whether the database holds the slots that this is to serve. A database that holds nothing yet, and
-// all slots so far, takes the ones that it is given.
+// Whether the database holds the slots that this is to serve. A database that holds nothing yet,
+// and all slots so far, takes the ones that it is given.
 absl::Status PostgresStore::CheckSlots(Session& session) {
   const absl::StatusOr<Rows> column = session.Run(
       "SELECT 1 FROM pg_attribute WHERE attrelid = 'hulld.store'::regclass AND attname = 'slots'");
@@ -58,15 +58,16 @@ absl::Status PostgresStore::CheckSlots(Session& session) {
   if (held == options_.slots) return absl::OkStatus();
   if (held.empty()) return TakeSlots(session);
   if (options_.slots.empty()) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "this database is one of several shards, and holds slots ", held,
-        ": start hulld with the file that names them all (--postgres-shards)"));
+    return absl::FailedPreconditionError(
+        absl::StrCat("this database is one of several shards, and holds slots ", held,
+                     ": start hulld with the file that names them all (--postgres-shards)"));
   }
-  return absl::FailedPreconditionError(absl::StrCat(
-      "this database holds slots ", held, ", and the file of --postgres-shards gives it ",
-      options_.slots,
-      ": start hulld with the file that it was filled with; to move slots, end all servers and copy "
-      "the hulls to other databases (hulld migrate)"));
+  return absl::FailedPreconditionError(
+      absl::StrCat("this database holds slots ", held,
+                   ", and the file of --postgres-shards gives it ", options_.slots,
+                   ": start hulld with the file that it was filled with; to move slots, end all "
+                   "servers and copy "
+                   "the hulls to other databases (hulld migrate)"));
 }
 
 // Servers that are active over it with all slots, which know nothing of this, are shut out.

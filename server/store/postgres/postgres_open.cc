@@ -294,7 +294,8 @@ absl::Status PostgresStore::MakeTables(Session& session) {
           .Run(absl::StrCat("BEGIN;", schema->count() == 0 ? "CREATE SCHEMA hulld;" : "", kTables,
                             "INSERT INTO hulld.store (format, store_id, revision, batch, epoch, "
                             "owner, written_in, relaxed) VALUES (",
-                            kFormatWithoutSlots, ", '", RandomId(), "', 0, 0, 0, '', 0, false); COMMIT;"))
+                            kFormatWithoutSlots, ", '", RandomId(),
+                            "', 0, 0, 0, '', 0, false); COMMIT;"))
           .status();
   if (!made.ok()) session.Run("ROLLBACK").status().IgnoreError();
   return made;

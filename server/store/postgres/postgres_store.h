@@ -87,8 +87,8 @@ class PostgresStore : public Store {
   // Waits while another server is active, unless take_over. Makes the schema where there is none.
   // INVALID_ARGUMENT: no connection string. FAILED_PRECONDITION: a newer hulld made the schema, or
   // the database is too old. CANCELLED: should_stop said so. DATA_LOSS: the row of the store is not
-  // there. UNAVAILABLE: it cannot connect, or may not do what it must. FAILED_PRECONDITION also: the
-  // database holds other slots.
+  // there. UNAVAILABLE: it cannot connect, or may not do what it must. FAILED_PRECONDITION also:
+  // the database holds other slots.
   static absl::StatusOr<std::unique_ptr<PostgresStore>> Open(PostgresOptions options);
 
   ~PostgresStore() override;

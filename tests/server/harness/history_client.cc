@@ -53,6 +53,14 @@ int NumberOf(const double* xyz) {
   return -1;
 }
 
+// Of the store with this ID, where there are several.
+uint64_t RevisionOf(const v1::ResponseHeader& header, const std::string& store_id) {
+  for (const v1::ShardRevision& shard : header.shards()) {
+    if (shard.store_id() == store_id) return shard.revision();
+  }
+  return header.revision();
+}
+
 }  // namespace
 
 const Coordinates& HistoryCloud() {
@@ -112,7 +120,7 @@ bool HistoryClient::End(const std::string& hull_id, Operation& operation,
                         const grpc::Status& status) {
   operation.outcome = OutcomeOf(status);
   const bool read = operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
-                    operation.kind == Kind::kProbe;
+                    operation.kind == Kind::kProbe || operation.kind == Kind::kPair;
   if (operation.outcome == Outcome::kUnknown) {
     // The incarnation is gone: what it did, it did before this answer.
     const bool gone = status.error_code() == grpc::StatusCode::FAILED_PRECONDITION;
@@ -146,8 +154,10 @@ void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshne
   }
 }
 
-void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation) {
-  operation.store_revision = header.revision();
+void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation,
+                               const std::string& store_id) {
+  operation.store_revision = RevisionOf(header, store_id);
+  if (tells_stores_) operation.store_id = store_id.empty() ? header.store_id() : store_id;
   operation.staleness = static_cast<uint64_t>(1'000'000'000 * header.staleness().seconds() +
                                               header.staleness().nanos());
   if (header.revision() > 0) last_header_ = header;
@@ -332,8 +342,25 @@ bool HistoryClient::Probe(const std::string& hull_id) {
   ChooseFreshness(operation, *request.mutable_freshness());
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.revision = response.hull_a().revision();
-  TakeHeader(response.header(), operation);
+  TakeHeader(response.header(), operation, response.hull_a().store_id());
   operation.touching = response.relation() == v1::RELATION_TOUCHING;
+  return End(hull_id, operation, status);
+}
+
+bool HistoryClient::Pair(const std::string& hull_id, const std::string& other) {
+  Operation operation = Begin(Kind::kPair);
+  operation.other = other;
+  v1::CheckCollisionRequest request;
+  v1::CheckCollisionResponse response;
+  *request.mutable_a() = PlacementOf(hull_id);
+  *request.mutable_b() = PlacementOf(other);
+  const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
+  operation.create_revision = response.hull_a().create_revision();
+  operation.revision = response.hull_a().revision();
+  operation.other_create_revision = response.hull_b().create_revision();
+  operation.other_revision = response.hull_b().revision();
+  TakeHeader(response.header(), operation, response.hull_a().store_id());
+  operation.other_store_revision = RevisionOf(response.header(), response.hull_b().store_id());
   return End(hull_id, operation, status);
 }
 

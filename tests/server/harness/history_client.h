@@ -32,6 +32,8 @@ class HistoryClient {
   // From now on reads ask for any freshness: the latest, the revision of the last answer, a bound
   // of some milliseconds, or both. Otherwise for the latest.
   void ReadAtAnyFreshness() { any_freshness_ = true; }
+  // From now on operations say which store they are of: hulls are spread over several.
+  void TellStores() { tells_stores_ = true; }
 
   // Makes kProbeHull; once per store.
   void MakeProbe();
@@ -55,6 +57,8 @@ class HistoryClient {
   bool Get(const std::string& hull_id);
   bool Mesh(const std::string& hull_id);
   bool Probe(const std::string& hull_id);
+  // How two hulls of the history stand to each other.
+  bool Pair(const std::string& hull_id, const std::string& other);
 
  private:
   struct Stream {
@@ -71,8 +75,9 @@ class HistoryClient {
   Coordinates SomePoints(int count, Operation& operation);
   // Tells request and operation of the same freshness, at random.
   void ChooseFreshness(Operation& operation, v1::Freshness& freshness);
-  // What an answer says of the store.
-  void TakeHeader(const v1::ResponseHeader& header, Operation& operation);
+  // What an answer says of the store; of several, of the one with this ID.
+  void TakeHeader(const v1::ResponseHeader& header, Operation& operation,
+                  const std::string& store_id = "");
   // Absent most times; else the revision last seen.
   std::optional<uint64_t> SomeRevision(const std::string& hull_id);
   int Below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
@@ -85,6 +90,7 @@ class HistoryClient {
   std::map<std::string, Stream> streams_;
   std::map<std::string, uint64_t> revisions_;
   bool any_freshness_ = false;
+  bool tells_stores_ = false;
   // Of the last answer.
   v1::ResponseHeader last_header_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <set>
 #include <unordered_set>
 #include <utility>
 
@@ -20,8 +21,8 @@ using Outcome = Operation::Outcome;
 bool IsOptional(const Operation& operation) { return operation.outcome == Outcome::kUnknown; }
 
 const char* Name(Kind kind) {
-  constexpr const char* kNames[] = {"create", "open", "append", "replace",
-                                    "delete", "get",  "mesh",   "probe"};
+  constexpr const char* kNames[] = {"create", "open", "append", "replace", "delete",
+                                    "get",    "mesh", "probe",  "pair"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -31,6 +32,9 @@ std::string Describe(const Operation& operation) {
                                   operation.returned == UINT64_MAX ? 0 : operation.returned, "] ",
                                   kOutcomes[static_cast<int>(operation.outcome)], ", revision ",
                                   operation.revision, ", created at ", operation.create_revision);
+  if (operation.kind == Kind::kPair) {
+    absl::StrAppend(&text, ", with ", operation.other, " at revision ", operation.other_revision);
+  }
   if (operation.if_revision) absl::StrAppend(&text, ", if_revision ", *operation.if_revision);
   if (operation.kind == Kind::kAppend || operation.kind == Kind::kOpen) {
     absl::StrAppend(&text, ", writer ", operation.writer, ", sequence ", operation.sequence,
@@ -47,7 +51,7 @@ std::string Describe(const Operation& operation) {
 
 bool IsRead(const Operation& operation) {
   return operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
-         operation.kind == Kind::kProbe;
+         operation.kind == Kind::kProbe || operation.kind == Kind::kPair;
 }
 
 // From when on a call may have taken effect.
@@ -97,9 +101,13 @@ constexpr size_t kReported = 40;
 // Depth-first search for an order, over the operations sorted by invocation.
 class OrderSearch {
  public:
-  explicit OrderSearch(std::vector<Operation> operations)
-      : operations_(std::move(operations)), done_(operations_.size(), false) {
-    for (Operation& operation : operations_) {
+  explicit OrderSearch(const std::map<std::string, std::vector<Operation>>& operations) {
+    for (const auto& [hull_id, of_hull] : operations) {
+      const size_t hull = hulls_.emplace(hull_id, hulls_.size()).first->second;
+      for (const Operation& operation : of_hull) operations_.push_back({operation, hull});
+    }
+    done_.assign(operations_.size(), false);
+    for (Placed& operation : operations_) {
       if (IsRead(operation)) operation.invoked = EarliestOf(operation);
     }
     std::sort(operations_.begin(), operations_.end(),
@@ -109,16 +117,16 @@ class OrderSearch {
   }
 
   bool Run() {
-    bool found = Enter(SpecifiedHull(), 0, 0);
+    bool found = Enter(State(hulls_.size()), 0, 0);
     while (!found && !path_.empty()) found = TryNext();
     return found;
   }
 
   // The longest order found, and what could not follow it.
   std::string Fault() const {
-    std::string fault =
-        absl::StrCat("no order explains more than ", best_count_, " of ", required_,
-                     " answers; the hull was then ", best_state_.Key(), "; none of these follows:");
+    std::string fault = absl::StrCat("no order explains more than ", best_count_, " of ", required_,
+                                     " answers; the hull was then ", KeyOf(best_state_),
+                                     "; none of these follows:");
     for (const size_t i : best_candidates_) {
       absl::StrAppend(&fault, "\n  ", Describe(operations_[i]));
     }
@@ -131,9 +139,22 @@ class OrderSearch {
   }
 
  private:
-  // A state of the hull on the way to an order of all operations.
+  // An operation, and its hull by number.
+  struct Placed : Operation {
+    size_t hull = 0;
+  };
+  // Of each hull.
+  using State = std::vector<SpecifiedHull>;
+
+  static std::string KeyOf(const State& state) {
+    std::string key;
+    for (const SpecifiedHull& hull : state) absl::StrAppend(&key, hull.Key(), "|");
+    return key;
+  }
+
+  // A state of the hulls on the way to an order of all operations.
   struct Node {
-    SpecifiedHull state;
+    State state;
     // Operations so far that were answered.
     size_t count = 0;
     // When the latest operation so far was invoked.
@@ -177,18 +198,29 @@ class OrderSearch {
 
   // Whether a read comes after all changes that it must hold.
   bool HoldsAll(size_t i) const {
-    const Operation& read = operations_[i];
+    const Placed& read = operations_[i];
     if (!IsRead(read)) return true;
     const uint64_t revision = std::max(read.store_revision, read.at_least_revision);
+    const bool is_pair = read.kind == Kind::kPair;
+    const size_t other = is_pair ? hulls_.at(read.other) : read.hull;
     for (size_t j = first_left_; j < operations_.size(); ++j) {
       const uint64_t changed_at = done_[j] ? 0 : ChangedAt(operations_[j]);
-      if (changed_at > 0 && changed_at <= revision) return false;
+      if (changed_at == 0) continue;
+      const size_t hull = operations_[j].hull;
+      if (hull == read.hull && changed_at <= revision) return false;
+      if (is_pair && hull == other && changed_at <= read.other_store_revision) return false;
     }
     return true;
   }
 
-  std::string Key(const SpecifiedHull& state) const {
-    std::string key = absl::StrCat(state.Key(), ";", first_left_);
+  // Whether the hulls may answer so; if they may, the state is what they are after that.
+  bool StepAll(State& state, const Placed& operation) const {
+    if (operation.kind != Kind::kPair) return Step(state[operation.hull], operation);
+    return StepPair(state[operation.hull], state[hulls_.at(operation.other)], operation);
+  }
+
+  std::string Key(const State& state) const {
+    std::string key = absl::StrCat(KeyOf(state), ";", first_left_);
     // Beyond the first that is left, only what has been done matters.
     for (size_t i = first_left_; i < operations_.size() && i <= last_done_; ++i) {
       if (done_[i]) absl::StrAppend(&key, ",", i);
@@ -197,7 +229,7 @@ class OrderSearch {
   }
 
   // Puts a state at the end of the path, with what may come next. Returns whether it explains all.
-  bool Enter(SpecifiedHull state, size_t count, uint64_t latest) {
+  bool Enter(State state, size_t count, uint64_t latest) {
     if (count == required_) return true;
     Node node{std::move(state), count, latest, {}, 0, std::nullopt, first_left_, last_done_};
     while (first_left_ < operations_.size() &&
@@ -232,8 +264,8 @@ class OrderSearch {
       return false;
     }
     const size_t i = last.candidates[last.next++];
-    SpecifiedHull next = last.state;
-    if (!HoldsAll(i) || !Step(next, operations_[i])) return false;
+    State next = last.state;
+    if (!HoldsAll(i) || !StepAll(next, operations_[i])) return false;
     done_[i] = true;
     last_done_ = std::max(last.last_before, i);
     last.taken = i;
@@ -241,7 +273,9 @@ class OrderSearch {
                  std::max(last.latest, operations_[i].invoked));
   }
 
-  std::vector<Operation> operations_;
+  // By ID.
+  std::map<std::string, size_t> hulls_;
+  std::vector<Placed> operations_;
   std::vector<bool> done_;
   size_t required_ = 0;
   size_t first_left_ = 0;
@@ -250,19 +284,19 @@ class OrderSearch {
   std::vector<Node> path_;
   std::unordered_set<std::string> seen_;
   size_t best_count_ = 0;
-  SpecifiedHull best_state_;
+  State best_state_;
   std::vector<size_t> best_candidates_;
   std::vector<bool> best_done_;
 };
 
 // What is wrong with the store's revisions across all hulls.
-std::string StoreRevisionFault(const HullHistory& history) {
+std::string StoreRevisionFault(const HullHistory& history, const std::string& store_id) {
   std::vector<std::pair<uint64_t, uint64_t>> returned;  // when, and the revision told
   std::vector<std::pair<uint64_t, uint64_t>> invoked;
   std::map<uint64_t, std::string> changes;
   for (const auto& [hull_id, operations] : history.operations()) {
     for (const Operation& operation : operations) {
-      if (operation.outcome != Outcome::kOk) continue;
+      if (operation.outcome != Outcome::kOk || operation.store_id != store_id) continue;
       returned.push_back({operation.returned, operation.store_revision});
       invoked.push_back({EarliestOf(operation), operation.store_revision});
       const uint64_t revision = ChangedAt(operation);
@@ -329,20 +363,44 @@ size_t HullHistory::size() const {
 }
 
 std::string LinearizabilityFault(std::vector<Operation> operations) {
-  for (const Operation& operation : operations) {
-    const std::string fault = FreshnessFault(operation);
-    if (!fault.empty()) return fault;
+  return JointLinearizabilityFault({{"", std::move(operations)}});
+}
+
+std::string JointLinearizabilityFault(
+    const std::map<std::string, std::vector<Operation>>& operations) {
+  for (const auto& [hull_id, of_hull] : operations) {
+    for (const Operation& operation : of_hull) {
+      const std::string fault = FreshnessFault(operation);
+      if (!fault.empty()) return fault;
+    }
   }
-  OrderSearch search(std::move(operations));
+  OrderSearch search(operations);
   return search.Run() ? "" : search.Fault();
 }
 
 std::string HistoryFault(const HullHistory& history) {
+  bool has_pairs = false;
+  std::set<std::string> store_ids;
   for (const auto& [hull_id, operations] : history.operations()) {
-    const std::string fault = LinearizabilityFault(operations);
-    if (!fault.empty()) return absl::StrCat("hull ", hull_id, ": ", fault);
+    for (const Operation& operation : operations) {
+      has_pairs |= operation.kind == Kind::kPair;
+      if (operation.outcome == Outcome::kOk) store_ids.insert(operation.store_id);
+    }
   }
-  return StoreRevisionFault(history);
+  if (has_pairs) {
+    const std::string fault = JointLinearizabilityFault(history.operations());
+    if (!fault.empty()) return fault;
+  } else {
+    for (const auto& [hull_id, operations] : history.operations()) {
+      const std::string fault = LinearizabilityFault(operations);
+      if (!fault.empty()) return absl::StrCat("hull ", hull_id, ": ", fault);
+    }
+  }
+  for (const std::string& store_id : store_ids) {
+    const std::string fault = StoreRevisionFault(history, store_id);
+    if (!fault.empty()) return fault;
+  }
+  return "";
 }
 
 }  // namespace hulld::server

@@ -26,6 +26,7 @@ struct Operation {
     kGet,
     kMesh,
     kProbe,  // CheckCollision with one point of the cloud
+    kPair,   // CheckCollision with another hull of the history
   };
   enum class Outcome {
     kOk,
@@ -59,8 +60,13 @@ struct Operation {
   std::optional<uint64_t> max_staleness = 0;
   uint64_t at_least_revision = 0;
 
+  // Pair: the ID of the other hull.
+  std::string other;
+
   // What was answered.
   uint64_t store_revision = 0;
+  // Whose that is, where hulls are spread over several stores.
+  std::string store_id;
   // Of how long ago it may be, in nanoseconds.
   uint64_t staleness = 0;
   uint64_t create_revision = 0;
@@ -73,6 +79,10 @@ struct Operation {
   uint64_t received = 0;
   uint64_t outside = 0;
   uint64_t duplicate = 0;
+  // Pair: of the other hull.
+  uint64_t other_store_revision = 0;
+  uint64_t other_create_revision = 0;
+  uint64_t other_revision = 0;
 };
 
 // What clients did to hulls, by hull ID. Thread-safe while it is recorded.
@@ -111,9 +121,14 @@ class HullHistory {
 // 1993, Testing and Verifying Concurrent Objects; Lowe 2017, Testing for Linearizability.
 std::string LinearizabilityFault(std::vector<Operation> operations);
 
-// The same for every hull, and that revisions of the store, which all hulls share, never fall from
-// one call to a later one, as far as that may not be answered from the past, and that no two
-// changes have the same.
+// The same for several hulls together, by hull ID: there must be one order for all of them, so that
+// both hulls of a pair were as it says at one instant.
+std::string JointLinearizabilityFault(
+    const std::map<std::string, std::vector<Operation>>& operations);
+
+// The same for every hull, or for all together where pairs were asked for, and that revisions of
+// the store, which all hulls share, never fall from one call to a later one, as far as that may not
+// be answered from the past, and that no two changes have the same; of each store by itself.
 std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server

@@ -209,8 +209,18 @@ bool Step(SpecifiedHull& state, const Operation& operation) {
     case Kind::kMesh:
     case Kind::kProbe:
       return StepRead(state, operation);
+    case Kind::kPair:
+      break;
   }
   HULLD_UNREACHABLE();
+}
+
+bool StepPair(SpecifiedHull& hull, SpecifiedHull& other, const Operation& operation) {
+  if (operation.outcome == Outcome::kNotFound) return !hull.exists || !other.exists;
+  if (operation.outcome != Outcome::kOk || !hull.exists || !other.exists) return false;
+  return Agree(hull, operation.revision) && AgreeOnIncarnation(hull, operation.create_revision) &&
+         Agree(other, operation.other_revision) &&
+         AgreeOnIncarnation(other, operation.other_create_revision);
 }
 
 }  // namespace hulld::server

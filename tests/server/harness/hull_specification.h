@@ -36,7 +36,10 @@ struct SpecifiedHull {
 };
 
 // Whether the hull may answer an operation so; if it may, `hull` is what it is after that.
+// Not for a pair.
 bool Step(SpecifiedHull& hull, const Operation& operation);
+// The same for a pair, and the other hull of it.
+bool StepPair(SpecifiedHull& hull, SpecifiedHull& other, const Operation& operation);
 
 }  // namespace hulld::server
 

@@ -175,6 +175,12 @@ TEST_F(ConfigTest, PostgresNeedsItsFileAndNothingOfOtherStores) {
   ExpectRefused({"--postgres-servers=many"}, "--postgres-servers many is for --store postgres");
   ExpectRefused({postgres[0], postgres[1], "--postgres-servers=many", "--take-over"},
                 "--take-over is for --postgres-servers one");
+  const std::vector<std::string> shards = {"--store=postgres", "--postgres-shards=/s"};
+  EXPECT_EQ(Accepted({shards[0], shards[1], "--postgres-servers=many"}).postgres_shards, "/s");
+  ExpectRefused(shards, "--postgres-shards needs --postgres-servers many");
+  ExpectRefused({shards[0], shards[1], postgres[1], "--postgres-servers=many"},
+                "takes the place of --postgres-conninfo-file");
+  ExpectRefused({"--postgres-shards=/s"}, "--postgres-shards is for --store postgres");
   environment_["HULLD_STORE"] = "postgres";
   environment_["HULLD_POSTGRES_CONNINFO_FILE"] = "/q";
   EXPECT_EQ(Accepted({}).postgres_conninfo_file, "/q");
@@ -252,6 +258,7 @@ TEST_F(ConfigTest, HelpNamesEveryFlagAndVersionIsPrinted) {
                            "--durability",
                            "--postgres-conninfo-file",
                            "--postgres-servers",
+                           "--postgres-shards",
                            "--take-over",
                            "--memory-limit",
                            "--max-writers-per-hull",

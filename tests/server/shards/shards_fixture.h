@@ -55,14 +55,12 @@ class ShardsTest : public ::testing::Test {
   }
 
   absl::StatusOr<CreateResult> Create(const std::string& id) {
-    return Wait<CreateResult>([&](Reply<CreateResult> done) {
-      shards_->of(id).Create(id, false, std::move(done));
-    });
+    return Wait<CreateResult>(
+        [&](Reply<CreateResult> done) { shards_->of(id).Create(id, false, std::move(done)); });
   }
   absl::StatusOr<uint64_t> Delete(const std::string& id) {
-    return Wait<uint64_t>([&](Reply<uint64_t> done) {
-      shards_->of(id).Delete(id, std::nullopt, std::move(done));
-    });
+    return Wait<uint64_t>(
+        [&](Reply<uint64_t> done) { shards_->of(id).Delete(id, std::nullopt, std::move(done)); });
   }
   // Puts a new hull in the place of what there is; returns its revision.
   uint64_t Replace(const std::string& id, std::vector<Vector> points = CubeCorners()) {

@@ -129,8 +129,8 @@ TEST_F(ShardsWatchTest, ResumesAfterTheRevisionOfEachShard) {
   told.ReadUntilSynced();
   EXPECT_EQ(told.anew, 0);
   EXPECT_EQ(told.gone, std::vector<std::string>{deleted});
-  EXPECT_EQ(told.state, (std::map<std::string, std::pair<size_t, uint64_t>>{
-                            {changed, {size_t{1}, revision}}}));
+  EXPECT_EQ(told.state,
+            (std::map<std::string, std::pair<size_t, uint64_t>>{{changed, {size_t{1}, revision}}}));
 }
 
 TEST_F(ShardsWatchTest, StartsAnewAsAWholeWhereOneShardCannotResume) {
@@ -144,10 +144,8 @@ TEST_F(ShardsWatchTest, StartsAnewAsAWholeWhereOneShardCannotResume) {
   };
   const ShardsWatchStart starts[] = {
       // A revision that is not there yet; a shard that is not named; another store.
-      {true, {after(0, 1), after(1, 5), after(2, 1)}},
-      {true, {after(0, 1), after(2, 1)}},
-      {true, {after(0, 1), after(1, 1), {"another", 1}}},
-      {true, {{"another", 1}}},
+      {true, {after(0, 1), after(1, 5), after(2, 1)}},    {true, {after(0, 1), after(2, 1)}},
+      {true, {after(0, 1), after(1, 1), {"another", 1}}}, {true, {{"another", 1}}},
       {true, {after(0, 1), after(1, 0), after(2, 1)}},
   };
   for (const ShardsWatchStart& start : starts) {

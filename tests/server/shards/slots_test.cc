@@ -23,7 +23,8 @@ TEST(Slots, OfAnIdAreWhatClientsInOtherLanguagesCompute) {
 TEST(Slots, AreTakenAboutEvenly) {
   constexpr int kEach = 64;
   std::vector<int> count(kSlots);
-  for (int i = 0; i < static_cast<int>(kSlots) * kEach; ++i) ++count[SlotOf(absl::StrCat("arm/", i))];
+  for (int i = 0; i < static_cast<int>(kSlots) * kEach; ++i)
+    ++count[SlotOf(absl::StrCat("arm/", i))];
   // Each is binomial with a deviation of 8.
   for (const int n : count) {
     EXPECT_GT(n, kEach / 4);
@@ -85,8 +86,9 @@ TEST(ShardFile, ErrorsNameTheLineAndTheSlot) {
 
 // Whatever a file holds, it is refused or gives every slot to a shard that is there.
 TEST(ShardFile, AnyTextIsRefusedOrGivesEverySlotAShard) {
-  const std::string pieces[] = {"0",   "1023", "511", "512", "-", ",", " ", "\n",
-                                "a b", "#",    "\r",  "\0x", "1024", "0-511 a\n", "512-1023 b\n"};
+  const std::string pieces[] = {"0",  "1023", "511",  "512",       "-",
+                                ",",  " ",    "\n",   "a b",       "#",
+                                "\r", "\0x",  "1024", "0-511 a\n", "512-1023 b\n"};
   std::mt19937_64 random(1);
   int taken = 0;
   for (int i = 0; i < 20'000; ++i) {

@@ -81,7 +81,7 @@ TEST(FreshnessWords, WhatIsMalformedOrOfAnotherStoreIsRefused) {
   const MemoryStore store;
   const std::vector<std::string> ids = {store.id()};
   const auto expect = [&ids](const v1::Freshness& message, absl::StatusCode code,
-                               const std::string& what) {
+                             const std::string& what) {
     const absl::Status status = DecodeFreshness(message, ids, SteadyClock::now()).status();
     EXPECT_EQ(status.code(), code) << status;
     EXPECT_THAT(std::string(status.message()), HasSubstr(what));

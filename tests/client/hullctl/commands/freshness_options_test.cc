@@ -60,6 +60,10 @@ TEST_F(FreshnessOptions, EachReadCarriesThem) {
     EXPECT_EQ(other.code, 1) << read.front();
     EXPECT_THAT(other.out + other.err, HasSubstr("is not that of this store")) << read.front();
   }
+  // One for each of several stores.
+  const std::string own = header.store_id() + ":1";
+  EXPECT_EQ(Ask({"get", "cube", "--at-least", own, "--at-least", own}).code, 0);
+  EXPECT_EQ(Ask({"get", "cube", "--at-least", own, "--at-least", "another:1"}).code, 1);
   const Ran future = Ask({"get", "cube", "--at-least", header.store_id() + ":1000"});
   EXPECT_EQ(future.code, 1);
   EXPECT_THAT(future.err, HasSubstr("at_least_revision is 1000"));

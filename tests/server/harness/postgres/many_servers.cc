@@ -18,7 +18,6 @@
 namespace hulld::server {
 namespace {
 
-constexpr const char* kHulls[] = {"shared/a", "shared/b"};
 // Between questions of a client that was not answered, and how many it asks: for a minute.
 constexpr std::chrono::milliseconds kPause(5);
 constexpr int kMostQuestions = 12'000;
@@ -32,7 +31,8 @@ void ManyServersTest::SetUp() {
 
 ManyServersTest::Server::Server(const std::string& conninfo_file)
     : process(std::make_unique<Process>(std::vector<std::string>{
-          "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file",
+          "--listen", "127.0.0.1:0", "--store", "postgres",
+          conninfo_file.ends_with(".shards") ? "--postgres-shards" : "--postgres-conninfo-file",
           conninfo_file, "--postgres-servers", "many"})) {}
 
 void ManyServersTest::Server::AwaitListening() {
@@ -107,10 +107,14 @@ void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& histo
   const size_t name = calls.share_writers ? number % (kClients / 2) : number;
   HistoryClient client(Connect(number % servers_.size()), history, absl::StrCat("client-", name),
                        100 * calls.seed + number);
+  if (calls.pairs) client.TellStores();
   const auto move_on = [&] { client.Connect(Connect(random() % servers_.size())); };
   for (int call = 0; call < calls.each; ++call) {
-    const char* const hull = kHulls[call % 3 == 0 ? 0 : 1];
-    if (!client.CallAtRandom(hull)) {
+    const std::string& hull = calls.hulls[call % 3 == 0 ? 0 : 1];
+    const bool is_pair = calls.pairs && random() % 4 == 0;
+    const bool is_answered =
+        is_pair ? client.Pair(calls.hulls[0], calls.hulls[1]) : client.CallAtRandom(hull);
+    if (!is_answered) {
       // Questions alone, so that the history holds few changes of which nobody knows.
       int questions = 0;
       do {
@@ -155,7 +159,8 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
   for (std::thread& client : clients) client.join();
   for (size_t i = 0; i < servers_.size(); ++i) {
     HistoryClient last(Connect(i), history, "last", i);
-    for (const char* hull : kHulls) {
+    if (calls.pairs) last.TellStores();
+    for (const std::string& hull : calls.hulls) {
       EXPECT_TRUE(last.Get(hull)) << "server " << i << " does not answer, seed " << calls.seed;
       EXPECT_TRUE(last.Mesh(hull)) << "server " << i << " does not answer, seed " << calls.seed;
     }

@@ -28,7 +28,7 @@ class ManyServersTest : public ::testing::Test {
   void SetUp() override;
 
   // Ends the servers that there were, and starts one for each file with a connection string, one
-  // after the other, or all at once.
+  // after the other, or all at once. A file whose name ends in ".shards" names several databases.
   void Begin(const std::vector<std::string>& conninfo_files);
   void BeginAtOnce(const std::vector<std::string>& conninfo_files);
   // kServers over an empty database of the shared cluster.
@@ -48,6 +48,10 @@ class ManyServersTest : public ::testing::Test {
     uint64_t seed = 0;
     // Clients with numbers that differ by half of kClients write under the same ID.
     bool share_writers = false;
+    // Two, which are called about.
+    std::vector<std::string> hulls = {"shared/a", "shared/b"};
+    // Clients ask how they stand to each other, too. They are in two shards.
+    bool pairs = false;
   };
   using Fault = std::function<void()>;
   // Clients call at random, each another server now and then, and one that is not answered goes on
