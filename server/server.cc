@@ -55,6 +55,7 @@ absl::StatusOr<std::unique_ptr<Store>> OpenPostgres(const Config& config,
   if (!conninfo.ok()) return conninfo.status();
   PostgresOptions options;
   options.conninfo = *std::move(conninfo);
+  options.setting = slots.empty() ? setting : absl::StrCat(setting, ", ", conninfo_file);
   options.take_over = config.take_over;
   options.shared = config.postgres_servers == "many";
   options.slots = slots;
@@ -94,9 +95,7 @@ absl::StatusOr<Server::Stores> Server::OpenStores(const Config& config,
   for (const ShardFile::Shard& shard : file->shards) {
     absl::StatusOr<std::unique_ptr<Store>> store =
         OpenPostgres(config, shard.conninfo_file, "--postgres-shards", shard.slots, should_stop);
-    if (!store.ok()) {
-      return Prefixed(absl::StrCat("shard ", shard.conninfo_file, ": "), store.status());
-    }
+    if (!store.ok()) return store.status();
     for (const auto& other : opened.stores) {
       if (other->id() != (*store)->id()) continue;
       return absl::InvalidArgumentError(

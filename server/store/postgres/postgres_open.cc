@@ -153,16 +153,15 @@ std::string OwnerName() {
 }
 
 // What failed, for whoever starts a server.
-absl::Status OpenFailed(const absl::Status& status) {
+absl::Status OpenFailed(const PostgresOptions& options, const absl::Status& status) {
   std::string advice;
   if (SqlState(status) == "42501") {
     advice =
         "; the schema \"hulld\" and its tables must belong to the role of hulld, or the role must "
         "be allowed to make them: CREATE SCHEMA hulld AUTHORIZATION the_role";
   }
-  return absl::Status(status.code(),
-                      absl::StrCat("the store in PostgreSQL (--postgres-conninfo-file): ",
-                                   status.message(), advice));
+  return absl::Status(status.code(), absl::StrCat("the store in PostgreSQL (", options.setting,
+                                                  "): ", status.message(), advice));
 }
 
 }  // namespace
@@ -177,19 +176,20 @@ PostgresStore::PostgresStore(PostgresOptions options, Conninfo conninfo)
 absl::StatusOr<std::unique_ptr<PostgresStore>> PostgresStore::Open(PostgresOptions options) {
   absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(options.conninfo);
   if (!conninfo.ok()) {
-    return Prefixed("--postgres-conninfo-file: ", conninfo.status());
+    return Prefixed(absl::StrCat(options.setting, ": "), conninfo.status());
   }
   std::unique_ptr<PostgresStore> store(new PostgresStore(std::move(options), *std::move(conninfo)));
   absl::StatusOr<std::unique_ptr<Session>> session = store->OpenKeeper();
-  if (!session.ok()) return OpenFailed(session.status());
+  if (!session.ok()) return OpenFailed(store->options_, session.status());
   store->keeper_session_ = *std::move(session);
-  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok()) return OpenFailed(s);
-  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(s);
+  if (absl::Status s = store->CheckServer(*store->keeper_session_); !s.ok())
+    return OpenFailed(store->options_, s);
+  if (absl::Status s = store->WaitForTurn(); !s.ok()) return OpenFailed(store->options_, s);
   Session& keeper = *store->keeper_session_;
   const bool shared = store->options_.shared;
   const absl::Status made = shared ? store->MakeSharedSchema(keeper) : store->MakeSchema(keeper);
-  if (!made.ok()) return OpenFailed(made);
-  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(s);
+  if (!made.ok()) return OpenFailed(store->options_, made);
+  if (absl::Status s = store->BeginPatiently(); !s.ok()) return OpenFailed(store->options_, s);
   if (shared && store->options_.notices) store->StartNotices();
   store->keeper_ = std::thread([raw = store.get()] { raw->Keep(); });
   return store;

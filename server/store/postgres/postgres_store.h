@@ -29,6 +29,8 @@ namespace hulld::server {
 struct PostgresOptions {
   // A connection string of libpq.
   std::string conninfo;
+  // The setting that names it, for what is told when the store cannot be opened.
+  std::string setting = "--postgres-conninfo-file";
   // Takes the store from the server that is active, instead of waiting for its end.
   bool take_over = false;
   // Opens a store that a migration has not finished, too.

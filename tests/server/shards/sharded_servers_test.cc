@@ -206,6 +206,13 @@ TEST_F(ShardedServers, AServerWhoseFileSaysOtherwiseIsRefused) {
       HasSubstr("holds slots 512-1023, and the file of --postgres-shards gives it 512-1000"));
   EXPECT_THAT(Refuse("--postgres-shards", WriteShards("hole", {{"0-511", conninfos_[0]}})),
               HasSubstr("no line names slot 512-1023"));
+  const std::string away = conninfos_[1] + ".away";
+  std::ofstream(away) << "host=/nowhere dbname=hulld";
+  std::filesystem::permissions(away, std::filesystem::perms::owner_read);
+  const std::string unreachable = Refuse(
+      "--postgres-shards", WriteShards("away", {{"0-511", conninfos_[0]}, {"512-1023", away}}));
+  EXPECT_THAT(unreachable, HasSubstr("--postgres-shards, " + away));
+  EXPECT_THAT(unreachable, Not(HasSubstr("--postgres-conninfo-file")));
   // The server that is there was not disturbed.
   PutCube(ClientOf(0), kFirst, 1);
   PutCube(ClientOf(0), kSecond, 1);
