@@ -24,14 +24,24 @@ void ServiceProgram::WatchHulls() {
   const size_t kind = in_.Below(4);
   // Mostly from the start, else as after a break of the connection.
   if (kind > 0) request.clear_after_revision();
+  if (kind > 0) request.clear_after();
   if (kind == 0) request.set_store_id(service_.store_id_);
   if (kind == 1) request.set_store_id("another");
   if (!request.hull_id().empty() && !in_.OneOf(4)) request.clear_prefix();
   HullWatchCheck check(request);
   if (!WatchHullsOnce(request, true, &check) || !finding_.empty()) return;
   if (check.header().revision() == 0) return;
-  request.set_after_revision(check.header().revision());
-  request.set_store_id(check.header().store_id());
+  // By either of the fields, which say the same of one store.
+  request.clear_after_revision();
+  request.clear_after();
+  if (in_.OneOf(2)) {
+    v1::ShardRevision* const after = request.add_after();
+    after->set_revision(check.header().revision());
+    after->set_store_id(check.header().store_id());
+  } else {
+    request.set_after_revision(check.header().revision());
+    request.set_store_id(check.header().store_id());
+  }
   HullWatchCheck resumed(request);
   if (!WatchHullsOnce(request, false, &resumed) || !finding_.empty()) return;
   Reach("WatchHulls resumed");
@@ -57,7 +67,7 @@ bool ServiceProgram::WatchHullsOnce(const v1::WatchHullsRequest& request, bool t
   };
   bool told = read_until([&] { return check->is_synced(); });
   // A watch that was resumed tells what changed.
-  const bool tells_all = request.after_revision() == 0 || check->is_anew();
+  const bool tells_all = !Resumes(request) || check->is_anew();
   if (told && tells_all) CompareWatched(*check);
   if (told && then_change) {
     const auto before = hulls_;

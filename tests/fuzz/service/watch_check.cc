@@ -30,6 +30,10 @@ bool IsThere(const v1::HullEvent& event) {
 
 }  // namespace
 
+bool Resumes(const v1::WatchHullsRequest& request) {
+  return request.after_revision() > 0 || !request.after().empty();
+}
+
 bool HullWatchCheck::Watches(const std::string& hull_id) const {
   if (!request_.hull_id().empty()) return hull_id == request_.hull_id();
   return absl::StartsWith(hull_id, request_.prefix());
@@ -37,7 +41,7 @@ bool HullWatchCheck::Watches(const std::string& hull_id) const {
 
 std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
   if (response.anew()) {
-    if (request_.after_revision() == 0) return "a watch from the start starts anew";
+    if (!Resumes(request_)) return "a watch from the start starts anew";
     hulls_.clear();
     bodies_.clear();
     is_synced_ = false;
@@ -81,7 +85,7 @@ std::string HullWatchCheck::Received(const v1::WatchHullsResponse& response) {
 std::string HullWatchCheck::TakeEvent(const v1::HullEvent& event) {
   const v1::HullInfo& hull = event.hull();
   if (!Watches(hull.hull_id())) return "it is not watched";
-  const bool is_resumed = request_.after_revision() > 0 && !is_anew_;
+  const bool is_resumed = Resumes(request_) && !is_anew_;
   const bool was_body = bodies_.erase(hull.hull_id()) > 0;
   const bool was_known = was_body || hulls_.count(hull.hull_id()) > 0;
   if (event.kind() == v1::HULL_EVENT_KIND_DELETED) {

@@ -12,6 +12,9 @@
 
 namespace hulld::fuzz {
 
+// Whether it goes on behind what an earlier watch was told.
+bool Resumes(const v1::WatchHullsRequest& request);
+
 // Follows one WatchHulls call: what its client knows of the hulls. Functions return what is wrong
 // with a message, or nothing.
 class HullWatchCheck {
