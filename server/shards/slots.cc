@@ -1,7 +1,9 @@
 #include "server/shards/slots.h"
 
 #include <absl/status/status.h>
+#include <absl/strings/ascii.h>
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_split.h>
 
 #include <algorithm>
 #include <charconv>
@@ -21,24 +23,6 @@ absl::Status Malformed(size_t line, const std::string& what) {
   return absl::InvalidArgumentError(absl::StrCat("line ", line, ": ", what));
 }
 
-// What is between the separators.
-std::vector<std::string> Split(std::string_view text, char separator) {
-  std::vector<std::string> parts;
-  while (true) {
-    const size_t end = text.find(separator);
-    parts.emplace_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
-std::string Stripped(const std::string& text) {
-  constexpr const char* kSpace = " \t\r";
-  const size_t begin = text.find_first_not_of(kSpace);
-  if (begin == std::string::npos) return "";
-  return text.substr(begin, text.find_last_not_of(kSpace) + 1 - begin);
-}
-
 std::optional<size_t> ParseSlot(std::string_view text) {
   size_t slot = 0;
   const char* const end = text.data() + text.size();
@@ -48,9 +32,10 @@ std::optional<size_t> ParseSlot(std::string_view text) {
 }
 
 // Gives the slots of one line to a shard.
-absl::Status TakeSlots(std::string_view text, size_t line, uint16_t shard,
+absl::Status TakeSlots(const std::string& text, size_t line, uint16_t shard,
                        const std::vector<size_t>& lines, ShardFile* file) {
-  for (const std::string& part : Split(text, ',')) {
+  const std::vector<std::string> parts = absl::StrSplit(text, ',');
+  for (const std::string& part : parts) {
     const size_t dash = part.find('-');
     const std::optional<size_t> first = ParseSlot(std::string_view(part).substr(0, dash));
     const std::optional<size_t> last =
@@ -98,15 +83,16 @@ absl::StatusOr<ShardFile> ParseShardFile(std::string_view text, const std::strin
   // Of each shard.
   std::vector<size_t> lines;
   size_t line = 0;
-  for (const std::string& whole : Split(text, '\n')) {
+  const std::vector<std::string> rows = absl::StrSplit(std::string(text), '\n');
+  for (const std::string& whole : rows) {
     ++line;
-    const std::string row = Stripped(whole.substr(0, whole.find('#')));
+    const std::string row(absl::StripAsciiWhitespace(whole.substr(0, whole.find('#'))));
     if (row.empty()) continue;
     const size_t space = row.find_first_of(" \t");
     if (space == std::string::npos) {
       return Malformed(line, "it is SLOTS CONNINFO_FILE, as in \"0-511 /etc/hulld/a.conninfo\"");
     }
-    const std::string path = Stripped(row.substr(space));
+    const std::string path(absl::StripAsciiWhitespace(row.substr(space)));
     lines.push_back(line);
     const auto shard = static_cast<uint16_t>(file.shards.size());
     if (absl::Status s = TakeSlots(row.substr(0, space), line, shard, lines, &file); !s.ok()) {

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
-from types import TracebackType
-from typing import Any, Literal, TypeVar
+from typing import Literal
 
 import grpc
-import grpc.experimental
 import numpy.typing as npt
 
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
@@ -21,7 +18,6 @@ from hulld.answers.hulls import (
     HullChanges,
     HullInfo,
     HullMesh,
-    MeshAssembly,
     MeshPart,
     ReplacedHull,
     decode_replaced,
@@ -30,30 +26,25 @@ from hulld.answers.status import ServerStatus
 from hulld.appender import Appender, chunks_to_send
 from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
-from hulld.calls.attempts import Attempts
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
 from hulld.calls.freshness import Freshness
 from hulld.calls.requests import Call, SceneFilter
 from hulld.calls.told_pairs import WatchedPlacements
 from hulld.calls.wanted import Wanted
+from hulld.client_base import ClientBase
 from hulld.collision_stream import CollisionStream
-from hulld.connection import DEFAULT_SERVER, Connection, PathLike, Tls
+from hulld.connection import PathLike
 from hulld.errors import from_rpc_error, read_answer
 from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, all_pairs, as_pairs
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
-from hulld.notebook import Viewer
-from hulld.retry import RetryPolicy
 from hulld.watches import CollisionWatch, HullWatch
 from hulld.wire import MessageWriter
 
-T = TypeVar("T")
-
-DEFAULT_TIMEOUT = 30.0
 DEFAULT_IN_FLIGHT_BYTES = 8 << 20
 DEFAULT_IN_FLIGHT_CHUNKS = 64
 
 
-class Client:
+class Client(ClientBase):
     """A connection to hulld. Connects when first used; any thread may call it. A context manager,
     which closes it.
 
@@ -76,62 +67,6 @@ class Client:
     Numbers are never changed on the way: the doubles of an array are those that the server gets,
     and those of an answer are those that it sent.
     """
-
-    def __init__(
-        self,
-        server: str = DEFAULT_SERVER,
-        *,
-        timeout: float | None = DEFAULT_TIMEOUT,
-        retry: RetryPolicy = RetryPolicy(),
-        tls: Tls | None = None,
-        token: str | None = None,
-        insecure: bool = False,
-    ) -> None:
-        self._connection = Connection(server, tls, token, insecure)
-        self._viewer = Viewer(self._connection)
-        self._timeout = timeout
-        self._retry = retry
-        credentials = self._connection.credentials()
-        # Answers that stream then need no thread of their own: observed, 2 ms less for each call.
-        options = [
-            *self._connection.options(),
-            (grpc.experimental.ChannelOptions.SingleThreadedUnaryStream, 1),
-        ]
-        self._channel = (
-            grpc.insecure_channel(self._connection.target, options)
-            if credentials is None
-            else grpc.secure_channel(self._connection.target, credentials, options)
-        )
-        self._calls: dict[str, Any] = {}
-
-    @property
-    def server(self) -> str:
-        """The address that was given."""
-        return self._connection.server
-
-    @property
-    def channel(self) -> Any:
-        """gRPC's channel, for the generated stubs in hulld.v1. Calls through it carry no token of
-        their own accord."""
-        return self._channel
-
-    def close(self) -> None:
-        """Ends the connection and every call on it."""
-        self._channel.close()
-
-    def __enter__(self) -> Client:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def __repr__(self) -> str:
-        return f"hulld.Client({self.server!r})"
 
     # --- The server ---
 
@@ -272,8 +207,7 @@ class Client:
         canonical hull. NotFoundError: no such hull.
         """
         return self._unary(
-            requests.as_fresh(requests.get_hull(hull_id, audit, facets, self._viewer), freshness),
-            timeout,
+            requests.get_hull(hull_id, audit, facets, self._viewer), timeout, freshness
         )
 
     def get_hull_mesh(
@@ -295,10 +229,7 @@ class Client:
         cannot be met. NotFoundError: no such hull.
         """
         return self._mesh(
-            requests.as_fresh(
-                requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
-            ),
-            timeout,
+            requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout, freshness
         )
 
     def iter_hull_mesh(
@@ -314,10 +245,7 @@ class Client:
         """The same in parts of about 1 MiB, as they arrive: MeshHeader, then MeshVertices, then
         MeshFacets."""
         return self._parts(
-            requests.as_fresh(
-                requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
-            ),
-            timeout,
+            requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout, freshness
         )
 
     def list_hulls(
@@ -332,9 +260,7 @@ class Client:
         page. A hull present throughout appears exactly once. `timeout` is for each page."""
         token = ""
         while True:
-            page = self._unary(
-                requests.as_fresh(requests.list_hulls(prefix, page_size, token), freshness), timeout
-            )
+            page = self._unary(requests.list_hulls(prefix, page_size, token), timeout, freshness)
             yield from page.hulls
             token = page.next_page
             freshness = freshness and freshness.for_next_page(page.header)
@@ -403,7 +329,7 @@ class Client:
         self, body_id: str, *, freshness: Freshness | None = None, timeout: float | None = None
     ) -> Body:
         """The pieces of a body. NotFoundError: no such body."""
-        return self._unary(requests.as_fresh(requests.get_body(body_id), freshness), timeout)
+        return self._unary(requests.get_body(body_id), timeout, freshness)
 
     def list_bodies(
         self,
@@ -416,10 +342,7 @@ class Client:
         """The bodies whose IDs start with `prefix`, without their pieces; as list_hulls."""
         token = ""
         while True:
-            page = self._unary(
-                requests.as_fresh(requests.list_bodies(prefix, page_size, token), freshness),
-                timeout,
-            )
+            page = self._unary(requests.list_bodies(prefix, page_size, token), timeout, freshness)
             yield from page.bodies
             token = page.next_page
             freshness = freshness and freshness.for_next_page(page.header)
@@ -470,10 +393,9 @@ class Client:
         """
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._unary(
-            requests.as_fresh(
-                requests.check_collision(a, b, wanted, tolerance, method, self._viewer), freshness
-            ),
+            requests.check_collision(a, b, wanted, tolerance, method, self._viewer),
             timeout,
+            freshness,
         )
 
     def check_collisions(
@@ -505,10 +427,9 @@ class Client:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         batch = BatchAssembly(asked, wanted)
         for data in self._received(
-            requests.as_fresh(
-                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
-            ),
+            requests.check_collisions(packed, asked, wanted, tolerance, method),
             self._seconds(timeout),
+            freshness,
         ):
             read_answer(batch.add, data)
         return read_answer(lambda _: batch.finish(), None)
@@ -535,10 +456,7 @@ class Client:
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.as_fresh(
-                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
-            ),
-            timeout,
+            requests.check_collisions(packed, asked, wanted, tolerance, method), timeout, freshness
         )
 
     def find_collisions(
@@ -572,11 +490,9 @@ class Client:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         found = SceneAssembly(wanted)
         for data in self._received(
-            requests.as_fresh(
-                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
-                freshness,
-            ),
+            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
             self._seconds(timeout),
+            freshness,
         ):
             read_answer(found.add, data)
         return read_answer(lambda _: found.finish(), None)
@@ -605,11 +521,9 @@ class Client:
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.as_fresh(
-                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
-                freshness,
-            ),
+            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
             timeout,
+            freshness,
         )
 
     def stream_collisions(
@@ -672,66 +586,3 @@ class Client:
             self._retry,
             self._seconds(timeout),
         )
-
-    # --- How calls are made ---
-
-    def _seconds(self, timeout: float | None) -> float | None:
-        return self._timeout if timeout is None else timeout
-
-    def _start(self, call: Call[Any], timeout: float | None) -> Any:
-        """Starts a call whose answer streams."""
-        multi = self._calls.get(call.method) or self._calls.setdefault(
-            call.method, self._channel.unary_stream(call.method)
-        )
-        return multi(call.request, timeout=timeout, metadata=self._connection.metadata())
-
-    def _unary(self, call: Call[T], timeout: float | None) -> T:
-        multi = self._calls.get(call.method) or self._calls.setdefault(
-            call.method, self._channel.unary_unary(call.method)
-        )
-        attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
-        while True:
-            try:
-                answer = multi(
-                    call.request, timeout=attempts.remaining(), metadata=self._connection.metadata()
-                )
-            except grpc.RpcError as error:
-                time.sleep(attempts.wait_after(from_rpc_error(error)))
-                continue
-            return read_answer(call.decode, answer)
-
-    def _received(self, call: Call[Any], timeout: float | None) -> Iterator[bytes]:
-        """The messages of an answer. Retried only while nothing was received."""
-        attempts = Attempts(self._retry, call.safe_to_repeat, timeout)
-        received = False
-        while True:
-            stream = self._start(call, attempts.remaining())
-            try:
-                for data in stream:
-                    received = True
-                    yield data
-                return
-            except grpc.RpcError as error:
-                failed = from_rpc_error(error)
-            finally:
-                stream.cancel()
-            if received:
-                raise failed
-            time.sleep(attempts.wait_after(failed))
-
-    def _parts(self, call: Call[T], timeout: float | None) -> Iterator[T]:
-        for data in self._received(call, self._seconds(timeout)):
-            yield read_answer(call.decode, data)
-
-    def _mesh(self, call: Call[MeshPart], timeout: float | None) -> HullMesh:
-        """Retried from the start, whatever was received."""
-        attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
-        while True:
-            mesh = MeshAssembly()
-            try:
-                for data in self._start(call, attempts.remaining()):
-                    mesh.add(read_answer(call.decode, data))
-            except grpc.RpcError as error:
-                time.sleep(attempts.wait_after(from_rpc_error(error)))
-                continue
-            return read_answer(mesh.finish, self._viewer)

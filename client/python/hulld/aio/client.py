@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
-from types import TracebackType
-from typing import Any, Literal, TypeVar, cast
+from typing import Literal, cast
 
 import grpc
 import numpy.typing as npt
 
 from hulld.aio.appender import AsyncAppender
+from hulld.aio.client_base import AsyncClientBase
 from hulld.aio.collision_stream import AsyncCollisionStream
 from hulld.aio.watches import AsyncCollisionWatch, AsyncHullWatch
 from hulld.answers.assembly import BatchAssembly, SceneAssembly
@@ -23,7 +23,6 @@ from hulld.answers.hulls import (
     HullChanges,
     HullInfo,
     HullMesh,
-    MeshAssembly,
     MeshPart,
     ReplacedHull,
     decode_replaced,
@@ -33,83 +32,23 @@ from hulld.appender import chunks_to_send
 from hulld.backup import Backup, BackupWriter
 from hulld.calls import requests
 from hulld.calls.append_state import DEFAULT_CHUNK_BYTES, Appended, AppendState
-from hulld.calls.attempts import Attempts
 from hulld.calls.freshness import Freshness
 from hulld.calls.requests import Call, SceneFilter
 from hulld.calls.told_pairs import WatchedPlacements
 from hulld.calls.wanted import Wanted
-from hulld.client import DEFAULT_IN_FLIGHT_BYTES, DEFAULT_IN_FLIGHT_CHUNKS, DEFAULT_TIMEOUT
-from hulld.connection import DEFAULT_SERVER, Connection, PathLike, Tls
+from hulld.client import DEFAULT_IN_FLIGHT_BYTES, DEFAULT_IN_FLIGHT_CHUNKS
+from hulld.connection import PathLike
 from hulld.errors import from_rpc_error, read_answer
 from hulld.geometry.placements import PlacementLike, Placements, PlacementsLike, all_pairs, as_pairs
 from hulld.geometry.points import PointsLike, as_points, chunks_of, point_block
-from hulld.notebook import Viewer
-from hulld.retry import RetryPolicy
 from hulld.wire import MessageWriter
 
-T = TypeVar("T")
 
-
-class AsyncClient:
+class AsyncClient(AsyncClientBase):
     """hulld.Client for asyncio: the same methods with the same arguments, answers and errors. Calls
     are awaited; lists, parts and watches are iterated by `async for`; streams are entered by `async
     with`. For one event loop.
     """
-
-    def __init__(
-        self,
-        server: str = DEFAULT_SERVER,
-        *,
-        timeout: float | None = DEFAULT_TIMEOUT,
-        retry: RetryPolicy = RetryPolicy(),
-        tls: Tls | None = None,
-        token: str | None = None,
-        insecure: bool = False,
-    ) -> None:
-        self._connection = Connection(server, tls, token, insecure)
-        self._viewer = Viewer(self._connection)
-        self._timeout = timeout
-        self._retry = retry
-        self._credentials = self._connection.credentials()
-        self._open_channel: Any = None
-        self._calls: dict[str, Any] = {}
-
-    @property
-    def server(self) -> str:
-        """As Client.server."""
-        return self._connection.server
-
-    @property
-    def channel(self) -> Any:
-        """As Client.channel: a grpc.aio.Channel, made when it is first needed, as it belongs to the
-        loop that runs then."""
-        if self._open_channel is None:
-            options = self._connection.options()
-            self._open_channel = (
-                grpc.aio.insecure_channel(self._connection.target, options)
-                if self._credentials is None
-                else grpc.aio.secure_channel(self._connection.target, self._credentials, options)
-            )
-        return self._open_channel
-
-    async def close(self) -> None:
-        """As Client.close."""
-        if self._open_channel is not None:
-            await self._open_channel.close()
-
-    async def __aenter__(self) -> AsyncClient:
-        return self
-
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        await self.close()
-
-    def __repr__(self) -> str:
-        return f"hulld.AsyncClient({self.server!r})"
 
     # --- The server ---
 
@@ -227,8 +166,7 @@ class AsyncClient:
     ) -> Hull:
         """As Client.get_hull."""
         return await self._unary(
-            requests.as_fresh(requests.get_hull(hull_id, audit, facets, self._viewer), freshness),
-            timeout,
+            requests.get_hull(hull_id, audit, facets, self._viewer), timeout, freshness
         )
 
     async def get_hull_mesh(
@@ -242,19 +180,9 @@ class AsyncClient:
         timeout: float | None = None,
     ) -> HullMesh:
         """As Client.get_hull_mesh."""
-        call = requests.as_fresh(
-            requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
+        return await self._mesh(
+            requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout, freshness
         )
-        attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
-        while True:
-            mesh = MeshAssembly()
-            try:
-                async for data in self._start(call, attempts.remaining()):
-                    mesh.add(read_answer(call.decode, data))
-            except grpc.RpcError as error:
-                await asyncio.sleep(attempts.wait_after(from_rpc_error(error)))
-                continue
-            return read_answer(mesh.finish, self._viewer)
 
     def iter_hull_mesh(
         self,
@@ -268,10 +196,7 @@ class AsyncClient:
     ) -> AsyncIterator[MeshPart]:
         """As Client.iter_hull_mesh."""
         return self._parts(
-            requests.as_fresh(
-                requests.get_hull_mesh(hull_id, side, max_vertices, max_error), freshness
-            ),
-            timeout,
+            requests.get_hull_mesh(hull_id, side, max_vertices, max_error), timeout, freshness
         )
 
     async def list_hulls(
@@ -286,7 +211,7 @@ class AsyncClient:
         token = ""
         while True:
             page = await self._unary(
-                requests.as_fresh(requests.list_hulls(prefix, page_size, token), freshness), timeout
+                requests.list_hulls(prefix, page_size, token), timeout, freshness
             )
             for hull in page.hulls:
                 yield hull
@@ -340,7 +265,7 @@ class AsyncClient:
         self, body_id: str, *, freshness: Freshness | None = None, timeout: float | None = None
     ) -> Body:
         """As Client.get_body."""
-        return await self._unary(requests.as_fresh(requests.get_body(body_id), freshness), timeout)
+        return await self._unary(requests.get_body(body_id), timeout, freshness)
 
     async def list_bodies(
         self,
@@ -354,8 +279,7 @@ class AsyncClient:
         token = ""
         while True:
             page = await self._unary(
-                requests.as_fresh(requests.list_bodies(prefix, page_size, token), freshness),
-                timeout,
+                requests.list_bodies(prefix, page_size, token), timeout, freshness
             )
             for body in page.bodies:
                 yield body
@@ -392,10 +316,9 @@ class AsyncClient:
         """As Client.check_collision."""
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return await self._unary(
-            requests.as_fresh(
-                requests.check_collision(a, b, wanted, tolerance, method, self._viewer), freshness
-            ),
+            requests.check_collision(a, b, wanted, tolerance, method, self._viewer),
             timeout,
+            freshness,
         )
 
     async def check_collisions(
@@ -421,10 +344,9 @@ class AsyncClient:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         batch = BatchAssembly(asked, wanted)
         async for data in self._received(
-            requests.as_fresh(
-                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
-            ),
+            requests.check_collisions(packed, asked, wanted, tolerance, method),
             self._seconds(timeout),
+            freshness,
         ):
             read_answer(batch.add, data)
         return read_answer(lambda _: batch.finish(), None)
@@ -451,10 +373,7 @@ class AsyncClient:
         asked = all_pairs(len(packed)) if pairs is None else as_pairs(pairs, len(packed))
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.as_fresh(
-                requests.check_collisions(packed, asked, wanted, tolerance, method), freshness
-            ),
-            timeout,
+            requests.check_collisions(packed, asked, wanted, tolerance, method), timeout, freshness
         )
 
     async def find_collisions(
@@ -481,11 +400,9 @@ class AsyncClient:
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         found = SceneAssembly(wanted)
         async for data in self._received(
-            requests.as_fresh(
-                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
-                freshness,
-            ),
+            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
             self._seconds(timeout),
+            freshness,
         ):
             read_answer(found.add, data)
         return read_answer(lambda _: found.finish(), None)
@@ -513,11 +430,9 @@ class AsyncClient:
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)
         return self._parts(
-            requests.as_fresh(
-                requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
-                freshness,
-            ),
+            requests.find_collisions(Placements.of(placements), scene, wanted, tolerance),
             timeout,
+            freshness,
         )
 
     def stream_collisions(
@@ -576,56 +491,6 @@ class AsyncClient:
             self._retry,
             self._seconds(timeout),
         )
-
-    # --- How calls are made ---
-
-    def _seconds(self, timeout: float | None) -> float | None:
-        return self._timeout if timeout is None else timeout
-
-    def _start(self, call: Call[Any], timeout: float | None) -> Any:
-        """Starts a call whose answer streams."""
-        multi = self._calls.get(call.method) or self._calls.setdefault(
-            call.method, self.channel.unary_stream(call.method)
-        )
-        return multi(call.request, timeout=timeout, metadata=self._connection.metadata())
-
-    async def _unary(self, call: Call[T], timeout: float | None) -> T:
-        multi = self._calls.get(call.method) or self._calls.setdefault(
-            call.method, self.channel.unary_unary(call.method)
-        )
-        attempts = Attempts(self._retry, call.safe_to_repeat, self._seconds(timeout))
-        while True:
-            try:
-                answer = await multi(
-                    call.request, timeout=attempts.remaining(), metadata=self._connection.metadata()
-                )
-            except grpc.RpcError as error:
-                await asyncio.sleep(attempts.wait_after(from_rpc_error(error)))
-                continue
-            return read_answer(call.decode, answer)
-
-    async def _received(self, call: Call[Any], timeout: float | None) -> AsyncIterator[bytes]:
-        """The messages of an answer. Retried only while nothing was received."""
-        attempts = Attempts(self._retry, call.safe_to_repeat, timeout)
-        received = False
-        while True:
-            stream = self._start(call, attempts.remaining())
-            try:
-                async for data in stream:
-                    received = True
-                    yield data
-                return
-            except grpc.RpcError as error:
-                failed = from_rpc_error(error)
-            finally:
-                stream.cancel()
-            if received:
-                raise failed
-            await asyncio.sleep(attempts.wait_after(failed))
-
-    async def _parts(self, call: Call[T], timeout: float | None) -> AsyncIterator[T]:
-        async for data in self._received(call, self._seconds(timeout)):
-            yield read_answer(call.decode, data)
 
 
 async def _blocks(

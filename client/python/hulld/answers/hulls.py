@@ -19,8 +19,9 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 class Header:
     """The store, and its revision that a reply was answered from. Revisions of different stores
     mean nothing to each other. Of several stores (shards) that a reply was answered from, `shards`
-    names each with its revision; store_id and revision are empty then. staleness: seconds; the answer to a read with a Freshness holds
-    everything that was committed up to that long before the call, at least."""
+    names each with its revision; store_id and revision are empty then. staleness: seconds; the
+    answer to a read with a Freshness holds everything that was committed up to that long before the
+    call, at least."""
 
     store_id: str
     revision: int

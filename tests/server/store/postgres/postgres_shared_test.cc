@@ -85,6 +85,15 @@ class PostgresShared : public PostgresTest {
       std::this_thread::yield();
     }
   }
+  // A cube is there, and a point is added whose COMMIT the proxy holds back, until another session
+  // waits for the turn. The future is that of Put.
+  auto PutAPointWhoseCommitIsHeld() {
+    EXPECT_TRUE(hulls_->Put("h", CubeCorners()).ok());
+    proxy_->CutNext(Cut::kHoldCommit);
+    auto put = std::async(std::launch::async, [this] { return hulls_->Put("h", {{9, 9, 9}}); });
+    AwaitSession("datname = current_database() AND wait_event_type = 'Lock'");
+    return put;
+  }
   static std::vector<std::string> Listed(PostgresRegistry& server) {
     EXPECT_TRUE(server.registry().AwaitOthers({}).ok());
     std::vector<std::string> ids;
@@ -427,10 +436,7 @@ TEST_F(PostgresShared, AnOutcomeThatIsNotKnownIsFollowedLater) {
 TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
   Start();
   const Server other = StartBeside();
-  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  proxy_->CutNext(Cut::kHoldCommit);
-  auto put = std::async(std::launch::async, [this] { return hulls_->Put("h", {{9, 9, 9}}); });
-  AwaitSession("datname = current_database() AND wait_event_type = 'Lock'");
+  auto put = PutAPointWhoseCommitIsHeld();
   proxy_->Deliver();
   const auto result = put.get();
   ASSERT_TRUE(result.ok()) << result.status();
@@ -443,10 +449,7 @@ TEST_F(PostgresShared, ACommitThatArrivesLateIsWaitedFor) {
 TEST_F(PostgresShared, ACommitThatArrivesAfterItsTurnChangesNothing) {
   Start();
   const Server other = StartBeside();
-  ASSERT_TRUE(hulls_->Put("h", CubeCorners()).ok());
-  proxy_->CutNext(Cut::kHoldCommit);
-  auto put = std::async(std::launch::async, [this] { return hulls_->Put("h", {{9, 9, 9}}); });
-  AwaitSession("datname = current_database() AND wait_event_type = 'Lock'");
+  auto put = PutAPointWhoseCommitIsHeld();
   // As it does itself once nothing has come for ten seconds.
   EndSessions("state = 'idle in transaction'");
   ASSERT_TRUE(put.get().ok());
