@@ -180,10 +180,11 @@ void Committer::TellOthers(Locked& locked, const OtherChanges& others,
                            std::vector<Pending>& batch) {
   std::vector<Pending> superseded;
   const auto take_from = [&](std::vector<Pending>& pending) {
-    const auto [first, last] = std::ranges::stable_partition(
-        pending, [&](const Pending& each) { return !others.by_id.contains(each.change.id()); });
-    std::move(first, last, std::back_inserter(superseded));
-    pending.erase(first, last);
+    const auto first = std::stable_partition(
+        pending.begin(), pending.end(),
+        [&](const Pending& each) { return !others.by_id.contains(each.change.id()); });
+    std::move(first, pending.end(), std::back_inserter(superseded));
+    pending.erase(first, pending.end());
   };
   take_from(batch);
   {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -212,7 +211,9 @@ void Registry::LoadMany(Locked& locked, std::span<const std::string> ids, KnownH
   }
   // And the one of the caller.
   const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
-  for (const uint32_t k : std::span(hulls.due_).last(count) | std::views::reverse) {
+  // The last one that is due comes first.
+  for (size_t i = 1; i <= count; ++i) {
+    const uint32_t k = hulls.due_[hulls.due_.size() - i];
     locked.NoteLookup();
     const HullPointer hull = FindVisible(ids[hulls.hulls_[k].first]);
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
