@@ -27,7 +27,7 @@ void Sort(std::span<Ranked> vertices) {
   });
 }
 
-// Sorts into canonical order, unless the poll says stop.
+// Sorts into canonical order; after the poll said stop, nothing holds.
 //
 // Idea: the x of most hulls are spread out, so as many slices across x as there are vertices leave
 // few in each, and only these are compared. The slice of an x is a composition of rounded
@@ -37,6 +37,7 @@ std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) 
   double least = INFINITY;
   double largest = -INFINITY;
   for (const Ranked& v : vertices) {
+    if (poll.Step()) return vertices;
     least = std::min(least, v.point.x());
     largest = std::max(largest, v.point.x());
   }
@@ -52,11 +53,17 @@ std::vector<Ranked> SortedByPoint(std::vector<Ranked> vertices, StopPoll& poll) 
   };
   // ends[s]: first where slice s begins, then, as it fills, where it ends.
   std::vector<uint32_t> ends(vertices.size(), 0);
-  for (const Ranked& v : vertices) ++ends[slice_of(v)];
+  for (const Ranked& v : vertices) {
+    if (poll.Step()) return vertices;
+    ++ends[slice_of(v)];
+  }
   uint32_t begin = 0;
   for (uint32_t& end : ends) begin += std::exchange(end, begin);
   std::vector<Ranked> sorted(vertices.size());
-  for (const Ranked& v : vertices) sorted[ends[slice_of(v)]++] = v;
+  for (const Ranked& v : vertices) {
+    if (poll.Step()) return vertices;
+    sorted[ends[slice_of(v)]++] = v;
+  }
   uint32_t first = 0;
   for (const uint32_t end : ends) {
     if (poll.Step()) break;
@@ -77,14 +84,16 @@ Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   std::vector<Ranked> ranked;
   ranked.reserve(vertices.size());
   for (VertexId id = 0; id < vertices.id_bound(); ++id) {
+    if (poll.Step()) return {};
     if (vertices.IsAlive(id)) ranked.push_back({vertices[id], id});
   }
   ranked = SortedByPoint(std::move(ranked), poll);
+  if (poll.stopped()) return {};
   Ranking ranking;
-  if (poll.stopped()) return ranking;
   ranking.points.reserve(ranked.size());
   ranking.index_of.resize(vertices.id_bound());
   for (const Ranked& v : ranked) {
+    if (poll.Step()) return {};
     ranking.index_of[v.id] = static_cast<uint32_t>(ranking.points.size());
     ranking.points.push_back(v.point);
   }
@@ -122,7 +131,8 @@ class FaceCollector {
     if (poll.stopped()) return false;
     TracePolygons(poll);
     if (poll.stopped()) return false;
-    CountDepartures();
+    CountDepartures(poll);
+    if (poll.stopped()) return false;
     WriteDepartures(poll);
     return !poll.stopped();
   }
@@ -259,10 +269,10 @@ class FaceCollector {
   }
 
   // Leaves in departures_at_[v] where those at vertex v begin.
-  void CountDepartures() {
+  void CountDepartures(StopPoll& poll) {
     const auto count = [this](uint32_t tail, uint32_t, uint32_t) { ++departures_at_[tail]; };
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
-      if ((flags_[id] & kAnyFlat) != 0) return;
+      if (poll.Step() || (flags_[id] & kAnyFlat) != 0) return;
       ++triangle_facets_;
       ForEachTriangleDeparture(t, count);
     });
@@ -333,15 +343,25 @@ std::optional<Hull> SnapshotOfPolygon(const VertexTable& vertices, std::span<con
   if (poll.stopped()) return std::nullopt;
   const auto n = static_cast<uint32_t>(loop.size());
   std::vector<uint32_t> facet;
-  for (const VertexId id : loop) facet.push_back(ranking.index_of[id]);
+  for (const VertexId id : loop) {
+    if (poll.Step()) return std::nullopt;
+    facet.push_back(ranking.index_of[id]);
+  }
   std::rotate(facet.begin(), std::min_element(facet.begin(), facet.end()), facet.end());
   if (facet[1] > facet[n - 1]) std::reverse(facet.begin() + 1, facet.end());
-  std::vector<Edge> edges;
+  // The two edges of each vertex lead to its neighbours; each edge is written at its lower vertex.
+  std::vector<std::pair<uint32_t, uint32_t>> neighbours(n);
   for (uint32_t i = 0; i < n; ++i) {
-    const auto [low, high] = std::minmax(facet[i], facet[(i + 1) % n]);
-    edges.push_back({low, high});
+    if (poll.Step()) return std::nullopt;
+    neighbours[facet[i]] = std::minmax(facet[(i + n - 1) % n], facet[(i + 1) % n]);
   }
-  std::sort(edges.begin(), edges.end());
+  std::vector<Edge> edges;
+  edges.reserve(n);
+  for (uint32_t v = 0; v < n; ++v) {
+    if (poll.Step()) return std::nullopt;
+    if (neighbours[v].first > v) edges.push_back({v, neighbours[v].first});
+    if (neighbours[v].second > v) edges.push_back({v, neighbours[v].second});
+  }
   return Hull(2, std::move(ranking.points), {0, n}, std::move(facet), std::move(edges));
 }
 
