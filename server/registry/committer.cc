@@ -51,6 +51,15 @@ void Committer::Follow(const Locked& locked, Follower follower) {
   ready_.notify_one();
 }
 
+void Committer::Hold(const Locked& locked, std::shared_ptr<CommitHold> hold) {
+  HULLD_CHECK(locked.Holds(order_));
+  {
+    const std::lock_guard lock(mutex_);
+    holds_.push_back(std::move(hold));
+  }
+  ready_.notify_one();
+}
+
 void Committer::FollowSoon() {
   {
     const std::lock_guard lock(mutex_);
@@ -72,32 +81,62 @@ void Committer::NoteCaughtUp(const Locked& locked, SteadyClock::time_point asked
 void Committer::Run() {
   while (true) {
     Round round = WaitForRound();
-    if (round.batch.empty() && round.followers.empty()) return;
-    // Before anything is sent: a commit asks as well.
-    const SteadyClock::time_point asked = SteadyClock::now();
-    absl::Status status;
-    if (!round.batch.empty()) status = Write(round.batch);
-    if (!status.ok()) {
-      // Refused before anybody looks at what others did: where the outcome is not known, what is
-      // there by then may be this very batch.
-      Round looking = {{}, std::exchange(round.followers, {})};
-      Settle(round, status, absl::OkStatus(), asked);
-      if (looking.followers.empty()) continue;
-      round = std::move(looking);
-      status = absl::OkStatus();
-    }
-    // A commit has followed the others.
-    absl::Status followed;
-    if (round.batch.empty()) followed = store_.Follow();
-    Settle(round, status, followed, asked);
+    if (round.batch.empty() && round.followers.empty() && round.holds.empty()) return;
+    std::vector<std::shared_ptr<CommitHold>> holds = std::exchange(round.holds, {});
+    if (!round.batch.empty() || !round.followers.empty()) CommitAndFollow(std::move(round));
+    if (!holds.empty()) HoldFor(std::move(holds));
   }
+}
+
+void Committer::CommitAndFollow(Round round) {
+  // Before anything is sent: a commit asks as well.
+  const SteadyClock::time_point asked = SteadyClock::now();
+  absl::Status status;
+  if (!round.batch.empty()) status = Write(round.batch);
+  if (!status.ok()) {
+    // Refused before anybody looks at what others did: where the outcome is not known, what is
+    // there by then may be this very batch.
+    Round looking;
+    looking.followers = std::exchange(round.followers, {});
+    Settle(round, status, absl::OkStatus(), asked);
+    if (looking.followers.empty()) return;
+    round = std::move(looking);
+    status = absl::OkStatus();
+  }
+  // A commit has followed the others.
+  absl::Status followed;
+  if (round.batch.empty()) followed = store_.Follow();
+  Settle(round, status, followed, asked);
+}
+
+// One time for all who want one by now.
+void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
+  std::erase_if(holds, [](const auto& hold) { return !hold->is_wanted(); });
+  if (holds.empty()) return;
+  const SteadyClock::time_point asked = SteadyClock::now();
+  absl::Status status;
+  if (Statistics().failing) status = store_.Recover();
+  if (status.ok()) status = store_.HoldOthers();
+  Round nothing_else;
+  Settle(nothing_else, absl::OkStatus(), status, asked);
+  for (const auto& hold : holds) hold->Begin(status);
+  if (!status.ok()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    ++statistics_.holds;
+  }
+  const SteadyClock::time_point end = SteadyClock::now() + CommitHold::kLongest;
+  for (const auto& hold : holds) hold->LastUntil(end);
+  store_.ReleaseOthers();
 }
 
 // Empty: this is to end.
 Committer::Round Committer::WaitForRound() {
   std::unique_lock lock(mutex_);
-  ready_.wait(lock, [this] { return ending_ || !queue_.empty() || !followers_.empty(); });
-  return {std::exchange(queue_, {}), std::exchange(followers_, {})};
+  ready_.wait(lock, [this] {
+    return ending_ || !queue_.empty() || !followers_.empty() || !holds_.empty();
+  });
+  return {std::exchange(queue_, {}), std::exchange(followers_, {}), std::exchange(holds_, {})};
 }
 
 absl::Status Committer::Write(std::vector<Pending>& batch) {

@@ -6,11 +6,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "server/process/metrics.h"
 #include "server/process/synchronization.h"
+#include "server/registry/commit_hold.h"
 #include "server/registry/memory/locked.h"
 #include "server/store/store.h"
 
@@ -23,6 +25,8 @@ struct CommitStatistics {
   uint64_t failed_batches = 0;
   // The last batch failed.
   bool failing = false;
+  // Times that were held still for readers.
+  uint64_t holds = 0;
 };
 
 // Brings changes to the store, in the order in which they are submitted. One thread takes all that
@@ -87,6 +91,11 @@ class Committer {
   }
   // Requires that `locked` holds `order`. Cost: a question to the store, one for all who wait.
   void Follow(const Locked& locked, Follower follower);
+  // Holds the store still from when Others was told of all that other servers had committed; what
+  // was submitted before is committed or refused by then, and what is submitted later waits until
+  // the hold ends. Requires that `locked` holds `order`. Cost: two round trips to a store that is
+  // shared, for all who wait; changes wait for CommitHold::kLongest at most.
+  void Hold(const Locked& locked, std::shared_ptr<CommitHold> hold);
   // Others is to be told soon, if there is anything to tell. Takes no lock but the queue's.
   void FollowSoon();
   // Others was told of all that other servers had committed by this time, at least: when the store
@@ -106,14 +115,17 @@ class Committer {
     Completion done;
   };
 
-  // What is done at a time: either may be empty, and both are at the end.
+  // What is done at a time: any may be empty, and all are at the end.
   struct Round {
     std::vector<Pending> batch;
     std::vector<Follower> followers;
+    std::vector<std::shared_ptr<CommitHold>> holds;
   };
 
   void Run();
   Round WaitForRound();
+  void CommitAndFollow(Round round);
+  void HoldFor(std::vector<std::shared_ptr<CommitHold>> holds);
   absl::Status Write(std::vector<Pending>& batch);
   OtherChanges TakeOthers(const absl::Status& status);
   void Settle(Round& round, const absl::Status& status, const absl::Status& followed,
@@ -133,6 +145,7 @@ class Committer {
   ConditionVariable ready_;
   std::vector<Pending> queue_;
   std::vector<Follower> followers_;
+  std::vector<std::shared_ptr<CommitHold>> holds_;
   CommitStatistics statistics_;
   bool ending_ = false;
   Thread thread_;

@@ -154,6 +154,10 @@ class Registry {
   // AwaitOthers. Cost: as that, but nobody waits.
   void StartFollow(std::function<void(const absl::Status&)> done);
 
+  // Has nothing committed here for a while (Committer::Hold). What is resolved meanwhile of what is
+  // here (Freshness::OfWhatIsHere) is what the store holds all the while.
+  void Hold(std::shared_ptr<CommitHold> hold);
+
   // Hulls and bodies of other registries, which count against --max-hulls with those that are here.
   // Called under the mutex, and takes none. Before any other call.
   void CountAlso(std::function<uint64_t()> held_elsewhere) {

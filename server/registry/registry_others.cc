@@ -57,6 +57,11 @@ void Registry::StartFollow(std::function<void(const absl::Status&)> done) {
   committer_.Follow(locked, tell);
 }
 
+void Registry::Hold(std::shared_ptr<CommitHold> hold) {
+  const Locked locked(mutex_);
+  committer_.Hold(locked, std::move(hold));
+}
+
 // Goes on with something that the answer to a call depends on, at once or once what other servers
 // had committed by now is taken over.
 void Registry::WhenFresh(Refusal refuse, std::function<void(Locked&)> next) {

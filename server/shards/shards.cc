@@ -204,6 +204,7 @@ CommitStatistics Shards::Commits() const {
     sum.changes += part.changes;
     sum.failed_batches += part.failed_batches;
     sum.failing |= part.failing;
+    sum.holds += part.holds;
   }
   return sum;
 }

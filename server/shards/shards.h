@@ -34,9 +34,9 @@ namespace hulld::server {
 // that ID. With one shard everything does, as if this were not there.
 //
 // What is about several shards is put together here, of parts of which each is of one revision of
-// its store. Nothing is locked over two shards, and no change is made in two at once. A read of
-// several that is to be linearizable is proven to be of one instant by looking again
-// (shards_read.cc). Thread-safe.
+// its store. No change is made in two at once. A read of
+// several that is to be linearizable is proven to be of one instant by looking again; where it
+// never is, changes are held back for a moment (shards_read.cc). Thread-safe.
 class Shards {
  public:
   // What spreads IDs: the shard of each slot.
@@ -97,10 +97,9 @@ class Shards {
   bool has_bodies() const;
 
   // As Registry::Refresh. A read that is linearizable and concerns several shards is of one
-  // instant; it looks twice, which costs two round trips where stores are shared, and looks again
-  // as long as hulls of two shards changed between any two looks: then the call lasts until they
-  // stand still for a moment or should_stop says so (CANCELLED). One shard whose hulls change all
-  // the time does not hold it up.
+  // instant; it looks twice, which costs two round trips where stores are shared, three times where
+  // the hulls of one shard change all the time. Where those of two do, it looks once more after
+  // kLooks while nothing is committed to all shards of the call but one.
   // also: IDs whose shards belong to the call, too; as_of names them. holds: asked after each look,
   // without locks, whether what the caller found in those shards before it is still so; ABORTED
   // when it is not. Both may be empty.
@@ -132,7 +131,10 @@ class Shards {
   std::optional<StoreDisk> disk() const;
   void SetMetrics(StoreMetrics& metrics);
 
-  // For tests: called each time when a read of several shards has looked up hulls of one.
+  // Looks of one read before it holds changes back; a choice.
+  static constexpr int kLooks = 8;
+
+  // For tests: called each time when a read of several shards has looked up hulls of one, or holds.
   void OnPart(std::function<void()> on_part) { on_part_ = std::move(on_part); }
 
  private:
@@ -152,6 +154,11 @@ class Shards {
                                                         const std::function<bool()>& should_stop);
   absl::StatusOr<Look> LookOnce(KnownInShards& known, const std::function<bool()>& should_stop,
                                 const ShardsPlan& plan, const std::function<bool()>& holds);
+  absl::StatusOr<Look> LookAt(KnownInShards& known, std::span<const size_t> to_ask,
+                              const std::function<bool()>& should_stop, const ShardsPlan& plan,
+                              const std::function<bool()>& holds);
+  absl::StatusOr<Look> LookWhileHeld(KnownInShards& known, const std::function<bool()>& should_stop,
+                                     const ShardsPlan& plan, const std::function<bool()>& holds);
   absl::StatusOr<Look> LookUntilOneInstant(KnownInShards& known, Look before,
                                            const std::function<bool()>& should_stop,
                                            ShardsPlan plan, const std::function<bool()>& holds);

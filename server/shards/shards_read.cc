@@ -10,6 +10,12 @@
 // had at the time of the second was current then, and what the others had is the same before and
 // after it. So a hull that changes all the time does not hold up who asks how it stands to one of
 // another shard that does not.
+//
+// Where those of two shards change all the time, looking does not come to an end. After
+// Shards::kLooks, all shards of the call but one are held: nothing is committed there. What they
+// have then was current as well when the last one was asked. They are held one after the other in
+// the order of their stores' IDs, which is the same in all servers, so that those who hold do not
+// wait for each other in a circle.
 #include <absl/status/status.h>
 
 #include <algorithm>
@@ -143,7 +149,15 @@ absl::StatusOr<Shards::Look> Shards::LookOnce(KnownInShards& known,
                                               const std::function<bool()>& holds) {
   std::vector<size_t> shards;
   for (const Part& part : known.parts_) shards.push_back(part.shard);
-  const auto staleness = AwaitFreshIn(shards, plan.freshness, should_stop);
+  return LookAt(known, shards, should_stop, plan, holds);
+}
+
+// to_ask: of the shards of the call those that are to be as fresh as the plan says; the others are.
+absl::StatusOr<Shards::Look> Shards::LookAt(KnownInShards& known, std::span<const size_t> to_ask,
+                                            const std::function<bool()>& should_stop,
+                                            const ShardsPlan& plan,
+                                            const std::function<bool()>& holds) {
+  const auto staleness = AwaitFreshIn(to_ask, plan.freshness, should_stop);
   if (!staleness.ok()) return staleness.status();
   Look look;
   look.staleness = *staleness;
@@ -158,6 +172,41 @@ absl::StatusOr<Shards::Look> Shards::LookOnce(KnownInShards& known,
     if (on_part_) on_part_();
   }
   if (holds && !holds()) return absl::AbortedError("bodies changed meanwhile");
+  return look;
+}
+
+// ABORTED: changes could not be held back, or not for as long as the look took.
+absl::StatusOr<Shards::Look> Shards::LookWhileHeld(KnownInShards& known,
+                                                   const std::function<bool()>& should_stop,
+                                                   const ShardsPlan& plan,
+                                                   const std::function<bool()>& holds) {
+  struct Holds {
+    ~Holds() { EndAll(); }
+    // Whether all have lasted.
+    bool EndAll() {
+      bool lasted = true;
+      for (const auto& hold : std::exchange(all, {})) lasted = hold->End() && lasted;
+      return lasted;
+    }
+    std::vector<std::shared_ptr<CommitHold>> all;
+  };
+  std::vector<size_t> shards;
+  for (const Part& part : known.parts_) shards.push_back(part.shard);
+  std::ranges::sort(shards, {}, [this](size_t shard) { return store_ids_[shard]; });
+  Holds held;
+  for (const size_t shard : std::span(shards).first(shards.size() - 1)) {
+    held.all.push_back(std::make_shared<CommitHold>());
+    at(shard).Hold(held.all.back());
+    const absl::Status status = held.all.back()->Await(should_stop);
+    if (absl::IsCancelled(status)) return status;
+    if (!status.ok()) return absl::AbortedError(status.message());
+  }
+  if (on_part_) on_part_();
+  ShardsPlan now = plan;
+  // The one that is not held is asked while the others are.
+  now.freshness.began = SteadyClock::now();
+  absl::StatusOr<Look> look = LookAt(known, std::span(shards).last(1), should_stop, now, holds);
+  if (look.ok() && !held.EndAll()) return absl::AbortedError("changes were held back too long");
   return look;
 }
 
@@ -180,10 +229,16 @@ absl::StatusOr<Shards::Look> Shards::LookUntilOneInstant(KnownInShards& known, L
   const size_t parts = known.parts_.size();
   // Those that changed before the look that is `before`; at first, nothing is known of that.
   std::vector<bool> changed_before(parts, true);
-  while (true) {
+  for (int looks = 1;; ++looks) {
     if (Stopped(should_stop)) return Cancelled();
     // The question is to be asked after the last look.
     plan.freshness.began = SteadyClock::now();
+    if (looks % kLooks == 0) {
+      absl::StatusOr<Look> held = LookWhileHeld(known, should_stop, plan, {});
+      if (held.ok() && holds && !holds()) return absl::AbortedError("bodies changed meanwhile");
+      if (!absl::IsAborted(held.status())) return held;
+      plan.freshness.began = SteadyClock::now();
+    }
     absl::StatusOr<Look> now = LookOnce(known, should_stop, plan, holds);
     if (!now.ok()) return now;
     std::vector<bool> changed(parts);

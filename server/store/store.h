@@ -169,6 +169,13 @@ class Store {
       std::span<const HullGrowth> hulls) {
     return std::vector<std::optional<std::vector<Vector>>>(hulls.size());
   }
+  // From when this returns OK until ReleaseOthers, no other server commits; what they had committed
+  // is found as by Follow. The store may let them go on earlier if that does not come soon. Never
+  // while Commit, Recover or Follow runs, nor may these run in between. UNAVAILABLE: the store
+  // cannot be asked, or others hold it.
+  virtual absl::Status HoldOthers() { return absl::OkStatus(); }
+  // Requires that HoldOthers returned OK.
+  virtual void ReleaseOthers() {}
   // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
   virtual void OnOthers(std::function<void()> others) { (void)others; }
 

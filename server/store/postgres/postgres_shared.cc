@@ -253,17 +253,51 @@ absl::Status PostgresStore::Follow() {
                                              rows.status().message()));
 }
 
-// One transaction, in two round trips. The first takes the turn, which lasts until the end of the
-// transaction: batches come one after the other, and what others committed before is known. So the
-// revisions that are given then are the next, and nobody reads a batch before one that goes before
-// it. batch: what may have been committed if the session is lost.
-absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, SharedBatch* batch) {
+// What a batch does before it is written: it takes the turn, and learns what others did before.
+absl::Status PostgresStore::TakeTurn() {
   std::vector<Statement> turn;
   turn.push_back({.text = "BEGIN"});
   turn.push_back({.name = "hulld_turn"});
   turn.push_back(AskForOthers(batch_));
   const absl::StatusOr<std::vector<Rows>> rows = writer_->Ask(turn);
-  absl::Status status = rows.ok() ? NoteOthers(rows->back()) : rows.status();
+  return rows.ok() ? NoteOthers(rows->back()) : rows.status();
+}
+
+// Nothing was written. status: how it ended.
+void PostgresStore::GiveTurnBack(const absl::Status& status) {
+  if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
+  if (went_back_) GiveNewId();
+}
+
+// The turn of a batch that is not written.
+absl::Status PostgresStore::HoldOthers() {
+  if (!options_.shared) return absl::OkStatus();
+  if (absl::Status s = ended(); !s.ok()) return s;
+  absl::Status status;
+  if (writer_ == nullptr) {
+    absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
+    status = session.status();
+    if (session.ok()) writer_ = *std::move(session);
+  }
+  if (status.ok()) {
+    status = TakeTurn();
+    if (status.ok()) return status;
+    GiveTurnBack(status);
+  }
+  return absl::UnavailableError(
+      absl::StrCat("cannot hold the database's turn: ", status.message()));
+}
+
+void PostgresStore::ReleaseOthers() {
+  if (options_.shared && writer_ != nullptr) GiveTurnBack(absl::OkStatus());
+}
+
+// One transaction, in two round trips. The first takes the turn, which lasts until the end of the
+// transaction: batches come one after the other, and what others committed before is known. So the
+// revisions that are given then are the next, and nobody reads a batch before one that goes before
+// it. batch: what may have been committed if the session is lost.
+absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, SharedBatch* batch) {
+  absl::Status status = TakeTurn();
   std::vector<Change*> kept;
   for (Change* change : changes) {
     if (!others_.by_id.contains(change->id())) kept.push_back(change);
@@ -295,8 +329,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
       return status;
     }
   }
-  if (IsLost(status) || !writer_->Run("ROLLBACK").ok()) writer_ = nullptr;
-  if (went_back_) GiveNewId();
+  GiveTurnBack(status);
   return status;
 }
 

@@ -104,6 +104,8 @@ class PostgresStore : public Store {
   bool is_shared() const override { return options_.shared; }
   absl::Status Follow() override;
   OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
+  absl::Status HoldOthers() override;
+  void ReleaseOthers() override;
   std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
       std::span<const HullGrowth> hulls) override;
   void OnOthers(std::function<void()> others) override;
@@ -194,6 +196,8 @@ class PostgresStore : public Store {
   void GiveNewId();
   absl::Status NoteOthers(const Rows& rows);
   absl::Status CommitShared(std::span<Change* const> changes);
+  absl::Status TakeTurn();
+  void GiveTurnBack(const absl::Status& status);
   absl::Status AttemptShared(std::span<Change* const> changes, SharedBatch* batch);
   void KeepShared(const SharedBatch& batch);
   absl::StatusOr<bool> SharedOutcome(uint64_t batch);
