@@ -22,7 +22,7 @@
 namespace hulld::server {
 namespace {
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef HULLD_SANITIZED
 constexpr bool kKeepsWhatWasFreed = true;
 #else
 constexpr bool kKeepsWhatWasFreed = false;

@@ -13,10 +13,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <thread>
 
@@ -24,6 +26,8 @@ namespace hulld::server {
 namespace {
 
 constexpr char kAdminPassword[] = "Wort-des-Verwalters-3c";
+// Several times what all clusters of a few tests at once hold, so that they do not fill it.
+constexpr uintmax_t kSpaceInMemory = uintmax_t{2} << 30;
 // Far more than a standby takes to follow.
 constexpr int kMostAttempts = 10'000;
 
@@ -31,6 +35,11 @@ constexpr int kMostAttempts = 10'000;
   std::fprintf(stderr, "PostgresCluster: %s\n", what.c_str());
   std::abort();
 }
+
+// Of initdb, wherever the data are.
+constexpr const char* kInitialOptions[] = {
+    "-U",        "postgres",         "--auth=scram-sha-256", "--locale=C", "--encoding=UTF8",
+    "--no-sync", "--no-instructions"};
 
 // Where the newest server's programs are; empty: nowhere.
 std::string ProgramDirectory() {
@@ -108,34 +117,57 @@ void PostgresCluster::GiveToServer(const std::string& path) {
 }
 
 void PostgresCluster::MakeDirectory() {
+  // Each cluster has two thousand files. To make them takes ext4 a second of CPU once as many were
+  // deleted in the last seconds, which is what test after test does; in memory it takes nothing.
+  std::error_code error;
+  const auto in_memory = std::filesystem::space("/dev/shm", error);
+  const bool fits = !error && in_memory.available >= kSpaceInMemory;
   // Short, as a socket's path holds 107 characters.
-  std::string name = "/tmp/hulld-postgres-XXXXXX";
+  std::string name = absl::StrCat(fits ? "/dev/shm" : "/tmp", "/hulld-postgres-XXXXXX");
   directory_ = mkdtemp(name.data());
   GiveToServer(directory_);
   chmod(directory_.c_str(), 0755);
 }
 
-PostgresCluster::PostgresCluster(const WalIn& wal) {
-  MakeDirectory();
+void PostgresCluster::InitializeData(const std::vector<std::string>& options) {
   const std::string password_file = directory_ + "/password";
   std::ofstream(password_file) << kAdminPassword << "\n";
   GiveToServer(password_file);
-  std::vector<std::string> initdb = {ProgramDirectory() + "/initdb",
-                                     "-D",
-                                     directory_ + "/data",
-                                     "-U",
-                                     "postgres",
-                                     "--pwfile",
-                                     password_file,
-                                     "--auth=scram-sha-256",
-                                     "--locale=C",
-                                     "--encoding=UTF8",
-                                     "--no-sync",
-                                     "--no-instructions"};
-  if (!wal.directory.empty()) {
-    initdb.insert(initdb.end(), {"--waldir", wal.directory, "--wal-segsize=1"});
-  }
+  std::vector<std::string> initdb = {ProgramDirectory() + "/initdb", "-D", directory_ + "/data",
+                                     "--pwfile", password_file};
+  initdb.insert(initdb.end(), std::begin(kInitialOptions), std::end(kInitialOptions));
+  initdb.insert(initdb.end(), options.begin(), options.end());
   RunToEnd(AsServer(std::move(initdb)), directory_ + "/initdb.log");
+}
+
+void PostgresCluster::MakeData() {
+  namespace fs = std::filesystem;
+  const size_t key = std::hash<std::string>()(
+      absl::StrCat(ProgramDirectory(), kAdminPassword, absl::StrJoin(kInitialOptions, " ")));
+  const fs::path kept = absl::StrCat(HULLD_BINARY_DIR, "/postgres_data_", key);
+  const fs::path data = directory_ + "/data";
+  if (fs::exists(kept)) {
+    fs::copy(kept, data, fs::copy_options::recursive);
+    GiveToServer(data);
+    for (const auto& entry : fs::recursive_directory_iterator(data)) GiveToServer(entry.path());
+    return;
+  }
+  InitializeData({});
+  // Whole, or not there: another program may look for it now. The first one that is whole stays.
+  const fs::path copy = absl::StrCat(kept.string(), ".", getpid());
+  std::error_code error;
+  fs::copy(data, copy, fs::copy_options::recursive, error);
+  if (!error) fs::rename(copy, kept, error);
+  if (error) fs::remove_all(copy, error);
+}
+
+PostgresCluster::PostgresCluster(const WalIn& wal) {
+  MakeDirectory();
+  if (wal.directory.empty()) {
+    MakeData();
+  } else {
+    InitializeData({"--waldir", wal.directory, "--wal-segsize=1"});
+  }
   Start();
   Ask("postgres", absl::StrCat("CREATE ROLE hulld LOGIN PASSWORD '", kPassword, "'"));
 }
