@@ -5,7 +5,7 @@
 #
 # --tsan runs, instead, the tests of what uses threads under ThreadSanitizer (clang; preset tsan);
 # --fuzz runs each fuzzer for a fixed number of inputs under libFuzzer (clang; preset fuzz);
-# --arm64 cross-compiles the test of digests for 64-bit ARM and runs it by qemu;
+# --arm64 cross-compiles core and the test of digests for 64-bit ARM and runs it by qemu;
 # --tidy runs clang-tidy over what changed (tests/tidy.sh).
 #
 # On a bare Debian 12 it first installs what docker/packages.txt lists (as root); with everything

@@ -6,6 +6,7 @@
 
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
+#include "core/query/placed/rotation.h"
 
 namespace hulld {
 namespace {
@@ -29,9 +30,9 @@ BoxGap::BoxGap(const PlacedBody& x, const PlacedBody& y) {
       x.body().boxes().size() + y.body().boxes().size() + offset.cwiseAbs().maxCoeff();
   usable_ = IsFilterSize(size);
   error_ = kBoxGapErrorFactor * size;
-  R_XY_ = R_WX.transpose() * R_WY;
+  for (int i = 0; i < 3; ++i) R_XY_.col(i) = TransposedProduct(R_WX, Vector(R_WY.col(i)));
   abs_R_XY_ = R_XY_.cwiseAbs();
-  p_XY_ = R_WX.transpose() * offset;
+  p_XY_ = TransposedProduct(R_WX, offset);
 }
 
 double BoxGap::AtLeast(const Box& of_x, const Box& of_y) const {
@@ -42,10 +43,10 @@ double BoxGap::AtLeast(const Box& of_x, const Box& of_y) const {
   const Vector center_y = 0.5 * (of_y.low + of_y.high);
   const Vector half_y = 0.5 * (of_y.high - of_y.low);
   // From X's centre to Y's, in the frame of X.
-  const Vector step = R_XY_ * center_y + p_XY_ - center_x;
-  const Vector along_x = step.cwiseAbs() - half_x - abs_R_XY_ * half_y;
+  const Vector step = Product(R_XY_, center_y) + p_XY_ - center_x;
+  const Vector along_x = step.cwiseAbs() - half_x - Product(abs_R_XY_, half_y);
   const Vector along_y =
-      (R_XY_.transpose() * step).cwiseAbs() - half_y - abs_R_XY_.transpose() * half_x;
+      TransposedProduct(R_XY_, step).cwiseAbs() - half_y - TransposedProduct(abs_R_XY_, half_x);
   return std::max(along_x.maxCoeff(), along_y.maxCoeff()) - error_;
 }
 
@@ -59,9 +60,9 @@ Box BoundingBox(const PlacedBody& placed) {
   const double size = placed.body().boxes().size() + t.cwiseAbs().maxCoeff();
   if (!IsFilterSize(size)) return {Vector::Constant(-kInfinity), Vector::Constant(kInfinity)};
   const Eigen::Matrix3d R = RotationOf(placed.X_WB());
-  const Vector center = R * (0.5 * (box.low + box.high)) + t;
+  const Vector center = Product(R, Vector(0.5 * (box.low + box.high))) + t;
   const Vector error = Vector::Constant(kBoxGapErrorFactor * size);
-  const Vector half = R.cwiseAbs() * (0.5 * (box.high - box.low)) + error;
+  const Vector half = Product(R.cwiseAbs(), Vector(0.5 * (box.high - box.low))) + error;
   return {center - half, center + half};
 }
 

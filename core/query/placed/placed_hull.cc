@@ -5,7 +5,7 @@
 
 #include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
-#include "core/query/placed/plain_vector.h"
+#include "core/query/placed/rotation.h"
 
 namespace hulld {
 namespace {
@@ -32,13 +32,6 @@ Eigen::Matrix3d RotationOf(const std::array<double, 4>& q) {
       twice * (x * y + w * z), scale * ((ww + yy) - (xx + zz)), twice * (y * z - w * x),
       twice * (x * z - w * y), twice * (y * z + w * x), scale * ((ww + zz) - (xx + yy));
   return R;
-}
-
-// A matrix times a vector, in registers.
-Vector Product(const Eigen::Matrix3d& R, const PlainVector& v) {
-  const double* const r = R.data();  // column by column
-  return {r[0] * v.x + r[3] * v.y + r[6] * v.z, r[1] * v.x + r[4] * v.y + r[7] * v.z,
-          r[2] * v.x + r[5] * v.y + r[8] * v.z};
 }
 
 }  // namespace

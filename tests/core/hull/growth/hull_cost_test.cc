@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -321,7 +322,9 @@ TEST(HullCost, MemoryOfMeshesIsBoundedByTheVertices) {
 // Scenes hold many small hulls. What they hold whatever their size weighs more for each vertex.
 TEST(HullCost, MemoryOfSmallHullsIsSmall) {
   Random random(TestSeed(504));
-  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 700);
+  // The two of a LiveHull: a mutex takes 40 bytes on x86-64, and 48 on 64-bit ARM.
+  const double mutexes = 2 * (static_cast<double>(sizeof(std::mutex)) - 40);
+  EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 8, 1))), 700 + mutexes / 8);
   EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 24, 1))), 650);
   EXPECT_LE(AskedBytes(BuiltAtOnce(RandomOnSphere(random, 64, 1))), 400);
 }
