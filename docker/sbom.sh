@@ -81,14 +81,15 @@ packages_of_program() {
   done | sort -u
 }
 
-# package ID NAME VERSION MORE: MORE, members of the JSON object that end in a comma, or nothing.
+# package ID NAME VERSION MORE [LICENSE]: MORE, members of the JSON object that end in a comma, or
+# nothing; LICENSE, of what is ours.
 package() {
   quote "$2"
   printf '%s    {"SPDXID": "%s", "name": %s,' "$separator" "$1" "$REPLY"
   quote "$3"
   printf ' "versionInfo": %s, "downloadLocation": "NOASSERTION", "filesAnalyzed": false,%s' \
     "$REPLY" "$4"
-  printf ' "licenseConcluded": "NOASSERTION", "licenseDeclared": "NOASSERTION",'
+  printf ' "licenseConcluded": "NOASSERTION", "licenseDeclared": "%s",' "${5:-NOASSERTION}"
   printf ' "copyrightText": "NOASSERTION"}'
   separator=$',\n'
 }
@@ -133,7 +134,7 @@ for program in "${programs[@]}"; do
   spdx_id Program "$name"
   package "$REPLY" "$name" "$("$program" --version | awk '{ print $NF; exit }')" \
     " \"checksums\": [{\"algorithm\": \"SHA256\", \"checksumValue\": \"$(sha256sum "$program" |
-      cut -d ' ' -f 1)\"}],"
+      cut -d ' ' -f 1)\"}]," Apache-2.0
 done
 declare -A seen
 while read -r name version architecture; do

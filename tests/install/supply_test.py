@@ -99,6 +99,11 @@ class Sbom(unittest.TestCase):
         self.assertEqual({self.names[end] for _, end in self.related('DESCRIBES')},
                          {'hulld', 'hullctl'})
 
+    def test_it_says_under_which_licence_they_are(self):
+        declared = {package['name']: package['licenseDeclared']
+                    for package in self.document['packages']}
+        self.assertEqual({declared['hulld'], declared['hullctl']}, {'Apache-2.0'})
+
     def test_it_names_what_each_program_is_linked_with(self):
         for program in PROGRAMS:
             linked = self.related('DYNAMIC_LINK', f'SPDXRef-Program-{program.name}')
