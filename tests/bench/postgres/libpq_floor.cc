@@ -101,6 +101,8 @@ std::string AskDatabase(const std::string& conninfo, const std::string& statemen
   const std::unique_ptr<PGconn, decltype(&PQfinish)> connection(PQconnectdb(conninfo.c_str()),
                                                                 PQfinish);
   if (PQstatus(connection.get()) != CONNECTION_OK) Fail(PQerrorMessage(connection.get()));
+  PQsetNoticeProcessor(
+      connection.get(), [](void*, const char*) {}, nullptr);
   return FirstValue(connection.get(), statement);
 }
 

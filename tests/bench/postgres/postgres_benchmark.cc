@@ -6,9 +6,12 @@
 //
 //   commit     chunks of one point, one after the other
 //   questions  CheckCollision, LINEARIZABLE and BOUNDED, by N clients
+//   bounded    the same, BOUNDED alone, in short turns: processor time, beside a second RocksDB,
+//              which tells how far two servers differ that are the same
 //   ingest     points of a ball into one hull
 //   fill       makes hulls FROM to N of 64 vertices in the database "bench_start"; prints the rate
 //   start      starts five times over what fill made
+//   cold       questions about pairs of it that are not in memory
 //
 // CONNINFO: of a role that may make databases, of a server that trusts it. FOLDER: where RocksDB
 // keeps its hulls, and what servers read. `cpu_us`: processor time of the server for one request;
@@ -90,6 +93,9 @@ double ProcessorSeconds(pid_t pid) {
 double DatabaseSeconds() {
   double ticks = 0;
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    if (entry.path().filename().string().find_first_not_of("0123456789") != std::string::npos) {
+      continue;
+    }
     std::ifstream file(entry.path() / "stat");
     std::string stat{std::istreambuf_iterator<char>(file), {}};
     if (stat.find("(postgres)") == std::string::npos) continue;
@@ -177,8 +183,8 @@ struct Subject {
   // Takes a while; the microseconds of each request.
   std::function<std::vector<double>()> run;
   // One of each round.
-  std::vector<double> p50, p99, rate, cpu_us, database_cpu_us;
-  std::vector<double> all;
+  std::vector<double> p50 = {}, p99 = {}, rate = {}, cpu_us = {}, database_cpu_us = {};
+  std::vector<double> all = {};
 };
 
 void RunRounds(std::vector<Subject>& subjects, double seconds) {
@@ -299,18 +305,30 @@ void MeasureCommits(const Arguments& arguments) {
     floors.push_back(std::make_unique<LibpqFloor>(stores.Conninfo(name), kHull, shared));
     LibpqFloor* const floor = floors.back().get();
     subjects.push_back(
-        {.name = "libpq, as " + kind, .run = [=] { return timed([=] { floor->Commit(); }); }});
+        {.name = "libpq as " + kind, .run = [=] { return timed([=] { floor->Commit(); }); }});
     add_server(kind, stores.StartEmpty(kind));
   }
   add_server("shard", stores.StartEmpty("shard"));
   add_server("rocksdb", stores.StartEmpty("rocksdb"));
   add_server("gRPC alone", stores.StartFloor());
+  // Both floors, one after the other: what a commit over the network cannot go below.
+  GrowingWriter* const network = writers.back().get();
+  for (const std::string kind : {"one", "many"}) {
+    LibpqFloor* const floor = floors[kind == "one" ? 0 : 1].get();
+    subjects.push_back({.name = "gRPC and libpq as " + kind, .run = [=] {
+                          return timed([=] {
+                            network->SendAndReceive();
+                            floor->Commit();
+                          });
+                        }});
+  }
   RunRounds(subjects, arguments.seconds);
   Report(arguments, subjects,
-         {{"one", "libpq, as one"},
-          {"many", "libpq, as many"},
-          {"shard", "libpq, as many"},
-          {"rocksdb", "gRPC alone"}});
+         {{"one", "libpq as one"},
+          {"many", "libpq as many"},
+          {"shard", "many"},
+          {"gRPC and libpq as one", "libpq as one"},
+          {"gRPC and libpq as many", "libpq as many"}});
 }
 
 // One client: its connection, and the questions that it asks in turn.
@@ -371,7 +389,7 @@ std::vector<double> AskAll(std::vector<Asker>& askers, double seconds) {
     });
   }
   for (std::thread& thread : threads) thread.join();
-  std::vector<double> all;
+  std::vector<double> all = {};
   for (const std::vector<double>& each : taken) all.insert(all.end(), each.begin(), each.end());
   return all;
 }
@@ -417,7 +435,7 @@ void MeasureQuestions(const Arguments& arguments) {
   }
   LibpqFloor floor(stores.Conninfo(name), kHull, true);
   if (arguments.clients == 1) {
-    subjects.push_back({.name = "libpq, a question", .run = [&] {
+    subjects.push_back({.name = "libpq question", .run = [&] {
                           std::vector<double> taken;
                           const Clock::time_point begin = Clock::now();
                           while (Since(begin) < each) {
@@ -427,6 +445,37 @@ void MeasureQuestions(const Arguments& arguments) {
                           }
                           return taken;
                         }});
+  }
+  RunRounds(subjects, arguments.seconds);
+  Report(arguments, subjects, peer_of);
+}
+
+void MeasureBounded(const Arguments& arguments) {
+  constexpr double kTurn = 0.25;
+  const Stores stores(arguments);
+  std::vector<std::unique_ptr<ChildServer>> servers;
+  std::vector<std::unique_ptr<std::vector<Asker>>> askers;
+  std::vector<Subject> subjects;
+  std::map<std::string, std::string> peer_of;
+  for (const std::string name : {"rocksdb", "rocksdb again", "one", "many", "shard"}) {
+    if (name == "rocksdb again") {
+      std::filesystem::remove_all(arguments.folder + "/bench_again");
+      servers.push_back(stores.Start("rocksdb", "bench_again"));
+    } else {
+      servers.push_back(stores.StartEmpty(name));
+    }
+    const ChildServer& server = *servers.back();
+    const auto hulls = v1::HullService::NewStub(ConnectAlone(server.address()));
+    for (int i = 0; i < kQuestionHulls; ++i) MakeBallHull(*hulls, QuestionHull(i), kVertices, 1);
+    askers.push_back(std::make_unique<std::vector<Asker>>());
+    std::vector<Asker>* const all = askers.back().get();
+    for (int i = 0; i < arguments.clients; ++i) {
+      all->push_back(MakeAsker(server.address(), true, i));
+    }
+    AskAll(*all, 0.5);
+    peer_of[name] = "rocksdb";
+    subjects.push_back(
+        {.name = name, .pid = server.pid(), .run = [=] { return AskAll(*all, kTurn); }});
   }
   RunRounds(subjects, arguments.seconds);
   Report(arguments, subjects, peer_of);
@@ -583,13 +632,63 @@ void MeasureStarts(const Arguments& arguments) {
   if (out != stdout) std::fclose(out);
 }
 
+void MeasureCold(const Arguments& arguments) {
+  const Stores stores(arguments);
+  const int hulls =
+      std::stoi(AskDatabase(stores.Conninfo(kStartDatabase), "SELECT count(*) FROM hulld.hulls"));
+  std::vector<int> order(hulls);
+  for (int i = 0; i < hulls; ++i) order[i] = i;
+  std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
+  const std::unique_ptr<ChildServer> server = stores.Start("many", kStartDatabase);
+  std::vector<Asker> askers;
+  for (int i = 0; i < arguments.clients; ++i) {
+    askers.push_back(MakeAsker(server->address(), true, i));
+  }
+  // Each asker takes pairs of its own, of which none comes twice.
+  std::vector<std::vector<double>> taken(askers.size());
+  const auto ask = [&](size_t i, double seconds) {
+    const Clock::time_point begin = Clock::now();
+    Asker& asker = askers[i];
+    while (Since(begin) < seconds) {
+      const size_t pair = i + askers.size() * asker.next++;
+      if (2 * pair + 1 >= order.size()) return;
+      v1::CheckCollisionRequest request = asker.requests[pair % asker.requests.size()];
+      request.mutable_a()->set_hull_id(StartHull(order[2 * pair]));
+      request.mutable_b()->set_hull_id(StartHull(order[2 * pair + 1]));
+      grpc::ClientContext context;
+      v1::CheckCollisionResponse response;
+      const Clock::time_point start = Clock::now();
+      Require(asker.stub->CheckCollision(&context, request, &response), "CheckCollision");
+      taken[i].push_back(1e6 * Since(start));
+    }
+  };
+  Subject subject{.name = "many cold", .pid = server->pid(), .run = [&] {
+                    std::vector<std::thread> threads;
+                    for (std::vector<double>& each : taken) each.clear();
+                    for (size_t i = 0; i < askers.size(); ++i) {
+                      threads.emplace_back([&, i] { ask(i, arguments.seconds / 4); });
+                    }
+                    for (std::thread& thread : threads) thread.join();
+                    std::vector<double> all;
+                    for (const auto& each : taken) all.insert(all.end(), each.begin(), each.end());
+                    return all;
+                  }};
+  const double before = ResidentMebibytes(server->pid());
+  std::vector<Subject> subjects;
+  subjects.push_back(std::move(subject));
+  RunRounds(subjects, arguments.seconds);
+  Report(arguments, subjects, {});
+  const auto pairs = static_cast<double>(subjects[0].all.size());
+  std::printf("%.0f bytes of memory a hull\n",
+              (ResidentMebibytes(server->pid()) - before) * (1 << 20) / (2 * pairs));
+}
+
 int Run(int argc, char** argv) {
   Arguments arguments;
-  const std::map<std::string, void (*)(const Arguments&)> suites = {{"commit", MeasureCommits},
-                                                                    {"questions", MeasureQuestions},
-                                                                    {"ingest", MeasureIngest},
-                                                                    {"fill", Fill},
-                                                                    {"start", MeasureStarts}};
+  const std::map<std::string, void (*)(const Arguments&)> suites = {
+      {"commit", MeasureCommits}, {"questions", MeasureQuestions}, {"bounded", MeasureBounded},
+      {"cold", MeasureCold},      {"ingest", MeasureIngest},       {"fill", Fill},
+      {"start", MeasureStarts}};
   const std::map<std::string, std::function<void(const std::string&)>> flags = {
       {"--database", [&](const std::string& value) { arguments.database = value; }},
       {"--folder", [&](const std::string& value) { arguments.folder = value; }},

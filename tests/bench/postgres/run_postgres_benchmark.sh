@@ -4,7 +4,7 @@
 #
 #   bash tests/bench/postgres/run_postgres_benchmark.sh [MACHINE] [SUITE...]
 #
-# SUITES: commit questions questions64 ingest fill start; all by default. fill and start take as many
+# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill and start take as many
 # hulls as HULLS says, 1000000 by default; fill goes on where it was ended.
 #
 # Starts a PostgreSQL of its own in FOLDER, /tmp/hulld-bench-postgres by default, with fsync and
@@ -20,7 +20,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../../.."
 machine=${1:-epyc_gcc12}
 shift || true
 suites=("$@")
-((${#suites[@]} > 0)) || suites=(commit questions questions64 ingest fill start)
+((${#suites[@]} > 0)) || suites=(commit questions questions64 bounded ingest fill start cold)
 folder=${FOLDER:-/tmp/hulld-bench-postgres}
 results=tests/bench/results/postgres
 hulls=${HULLS:-1000000}
@@ -65,6 +65,7 @@ for suite in "${suites[@]}"; do
         from=$(sed -E 's/.* to ([0-9]+):.*/\1/' "$folder-stores/filled")
       done
       ;;
+    bounded | cold) measure "$suite" --clients 8 --out "$results/${suite}_$machine.csv" ;;
     start) measure start --out "$results/start_$machine.csv" ;;
     *) echo "there is no suite $suite" >&2 && exit 2 ;;
   esac
