@@ -202,7 +202,9 @@ void RunRounds(std::vector<Subject>& subjects, double seconds) {
       if (subject.pid != 0) {
         subject.cpu_us.push_back(1e6 * (ProcessorSeconds(subject.pid) - used) / count);
       }
-      subject.database_cpu_us.push_back(1e6 * (DatabaseSeconds() - database) / count);
+      // Less than nothing where a process of PostgreSQL ended meanwhile.
+      const double used_there = DatabaseSeconds() - database;
+      if (used_there >= 0) subject.database_cpu_us.push_back(1e6 * used_there / count);
       subject.rate.push_back(count / passed);
       subject.all.insert(subject.all.end(), taken.begin(), taken.end());
       std::sort(taken.begin(), taken.end());
