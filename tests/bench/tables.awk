@@ -452,11 +452,11 @@ function postgres_commit(   i, key, floor, both) {
   head("| a chunk of one point | p50 | p99 | p50 / libpq | p50 / gRPC, then libpq | CPU of hulld | of the database |")
   for (i = 1; i <= rows; i++) {
     key = order[i]
-    floor = key ~ /one$/ ? "libpq as one" : key ~ /many|shard/ ? "libpq as many" : ""
+    floor = key ~ /(^| )one$/ ? "libpq as one" : key ~ /many|shard/ ? "libpq as many" : ""
     both = "gRPC and " floor
     printf "| %s | %s | %s | %s | %s | %s | %s |\n", store_name(key), micro(cell[key, "p50_us"]), micro(cell[key, "p99_us"]),
            floor == "" ? "-" : sprintf("%.2f", cell[key, "p50_us"] / cell[floor, "p50_us"]),
-           floor == "" || key ~ /libpq/ ? "-" : sprintf("%.2f", cell[key, "p50_us"] / cell[both, "p50_us"]),
+           floor == "" || key ~ /libpq/ || !((both, "p50_us") in cell) ? "-" : sprintf("%.2f", cell[key, "p50_us"] / cell[both, "p50_us"]),
            micro(cell[key, "cpu_us"]), floor == "" ? "-" : micro(cell[key, "database_cpu_us"])
   }
   measured()
