@@ -4,8 +4,9 @@
 #
 #   bash tests/bench/postgres/run_postgres_benchmark.sh [MACHINE] [SUITE...]
 #
-# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill and start take as many
-# hulls as HULLS says, 1000000 by default; fill goes on where it was ended.
+# SUITES: commit questions questions64 bounded ingest fill start cold; all by default. fill makes as
+# many hulls as HULLS says, 1000000 by default, in pieces of SECONDS_EACH; start and cold ask what
+# it made last, also in an earlier run: "start cold" alone measures another program over the same.
 #
 # Starts a PostgreSQL of its own in FOLDER, /tmp/hulld-bench-postgres by default, with fsync and
 # synchronous_commit on, and ends it; what is there is used again. As root it runs as the user
@@ -66,7 +67,10 @@ for suite in "${suites[@]}"; do
       done
       ;;
     bounded | cold) measure "$suite" --clients 8 --out "$results/${suite}_$machine.csv" ;;
-    start) measure start --out "$results/start_$machine.csv" ;;
+    start)
+      rm -f "$results/start_$machine.csv"
+      measure start --out "$results/start_$machine.csv"
+      ;;
     *) echo "there is no suite $suite" >&2 && exit 2 ;;
   esac
 done
