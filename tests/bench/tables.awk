@@ -430,6 +430,83 @@ function grown(vertices,   path, line, fields, step) {
   if (index(files, "query_live") == 0) files = files ", [`query_live_" machine ".csv`](" results "query_live_" machine ".csv)"
   compare("one point more, then a question, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
 }
+# Over PostgreSQL: what a row of results/postgres/ is called.
+function store_name(row) {
+  sub(/^rocksdb/, "RocksDB", row)
+  sub(/ bounded$/, ", BOUNDED", row)
+  sub(/ linearizable$/, ", LINEARIZABLE", row)
+  sub(/^one/, "one server", row)
+  sub(/^many/, "many servers", row)
+  sub(/^shard/, "many servers, one shard in a file", row)
+  sub(/^libpq as one$/, "libpq alone, as one server", row)
+  sub(/^libpq as many$/, "libpq alone, as many servers", row)
+  sub(/^libpq question$/, "libpq alone, the question of LINEARIZABLE", row)
+  sub(/^gRPC and libpq as one$/, "gRPC alone, then libpq alone, as one", row)
+  sub(/^gRPC and libpq as many$/, "gRPC alone, then libpq alone, as many", row)
+  return row
+}
+function micro(value) { return value + 0 > 0 ? digits(value) " us" : "-" }
+
+function postgres_commit(   i, key, floor, both) {
+  read_rows("postgres/commit_" machine)
+  head("| a chunk of one point | p50 | p99 | p50 / libpq | p50 / gRPC, then libpq | CPU of hulld | of the database |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    floor = key ~ /(^| )one$/ ? "libpq as one" : key ~ /many|shard/ ? "libpq as many" : ""
+    both = "gRPC and " floor
+    printf "| %s | %s | %s | %s | %s | %s | %s |\n", store_name(key), micro(cell[key, "p50_us"]), micro(cell[key, "p99_us"]),
+           floor == "" ? "-" : sprintf("%.2f", cell[key, "p50_us"] / cell[floor, "p50_us"]),
+           floor == "" || key ~ /libpq/ || !((both, "p50_us") in cell) ? "-" : sprintf("%.2f", cell[key, "p50_us"] / cell[both, "p50_us"]),
+           micro(cell[key, "cpu_us"]), floor == "" ? "-" : micro(cell[key, "database_cpu_us"])
+  }
+  measured()
+}
+
+function postgres_questions(clients,   i, key) {
+  read_rows("postgres/questions" (clients > 1 ? clients : "") "_" machine)
+  head("| a question | p50 | p99 | a second | CPU of hulld | of RocksDB | CPU of the database |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    printf "| %s | %s | %s | %d | %s | %s | %s |\n", store_name(key), micro(cell[key, "p50_us"]), micro(cell[key, "p99_us"]),
+           cell[key, "per_second"], micro(cell[key, "cpu_us"]),
+           cell[key, "peer"] == "" ? "-" : sprintf("%.2f", cell[key, "cpu_of_peer"]),
+           key ~ /rocksdb|gRPC/ ? "-" : micro(cell[key, "database_cpu_us"])
+  }
+  measured()
+}
+
+function postgres_bounded(   i, key) {
+  read_rows("postgres/bounded_" machine)
+  head("| BOUNDED, 8 clients | CPU of hulld | of RocksDB | turns |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    printf "| %s | %s | %.3f | %d |\n", store_name(key), micro(cell[key, "cpu_us"]), cell[key, "cpu_of_peer"], cell[key, "rounds"]
+  }
+  measured()
+}
+
+function postgres_ingest(   i, key) {
+  read_rows("postgres/ingest_" machine)
+  head("| store | points | least of all rounds | CPU of hulld | of the database |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    printf "| %s | %s | %s | %.0f ns a point | %.0f ns |\n", store_name(key), million(cell[key, "per_second"]),
+           million(cell[key, "least_per_second"]), 1000 * cell[key, "cpu_us"], 1000 * cell[key, "database_cpu_us"]
+  }
+  measured()
+}
+
+function postgres_start(   i, key) {
+  read_rows("postgres/start_" machine)
+  head("| hulls of 64 vertices | listens after | first answer after | resident | processor time | in the database |")
+  for (i = 1; i <= rows; i++) {
+    key = order[i]
+    printf "| %d | %.0f ms | %.0f ms | %.0f MiB | %.0f ms | %.1f MiB |\n", key, cell[key, "listens_ms"], cell[key, "answers_ms"],
+           cell[key, "resident_mib"], cell[key, "cpu_ms"], cell[key, "store_mib"]
+  }
+  measured()
+}
+
 function summary(   one) {
   read_rows("hull_build_" machine)
   read_rows("hull_stream_" machine)
@@ -475,6 +552,12 @@ BEGIN {
     trade("|hulld|hulld tau 1e-09|simplified 1e-02|GJK double|FCL libccd|libccd MPR|Bullet|SAT double|")
   else if (table == "network") network()
   else if (table == "start") start()
+  else if (table == "postgres-commit") postgres_commit()
+  else if (table == "postgres-questions") postgres_questions(1)
+  else if (table == "postgres-many-questions") postgres_questions(64)
+  else if (table == "postgres-bounded") postgres_bounded()
+  else if (table == "postgres-ingest") postgres_ingest()
+  else if (table == "postgres-start") postgres_start()
   else if (table == "overload") overload()
   else if (table == "busy") busy()
   else if (table == "live") live()

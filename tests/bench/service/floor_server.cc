@@ -145,7 +145,7 @@ class AppendDialogue : public Dialogue<v1::AppendPointsRequest, v1::AppendPoints
     ack->set_hull_revision(kRevision);
     ack->set_vertex_count(kRevision);
     ack->mutable_counts()->set_received((points.xyz_size() + points.xyz_float_size()) / 3);
-    ack->mutable_counts()->set_inside((points.xyz_size() + points.xyz_float_size()) / 3);
+    ack->mutable_counts()->set_outside((points.xyz_size() + points.xyz_float_size()) / 3);
   }
 };
 

@@ -1,0 +1,59 @@
+#ifndef HULLD_TESTS_BENCH_POSTGRES_LIBPQ_FLOOR_H_
+#define HULLD_TESTS_BENCH_POSTGRES_LIBPQ_FLOOR_H_
+
+#include <libpq-fe.h>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace hulld::bench {
+
+// What libpq and PostgreSQL alone take for what hulld asks of them: the same prepared statements
+// with parameters of the same bytes, in the same pipelines, one after the other.
+class LibpqFloor {
+ public:
+  // conninfo: a database in which a hulld kept `hull_id`, whose rows it repeats, and which no hulld
+  // has open. shared: that hulld was one of many (--postgres-servers many). Ends the program,
+  // saying why, when anything fails.
+  LibpqFloor(const std::string& conninfo, const std::string& hull_id, bool shared);
+
+  // Commits what a chunk of one point changes. Cost: one round trip, or two where it is shared.
+  void Commit();
+  // The read index: what others committed. Requires that it is shared. Cost: one round trip.
+  void Follow();
+
+ private:
+  struct Statement {
+    const char* name = nullptr;
+    std::vector<std::string> parameters = {};
+  };
+
+  void Run(const std::string& text);
+  std::string Value(const std::string& query);
+  void Ask(const std::vector<Statement>& statements);
+  std::vector<Statement> Puts() const;
+  Statement Fence() const;
+  Statement Others() const;
+
+  const bool shared_;
+  const std::string hull_id_;
+  const std::unique_ptr<PGconn, decltype(&PQfinish)> connection_;
+  uint64_t incarnation_ = 0;
+  uint64_t epoch_ = 0;
+  uint64_t batch_ = 0;
+  uint64_t revision_ = 0;
+  std::string record_;
+  std::string writer_id_;
+  std::string sequence_;
+  std::string delta_;
+};
+
+// Runs one statement as who may make databases, and returns the first column of its first row, or
+// nothing.
+std::string AskDatabase(const std::string& conninfo, const std::string& statement);
+
+}  // namespace hulld::bench
+
+#endif  // HULLD_TESTS_BENCH_POSTGRES_LIBPQ_FLOOR_H_
