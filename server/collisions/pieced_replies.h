@@ -10,12 +10,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
 #include "server/call/queued_stream.h"
+#include "server/process/shared_loop.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/settings/config.h"
@@ -115,6 +117,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual size_t HeldBytes() const = 0;
 
   Shards& shards() { return shards_; }
+
+  // Runs `work` on ranges that together are [0, count), each once: a long call's on several threads
+  // at a time. For the steps above.
+  void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
+    if (IsShort()) return work(0, count);
+    SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
+  }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
   // without the mutex, on any thread, by one thread at a time for each piece.
