@@ -78,8 +78,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
   // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
   static constexpr size_t kSmallBytes = 256 << 10;
-  // Replies up to this size join the one that waits before them.
+  // Replies up to this size join the one that waits before them. A reply up to this size waits for
+  // others while slices run, but no longer than this time by much: a write costs both sides as much
+  // as a hundred pairs.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
+  static constexpr std::chrono::milliseconds kMostWait{2};
 
   // Where the call is prepared and computed.
   struct Threads {
@@ -235,6 +238,12 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
+
+  // A slice that runs ends in a Locked step.
+  bool KeepsWaiting() const final {
+    return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
+           this->LastWaitingTime() < kMostWait;
+  }
 
   void StartWork() final {
     while (is_head_left_ && this->unsent_bytes() < kMostUnsentBytes) is_head_left_ = QueueHead();
