@@ -173,8 +173,8 @@ absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungC
   }
   std::optional<PlacedHull> made_a;
   std::optional<PlacedHull> made_b;
-  absl::StatusOr<hulld::Answer> answer = CheckCollision(table_.PlacedAt(pair.a, &made_a),
-                                                 table_.PlacedAt(pair.b, &made_b), options_);
+  absl::StatusOr<hulld::Answer> answer =
+      CheckCollision(table_.PlacedAt(pair.a, &made_a), table_.PlacedAt(pair.b, &made_b), options_);
   if (!answer.ok()) return Add({std::move(answer)}, piece, columns, counts);
   ++piece.next;
   counts->Add(answer->rung);

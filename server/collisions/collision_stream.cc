@@ -24,11 +24,6 @@ constexpr int kMostShortUpdate = 4096;
 constexpr int kMostQuickPairs = 8;
 // A stream is opened for many updates; how many is a guess.
 constexpr uint64_t kExpectedUpdates = 256;
-// So many pairs are worth another thread, and are shared at a time; and what a thread takes of them
-// at a time: some microseconds.
-constexpr size_t kLeastShared = 128;
-constexpr size_t kMostShared = 2048;
-constexpr size_t kPairsPerShare = 32;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
 
@@ -168,8 +163,7 @@ absl::Status CollisionStream::HandleOpen() {
 absl::Status CollisionStream::ChargeFor(size_t pairs) {
   // A pair among the pairs of two placements, and among those that are asked about.
   constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
-  charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair +
-              std::min(pairs, kMostShared) * sizeof(Found));
+  charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
   return shards_.CheckMemory(MemoryUse::kReading);
 }
 
@@ -219,16 +213,11 @@ void CollisionStream::AskAboutPairsOf(size_t placement) {
   }
 }
 
-PlacedAnswer CollisionStream::Ask(PairState& pair) const {
-  if (!table_.is_answerable(pair.a) || !table_.is_answerable(pair.b)) {
-    return {absl::StatusOr<Answer>(), {}};
-  }
-  return AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
-}
-
-void CollisionStream::AddAnswer(uint32_t index, PlacedAnswer answer) {
+void CollisionStream::AddAnswer(uint32_t index) {
   PairState& pair = pairs_[index];
   const bool answerable = table_.is_answerable(pair.a) && table_.is_answerable(pair.b);
+  PlacedAnswer answer;
+  if (answerable) answer = AskPlaced(table_, pair.a, pair.b, options_, &pair.cache);
   const bool is_answered = answerable && answer.answer.ok();
   if (answerable && !is_answered) {
     answer.answer = NameLimit(table_, pair.a, pair.b, answer.answer.status(), options_);
@@ -266,9 +255,7 @@ void CollisionStream::AnswerSlice() {
   const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerLook;
   while (next_asked_ < asked_.size()) {
     if (reply_bytes_ >= FullMessageBytes(wanted_)) break;
-    if (next_asked_ % kPairsPerLook == 0 && IsWorthSharing()) return ShareOut();
-    const uint32_t index = asked_[next_asked_++];
-    AddAnswer(index, Ask(pairs_[index]));
+    AddAnswer(asked_[next_asked_++]);
     if (next_asked_ % pairs_per_look != 0) continue;
     if (call().ShouldStop()) break;
     if (std::chrono::steady_clock::now() >= end) {
@@ -279,63 +266,6 @@ void CollisionStream::AnswerSlice() {
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (next_asked_ == asked_.size()) call().EndMessage();
   SendPart(next_asked_ == asked_.size());
-}
-
-// Whether other threads are to answer some of the pairs that are left: of hulls, and no more than
-// the relation, so that answers are small.
-bool CollisionStream::IsWorthSharing() const {
-  return asked_.size() - next_asked_ >= kLeastShared && pool_.threads() > 1 &&
-         options_.WantsRelationOnly() && !table_.has_bodies();
-}
-
-void CollisionStream::ShareOut() {
-  shared_.resize(std::min(asked_.size() - next_asked_, kMostShared));
-  next_shared_ = 0;
-  const auto shares = static_cast<int>(shared_.size() / (kLeastShared / 2));
-  sharers_ = std::min(shares, pool_.threads());
-  for (int others = sharers_ - 1; others > 0; --others) {
-    RunOn(lane_, [this] { AnswerShare(); });
-  }
-  AnswerShare();
-}
-
-// Answers shared pairs until none is left to begin with, or it is the turn of others.
-void CollisionStream::AnswerShare() {
-  const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
-  const size_t count = shared_.size();
-  while (!call().ShouldStop()) {
-    const size_t begin = next_shared_.fetch_add(kPairsPerShare);
-    if (begin >= count) break;
-    for (size_t i = begin; i < std::min(count, begin + kPairsPerShare); ++i) {
-      const absl::StatusOr<Answer> answer = Ask(pairs_[asked_[next_asked_ + i]]).answer;
-      shared_[i].status = answer.status();
-      if (!answer.ok()) continue;
-      shared_[i].relation = answer->relation;
-      shared_[i].rung = answer->rung;
-    }
-    if (std::chrono::steady_clock::now() < end) continue;
-    return RunOn(lane_, [this] { AnswerShare(); });
-  }
-  if (--sharers_ == 0) TakeShares();
-}
-
-// Where the call stopped, some of them may not be answered, and nothing is sent.
-void CollisionStream::TakeShares() {
-  if (call().ShouldStop()) return FinishCall(call().StopStatus());
-  for (const Found& found : shared_) {
-    PlacedAnswer answer;
-    if (found.status.ok()) {
-      answer.answer.emplace();
-      answer.answer->relation = found.relation;
-      answer.answer->rung = found.rung;
-    } else {
-      answer.answer = found.status;
-    }
-    AddAnswer(asked_[next_asked_++], std::move(answer));
-  }
-  // Others take their turn between two such parts.
-  if (next_asked_ < asked_.size()) return RunOn(lane_, [this] { AnswerSlice(); });
-  AnswerSlice();
 }
 
 }  // namespace hulld::server

@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +14,6 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
@@ -37,13 +35,6 @@ class CollisionStream
                             TaskPool& pool);
 
  private:
-  // What was found of a pair of which only the relation is wanted.
-  struct Found {
-    absl::Status status;
-    Relation relation = Relation::kSeparated;
-    Rung rung = Rung::kBounds;
-  };
-
   // What is kept of a pair from one answer to the next.
   struct PairState {
     uint32_t a;
@@ -77,13 +68,8 @@ class CollisionStream
   absl::Status Refresh(ShardsPlan plan);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
-  PlacedAnswer Ask(PairState& pair) const;
-  void AddAnswer(uint32_t index, PlacedAnswer answer);
+  void AddAnswer(uint32_t index);
   void AnswerSlice();
-  bool IsWorthSharing() const;
-  void ShareOut();
-  void AnswerShare();
-  void TakeShares();
   void SendPart(bool last);
 
   Shards& shards_;
@@ -118,12 +104,6 @@ class CollisionStream
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;
   RungCounts rungs_;
-
-  // Of the next pairs to answer, those that the threads of the pool share: their answers, the next
-  // one to ask about, and how many threads are at it. The last of them goes on alone.
-  std::vector<Found> shared_;
-  std::atomic<size_t> next_shared_ = 0;
-  std::atomic<int> sharers_ = 0;
 };
 
 }  // namespace hulld::server

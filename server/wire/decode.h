@@ -46,8 +46,7 @@ inline Pose ReadPose(const google::protobuf::RepeatedField<double>& poses, size_
   return {{numbers[0], numbers[1], numbers[2], numbers[3]},
           Vector(numbers[4], numbers[5], numbers[6])};
 }
-inline void WritePose(const Pose& pose, size_t i,
-                      google::protobuf::RepeatedField<double>* poses) {
+inline void WritePose(const Pose& pose, size_t i, google::protobuf::RepeatedField<double>* poses) {
   double* const numbers = poses->mutable_data() + kPoseNumbers * i;
   for (int k = 0; k < 4; ++k) numbers[k] = pose.q[k];
   for (int k = 0; k < 3; ++k) numbers[4 + k] = pose.t[k];

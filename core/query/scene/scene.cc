@@ -173,8 +173,7 @@ absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placem
 }
 
 absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
-                                              const SceneOptions& options,
-                                              std::vector<Box> boxes) {
+                                              const SceneOptions& options, std::vector<Box> boxes) {
   HULLD_CHECK(boxes.size() == placements.size());
   return MakeWith(placements, options, std::move(boxes));
 }

@@ -92,8 +92,7 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
 
 absl::StatusOr<PlacementTable> PlacementTable::Make(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-    v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
-    const char* what) {
+    v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements, const char* what) {
   const bool is_packed = packed.hull_ids_size() + packed.hulls_size() + packed.poses_size() > 0;
   if (is_packed && !placements.empty()) {
     return absl::InvalidArgumentError(
@@ -181,9 +180,9 @@ size_t PlacementTable::MemoryBytes() const {
     if (!is_packed_ || HasHull(i)) of_errors += ErrorBytes(status);
   }
   for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
-  const size_t each =
-      2 * sizeof(uint32_t) + sizeof(Pose) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
-  return size() * each + named_.size() * sizeof named_[0] +
+  const size_t each = 2 * sizeof(uint32_t) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
+  const size_t of_poses = static_cast<size_t>(poses_.Capacity()) * sizeof(double);
+  return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() *
              (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownInShards::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +

@@ -35,9 +35,10 @@ class PlacementTable {
  public:
   PlacementTable() = default;
   // Reads a request that has one of the two forms, and takes the poses of packed placements out of
-  // it. Notes what is malformed and what is not the caller's; no hull is known before Resolve. INVALID_ARGUMENT: both forms, or packed ones whose
-  // lists do not fit each other. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
-  // `what` holds them, as in "the batch".
+  // it. Notes what is malformed and what is not the caller's; no hull is known before Resolve.
+  // INVALID_ARGUMENT: both forms, or packed ones whose lists do not fit each other.
+  // RESOURCE_EXHAUSTED: more than max_placements (--max-placements). `what` holds them, as in "the
+  // batch".
   static absl::StatusOr<PlacementTable> Make(
       const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
       v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
@@ -191,7 +192,8 @@ class PlacementTable {
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;
   std::vector<char> query_hull_changed_;
-  // Once SortByHull was called, the placements of hull k: by_hull_[by_hull_begin_[k]] up to by_hull_begin_[k + 1].
+  // Once SortByHull was called, the placements of hull k: by_hull_[by_hull_begin_[k]] up to
+  // by_hull_begin_[k + 1].
   std::vector<uint32_t> by_hull_;
   std::vector<size_t> by_hull_begin_;
   // Of the last Resolve.
