@@ -120,6 +120,8 @@ class RequestStream : public Stream {
 
   // Requires that the call was let in.
   const Request& request() const { return request_; }
+  // To take a part of it, which stays counted until the call ends.
+  Request& own_request() { return request_; }
 
  private:
   absl::Status Receive() final {

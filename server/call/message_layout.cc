@@ -62,23 +62,111 @@ uint32_t ElementBytes(FieldDescriptor::CppType type) {
   }
 }
 
-// Passes over `length` bytes and counts those that end a varint. False: there are fewer.
-bool CountVarints(CodedInputStream& input, uint64_t length, uint64_t& count) {
-  while (length > 0) {
-    const void* data = nullptr;
-    int size = 0;
-    if (!input.GetDirectBufferPointer(&data, &size)) return false;
-    const auto taken = static_cast<int>(std::min<uint64_t>(length, static_cast<uint64_t>(size)));
-    const auto* bytes = static_cast<const uint8_t*>(data);
-    count += static_cast<uint64_t>(
-        std::count_if(bytes, bytes + taken, [](uint8_t byte) { return byte < 0x80; }));
-    if (!input.Skip(taken)) return false;
-    length -= static_cast<uint64_t>(taken);
-  }
-  return true;
+uint64_t VarintsEndingIn(const uint8_t* bytes, const uint8_t* end) {
+  return static_cast<uint64_t>(std::count_if(bytes, end, [](uint8_t byte) { return byte < 0x80; }));
 }
 
 }  // namespace
+
+// A message in several pieces of memory.
+class MessageLayout::PiecedInput {
+ public:
+  explicit PiecedInput(CodedInputStream& input) : input_(input) {}
+
+  // 0: at the end, or malformed.
+  uint32_t ReadTag() { return input_.ReadTag(); }
+  bool ReadVarint(uint64_t* value) { return input_.ReadVarint64(value); }
+  bool Skip(uint32_t length) { return input_.Skip(static_cast<int>(length)); }
+
+  // Passes over `length` bytes and counts those that end a varint. False: there are fewer.
+  bool CountVarints(uint32_t length, uint64_t& count) {
+    while (length > 0) {
+      const void* data = nullptr;
+      int size = 0;
+      if (!input_.GetDirectBufferPointer(&data, &size)) return false;
+      const uint32_t taken = std::min(length, static_cast<uint32_t>(size));
+      const auto* const bytes = static_cast<const uint8_t*>(data);
+      count += VarintsEndingIn(bytes, bytes + taken);
+      if (!input_.Skip(static_cast<int>(taken))) return false;
+      length -= taken;
+    }
+    return true;
+  }
+
+  // Counts a message of the next `length` bytes. False: it is malformed.
+  bool CountMessage(const MessageLayout& layout, uint32_t length, uint64_t most, int depth,
+                    uint64_t& bytes);
+
+ private:
+  CodedInputStream& input_;
+};
+
+// One in a single piece, which most small ones are.
+class MessageLayout::FlatInput {
+ public:
+  FlatInput(const uint8_t* begin, const uint8_t* end) : next_(begin), end_(end) {}
+
+  bool is_at_end() const { return next_ == end_; }
+
+  uint32_t ReadTag() {
+    uint64_t tag = 0;
+    return ReadVarint(&tag) ? static_cast<uint32_t>(tag) : 0;
+  }
+  bool ReadVarint(uint64_t* value) {
+    if (next_ < end_ && *next_ < 0x80) {
+      *value = *next_++;
+      return true;
+    }
+    *value = 0;
+    for (int shift = 0; shift < 70 && next_ < end_; shift += 7) {
+      const uint8_t byte = *next_++;
+      *value |= static_cast<uint64_t>(byte & 0x7f) << shift;
+      if (byte < 0x80) return true;
+    }
+    return false;
+  }
+  bool Skip(uint32_t length) {
+    if (length > static_cast<uint64_t>(end_ - next_)) return false;
+    next_ += length;
+    return true;
+  }
+  bool CountVarints(uint32_t length, uint64_t& count) {
+    const uint8_t* const begin = next_;
+    const bool is_whole = Skip(length);
+    count += VarintsEndingIn(begin, is_whole ? next_ : end_);
+    return is_whole;
+  }
+  bool CountMessage(const MessageLayout& layout, uint32_t length, uint64_t most, int depth,
+                    uint64_t& bytes) {
+    const uint8_t* const begin = next_;
+    const bool is_whole = Skip(length);
+    FlatInput message(begin, is_whole ? next_ : end_);
+    layout.Count(message, most, depth, bytes);
+    return is_whole && message.is_at_end();
+  }
+
+ private:
+  const uint8_t* next_;
+  const uint8_t* const end_;
+};
+
+bool MessageLayout::PiecedInput::CountMessage(const MessageLayout& layout, uint32_t length,
+                                              uint64_t most, int depth, uint64_t& bytes) {
+  const void* data = nullptr;
+  int size = 0;
+  if (length > 0 && input_.GetDirectBufferPointer(&data, &size) &&
+      length <= static_cast<uint32_t>(size)) {
+    const auto* const begin = static_cast<const uint8_t*>(data);
+    FlatInput message(begin, begin + length);
+    layout.Count(message, most, depth, bytes);
+    return message.is_at_end() && Skip(length);
+  }
+  const CodedInputStream::Limit limit = input_.PushLimit(static_cast<int>(length));
+  layout.Count(*this, most, depth, bytes);
+  if (input_.BytesUntilLimit() != 0) return false;
+  input_.PopLimit(limit);
+  return true;
+}
 
 const MessageLayout& MessageLayout::Of(const Descriptor& type) {
   // Recursive: a layout asks for those of its fields. Types that contain themselves would need
@@ -134,12 +222,13 @@ const MessageLayout::Field& MessageLayout::FieldAt(int number) const {
 
 uint64_t MessageLayout::ParsedBytes(CodedInputStream& input, uint64_t most) const {
   uint64_t bytes = own_bytes_;
-  Count(input, most, 0, bytes);
+  PiecedInput pieced(input);
+  Count(pieced, most, 0, bytes);
   return bytes;
 }
 
-void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
-                          uint64_t& bytes) const {
+template <typename Input>
+void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const {
   // Within a group, which no type of the contract has, everything is unknown.
   int groups = 0;
   while (bytes <= most) {
@@ -154,7 +243,7 @@ void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
     switch (WireFormat::GetTagWireType(tag)) {
       case WireFormat::WIRETYPE_VARINT: {
         uint64_t value = 0;
-        if (!input.ReadVarint64(&value)) return;
+        if (!input.ReadVarint(&value)) return;
         bytes += is_number && field.is_varint ? number_bytes : kUnknown;
         break;
       }
@@ -180,19 +269,18 @@ void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
         const bool is_message = field.kind == Field::Kind::kMessage;
         bytes += is_message ? field.message->own_bytes_ : kAllocation;
         if (field.is_repeated && !is_number) bytes += kListedPointer;
-        uint32_t length = 0;
-        if (!input.ReadVarint32(&length) || length > INT32_MAX) return;
+        uint64_t read = 0;
+        if (!input.ReadVarint(&read)) return;
+        const auto length = static_cast<uint32_t>(read);
+        if (length > INT32_MAX) return;
         if (is_message) {
           if (depth >= kDeepest) return;
-          const CodedInputStream::Limit limit = input.PushLimit(static_cast<int>(length));
-          field.message->Count(input, most, depth + 1, bytes);
-          if (input.BytesUntilLimit() != 0) return;
-          input.PopLimit(limit);
+          if (!input.CountMessage(*field.message, length, most, depth + 1, bytes)) return;
           break;
         }
         if (is_number && field.is_repeated && field.is_varint) {
           uint64_t count = 0;
-          const bool whole = CountVarints(input, length, count);
+          const bool whole = input.CountVarints(length, count);
           bytes += kSlack * count * field.element_bytes;
           if (!whole) return;
           break;
@@ -204,7 +292,7 @@ void MessageLayout::Count(CodedInputStream& input, uint64_t most, int depth,
         } else {
           bytes += kUnknown + length;
         }
-        if (!input.Skip(static_cast<int>(length))) return;
+        if (!input.Skip(length)) return;
         break;
       }
       default:

@@ -20,7 +20,7 @@ class MessageLayout {
 
   // Bytes of memory that the message in `input` takes once it is parsed, at most; more than `most`
   // as soon as it is more than that. Unknown fields, which parsing keeps, count too. Where the
-  // message is malformed the count ends, as parsing will. Cost: O(fields), about 10 ns each;
+  // message is malformed the count ends, as parsing will. Cost: O(fields), some ns each;
   // numbers in packed lists are counted at memory speed.
   uint64_t ParsedBytes(google::protobuf::io::CodedInputStream& input, uint64_t most) const;
 
@@ -37,8 +37,11 @@ class MessageLayout {
 
   explicit MessageLayout(const google::protobuf::Descriptor& type);
 
-  void Count(google::protobuf::io::CodedInputStream& input, uint64_t most, int depth,
-             uint64_t& bytes) const;
+  class PiecedInput;
+  class FlatInput;
+
+  template <typename Input>
+  void Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const;
   const Field& FieldAt(int number) const;
 
   // By number; those in between are unknown.

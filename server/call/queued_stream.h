@@ -5,6 +5,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <deque>
 #include <mutex>
@@ -55,12 +56,15 @@ class QueuedStream : public CallStream<Reactor> {
   virtual void StartWork() = 0;
   // Whether something is under way that must be over before the stream ends.
   virtual bool IsWorking() const = 0;
+  // Whether the only reply that waits is to wait on for others to join it, which saves writes.
+  // Requires, where it says so, that a Locked step follows soon.
+  virtual bool KeepsWaiting() const { return false; }
 
   // Queues a reply. bytes: its size, where the stream bounds what waits.
   void Queue(Reply reply, size_t bytes = 0) {
     CheckLocked();
     unsent_bytes_ += bytes;
-    waiting_.push_back({std::move(reply), bytes});
+    waiting_.push_back({std::move(reply), bytes, std::chrono::steady_clock::now()});
   }
   // The last reply while it waits, so that more may be added to it; null when none waits.
   Reply* LastWaiting() { return waiting_.empty() ? nullptr : &waiting_.back().reply; }
@@ -70,6 +74,10 @@ class QueuedStream : public CallStream<Reactor> {
     HULLD_CHECK(!waiting_.empty());
     waiting_.back().bytes += bytes;
     unsent_bytes_ += bytes;
+  }
+  // For how long it waits.
+  std::chrono::steady_clock::duration LastWaitingTime() const {
+    return std::chrono::steady_clock::now() - waiting_.back().since;
   }
   void DropWaiting() {
     CheckLocked();
@@ -95,6 +103,7 @@ class QueuedStream : public CallStream<Reactor> {
   struct Waiting {
     Reply reply;
     size_t bytes;
+    std::chrono::steady_clock::time_point since;
   };
 
   void CheckLocked() const { HULLD_DCHECK(holder_ == std::this_thread::get_id()); }
@@ -122,7 +131,8 @@ class QueuedStream : public CallStream<Reactor> {
   void Proceed() {
     if (this->finished()) return;
     if (!end_.has_value()) StartWork();
-    if (!writing_ && !waiting_.empty()) {
+    const bool is_alone = waiting_.size() == 1 && !end_.has_value();
+    if (!writing_ && !waiting_.empty() && !(is_alone && KeepsWaiting())) {
       writing_ = true;
       bytes_ = SerializeReply(waiting_.front().reply);
       bytes_in_flight_ = waiting_.front().bytes;

@@ -65,8 +65,8 @@ absl::Status BatchStream::Validate() {
   team_options_ = options_;
   team_options_.threads = team_threads_;
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           shards().limits().max_placements, "the batch");
+      PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
+                           call().caller(), shards().limits().max_placements, "the batch");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   pair_count_ = static_cast<uint64_t>(request().pairs_size()) / 2;
@@ -85,6 +85,11 @@ absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
   if (!may_wait) return table_.TryResolve(shards(), options_, plan);
   if (absl::Status s = table_.Resolve(shards(), options_, plan); !s.ok()) return s;
   return true;
+}
+
+absl::Status BatchStream::Prepare() {
+  is_plain_ = options_.WantsRelationOnly() && !table_.has_bodies();
+  return absl::OkStatus();
 }
 
 bool BatchStream::QueueHead() {
@@ -163,7 +168,18 @@ absl::Status BatchStream::Answer(PairsPiece& piece, BatchColumns* columns, RungC
     ++piece.next;
     return absl::OkStatus();
   }
-  return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
+  if (!is_plain_) {
+    return Add(AskPlaced(table_, pair.a, pair.b, options_, nullptr), piece, columns, counts);
+  }
+  std::optional<PlacedHull> made_a;
+  std::optional<PlacedHull> made_b;
+  absl::StatusOr<hulld::Answer> answer =
+      CheckCollision(table_.PlacedAt(pair.a, &made_a), table_.PlacedAt(pair.b, &made_b), options_);
+  if (!answer.ok()) return Add({std::move(answer)}, piece, columns, counts);
+  ++piece.next;
+  counts->Add(answer->rung);
+  columns->Add([&](v1::AnswerColumns* to) { return AddRelation(*answer, to); });
+  return absl::OkStatus();
 }
 
 absl::Status BatchStream::AnswerByTextbook(PairsPiece& piece, Clock::time_point end,

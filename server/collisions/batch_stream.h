@@ -47,6 +47,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   bool IsShort() const override;
   absl::Status Validate() override;
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
+  absl::Status Prepare() override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;
   size_t HeldBytes() const override { return table_.MemoryBytes(); }
   // The rest requires the mutex.
@@ -82,6 +83,8 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // The same for a pair that is worth the team.
   QueryOptions team_options_;
   PlacementTable table_;
+  // Every pair is one of hulls, and the relation is all that is wanted.
+  bool is_plain_ = false;
 
   // Guarded by the mutex.
   // The first row of the table of hulls that is still to be told, and the last part of the table,

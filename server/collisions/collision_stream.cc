@@ -112,7 +112,7 @@ absl::Status CollisionStream::HandleMessage() {
 }
 
 absl::Status CollisionStream::HandleOpen() {
-  const v1::CollisionStreamOpen& open = request().open();
+  v1::CollisionStreamOpen& open = *request().mutable_open();
   absl::StatusOr<QueryOptions> options = MakeQueryOptions(
       v1::METHOD_UNSPECIFIED, open.wanted(), open.tolerance(), shards_.limits(), call().lifetime());
   if (!options.ok()) return Prefixed("open: ", options.status());
@@ -121,7 +121,7 @@ absl::Status CollisionStream::HandleOpen() {
   if (!freshness.ok()) return Prefixed("open: ", freshness.status());
   freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(open.placements(), open.packed_placements(), call().caller(),
+      PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            shards_.limits().max_placements, "the stream");
   if (!table.ok()) return Prefixed("open: ", table.status());
   const absl::Status valid = ValidatePairs(open.pairs(), table->size(),

@@ -10,12 +10,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
 #include "server/call/queued_stream.h"
+#include "server/process/shared_loop.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/settings/config.h"
@@ -76,8 +78,11 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kMostHeldBytes = Config::kReplyMessageBytes / 4;
   // Some hundred placements. With --max-concurrent-batches such calls, some MiB.
   static constexpr size_t kSmallBytes = 256 << 10;
-  // Replies up to this size join the one that waits before them.
+  // Replies up to this size join the one that waits before them. A reply up to this size waits for
+  // others while slices run, but no longer than this time by much: a write costs both sides as much
+  // as a hundred pairs.
   static constexpr size_t kSmallReplyBytes = 32 << 10;
+  static constexpr std::chrono::milliseconds kMostWait{2};
 
   // Where the call is prepared and computed.
   struct Threads {
@@ -115,6 +120,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual size_t HeldBytes() const = 0;
 
   Shards& shards() { return shards_; }
+
+  // Runs `work` on ranges that together are [0, count), each once: a long call's on several threads
+  // at a time. For the steps above.
+  void ShareOut(size_t count, size_t step, const std::function<void(size_t, size_t)>& work) {
+    if (IsShort()) return work(0, count);
+    SharedLoop::Run(readers_, most_pieces_ / 2 - 1, count, step, work);
+  }
 
   // Works on the piece until `end`, or until it is done: adds replies and advances `next`. Called
   // without the mutex, on any thread, by one thread at a time for each piece.
@@ -226,6 +238,12 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   }
 
   bool IsWorking() const final { return opening_ || running_ > 0; }
+
+  // A slice that runs ends in a Locked step.
+  bool KeepsWaiting() const final {
+    return running_ > 0 && this->LastWaitingBytes() <= kSmallReplyBytes &&
+           this->LastWaitingTime() < kMostWait;
+  }
 
   void StartWork() final {
     while (is_head_left_ && this->unsent_bytes() < kMostUnsentBytes) is_head_left_ = QueueHead();

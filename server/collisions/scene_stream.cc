@@ -22,6 +22,8 @@ constexpr int kMostShortPlacements = 512;
 // such a part, which takes about as long as a candidate.
 constexpr uint64_t kStepsPerLook = 16;
 constexpr uint64_t kNodesPerStep = 16;
+// Placements whose boxes a thread computes at a time: some 100 us.
+constexpr size_t kBoxesPerStep = 256;
 // Two indices of a pair, as varints.
 constexpr size_t kPairBytes = 10;
 
@@ -78,8 +80,8 @@ absl::Status SceneStream::Validate() {
   if (!freshness.ok()) return freshness.status();
   freshness_ = *freshness;
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(request().placements(), request().packed_placements(), call().caller(),
-                           shards().limits().max_placements, "the scene");
+      PlacementTable::Make(request().placements(), *own_request().mutable_packed_placements(),
+                           call().caller(), shards().limits().max_placements, "the scene");
   if (!table.ok()) return table.status();
   table_ = *std::move(table);
   if (absl::Status s = ValidateGroups(request(), table_.size()); !s.ok()) return s;
@@ -102,7 +104,14 @@ absl::StatusOr<bool> SceneStream::ResolveHulls(bool may_wait) {
 
 absl::Status SceneStream::Prepare() {
   options_.bodies = table_.bodies();
-  absl::StatusOr<SceneSearch> search = SceneSearch::Make(table_.placed(), options_);
+  std::vector<Box> boxes(table_.size());
+  ShareOut(boxes.size(), kBoxesPerStep, [&](size_t begin, size_t end) {
+    if (call().ShouldStop()) return;
+    for (size_t i = begin; i < end; ++i) boxes[i] = table_.BoxOf(i);
+  });
+  if (call().ShouldStop()) return call().StopStatus();
+  absl::StatusOr<SceneSearch> search =
+      SceneSearch::Make(table_.placed(), options_, std::move(boxes));
   if (!search.ok()) return search.status();
   search_ = *std::move(search);
   call().AddPairs(search_->pairs());

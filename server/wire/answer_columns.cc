@@ -94,6 +94,12 @@ size_t AddUnanswered(const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   return bytes + AddNumbers(nullptr, wanted, columns);
 }
 
+size_t AddRelation(const Answer& answer, v1::AnswerColumns* columns) {
+  columns->add_relations(EncodeRelation(answer.relation));
+  columns->add_rungs(EncodeRung(answer.rung));
+  return 2;
+}
+
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const QueryHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns) {
   if (!answer.ok()) {

@@ -24,6 +24,9 @@ size_t FullMessageBytes(const v1::Wanted& wanted);
 size_t AddAnswer(const absl::StatusOr<Answer>& answer, const QueryHull& a, const QueryHull& b,
                  const v1::Wanted& wanted, v1::AnswerColumns* columns);
 
+// The same for an answer where the relation is all that is wanted.
+size_t AddRelation(const Answer& answer, v1::AnswerColumns* columns);
+
 // Whether something in the columns names a row, so that they cannot follow the rows of others.
 bool NamesRows(const v1::AnswerColumns& columns);
 

@@ -122,7 +122,7 @@ absl::StatusOr<Chunk> DecodeChunk(const v1::AppendChunk& message, uint64_t max_p
   return chunk;
 }
 
-absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
+Pose ReadPose(const v1::Pose& message) {
   Pose pose;
   if (message.has_rotation()) {
     const v1::Quaternion& q = message.rotation();
@@ -132,15 +132,17 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
     const v1::Vector3& t = message.translation();
     pose.t = Vector(t.x(), t.y(), t.z());
   }
+  return pose;
+}
+
+absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
+  const Pose pose = ReadPose(message);
   if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
   return pose;
 }
 
 absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i) {
-  const double* const numbers = poses.data() + static_cast<ptrdiff_t>(kPoseNumbers) * i;
-  Pose pose;
-  pose.q = {numbers[0], numbers[1], numbers[2], numbers[3]};
-  pose.t = Vector(numbers[4], numbers[5], numbers[6]);
+  const Pose pose = ReadPose(poses, static_cast<size_t>(i));
   if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
   return pose;
 }

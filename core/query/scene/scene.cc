@@ -146,7 +146,7 @@ SceneSearch::SceneSearch(std::span<const PlacedHull> placements, const SceneOpti
   size_ = options.movers ? std::min(*options.movers, count) : count;
 }
 
-bool SceneSearch::BuildTree() {
+bool SceneSearch::ComputeBoxes() {
   const std::function<bool()>& should_stop = options_->query.should_stop;
   const auto count = static_cast<uint32_t>(placements_.size());
   boxes_.resize(count);
@@ -159,13 +159,28 @@ bool SceneSearch::BuildTree() {
       boxes_[i] = IsBody(i) ? BoundingBox(options_->bodies[i]) : BoundingBox(placements_[i]);
     }
   }
-  if (StopPoll(should_stop, 1).Poll()) return false;
-  tree_ = BoxTree(boxes_, should_stop);
   return !StopPoll(should_stop, 1).Poll();
+}
+
+bool SceneSearch::BuildTree() {
+  tree_ = BoxTree(boxes_, options_->query.should_stop);
+  return !StopPoll(options_->query.should_stop, 1).Poll();
 }
 
 absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
                                               const SceneOptions& options) {
+  return MakeWith(placements, options, std::nullopt);
+}
+
+absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placements,
+                                              const SceneOptions& options, std::vector<Box> boxes) {
+  HULLD_CHECK(boxes.size() == placements.size());
+  return MakeWith(placements, options, std::move(boxes));
+}
+
+absl::StatusOr<SceneSearch> SceneSearch::MakeWith(std::span<const PlacedHull> placements,
+                                                  const SceneOptions& options,
+                                                  std::optional<std::vector<Box>> boxes) {
   if (!options.groups.empty() && options.groups.size() != placements.size()) {
     return absl::InvalidArgumentError(absl::StrCat("groups holds ", options.groups.size(),
                                                    " groups for ", placements.size(),
@@ -173,7 +188,13 @@ absl::StatusOr<SceneSearch> SceneSearch::Make(std::span<const PlacedHull> placem
   }
   HULLD_CHECK(options.bodies.empty() || options.bodies.size() == placements.size());
   SceneSearch scene(placements, options);
-  if (!scene.BuildTree()) return absl::CancelledError("stopped in a scene");
+  bool is_made = true;
+  if (boxes.has_value()) {
+    scene.boxes_ = *std::move(boxes);
+  } else {
+    is_made = scene.ComputeBoxes();
+  }
+  if (!is_made || !scene.BuildTree()) return absl::CancelledError("stopped in a scene");
   return scene;
 }
 

@@ -71,6 +71,9 @@ class SceneSearch {
   // each placement. CANCELLED: should_stop said so.
   static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
                                           const SceneOptions& options);
+  // The same for a caller that computed the boxes: BoundingBox of each placement.
+  static absl::StatusOr<SceneSearch> Make(std::span<const PlacedHull> placements,
+                                          const SceneOptions& options, std::vector<Box> boxes);
 
   // Pairs that the groups and movers leave.
   uint64_t pairs() const { return pairs_; }
@@ -94,7 +97,11 @@ class SceneSearch {
 
   SceneSearch(std::span<const PlacedHull> placements, const SceneOptions& options);
 
-  // False: should_stop said so, and what was built is to be dropped.
+  static absl::StatusOr<SceneSearch> MakeWith(std::span<const PlacedHull> placements,
+                                              const SceneOptions& options,
+                                              std::optional<std::vector<Box>> boxes);
+  // False: should_stop said so, and what was made is to be dropped.
+  bool ComputeBoxes();
   bool BuildTree();
   bool IsIgnored(uint32_t a, uint32_t b) const;
   bool IsBody(uint32_t placement) const {

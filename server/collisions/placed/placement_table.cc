@@ -92,8 +92,7 @@ absl::Status CheckPacked(const v1::PackedPlacements& packed) {
 
 absl::StatusOr<PlacementTable> PlacementTable::Make(
     const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-    const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
-    const char* what) {
+    v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements, const char* what) {
   const bool is_packed = packed.hull_ids_size() + packed.hulls_size() + packed.poses_size() > 0;
   if (is_packed && !placements.empty()) {
     return absl::InvalidArgumentError(
@@ -110,7 +109,7 @@ absl::StatusOr<PlacementTable> PlacementTable::Make(
   return PlacementTable(packed, caller);
 }
 
-PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller& caller)
+PlacementTable::PlacementTable(v1::PackedPlacements& packed, const Caller& caller)
     : is_packed_(true), prefix_(caller.prefix) {
   std::vector<absl::Status> malformed(packed.hull_ids_size());
   named_.resize(malformed.size(), kNoHull);
@@ -124,13 +123,12 @@ PlacementTable::PlacementTable(const v1::PackedPlacements& packed, const Caller&
   }
   const size_t count = packed.hulls_size();
   hull_of_.reserve(count);
-  poses_.resize(count);
+  poses_.Swap(packed.mutable_poses());
   for (size_t i = 0; i < count; ++i) {
     const uint32_t named = packed.hulls(static_cast<int>(i));
     hull_of_.push_back(named_[named]);
     if (HasHull(i)) {
-      SetPose(i, DecodePoseAt(packed.poses(), static_cast<int>(i)), "packed_placements.poses[",
-              "].");
+      CheckPose(i, "packed_placements.poses[", "].");
     } else {
       malformed_.emplace(i, malformed[named]);
     }
@@ -143,7 +141,7 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
   std::unordered_map<std::string_view, uint32_t> index_of;
   const size_t count = placements.size();
   hull_of_.resize(count, kNoHull);
-  poses_.resize(count);
+  poses_.Resize(static_cast<int>(count) * kPoseNumbers, 0);
   for (size_t i = 0; i < count; ++i) {
     const v1::Placement& placement = placements[static_cast<int>(i)];
     auto known = index_of.find(placement.hull_id());
@@ -158,18 +156,16 @@ PlacementTable::PlacementTable(const google::protobuf::RepeatedPtrField<v1::Plac
       ids_.push_back(placement.hull_id());
     }
     hull_of_[i] = known->second;
-    SetPose(i, DecodePose(placement.pose()), "placements[", "].pose.");
+    WritePose(ReadPose(placement.pose()), i, &poses_);
+    CheckPose(i, "placements[", "].pose.");
   }
 }
 
 // of, after: what an error says before and after the index.
-void PlacementTable::SetPose(size_t i, absl::StatusOr<Pose> pose, const char* of,
-                             const char* after) {
-  if (pose.ok()) {
-    poses_[i] = *pose;
-  } else {
-    malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), pose.status()));
-  }
+void PlacementTable::CheckPose(size_t i, const char* of, const char* after) {
+  const Pose pose = PoseAt(i);
+  if (IsValidPose(pose)) return;
+  malformed_.emplace(i, Prefixed(absl::StrCat(of, i, after), ValidatePose(pose)));
 }
 
 size_t PlacementTable::MemoryBytes() const {
@@ -184,9 +180,9 @@ size_t PlacementTable::MemoryBytes() const {
     if (!is_packed_ || HasHull(i)) of_errors += ErrorBytes(status);
   }
   for (const absl::StatusOr<HullView>& hull : hulls_) of_errors += ErrorBytes(hull.status());
-  const size_t each =
-      2 * sizeof(uint32_t) + sizeof(Pose) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
-  return size() * each + named_.size() * sizeof named_[0] +
+  const size_t each = 2 * sizeof(uint32_t) + (places_on_demand_ ? 0 : sizeof(PlacedHull));
+  const size_t of_poses = static_cast<size_t>(poses_.Capacity()) * sizeof(double);
+  return size() * each + of_poses + named_.size() * sizeof named_[0] +
          ids_.size() *
              (sizeof(std::string) + sizeof(absl::StatusOr<HullView>) + KnownInShards::kBytesEach +
               sizeof(const QueryHull*) + sizeof(size_t) + 2 * sizeof(char)) +
@@ -291,7 +287,6 @@ void PlacementTable::Take(const Shards& shards, ShardsResolved resolved,
   TakeBodies();
   hulls_of_pieces_.clear();
   if (options.want_certificate) TakeHullsOfPieces();
-  if (by_hull_begin_.empty()) SortByHull();
 }
 
 // Where there are bodies, hulls are asked about as bodies of one piece.
@@ -333,7 +328,7 @@ void PlacementTable::TakeHullsOfPieces() {
 
 PlacedBody PlacementTable::PlaceBody(size_t i) const {
   if (!is_answerable(i)) return PlacedBody(NoBody(), Pose());
-  return PlacedBody(*query_bodies_[hull_of_[i]], poses_[i]);
+  return PlacedBody(*query_bodies_[hull_of_[i]], PoseAt(i));
 }
 
 void PlacementTable::SortByHull() {
@@ -355,7 +350,7 @@ const QueryHull& PlacementTable::HullAt(size_t i) const {
 
 PlacedHull PlacementTable::Place(size_t i) const {
   if (!is_answerable(i)) return PlacedHull(NoHull(), Pose());
-  return PlacedHull(*query_hulls_[hull_of_[i]], poses_[i]);
+  return PlacedHull(*query_hulls_[hull_of_[i]], PoseAt(i));
 }
 
 void PlacementTable::PlaceAgain(size_t i) {
@@ -374,7 +369,7 @@ bool PlacementTable::query_hull_changed(size_t i) const {
 
 void PlacementTable::Move(size_t i, const Pose& X_WH) {
   if (!HasHull(i)) return;
-  poses_[i] = X_WH;
+  WritePose(X_WH, i, &poses_);
   malformed_.erase(i);
   PlaceAgain(i);
   if (has_bodies()) bodies_[i] = PlaceBody(i);

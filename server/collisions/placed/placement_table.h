@@ -25,6 +25,7 @@
 #include "server/access/caller.h"
 #include "server/shards/body_resolution.h"
 #include "server/shards/shards.h"
+#include "server/wire/decode.h"
 
 namespace hulld::server {
 
@@ -33,13 +34,14 @@ namespace hulld::server {
 class PlacementTable {
  public:
   PlacementTable() = default;
-  // Reads a request that has one of the two forms. Notes what is malformed and what is not the
-  // caller's; no hull is known before Resolve. INVALID_ARGUMENT: both forms, or packed ones whose
-  // lists do not fit each other. RESOURCE_EXHAUSTED: more than max_placements (--max-placements).
-  // `what` holds them, as in "the batch".
+  // Reads a request that has one of the two forms, and takes the poses of packed placements out of
+  // it. Notes what is malformed and what is not the caller's; no hull is known before Resolve.
+  // INVALID_ARGUMENT: both forms, or packed ones whose lists do not fit each other.
+  // RESOURCE_EXHAUSTED: more than max_placements (--max-placements). `what` holds them, as in "the
+  // batch".
   static absl::StatusOr<PlacementTable> Make(
       const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
-      const v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
+      v1::PackedPlacements& packed, const Caller& caller, uint64_t max_placements,
       const char* what);
 
   // Placements are placed when they are asked for, each time: for a call that asks for each of them
@@ -57,7 +59,7 @@ class PlacementTable {
   // The same as Resolve, but false, at once, where it would have to wait or to make something.
   bool TryResolve(Shards& shards, const QueryOptions& options, const ShardsPlan& plan);
 
-  size_t size() const { return poses_.size(); }
+  size_t size() const { return hull_of_.size(); }
   // How many hulls there are for them.
   size_t hull_count() const { return ids_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
@@ -99,6 +101,7 @@ class PlacementTable {
 
   // The same as Resolve for a few of hull_ids(), by index, each once, of which the registry told
   // that they changed, so that they are taken as they are there; the others stay as they are.
+  // Requires SortByHull.
   absl::Status ResolveSome(Shards& shards, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
@@ -109,7 +112,9 @@ class PlacementTable {
   std::span<const std::string> hull_ids() const { return ids_; }
   // What hull k is, or why there is none. Requires that it was resolved.
   const absl::StatusOr<HullView>& hull(size_t k) const { return hulls_[k]; }
-  // The placements of hull k. Requires that it was resolved.
+  // Lists the placements by their hull, for placements_of and ResolveSome. Cost: O(n).
+  void SortByHull();
+  // The placements of hull k. Requires SortByHull.
   std::span<const uint32_t> placements_of(size_t k) const {
     return std::span(by_hull_).subspan(by_hull_begin_[k],
                                        by_hull_begin_[k + 1] - by_hull_begin_[k]);
@@ -149,11 +154,12 @@ class PlacementTable {
 
   PlacementTable(const google::protobuf::RepeatedPtrField<v1::Placement>& placements,
                  const Caller& caller);
-  PlacementTable(const v1::PackedPlacements& packed, const Caller& caller);
+  PlacementTable(v1::PackedPlacements& packed, const Caller& caller);
 
   bool HasHull(size_t i) const { return hull_of_[i] != kNoHull; }
   bool IsMalformed(size_t i) const { return !malformed_.empty() && malformed_.contains(i); }
-  void SetPose(size_t i, absl::StatusOr<Pose> pose, const char* of, const char* after);
+  void CheckPose(size_t i, const char* of, const char* after);
+  Pose PoseAt(size_t i) const { return ReadPose(poses_, i); }
   absl::Status ResolveFrom(Shards& shards, KnownPlaced& known, const QueryOptions& options,
                            const ShardsPlan& plan);
   PlacedLookup LookupFor(const QueryOptions& options, const ShardsPlan& plan) const;
@@ -165,14 +171,13 @@ class PlacementTable {
   size_t EncodePlacement(size_t row, const RowFields& to) const;
   size_t BodyBytes() const;
   PlacedBody PlaceBody(size_t i) const;
-  void SortByHull();
   PlacedHull Place(size_t i) const;
   void PlaceAgain(size_t i);
 
   // Of each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
-  // not the caller's; and its pose.
+  // not the caller's; and its pose, as packed placements have it.
   std::vector<uint32_t> hull_of_;
-  std::vector<Pose> poses_;
+  google::protobuf::RepeatedField<double> poses_;
   // What is wrong with the ID or the pose of a placement.
   std::unordered_map<size_t, absl::Status> malformed_;
   bool is_packed_ = false;
@@ -187,7 +192,8 @@ class PlacementTable {
   std::vector<const QueryHull*> query_hulls_;
   std::vector<char> changed_;
   std::vector<char> query_hull_changed_;
-  // The placements of hull k: by_hull_[by_hull_begin_[k]] up to by_hull_begin_[k + 1].
+  // Once SortByHull was called, the placements of hull k: by_hull_[by_hull_begin_[k]] up to
+  // by_hull_begin_[k + 1].
   std::vector<uint32_t> by_hull_;
   std::vector<size_t> by_hull_begin_;
   // Of the last Resolve.

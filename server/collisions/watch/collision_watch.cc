@@ -130,7 +130,7 @@ absl::Status CollisionWatch::HandleMessage() {
         return absl::InvalidArgumentError(
             "open came twice; other placements or pairs need another watch");
       }
-      return Prefixed("open: ", HandleOpen(request().open()));
+      return Prefixed("open: ", HandleOpen(*request().mutable_open()));
     case v1::WatchCollisionsRequest::kUpdate:
       if (!is_open_)
         return absl::InvalidArgumentError("the first message must be open, not update");
@@ -142,7 +142,7 @@ absl::Status CollisionWatch::HandleMessage() {
   return absl::InvalidArgumentError("the message is empty; set open or update");
 }
 
-absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
+absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   // NaN, too.
   if (open.has_clearance() && !(open.clearance() >= 0)) {
     return absl::InvalidArgumentError(
@@ -155,7 +155,7 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
       MakeQueryOptions(v1::METHOD_UNSPECIFIED, wanted, 0, limits, call().lifetime());
   if (!options.ok()) return options.status();
   absl::StatusOr<PlacementTable> table =
-      PlacementTable::Make(open.placements(), open.packed_placements(), call().caller(),
+      PlacementTable::Make(open.placements(), *open.mutable_packed_placements(), call().caller(),
                            limits.max_placements, "the watch");
   if (!table.ok()) return table.status();
   const bool has_groups = open.groups_size() > 0 || open.ignored_group_pairs_size() > 0 ||
@@ -171,6 +171,7 @@ absl::Status CollisionWatch::HandleOpen(const v1::CollisionWatchOpen& open) {
   if (!valid.ok()) return valid;
   options_ = *std::move(options);
   table_ = *std::move(table);
+  table_.SortByHull();
   pairs_ = WatchedPairs(open, table_.size(), limits.max_pairs_per_batch);
   charge_.Set(table_.MemoryBytes() + pairs_.MemoryBytes());
   if (absl::Status s = WatchHulls(); !s.ok()) return s;

@@ -65,7 +65,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   // The following are the work.
   void TakeMessage();
   absl::Status HandleMessage();
-  absl::Status HandleOpen(const v1::CollisionWatchOpen& open);
+  absl::Status HandleOpen(v1::CollisionWatchOpen& open);
   absl::Status WatchHulls();
   void FollowPieces(std::span<const size_t> hulls);
   std::vector<size_t> ConcernedBy(const ShardsWatchPiece& piece) const;

@@ -4,7 +4,7 @@
 //
 //   remote_benchmark [--out FILE.csv] [--suite NAME]... [--filter TEXT] [--rounds N] [--seconds S]
 //                    [--transport tcp|unix] [--hulld PROGRAM] [--data FOLDER]
-//                    [--hulld-flag=FLAG]...
+//                    [--hulld-flag=FLAG]... [--beside PROGRAM]
 //
 // Columns: what the workload counts a second; the time of one call; `of_floor`: per_second as a
 // multiple of the floor's, `p50_of_floor`: p50 as a multiple of the floor's, `of_in_process`:
@@ -36,6 +36,7 @@ struct Arguments {
   int rounds = 5;
   double seconds = 0.5;
   std::string hulld = HULLD_PROGRAM;
+  std::string beside;
   std::string data = std::filesystem::temp_directory_path();
   std::vector<std::string> hulld_flags;
 };
@@ -157,19 +158,25 @@ struct Servers {
     const auto address = [&](const char* name) {
       return transport == "tcp" ? "127.0.0.1:0" : "unix:" + (folder / name).string();
     };
-    const auto command = [&](const char* name, const std::string& store) {
-      std::vector<std::string> words = {arguments.hulld, "--listen", address(name), store};
+    const auto command = [&](const std::string& program, const char* name,
+                             const std::string& store) {
+      std::vector<std::string> words = {program, "--listen", address(name), store};
       words.insert(words.end(), arguments.hulld_flags.begin(), arguments.hulld_flags.end());
       return words;
     };
     floor.emplace("floor", transport,
                   std::vector<std::string>{HULLD_FLOOR_PROGRAM, address("floor")});
-    hulld.emplace("hulld", transport, command("hulld", "--store=memory"));
-    durable.emplace("hulld durable", transport,
-                    command("durable", "--data-dir=" + (folder / "store").string()));
+    hulld.emplace("hulld", transport, command(arguments.hulld, "hulld", "--store=memory"));
+    if (!arguments.beside.empty()) {
+      beside.emplace("beside", transport, command(arguments.beside, "beside", "--store=memory"));
+    }
+    durable.emplace(
+        "hulld durable", transport,
+        command(arguments.hulld, "durable", "--data-dir=" + (folder / "store").string()));
   }
   ~Servers() {
     durable.reset();
+    beside.reset();
     hulld.reset();
     floor.reset();
     std::error_code ignored;
@@ -179,6 +186,8 @@ struct Servers {
   std::filesystem::path folder;
   std::optional<RemoteSubject> floor;
   std::optional<RemoteSubject> hulld;
+  // Another one to compare it with.
+  std::optional<RemoteSubject> beside;
   // Keeps everything on disk.
   std::optional<RemoteSubject> durable;
 };
@@ -217,6 +226,7 @@ int Main(int argc, char** argv) {
       ->check(CLI::Range(1, 1000));
   app.add_option("--seconds", arguments.seconds, "Of each round")->check(CLI::PositiveNumber);
   app.add_option("--hulld", arguments.hulld, "Another hulld, as of another version");
+  app.add_option("--beside", arguments.beside, "A second hulld, measured in turn with the first");
   app.add_option("--data", arguments.data, "Folder to keep the durable store in meanwhile");
   app.add_option("--hulld-flag", arguments.hulld_flags,
                  "Passed to hulld, as in --hulld-flag=--threads=1");
@@ -229,6 +239,7 @@ int Main(int argc, char** argv) {
     Servers servers(transport, arguments);
     for (const RemoteWorkload& workload : workloads) {
       std::vector<RemoteSubject*> subjects = {&*servers.floor, &*servers.hulld};
+      if (servers.beside.has_value()) subjects.push_back(&*servers.beside);
       // What is only read is in memory either way.
       if (workload.unit == "points") subjects.push_back(&*servers.durable);
       Run(workload, subjects, arguments.rounds, report);

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "core/query/batch.h"
+#include "core/query/collision.h"
 #include "core/query/scene/scene.h"
 #include "tests/bench/bench_random.h"
 #include "tests/bench/queries/query_sets.h"
@@ -157,6 +158,10 @@ Sample AnswerBatchInProcess(const Batch& batch, double seconds) {
 struct Motion {
   v1::CollisionStreamOpen open;
   std::vector<v1::CollisionStreamUpdate> frames;
+  // The same for core: of each pair the first placement, the hull of the second, and its poses.
+  std::vector<PlacedHull> first;
+  std::vector<const QueryHull*> second;
+  std::vector<std::vector<Pose>> poses;
 };
 
 std::shared_ptr<Motion> MakeMotion(size_t count) {
@@ -168,11 +173,14 @@ std::shared_ptr<Motion> MakeMotion(size_t count) {
     const QuerySet::Query& query = set.queries[i];
     FillPlacement(query.hull_a, query.X_WA, motion->open.add_placements());
     FillPlacement(query.hull_b, query.X_WB, motion->open.add_placements());
+    motion->first.push_back(set.a[i]);
+    motion->second.push_back(&set.b[i].query_hull());
     motion->open.add_pairs(static_cast<uint32_t>(2 * i));
     motion->open.add_pairs(static_cast<uint32_t>(2 * i + 1));
   }
   for (size_t frame = 0; frame < kFrames; ++frame) {
     v1::CollisionStreamUpdate& update = motion->frames.emplace_back();
+    std::vector<Pose>& poses = motion->poses.emplace_back();
     const double phase =
         kStep * std::abs(static_cast<double>(kFrames / 2) - static_cast<double>(frame));
     for (size_t i = 0; i < count; ++i) {
@@ -180,6 +188,7 @@ std::shared_ptr<Motion> MakeMotion(size_t count) {
       X_WB.q[i % 4] += phase;
       update.add_placements(static_cast<uint32_t>(2 * i + 1));
       AddPose(X_WB, &update);
+      poses.push_back(X_WB);
     }
   }
   return motion;
@@ -197,6 +206,24 @@ Sample FollowMotion(RemoteSubject& subject, const Motion& motion, double seconds
   });
   CheckOk(stream->Close(), "closing a stream");
   return sample;
+}
+
+// As core does it: each pair with what the last question left of it.
+Sample FollowMotionInProcess(const Motion& motion, double seconds) {
+  const auto count = static_cast<int64_t>(motion.first.size());
+  std::vector<PairCache> caches(motion.first.size());
+  std::vector<Relation> relations(motion.first.size());
+  return Repeat(1, seconds, static_cast<double>(count), [&](int, size_t step) {
+    const std::vector<Pose>& poses = motion.poses[step % motion.poses.size()];
+#pragma omp parallel for schedule(dynamic, 16) num_threads(kThreads)
+    for (int64_t i = 0; i < count; ++i) {
+      const auto b = PlacedHull::Make(*motion.second[i], poses[i]);
+      CheckOk(b.status(), "a pose");
+      const auto answer = CheckCollision(motion.first[i], *b, {}, &caches[i]);
+      CheckOk(answer.status(), "a pair");
+      relations[i] = answer->relation;
+    }
+  });
 }
 
 struct Scene {
@@ -298,7 +325,8 @@ std::vector<RemoteWorkload> MakeStreamWorkloads(double seconds) {
     const std::shared_ptr<Motion> motion = MakeMotion(count);
     workloads.push_back(
         {"stream " + std::to_string(count) + (count == 1 ? " pair" : " pairs"), "pairs",
-         [=](RemoteSubject& subject) { return FollowMotion(subject, *motion, seconds); }, nullptr});
+         [=](RemoteSubject& subject) { return FollowMotion(subject, *motion, seconds); },
+         [=] { return FollowMotionInProcess(*motion, seconds); }});
   }
   return workloads;
 }

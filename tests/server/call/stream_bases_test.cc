@@ -58,6 +58,8 @@ class TestQueue : public QueuedStream<WriteReactor, Batch> {
     Locked([&] { working_ = working; });
   }
   void Do(const std::function<void()>& step) { Locked(step); }
+  // From the next step on.
+  void KeepWaiting(bool keeps) { keeps_waiting_ = keeps; }
   bool ShouldStop() { return call().ShouldStop(); }
 
   using QueuedStream::end;
@@ -71,10 +73,12 @@ class TestQueue : public QueuedStream<WriteReactor, Batch> {
   void Open() override { script_(std::static_pointer_cast<TestQueue>(shared_from_this())); }
   void StartWork() override {}
   bool IsWorking() const override { return working_; }
+  bool KeepsWaiting() const override { return keeps_waiting_; }
 
   const Script script_;
   const std::shared_ptr<Signal> gone_;
   bool working_ = false;
+  std::atomic<bool> keeps_waiting_ = false;
 };
 
 // Makes `count` replies, and notes how many it made.
@@ -260,6 +264,26 @@ TEST_F(StreamBases, UnsentBytesCountWhatWaitsAndWhatIsBeingWritten) {
       &numbers);
   EXPECT_TRUE(status.ok());
   EXPECT_THAT(numbers, ElementsAre(1, 3));
+}
+
+TEST_F(StreamBases, AReplyWaitsForOthersUntilOneFollowsOrAllIsSaid) {
+  std::vector<uint64_t> numbers;
+  const grpc::Status status = Run(
+      [](const std::shared_ptr<TestQueue>& stream) {
+        stream->KeepWaiting(true);
+        stream->Reply(1, 100);
+        stream->Do([&] {
+          ASSERT_NE(stream->LastWaiting(), nullptr);
+          stream->LastWaiting()->set_first_pair(2);
+        });
+        // It does not wait behind another: only the last one does.
+        stream->Reply(3, 10);
+        stream->Do([&] { EXPECT_EQ(stream->LastWaitingBytes(), 10u); });
+        stream->SetEnd(absl::OkStatus());
+      },
+      &numbers);
+  EXPECT_TRUE(status.ok());
+  EXPECT_THAT(numbers, ElementsAre(2, 3));
 }
 
 TEST_F(StreamBases, RepliesOfManyThreadsAllArrive) {

@@ -100,6 +100,18 @@ class Stream {
 
 class StreamCollisionsCall : public ServerTest {
  protected:
+  std::vector<int> BatchRelations(const v1::BatchCheckCollisionsRequest& request) {
+    grpc::ClientContext context;
+    const auto stream = collisions_->BatchCheckCollisions(&context, request);
+    std::vector<int> relations;
+    for (v1::BatchCheckCollisionsResponse part; stream->Read(&part);) {
+      relations.insert(relations.end(), part.columns().relations().begin(),
+                       part.columns().relations().end());
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    return relations;
+  }
+
   void ExpectRefused(const std::vector<v1::StreamCollisionsRequest>& messages,
                      grpc::StatusCode code, const std::string& what) {
     Stream stream(*collisions_);
@@ -346,6 +358,47 @@ TEST_F(StreamCollisionsCall, LongAnswersComeInPiecesOfAMebibyte) {
       const bool found = answer.columns().axes(i).kind() != v1::AXIS_KIND_UNSPECIFIED;
       ASSERT_EQ(found, i % 2 == 0);
     }
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+// Those of a hull that is missing among them.
+TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
+  Put("cube", Cube());
+  Put("ball", Sphere(60));
+  const std::vector<std::string> ids = {"cube", "ball", "missing", "ball", "cube"};
+  v1::BatchCheckCollisionsRequest batch;
+  std::vector<v1::Placement> placements;
+  std::vector<uint32_t> pairs;
+  constexpr uint32_t kPlacements = 100;
+  for (uint32_t i = 0; i < kPlacements; ++i) {
+    placements.push_back(PlacementOf(ids[i % ids.size()], 0.1 * i));
+    for (uint32_t j = 0; j < i; ++j) pairs.insert(pairs.end(), {j, i});
+  }
+  batch.mutable_pairs()->Assign(pairs.begin(), pairs.end());
+  Stream stream(*collisions_);
+  auto answer = stream.Ask(Open(placements, pairs));
+  for (int step = 0; step < 3; ++step) {
+    std::vector<std::pair<uint32_t, PoseNumbers>> moves;
+    for (uint32_t i = 0; i < kPlacements; ++i) {
+      const double x = 0.1 * i + 0.01 * step * (i % 7);
+      placements[i].mutable_pose()->mutable_translation()->set_x(x);
+      moves.push_back({i, {1, 0, 0, 0, x, 0, 0}});
+    }
+    if (step > 0) answer = stream.Ask(Move(moves));
+    batch.mutable_placements()->Assign(placements.begin(), placements.end());
+    const std::vector<int> expected = BatchRelations(batch);
+    ASSERT_EQ(expected.size(), pairs.size() / 2);
+    ASSERT_EQ(answer.pairs_size(), pairs.size() / 2);
+    int relations[5] = {};
+    for (int i = 0; i < answer.pairs_size(); ++i) {
+      ASSERT_EQ(answer.pairs(i), i);
+      ASSERT_EQ(answer.columns().relations(i), expected[i]) << i;
+      ++relations[answer.columns().relations(i)];
+    }
+    EXPECT_GT(relations[v1::RELATION_UNSPECIFIED], 1000);
+    EXPECT_GT(relations[v1::RELATION_SEPARATED], 1000);
+    EXPECT_GT(relations[v1::RELATION_OVERLAPPING], 300);
   }
   EXPECT_TRUE(stream.Finish().ok());
 }

@@ -1,0 +1,68 @@
+#ifndef HULLD_SERVER_PROCESS_SHARED_LOOP_H_
+#define HULLD_SERVER_PROCESS_SHARED_LOOP_H_
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "server/process/synchronization.h"
+#include "server/process/worker_pool.h"
+
+namespace hulld::server {
+
+// A loop over [0, count) that several threads share: each takes the next `step` of it.
+class SharedLoop {
+ public:
+  // Runs `work` on ranges that together are [0, count), each once, on this thread and on up to
+  // `most_helpers` threads of a pool that come free meanwhile. Waits for what these have begun, and
+  // for none that has not, so it may be called on any thread that may wait. `work` is called by
+  // several threads at a time. Requires step > 0.
+  static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step,
+                  std::function<void(size_t begin, size_t end)> work) {
+    const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
+    const size_t steps = (count + step - 1) / step;
+    for (size_t i = 1; i < steps && i <= most_helpers; ++i) {
+      helpers.Submit([loop] { loop->TakePart(); });
+    }
+    loop->TakePart();
+    loop->AwaitAll();
+  }
+
+  // For Run.
+  SharedLoop(size_t count, size_t step, std::function<void(size_t begin, size_t end)> work)
+      : count_(count), step_(step), work_(std::move(work)) {}
+
+ private:
+  // Until nothing is left to begin with.
+  void TakePart() {
+    for (size_t begin = next_.fetch_add(step_); begin < count_; begin = next_.fetch_add(step_)) {
+      const size_t end = std::min(count_, begin + step_);
+      work_(begin, end);
+      const std::lock_guard lock(mutex_);
+      done_ += end - begin;
+      if (done_ == count_) all_done_.notify_all();
+    }
+  }
+
+  void AwaitAll() {
+    std::unique_lock lock(mutex_);
+    while (done_ < count_) all_done_.wait(lock);
+  }
+
+  const size_t count_;
+  const size_t step_;
+  // Not called once all is done, although helpers that come late still hold it.
+  const std::function<void(size_t begin, size_t end)> work_;
+  std::atomic<size_t> next_ = 0;
+  Mutex mutex_;
+  ConditionVariable all_done_;
+  size_t done_ = 0;
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_PROCESS_SHARED_LOOP_H_
