@@ -148,8 +148,17 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
   const std::string& id = ids[known.first];
   bool was_missing = false;
   while (true) {
-    const HullPointer hull = FindVisible(id);
-    if (hull == nullptr) {
+    std::optional<HullPointer> found = hulls_.Ask(id);
+    if (!found.has_value() && !bodies_.contains(id)) {
+      if (!may_wait) return WouldWait();
+      const absl::Status read = AwaitKnown(locked, ids, hulls, k, should_stop);
+      if (Stopped(should_stop)) return Cancelled();
+      if (read.ok()) continue;
+      known.view = read;
+      return absl::OkStatus();
+    }
+    const HullPointer hull = std::move(found).value_or(nullptr);
+    if (hull == nullptr || !hull->state.visible()) {
       known.view = NoSuchHull(id);
       return absl::OkStatus();
     }
@@ -214,7 +223,9 @@ void Registry::LoadMany(Locked& locked, std::span<const std::string> ids, KnownH
   const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
   for (const uint32_t k : std::span(hulls.due_).last(count) | std::views::reverse) {
     locked.NoteLookup();
-    const HullPointer hull = FindVisible(ids[hulls.hulls_[k].first]);
+    const std::string& id = ids[hulls.hulls_[k].first];
+    if (!IsKnown(id)) continue;
+    const HullPointer hull = FindVisible(id);
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
         hull->state.life() == HullState::Life::kEnding) {
       continue;
@@ -310,7 +321,9 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
     snapshot_seconds_->Observe(taken.count());
   }
   Locked locked(mutex_);
-  const HullPointer hull = FindVisible(view.record.hull_id);
+  const std::string& id = view.record.hull_id;
+  // What is not known any more has nothing to be noted of.
+  const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
   const bool is_current =
       hull != nullptr && hull->committed.record.revision == view.record.revision;
   if (is_current && absl::IsDataLoss(status)) MarkDamaged(*hull, status);
