@@ -66,9 +66,12 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
                                                  grpc::ByteBuffer* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
-        EndFresh(shards_, readers_, call, [this, call](std::chrono::nanoseconds staleness) {
-          return List(call->request(), call->call(), staleness, &call->response());
-        });
+        EndFresh(
+            shards_, readers_, call,
+            [this, call](std::chrono::nanoseconds staleness) {
+              return List(call->request(), call->call(), staleness, &call->response());
+            },
+            !shards_.any_store().finds_records());
       });
 }
 
@@ -147,16 +150,19 @@ absl::Status HullService::List(const v1::ListHullsRequest& request, const Call& 
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const ShardsHullPage page = shards_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize));
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{page.revisions, staleness},
+  const absl::StatusOr<ShardsHullPage> page =
+      shards_.List(*prefix, *after, std::min(asked, Config::kMaxPageSize),
+                   [&call] { return call.ShouldStop(); });
+  if (!page.ok()) return page.status();
+  EncodeHeader(shards_.store_ids(), ShardsAsOf{page->revisions, staleness},
                response->mutable_header());
-  for (const ListedHull& hull : page.hulls) {
+  for (const ListedHull& hull : page->hulls) {
     v1::HullInfo* info = response->add_hulls();
     EncodeRecord(hull.record, info);
     info->set_damaged(hull.damaged);
   }
-  if (page.more) {
-    response->set_next_page_token(EncodePageToken(*prefix, page.hulls.back().record.hull_id));
+  if (page->more) {
+    response->set_next_page_token(EncodePageToken(*prefix, page->hulls.back().record.hull_id));
   }
   return absl::OkStatus();
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <map>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -25,6 +27,8 @@ constexpr char kPrepare[] = R"(
     SET search_path = '';
     SET synchronous_commit = on;
     PREPARE migrate_fence(bigint) AS UPDATE hulld.store SET written_in = $1;
+    PREPARE migrate_count(bigint, bigint) AS
+      UPDATE hulld.store SET hulls = hulls + $1, vertices = vertices + $2;
     PREPARE migrate_finish(bigint) AS UPDATE hulld.store SET revision = $1;)";
 
 // The store has the claim, and is read; a session of its own writes, fenced by the epoch of that
@@ -56,7 +60,7 @@ class PostgresTarget : public MigrationTarget {
     for (const char* text :
          {"DELETE FROM hulld.hulls", "DELETE FROM hulld.bodies", "DELETE FROM hulld.writers",
           "DELETE FROM hulld.bases", "DELETE FROM hulld.deltas",
-          "DROP TABLE IF EXISTS hulld.migration",
+          "UPDATE hulld.store SET hulls = 0, vertices = 0", "DROP TABLE IF EXISTS hulld.migration",
           "CREATE TABLE hulld.migration (store_id text NOT NULL, revision bigint NOT NULL)",
           "PREPARE migrate_begin(text, bigint) AS INSERT INTO hulld.migration VALUES ($1, $2)"}) {
       statements.push_back({.text = text});
@@ -68,7 +72,17 @@ class PostgresTarget : public MigrationTarget {
   }
 
   absl::Status Add(std::span<const Change* const> changes) override {
-    return Transact(StatementsOf(changes));
+    // A hull may be several changes, all of them here.
+    std::map<std::string_view, uint64_t> vertices;
+    for (const Change* change : changes) {
+      if (change->body == nullptr) vertices[change->id()] = change->hull.record.vertex_count;
+    }
+    uint64_t sum = 0;
+    for (const auto& [id, count] : vertices) sum += count;
+    std::vector<Statement> statements = StatementsOf(changes);
+    statements.push_back({.name = "migrate_count",
+                          .parameters = {EncodeBigint(vertices.size()), EncodeBigint(sum)}});
+    return Transact(std::move(statements));
   }
 
   absl::Status Finish(const MigrationSource& source) override {

@@ -161,6 +161,7 @@ std::optional<ChangeFeed::State> ChangeFeed::AsToldTo(const WatchTarget& target,
 void ChangeFeed::Note(Locked& locked, const std::string& id, const State& state) {
   HULLD_CHECK(locked.Holds(order_) && state.revision > revision_);
   revision_ = state.revision;
+  if (state.life != Life::kEnded) gone_.erase(id);
   const auto note_for = [&](const Interests& interests) {
     for (const auto& interest : interests) {
       const std::optional<State> told = AsToldTo(interest->target, state);
@@ -216,8 +217,13 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& i
 
 void ChangeFeed::RememberDeletion(const std::string& id, const State& state) {
   deletions_.push_back({state.revision, id, state.is_body});
+  // The key is to be that of the last one.
+  gone_.erase(id);
+  gone_.emplace(deletions_.back().id, state.revision);
   if (deletions_.size() <= kMostDeletions) return;
   deletions_begin_ = deletions_.front().revision;
+  const auto first = gone_.find(deletions_.front().id);
+  if (first != gone_.end() && first->second == deletions_begin_) gone_.erase(first);
   deletions_.pop_front();
 }
 
@@ -404,16 +410,25 @@ void ChangeFeed::TakeChanges(ChangeWatch& watch, WatchPiece* piece) {
     return;
   }
   piece->waits = true;
-  watch.is_armed = true;
+  Arm(watch);
+}
+
+void ChangeFeed::Arm(ChangeWatch& watch) {
+  HULLD_CHECK(!std::exchange(watch.is_armed, true));
   ++watch.interest->armed;
+}
+
+void ChangeFeed::Wake(Locked& locked, const std::shared_ptr<ChangeWatch>& watch) {
+  HULLD_CHECK(locked.Holds(order_));
+  if (!watch->is_armed) return;
+  MakeReady(watch);
+  locked.Afterwards([this] { wake_.notify_one(); });
 }
 
 void ChangeFeed::Nudge(Locked& locked, const std::shared_ptr<ChangeWatch>& watch) {
   HULLD_CHECK(locked.Holds(order_));
   watch->is_nudged = true;
-  if (!watch->is_armed) return;
-  MakeReady(watch);
-  locked.Afterwards([this] { wake_.notify_one(); });
+  Wake(locked, watch);
 }
 
 void ChangeFeed::End(Locked& locked) {

@@ -22,13 +22,14 @@
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
+#include "server/store/store.h"
 
 namespace hulld::server {
 
 struct WatchInterest;
 
 // One who wants to be told of changes. Guarded by the mutex of the feed.
-struct ChangeWatch {
+struct ChangeWatch : std::enable_shared_from_this<ChangeWatch> {
   enum class Stage {
     // Resumes: is told what went since.
     kDeletions,
@@ -48,6 +49,11 @@ struct ChangeWatch {
   // The last deletion that was told, by its revision; the last hull that was told, by its ID.
   uint64_t last_deletion = 0;
   std::string last_id;
+  // Where a store finds records: the hulls that are told next, or why they could not be read, while
+  // they are there; whether they are being read; and how often that was begun.
+  std::optional<absl::StatusOr<FoundHulls>> found;
+  bool is_reading = false;
+  uint64_t readings = 0;
   // Every change up to this one was told, once the stages before kChanges are over.
   uint64_t cursor = 0;
   // The cursor when something was told last.
@@ -83,7 +89,7 @@ struct ChangeWatch {
 // starts anew.
 class ChangeFeed {
  public:
-  // How many deletions are remembered; with IDs of the greatest length, 20 MiB, which no budget
+  // How many deletions are remembered; with IDs of the greatest length, 25 MiB, which no budget
   // counts.
   static constexpr size_t kMostDeletions = 1 << 16;
   // Hulls that are looked at, or told of, at a time: some 50 us under the mutex.
@@ -145,6 +151,13 @@ class ChangeFeed {
   // Whether what changed after the cursor is known no more, so that the watch must start anew.
   bool IsLost(const ChangeWatch& watch) const;
 
+  // The watch waits until it is woken, or something changes.
+  void Arm(ChangeWatch& watch);
+  // A watch that waits comes for its next piece.
+  void Wake(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
+  // Whether an ID that is among the deletions that are remembered began anew since.
+  bool BeganAnew(const std::string& id) const { return !gone_.contains(id); }
+
   // Has a watch come for its next piece although nothing changed.
   void Nudge(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
   // Nudges all; there is nothing to tell from now on.
@@ -205,6 +218,9 @@ class ChangeFeed {
   // In the order of revisions. What went up to deletions_begin_ is not remembered.
   std::deque<Deletion> deletions_;
   uint64_t deletions_begin_ = 0;
+  // Of these the last of each ID, where nothing began under the ID since: its revision, by the ID
+  // in `deletions_`.
+  std::unordered_map<std::string_view, uint64_t> gone_;
 
   // By a prefix, and by an ID: the interests in it.
   std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_prefix_;

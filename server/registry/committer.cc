@@ -105,7 +105,12 @@ void Committer::CommitAndFollow(Round round) {
   }
   // A commit has followed the others.
   absl::Status followed;
-  if (round.batch.empty()) followed = store_.Follow();
+  if (round.batch.empty()) {
+    // Who waits to know all that the store holds must not wait for the next change to find out
+    // what became of the last.
+    if (!store_.is_shared() && Statistics().failing) followed = store_.Recover();
+    if (followed.ok()) followed = store_.Follow();
+  }
   Settle(round, status, followed, asked);
 }
 

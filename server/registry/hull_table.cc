@@ -1,5 +1,7 @@
 #include "server/registry/hull_table.h"
 
+#include <utility>
+
 #include "core/base/check.h"
 #include "server/registry/registered_hull.h"
 
@@ -25,7 +27,9 @@ HullRecord HullTable::RestingHull::RecordWith(const std::string& id) const {
   return record;
 }
 
-bool HullTable::Entry::visible() const { return awake_ == nullptr || awake_->state.visible(); }
+bool HullTable::Entry::visible() const {
+  return !is_absent_ && (awake_ == nullptr || awake_->state.visible());
+}
 
 uint64_t HullTable::Entry::revision() const {
   return awake_ == nullptr ? resting_.revision : awake_->committed.record.revision;
@@ -41,15 +45,23 @@ HullChange HullTable::Entry::Describe(const std::string& id) const {
   return change;
 }
 
+bool HullTable::contains(const std::string& id) const {
+  const auto found = entries_.find(id);
+  return found != entries_.end() && !found->second.is_absent_;
+}
+
 bool HullTable::IsVisible(const std::string& id) const {
   const auto found = entries_.find(id);
   return found != entries_.end() && found->second.visible();
 }
 
-HullTable::HullPointer HullTable::Find(const std::string& id) {
+std::optional<HullTable::HullPointer> HullTable::Ask(const std::string& id) {
   const auto found = entries_.find(id);
-  if (found == entries_.end()) return nullptr;
+  if (found == entries_.end())
+    return is_cache() ? std::nullopt : std::optional<HullPointer>(nullptr);
   Entry& entry = found->second;
+  entry.is_used_ = true;
+  if (entry.is_absent_) return nullptr;
   if (entry.awake_ == nullptr) {
     const RestingHull& resting = entry.resting_;
     const StoredHull stored = {resting.RecordWith(id), resting.writer_count, resting.layout};
@@ -62,11 +74,24 @@ HullTable::HullPointer HullTable::Find(const std::string& id) {
   return entry.awake_;
 }
 
+// There must be none, which may be known.
+HullTable::Entry& HullTable::Add(const std::string& id) {
+  const auto [place, is_new] = entries_.try_emplace(id);
+  HULLD_CHECK(is_new || place->second.is_absent_);
+  place->second.is_absent_ = false;
+  ++size_;
+  return place->second;
+}
+
 void HullTable::AddResting(const StoredHull& stored) {
-  const auto [place, is_new] = entries_.try_emplace(stored.record.hull_id);
-  HULLD_CHECK(is_new);
-  place->second.resting_ = RestingHull(stored);
-  ++held_;
+  Add(stored.record.hull_id).resting_ = RestingHull(stored);
+}
+
+void HullTable::NoteAbsent(const std::string& id) {
+  HULLD_CHECK(is_cache());
+  const auto [place, is_new] = entries_.try_emplace(id);
+  HULLD_CHECK(is_new || place->second.is_absent_);
+  place->second.is_absent_ = true;
 }
 
 HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullState& state) {
@@ -76,17 +101,19 @@ HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullSta
 }
 
 void HullTable::Insert(const HullPointer& hull) {
-  const auto [place, is_new] = entries_.try_emplace(hull->committed.record.hull_id);
-  HULLD_CHECK(is_new);
-  place->second.awake_ = hull;
-  ++held_;
+  Add(hull->committed.record.hull_id).awake_ = hull;
 }
 
 void HullTable::Erase(const HullPointer& hull) {
   const auto found = entries_.find(hull->committed.record.hull_id);
   HULLD_CHECK(found != entries_.end() && found->second.awake_ == hull);
-  entries_.erase(found);
-  --held_;
+  --size_;
+  if (!is_cache()) {
+    entries_.erase(found);
+    return;
+  }
+  found->second = {};
+  found->second.is_absent_ = true;
 }
 
 // Whether nothing would be lost with it but what its record says.
@@ -100,20 +127,26 @@ bool HullTable::IsUnused(const HullPointer& hull) const {
 
 void HullTable::RestSome() {
   auto next = entries_.upper_bound(hand_);
-  for (int i = 0; i < kHullsPerStep; ++i, ++next) {
+  for (int i = 0; i < kHullsPerStep; ++i) {
     if (next == entries_.end()) {
       hand_.clear();
       return;
     }
     if (i + 1 == kHullsPerStep) hand_ = next->first;
-    Entry& entry = next->second;
-    if (entry.awake_ == nullptr || !IsUnused(entry.awake_)) continue;
-    RestingHull resting(entry.awake_->committed);
-    resting.has_box = entry.awake_->has_box;
-    resting.low = entry.awake_->low;
-    resting.high = entry.awake_->high;
-    entry.resting_ = resting;
-    entry.awake_ = nullptr;
+    const auto looked_at = next++;
+    Entry& entry = looked_at->second;
+    if (entry.awake_ != nullptr) {
+      if (!IsUnused(entry.awake_)) continue;
+      RestingHull resting(entry.awake_->committed);
+      resting.has_box = entry.awake_->has_box;
+      resting.low = entry.awake_->low;
+      resting.high = entry.awake_->high;
+      entry.resting_ = resting;
+      entry.awake_ = nullptr;
+    }
+    if (!is_cache() || entries_.size() <= *most_ || std::exchange(entry.is_used_, false)) continue;
+    if (!entry.is_absent_) --size_;
+    entries_.erase(looked_at);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "server/registry/hull_state.h"
@@ -25,13 +26,23 @@ namespace hulld::server {
 // finds that nothing of it is in use. Each operation moves the hand by a few hulls, so there is no
 // pass over all of them.
 //
+// Where the store finds records, this is a cache of them, and of IDs of which it is known that
+// there is no hull: what is not here is not known. The hand then drops what it finds at rest, and
+// not looked for since it came by last, once there is more than was asked for.
+//
 // Guarded by the registry's mutex.
 class HullTable {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
+  // About what a record takes, with its ID. Bytes.
+  static constexpr uint64_t kBytesOfRecord = 320;
+
   // readable: whether the store gives back what it keeps of hulls. The budget must outlive this.
   HullTable(bool readable, MemoryBudget& budget) : readable_(readable), budget_(budget) {}
+
+  // This is a cache of so many records, and of more only where they are in use. Before the first.
+  void KeepAtMost(size_t records) { most_ = records; }
 
  private:
   // What is known of a hull at rest, beside its ID.
@@ -66,42 +77,57 @@ class HullTable {
    private:
     friend class HullTable;
 
-    // Null: at rest.
+    // Null: at rest, or there is none.
     HullPointer awake_;
     RestingHull resting_;
+    bool is_absent_ = false;
+    // Looked for since the hand came by.
+    bool is_used_ = false;
   };
   using Entries = std::map<std::string, Entry>;
 
-  bool empty() const { return entries_.empty(); }
-  size_t size() const { return entries_.size(); }
-  // The same for who does not have the mutex.
-  size_t held() const { return held_.load(std::memory_order_relaxed); }
-  bool contains(const std::string& id) const { return entries_.contains(id); }
+  // How many hulls are here; any thread.
+  size_t size() const { return size_.load(std::memory_order_relaxed); }
+  bool contains(const std::string& id) const;
   bool IsVisible(const std::string& id) const;
-  // For walks in the byte order of the IDs.
+  // Whether it is known what there is, or that there is nothing. A cache does not know what is not
+  // here; otherwise that is not there.
+  bool Knows(const std::string& id) const { return !is_cache() || entries_.contains(id); }
+  // For walks in the byte order of the IDs. Of a cache, also those of which there is none.
   const Entries& entries() const { return entries_; }
 
-  // The hull, no longer at rest; null when there is none. Cost: O(log n).
-  HullPointer Find(const std::string& id);
+  // The hull, no longer at rest; null when there is none; nothing when that is not known. Cost:
+  // O(log n).
+  std::optional<HullPointer> Ask(const std::string& id);
+  // The same; null also when it is not known.
+  HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
   // Adds a hull of the store, at rest. Requires that there is none with its ID.
   void AddResting(const StoredHull& stored);
+  // There is no hull with this ID. Requires that none is known.
+  void NoteAbsent(const std::string& id);
   // Adds a hull that is in use. Requires that there is none with its ID.
   HullPointer Insert(const StoredHull& stored, const HullState& state);
   void Insert(const HullPointer& hull);
-  // Requires that it is there.
+  // Requires that it is there. From then on it is known that there is none.
   void Erase(const HullPointer& hull);
 
-  // Moves the hand by kHullsPerStep, and puts to rest what it finds unused. Cost: O(log n).
+  // Moves the hand by kHullsPerStep, and puts to rest what it finds unused; a cache drops what is
+  // too much. Cost: O(log n).
   void RestSome();
   static constexpr int kHullsPerStep = 4;
 
  private:
+  bool is_cache() const { return most_.has_value(); }
+  Entry& Add(const std::string& id);
   bool IsUnused(const HullPointer& hull) const;
 
   const bool readable_;
   MemoryBudget& budget_;
   Entries entries_;
-  std::atomic<size_t> held_ = 0;
+  // Those that are hulls.
+  std::atomic<size_t> size_ = 0;
+  // Set: a cache of so many.
+  std::optional<size_t> most_;
   // After the last hull that RestSome looked at.
   std::string hand_;
 };

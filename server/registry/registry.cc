@@ -23,6 +23,11 @@ Limits WithMemoryLimit(Limits limits) {
   return limits;
 }
 
+// A sixteenth of the limit, beside what it holds of points.
+size_t MostRecords(uint64_t memory_limit) {
+  return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
+}
+
 // The rest is for writers, whose hulls stay in memory where no store keeps them.
 uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
@@ -33,12 +38,14 @@ uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
                    std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
     : store_(store),
+      is_cache_(store.finds_records()),
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
       memory_(limits_.memory_limit, ReadersShare(limits_.memory_limit, store), mutex_),
       hulls_(store.keeps_hulls(), memory_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
+  if (is_cache_) hulls_.KeepAtMost(MostRecords(limits_.memory_limit));
   preparers_.emplace(1, preparers);
   loaders_.emplace(std::max(1, DefaultThreads() - 1), loaders);
   if (!store.is_shared()) return;
@@ -66,21 +73,26 @@ Registry::~Registry() {
 
 absl::Status Registry::Load() {
   Locked locked(mutex_);
-  HULLD_CHECK(hulls_.empty() && revision_ == 0);
+  HULLD_CHECK(hulls_.size() == 0 && revision_ == 0);
   revision_ = store_.revision();
   feed_.Begin(revision_);
-  const absl::Status status =
-      store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
-        if (stored.ok()) {
-          hulls_.AddResting(*stored);
-          vertex_count_ += stored->record.vertex_count;
-          return;
-        }
-        spdlog::error("{}", std::string(stored.status().message()));
-        StoredHull nothing;
-        nothing.record.hull_id = id;
-        MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
-      });
+  absl::Status status;
+  if (is_cache_) {
+    kept_hulls_ = store_.totals().hulls;
+    vertex_count_ = store_.totals().vertices;
+  } else {
+    status = store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
+      if (stored.ok()) {
+        hulls_.AddResting(*stored);
+        vertex_count_ += stored->record.vertex_count;
+        return;
+      }
+      spdlog::error("{}", std::string(stored.status().message()));
+      StoredHull nothing;
+      nothing.record.hull_id = id;
+      MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
+    });
+  }
   if (cache_.damaged > 0) {
     spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
   }
@@ -95,8 +107,14 @@ absl::Status Registry::Load() {
   return followed;
 }
 
+Registry::HullPointer Registry::Find(const std::string& id) {
+  std::optional<HullPointer> hull = hulls_.Ask(id);
+  HULLD_CHECK(hull.has_value() || bodies_.contains(id));
+  return std::move(hull).value_or(nullptr);
+}
+
 Registry::HullPointer Registry::FindVisible(const std::string& id) {
-  HullPointer hull = hulls_.Find(id);
+  HullPointer hull = Find(id);
   return hull != nullptr && hull->state.visible() ? hull : nullptr;
 }
 
@@ -114,8 +132,9 @@ void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Statu
 
 absl::Status Registry::CheckHullCount() const {
   const uint64_t elsewhere = held_elsewhere_ ? held_elsewhere_() : 0;
-  if (hulls_.size() + bodies_.size() + elsewhere < limits_.max_hulls) return absl::OkStatus();
-  std::string held = absl::StrCat("the store holds ", hulls_.size(), " hulls");
+  const uint64_t hulls = HullCount();
+  if (hulls + bodies_.size() + elsewhere < limits_.max_hulls) return absl::OkStatus();
+  std::string held = absl::StrCat("the store holds ", hulls, " hulls");
   if (!bodies_.empty()) absl::StrAppend(&held, " and ", bodies_.size(), " bodies");
   if (elsewhere > 0) absl::StrAppend(&held, ", and other shards ", elsewhere);
   return LimitExceeded(held, limits_.max_hulls, "max-hulls");
@@ -132,7 +151,11 @@ void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult>
 
 void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                             const Reply<CreateResult>& done) {
-  const HullPointer existing = hulls_.Find(id);
+  if (!IsKnown(id)) {
+    return WhenKnown(locked, id, done,
+                     [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
+  }
+  const HullPointer existing = Find(id);
   if (existing == nullptr) {
     return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
       if (Committer::IsSuperseded(hull.status())) {
@@ -176,6 +199,7 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
              return done(later, status);
            }
            hull->SetStored(creation.hull);
+           ++kept_hulls_;
            Publish(hull->committed.record.revision);
            NoteChange(*hull);
            feed_.NoteCreated(later, hull);
@@ -190,7 +214,11 @@ void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision
 
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
-  const HullPointer hull = hulls_.Find(id);
+  if (!IsKnown(id)) {
+    return WhenKnown(locked, id, done,
+                     [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
+  }
+  const HullPointer hull = Find(id);
   if (hull == nullptr) return Answer<uint64_t>(locked, done, NoSuchHull(id));
   if (!hull->state.quiet()) {
     hull->exclusive.push_back(
@@ -216,6 +244,7 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
            const uint64_t revision = deletion.revision;
            Publish(revision);
            vertex_count_ -= hull->committed.record.vertex_count;
+           --kept_hulls_;
            NoteChange(*hull);
            feed_.NoteDeleted(later, hull->committed.record, revision);
            Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
@@ -235,7 +264,12 @@ void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
 
 void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                              const Reply<ReplaceResult>& done) {
-  const HullPointer former = hulls_.Find(replacement->hull_id);
+  const std::string& id = replacement->hull_id;
+  if (!IsKnown(id)) {
+    return WhenKnown(locked, id, done,
+                     [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+  }
+  const HullPointer former = Find(id);
   if (former != nullptr && !former->state.quiet()) {
     former->exclusive.push_back(
         [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
@@ -345,6 +379,7 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
   }
   if (!status.ok()) return status;
   vertex_count_ += record.vertex_count;
+  if (former == nullptr) ++kept_hulls_;
   Publish(record.revision);
   NoteChange(*hull);
   if (former == nullptr) {
@@ -423,8 +458,10 @@ void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
   ++cache_.damaged;
 }
 
-HullPage Registry::List(const std::string& prefix, const std::string& after,
-                        size_t page_size) const {
+absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
+                                        size_t page_size,
+                                        const std::function<bool()>& should_stop) {
+  if (is_cache_) return ListFound(prefix, after, page_size, should_stop);
   HullPage page;
   const std::lock_guard lock(mutex_);
   page.store_revision = revision_;
@@ -449,7 +486,7 @@ HoldStatistics Registry::Holds() const {
 
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(mutex_);
-  return {revision_, hulls_.size() - creating_, vertex_count_, bodies_.size()};
+  return {revision_, HullCount() - creating_, vertex_count_, bodies_.size()};
 }
 
 CacheStatistics Registry::Cache() const {

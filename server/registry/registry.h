@@ -39,6 +39,11 @@ struct PendingChunk;
 // or memory allows, a builder and its points as a LiveHull, of which readers are given versions.
 // What is not in memory is read back from the store at first use.
 //
+// Where the store finds records, hulls are not read when a server starts: the table holds records
+// of those that were asked for lately, and what is not in it is not known until it is read
+// (records/registry_records.cc). So whatever depends on what there is under an ID first makes that
+// known, and looks again when it is done with waiting. Bodies are all in memory.
+//
 // The registry owns IDs, revisions and the rules of change: what may follow what, and what readers
 // see. HullState says what a hull can be in, the Committer brings changes to the store, and the
 // MemoryBudget says what is dropped.
@@ -92,9 +97,12 @@ class Registry {
   Registry& operator=(const Registry&) = delete;
   ~Registry();
 
-  // Reads the records of all hulls that the store holds; before any other call. Damaged ones are
-  // logged, and answered with DATA_LOSS later.
+  // Reads the records of all hulls that the store holds, unless it finds records, and all bodies;
+  // before any other call. Damaged ones are logged, and answered with DATA_LOSS later.
   absl::Status Load();
+  // Of a store that finds records, how many are kept in memory while nobody uses them, instead of
+  // what a part of --memory-limit holds. Before Load; for tests.
+  void KeepRecords(size_t most) { hulls_.KeepAtMost(most); }
 
   const Store& store() const { return store_; }
   const Limits& limits() const { return limits_; }
@@ -135,7 +143,10 @@ class Registry {
   bool has_bodies() const { return body_count_.load(std::memory_order_relaxed) > 0; }
 
   // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
-  HullPage List(const std::string& prefix, const std::string& after, size_t page_size) const;
+  // Where the store finds records, it is asked, hence not for gRPC's threads then. UNAVAILABLE: it
+  // cannot be read. CANCELLED: should_stop said so.
+  absl::StatusOr<HullPage> List(const std::string& prefix, const std::string& after,
+                                size_t page_size, const std::function<bool()>& should_stop = {});
 
   // Where the store is shared, waits until all that other servers had committed by the time of the
   // call is taken over: before what does not do so itself (List, FindBodies, ListBodies). Not for
@@ -164,7 +175,7 @@ class Registry {
     held_elsewhere_ = std::move(held_elsewhere);
   }
   // How many hulls and bodies are here. Takes no lock.
-  uint64_t held() const { return hulls_.held() + body_count_.load(std::memory_order_relaxed); }
+  uint64_t held() const { return HullCount() + body_count_.load(std::memory_order_relaxed); }
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -253,10 +264,19 @@ class Registry {
   struct BuiltChunk;
   enum class Verdict;
   using HullPointer = std::shared_ptr<RegisteredHull>;
+  using Refusal = std::function<void(const absl::Status&)>;
 
+  // The hull, which must be known (IsKnown), as in HullTable.
+  HullPointer Find(const std::string& id);
   HullPointer FindVisible(const std::string& id);
   void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
   absl::Status CheckHullCount() const;
+  // Those whose creation is in flight included. Takes no lock.
+  uint64_t HullCount() const {
+    return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
+                           creating_.load(std::memory_order_relaxed)
+                     : hulls_.size();
+  }
   // The revision that the store gave the last change becomes visible.
   void Publish(uint64_t revision);
 
@@ -301,7 +321,6 @@ class Registry {
 
   // Other servers (registry_others.cc).
   absl::Status AwaitOthers(Locked& locked, const std::function<bool()>& should_stop);
-  using Refusal = std::function<void(const absl::Status&)>;
   void WhenFresh(Refusal refuse, std::function<void(Locked&)> next);
   void Again(Locked& locked, std::function<void(Locked&)> task);
   void AdvanceLater(const HullPointer& hull);
@@ -311,7 +330,7 @@ class Registry {
   static constexpr uint64_t kMostGrowth = 1 << 16;
   std::vector<HullGrowth> GrownHulls(const OtherChanges& others) const;
   void TakeOver(Locked& locked, const OtherChanges& others);
-  void TakeOver(Locked& locked, const std::string& id, const OtherChange& other);
+  void TakeOver(Locked& locked, const std::string& id, const OtherChange& other, uint64_t since);
   bool TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
                        bool is_news);
   HullPointer TakeOverHull(const std::string& id, const absl::StatusOr<StoredHull>& stored);
@@ -364,7 +383,50 @@ class Registry {
 
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
+  // Records of a store that finds them (records/registry_records.cc).
+  //
+  // IDs whose record is being read from the store, which one thread at a time does for each. Who
+  // depends on one waits until it is over; what was read is in the table then, or was and is
+  // dropped again.
+  struct Reading {
+    std::string id;
+    bool is_over = false;
+    // Why it could not be read.
+    absl::Status status;
+    ConditionVariable over;
+    std::vector<std::pair<Refusal, std::function<void(Locked&)>>> waiting;
+  };
+  using Readings = std::vector<std::shared_ptr<Reading>>;
+  // Told with the mutex held, once what was found is of no later moment than what is known here.
+  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundHulls>&)>;
+
+  // Whether it is known what there is under an ID. Cost: O(log n).
+  bool IsKnown(const std::string& id) const { return hulls_.Knows(id) || bodies_.contains(id); }
+  // Has the record of an ID that is not known read, and goes on with `next`, which must look anew
+  // whether it is known then; or refuses.
+  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
+                 std::function<void(Locked&)> next);
+  absl::Status AwaitKnown(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
+                          uint32_t k, const std::function<bool()>& should_stop);
+  void ReadDue();
+  void ReadRecords(Locked& locked, const Readings& readings);
+  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundHulls> found,
+                   FoundTaker take);
+  void TakeRecords(Locked& locked, const Readings& readings,
+                   const absl::StatusOr<FoundHulls>& found);
+  void TakeRecord(const std::string& id, const FoundHulls& found);
+  void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
+  // What other servers did of it is in the table, in the place of what is being read.
+  void EndReadingOf(const std::string& id);
+  absl::StatusOr<HullPage> ListFound(const std::string& prefix, const std::string& after,
+                                     size_t page_size, const std::function<bool()>& should_stop);
+  HullChange DescribeFound(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
+  void ReadPresent(Locked& locked, ChangeWatch& watch);
+  absl::Status TakePresentFound(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
+
   Store& store_;
+  // Whether the table is a cache of what the store finds.
+  const bool is_cache_;
   // Where the making of canonical snapshots is timed, if anywhere.
   prometheus::Histogram* snapshot_seconds_ = nullptr;
   // With the memory limit in force.
@@ -388,8 +450,15 @@ class Registry {
   std::function<uint64_t()> held_elsewhere_;
   // As many as bodies_ holds.
   std::atomic<size_t> body_count_ = 0;
-  // Those of hulls_ whose creation is not committed yet.
-  uint64_t creating_ = 0;
+  // Those of hulls_ whose creation is not committed yet. Changed under the mutex.
+  std::atomic<uint64_t> creating_ = 0;
+  // Where hulls_ is a cache: how many the store holds at revision_. Changed under the mutex.
+  std::atomic<uint64_t> kept_hulls_ = 0;
+  // Those that are not over, by ID; of these the ones that no thread has taken yet; and threads
+  // that take them.
+  std::map<std::string, std::shared_ptr<Reading>> readings_;
+  Readings due_readings_;
+  size_t reading_threads_ = 0;
   // For readers that look up hulls in slices, or again.
   RecentChanges recent_changes_;
   // Hits, misses, loads and damaged; the rest is the budget's.

@@ -22,6 +22,8 @@ struct Registry::OpenRequest {
   std::function<void(const absl::Status&)> on_gone;
   Reply<OpenResult> done;
   ClientId client = kNoClient;
+  // What was read for it, so that it stays known until its turn comes.
+  HullPointer known = nullptr;
 };
 
 // What the rules say of a chunk that they allow.
@@ -115,7 +117,18 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   const auto refuse = [request](Locked& later, const absl::Status& status) {
     Answer<OpenResult>(later, request->done, status);
   };
-  const HullPointer hull = hulls_.Find(request->hull_id);
+  const std::string& id = request->hull_id;
+  const HullPointer known = std::exchange(request->known, nullptr);
+  if (!IsKnown(id)) {
+    return WhenKnown(locked, id, request->done, [this, request](Locked& later) {
+      const bool is_known = IsKnown(request->hull_id);
+      if (is_known) request->known = Find(request->hull_id);
+      // Where there is none, nothing of the store is to be read any more.
+      if (is_known && request->known == nullptr) return OpenLocked(later, request);
+      RunOpen(request);
+    });
+  }
+  const HullPointer hull = Find(id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
@@ -315,6 +328,7 @@ absl::StatusOr<Registry::BuiltChunk> Registry::Build(Locked& locked, RegisteredH
   BuiltChunk built;
   Change& change = built.change;
   change.hull = hull.head;
+  change.former_vertices = hull.head.record.vertex_count;
   change.former_layout = hull.head.layout;
   std::unique_ptr<HullBuilder> builder = std::move(hull.builder);
   HULLD_CHECK(builder != nullptr || hull.state.in_flight() == 0);

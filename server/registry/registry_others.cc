@@ -111,9 +111,15 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
   in_order.reserve(others.by_id.size());
   for (const auto& [id, other] : others.by_id) in_order.emplace_back(other.revision, &id);
   std::ranges::sort(in_order);
+  const uint64_t since = revision_;
   for (const auto& [revision, id] : in_order) {
-    TakeOver(locked, *id, others.by_id.at(*id));
+    TakeOver(locked, *id, others.by_id.at(*id), since);
+    EndReadingOf(*id);
     hulls_.RestSome();
+  }
+  if (is_cache_ && others.revision > 0) {
+    kept_hulls_ = others.totals.hulls;
+    vertex_count_ = others.totals.vertices;
   }
   if (others.revision > revision_) {
     Publish(others.revision);
@@ -123,7 +129,12 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
   for (const auto& next : std::exchange(after_others_, {})) next(locked);
 }
 
-void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other) {
+// since: the revision up to which everything was taken over before.
+void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other,
+                        uint64_t since) {
+  // What was not known to be here is told from what others say of it.
+  const bool was_known = IsKnown(id);
+  const bool has_ended = !was_known && other.former_began != 0 && other.former_began <= since;
   // Not what was read when the store was loaded.
   const bool is_news = other.revision > revision_;
   if (is_news) Publish(other.revision);
@@ -137,7 +148,7 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
     return AdvanceLater(former);
   }
   if (former != nullptr) {
-    vertex_count_ -= former->committed.record.vertex_count;
+    if (!is_cache_) vertex_count_ -= former->committed.record.vertex_count;
     NoteChange(*former);
     former->state.Vanish();
     ++former->supersessions;
@@ -150,13 +161,20 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
   if (body != nullptr && body->damage().ok()) {
     if (former != nullptr) {
       feed_.NoteBecameBody(locked, former->committed.record, body);
+    } else if (has_ended) {
+      HullRecord ended;
+      ended.hull_id = id;
+      ended.create_revision = other.former_began;
+      feed_.NoteBecameBody(locked, ended, body);
     } else {
       feed_.NoteBodyPut(locked, former_body, body);
     }
   } else if (hull != nullptr && !hull->state.damaged()) {
     if (former_body != nullptr) {
       feed_.NoteBecameHull(locked, *former_body, hull);
-    } else if (former != nullptr) {
+    } else if (!was_known && hull->committed.record.create_revision <= since) {
+      feed_.NoteChanged(locked, hull);
+    } else if (former != nullptr || has_ended) {
       feed_.NoteReplaced(locked, hull);
     } else {
       feed_.NoteCreated(locked, hull);
@@ -167,8 +185,9 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
     // Of one that was never known here, who resumes a watch may know.
     HullRecord record;
     record.hull_id = id;
-    record.create_revision =
-        former == nullptr ? other.revision : former->committed.record.create_revision;
+    record.create_revision = former != nullptr ? former->committed.record.create_revision
+                             : has_ended       ? other.former_began
+                                               : other.revision;
     feed_.NoteDeleted(locked, record, other.revision);
   } else {
     feed_.NoteOther(locked, other.revision);
@@ -183,7 +202,7 @@ bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const Ot
   const HullRecord& before = hull->committed.record;
   if (before.create_revision != stored.record.create_revision) return false;
   // Also where the record is the same: an empty chunk counts in the sequences of its writer.
-  vertex_count_ += stored.record.vertex_count - before.vertex_count;
+  if (!is_cache_) vertex_count_ += stored.record.vertex_count - before.vertex_count;
   const bool grew =
       hull->Supersede(locked, stored, other.growth.has_value() ? &*other.growth : nullptr);
   cache_.grown += grew;
@@ -198,7 +217,7 @@ Registry::HullPointer Registry::TakeOverHull(const std::string& id,
                                              const absl::StatusOr<StoredHull>& stored) {
   if (stored.ok()) {
     hulls_.AddResting(*stored);
-    vertex_count_ += stored->record.vertex_count;
+    if (!is_cache_) vertex_count_ += stored->record.vertex_count;
     HullPointer hull = hulls_.Find(id);
     NoteChange(*hull);
     return hull;

@@ -147,8 +147,17 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
   const std::string& id = ids[known.first];
   bool was_missing = false;
   while (true) {
-    const HullPointer hull = FindVisible(id);
-    if (hull == nullptr) {
+    std::optional<HullPointer> found = hulls_.Ask(id);
+    if (!found.has_value() && !bodies_.contains(id)) {
+      if (!may_wait) return WouldWait();
+      const absl::Status read = AwaitKnown(locked, ids, hulls, k, should_stop);
+      if (Stopped(should_stop)) return Cancelled();
+      if (read.ok()) continue;
+      known.view = read;
+      return absl::OkStatus();
+    }
+    const HullPointer hull = std::move(found).value_or(nullptr);
+    if (hull == nullptr || !hull->state.visible()) {
       known.view = NoSuchHull(id);
       return absl::OkStatus();
     }
@@ -215,7 +224,9 @@ void Registry::LoadMany(Locked& locked, std::span<const std::string> ids, KnownH
   for (size_t i = 1; i <= count; ++i) {
     const uint32_t k = hulls.due_[hulls.due_.size() - i];
     locked.NoteLookup();
-    const HullPointer hull = FindVisible(ids[hulls.hulls_[k].first]);
+    const std::string& id = ids[hulls.hulls_[k].first];
+    if (!IsKnown(id)) continue;
+    const HullPointer hull = FindVisible(id);
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
         hull->state.life() == HullState::Life::kEnding) {
       continue;
@@ -311,7 +322,9 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
     snapshot_seconds_->Observe(taken.count());
   }
   Locked locked(mutex_);
-  const HullPointer hull = FindVisible(view.record.hull_id);
+  const std::string& id = view.record.hull_id;
+  // What is not known any more has nothing to be noted of.
+  const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
   const bool is_current =
       hull != nullptr && hull->committed.record.revision == view.record.revision;
   if (is_current && absl::IsDataLoss(status)) MarkDamaged(*hull, status);

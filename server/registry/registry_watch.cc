@@ -32,22 +32,31 @@ absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarg
 }
 
 absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
-  const std::lock_guard lock(mutex_);
+  Locked locked(mutex_);
   if (feed_.has_ended()) return Draining();
-  if (feed_.IsLost(watch)) feed_.StartAnew(watch);
+  if (feed_.IsLost(watch)) {
+    feed_.StartAnew(watch);
+    watch.found.reset();
+    watch.is_reading = false;
+  }
   WatchPiece piece;
   piece.anew = std::exchange(watch.anew, false);
   piece.revision = watch.after_revision;
   const bool tells_bodies = feed_.TargetOf(watch).bodies;
   const auto is_there = [this, tells_bodies](const std::string& id) {
-    return hulls_.IsVisible(id) || (tells_bodies && FindBody(id) != nullptr);
+    if (bodies_.contains(id)) return tells_bodies && FindBody(id) != nullptr;
+    return hulls_.Knows(id) ? hulls_.IsVisible(id) : feed_.BeganAnew(id);
   };
   switch (watch.stage) {
     case ChangeWatch::Stage::kDeletions:
       if (!feed_.TakeDeletions(watch, is_there, &piece)) watch.stage = ChangeWatch::Stage::kPresent;
       break;
     case ChangeWatch::Stage::kPresent:
-      TakePresent(watch, &piece);
+      if (!is_cache_) {
+        TakePresent(watch, &piece);
+      } else if (absl::Status s = TakePresentFound(locked, watch, &piece); !s.ok()) {
+        return s;
+      }
       break;
     case ChangeWatch::Stage::kChanges:
       feed_.TakeChanges(watch, &piece);

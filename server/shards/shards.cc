@@ -93,17 +93,19 @@ absl::Status Shards::CheckMemory(MemoryUse use) {
   return absl::OkStatus();
 }
 
-ShardsHullPage Shards::List(const std::string& prefix, const std::string& after,
-                            size_t page_size) const {
+absl::StatusOr<ShardsHullPage> Shards::List(const std::string& prefix, const std::string& after,
+                                            size_t page_size,
+                                            const std::function<bool()>& should_stop) {
   std::vector<std::vector<ListedHull>> pages;
   ShardRevisions revisions;
   bool more = false;
   for (size_t shard = 0; shard < size(); ++shard) {
-    HullPage page = at(shard).List(prefix, after, page_size);
-    revisions.push_back({shard, page.store_revision});
-    more |= page.more;
-    if (size() == 1) return {std::move(revisions), std::move(page.hulls), more};
-    pages.push_back(std::move(page.hulls));
+    absl::StatusOr<HullPage> page = at(shard).List(prefix, after, page_size, should_stop);
+    if (!page.ok()) return page.status();
+    revisions.push_back({shard, page->store_revision});
+    more |= page->more;
+    if (size() == 1) return ShardsHullPage{std::move(revisions), std::move(page->hulls), more};
+    pages.push_back(std::move(page->hulls));
   }
   auto merged = MergePages<ShardsHullPage>(
       pages, more, page_size, &ShardsHullPage::hulls,

@@ -89,7 +89,9 @@ class Shards {
                                                       const std::function<bool()>& should_stop);
   std::optional<std::chrono::nanoseconds> TryFresh(const ShardsFreshness& freshness);
   // In the byte order of the IDs, across shards.
-  ShardsHullPage List(const std::string& prefix, const std::string& after, size_t page_size) const;
+  absl::StatusOr<ShardsHullPage> List(const std::string& prefix, const std::string& after,
+                                      size_t page_size,
+                                      const std::function<bool()>& should_stop = {});
   ShardsBodyPage ListBodies(const std::string& prefix, const std::string& after,
                             size_t page_size) const;
   // As Registry::FindBodies.

@@ -22,6 +22,8 @@ struct OtherChange {
   uint64_t revision = 0;
   // At which an incarnation ended last; 0: none did.
   uint64_t ended_at = 0;
+  // create_revision of the first incarnation that ended; 0: none did, or that is not known.
+  uint64_t former_began = 0;
   // What there is by now: one of the two, or nothing. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;
@@ -30,11 +32,19 @@ struct OtherChange {
   std::optional<std::vector<Vector>> growth;
 };
 
+// What a store holds, counted.
+struct StoreTotals {
+  uint64_t hulls = 0;
+  uint64_t vertices = 0;
+};
+
 // What other servers committed to a store that is shared (Store::is_shared), up to a moment.
 struct OtherChanges {
   // The store's at that moment; 0: there is nothing that was not known.
   uint64_t revision = 0;
   std::map<std::string, OtherChange> by_id;
+  // What the store held at that moment, where it finds records (Store::finds_records).
+  StoreTotals totals;
 };
 
 }  // namespace hulld::server

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -58,6 +59,8 @@ struct Change {
   // A change of a hull that neither begins nor ends: its revisions when all changes that were
   // submitted before are committed, and those of the same batch are not.
   std::shared_ptr<const HullRevisions> before;
+  // How many vertices the hull had before, where it neither begins nor ends.
+  uint64_t former_vertices = 0;
   // How the hull's vertices were kept before.
   VertexLayout former_layout;
   VertexChange vertex_change = VertexChange::kNone;
@@ -81,6 +84,16 @@ using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<
 
 // The same for bodies.
 using StoredBodyVisitor = std::function<void(const std::string&, absl::StatusOr<StoredBody>)>;
+
+// What a store holds of hulls that were asked for, all of it of one moment.
+struct FoundHulls {
+  // The store's at that moment.
+  uint64_t revision = 0;
+  // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull.
+  std::map<std::string, absl::StatusOr<StoredHull>> hulls;
+  // Of a list: whether there are others after these.
+  bool more = false;
+};
 
 // Operations that failed so far, each counted once, by what the system refused.
 struct StoreFailures {
@@ -128,6 +141,21 @@ class Store {
   // The writer's last committed sequence; 0 when there is none.
   virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                                 const std::string& writer_id) = 0;
+
+  // Whether records can be looked up one by one at little cost, so that nobody needs to read all of
+  // them at first. What is found holds everything that was committed by the time of the call, by
+  // this server or another. UNAVAILABLE: the store cannot be read.
+  virtual bool finds_records() const { return false; }
+  virtual absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> /*ids*/) {
+    return absl::UnimplementedError("this store does not find records");
+  }
+  // At most so many hulls whose IDs start with `prefix` and come after `after`, in byte order.
+  virtual absl::StatusOr<FoundHulls> ListHulls(const std::string& /*prefix*/,
+                                               const std::string& /*after*/, size_t /*most*/) {
+    return absl::UnimplementedError("this store does not find records");
+  }
+  // What there is at revision(), where records are found. Never while Commit runs.
+  virtual StoreTotals totals() const { return {}; }
 
   // Every writer of the hull, in byte order of the IDs; as many as are there. FAILED_PRECONDITION:
   // nothing is kept.

@@ -99,6 +99,10 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
         [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
     return;
   }
+  if (!IsKnown(id)) {
+    return WhenKnown(locked, id, done,
+                     [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+  }
   if (absl::Status s = CheckBody(locked, id, if_revision); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
   }
@@ -132,6 +136,10 @@ void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revi
 
 void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
                                 std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
+  if (!IsKnown(id)) {
+    return WhenKnown(locked, id, done,
+                     [=, this](Locked& later) { DeleteBodyLocked(later, id, if_revision, done); });
+  }
   const auto found = bodies_.find(id);
   if (found == bodies_.end()) {
     const absl::Status missing =

@@ -183,6 +183,25 @@ std::string PrepareBatchStatements() {
       SELECT * FROM unnest($1, $2, $3, $4);)";
 }
 
+StoreTotals AddedBy(std::span<const Change* const> changes) {
+  StoreTotals added;
+  for (const Change* change : changes) {
+    if (change->body != nullptr) continue;
+    const uint64_t vertices = change->hull.record.vertex_count;
+    if (change->deleted) {
+      --added.hulls;
+      added.vertices -= vertices;
+    } else if (change->begins) {
+      if (!change->replaced.has_value()) ++added.hulls;
+      added.vertices += vertices;
+      if (change->replaced.has_value()) added.vertices -= change->replaced->record.vertex_count;
+    } else {
+      added.vertices += vertices - change->former_vertices;
+    }
+  }
+  return added;
+}
+
 std::vector<Statement> StatementsOf(std::span<const Change* const> changes) {
   std::map<std::string, HullRows> hulls;
   std::map<std::string, const Change*> bodies;

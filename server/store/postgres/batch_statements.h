@@ -18,6 +18,10 @@ std::string PrepareBatchStatements();
 // are kept).
 std::vector<Statement> StatementsOf(std::span<const Change* const> changes);
 
+// What a batch adds to what the store holds, modulo 2^64. The vertices of a hull whose record was
+// damaged when it ended stay counted.
+StoreTotals AddedBy(std::span<const Change* const> changes);
+
 }  // namespace hulld::server
 
 #endif  // HULLD_SERVER_STORE_POSTGRES_BATCH_STATEMENTS_H_

@@ -24,6 +24,21 @@ Statement AskForDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
                          EncodeBigint(up_to)}};
 }
 
+// rows: the store's revision and a hull each; without one where there is none.
+absl::StatusOr<FoundHulls> FoundIn(const Rows& rows, std::string_view prefix, size_t most) {
+  if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
+  FoundHulls found;
+  found.revision = rows.bigint(0, 0);
+  for (int i = 0; i < rows.count(); ++i) {
+    const std::string id(rows.at(i, 1));
+    if (id.empty() || !id.starts_with(prefix)) break;
+    found.more = found.hulls.size() == most;
+    if (found.more) break;
+    found.hulls.emplace(id, UnsealStoredHull(id, rows.at(i, 2)));
+  }
+  return found;
+}
+
 // deltas: between the two versions.
 std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth& hull) {
   const VertexLayout& before = hull.before.layout;
@@ -88,6 +103,24 @@ absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
   return ForEachRow("hulld_bodies_after", [&](const std::string& body_id, std::string_view sealed) {
     visit(body_id, UnsealStoredBody(body_id, sealed));
   });
+}
+
+absl::StatusOr<FoundHulls> PostgresStore::FindHulls(std::span<const std::string> ids) {
+  ArrayParameter asked(ArrayParameter::Element::kText);
+  for (const std::string& id : ids) asked.Add(id);
+  const absl::StatusOr<std::vector<Rows>> rows =
+      Read({{.name = "hulld_find_hulls", .parameters = {asked.Take()}}});
+  if (!rows.ok()) return rows.status();
+  return FoundIn(rows->front(), "", ids.size());
+}
+
+// One row more tells whether there are others.
+absl::StatusOr<FoundHulls> PostgresStore::ListHulls(const std::string& prefix,
+                                                    const std::string& after, size_t most) {
+  const absl::StatusOr<std::vector<Rows>> rows =
+      Read({{.name = "hulld_list_hulls", .parameters = {prefix, after, EncodeBigint(most + 1)}}});
+  if (!rows.ok()) return rows.status();
+  return FoundIn(rows->front(), prefix, most);
 }
 
 absl::StatusOr<std::vector<Vector>> PostgresStore::LoadVertices(const StoredHull& hull) {

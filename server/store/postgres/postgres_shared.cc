@@ -33,8 +33,9 @@ constexpr std::chrono::milliseconds kLongestPause{500};
 
 // hulld.changes tells which IDs each batch changed, for the other servers: `revision` is the
 // store's after the last change of the ID in the batch, `ended_at` that at which an incarnation of
-// it ended, or 0. hulld.store.pruned: batches up to this one are not told any more. hulld.servers
-// tells the last batch of each server, for one that lost the answer to its COMMIT.
+// it ended, or 0; `began` the create_revision of the first that did. hulld.store.pruned: batches up
+// to this one are not told any more. hulld.servers tells the last batch of each server, for one
+// that lost the answer to its COMMIT.
 constexpr char kSharedTables[] = R"(
   BEGIN;
   CREATE TABLE hulld.changes (
@@ -42,6 +43,7 @@ constexpr char kSharedTables[] = R"(
     id text COLLATE "C",
     revision bigint NOT NULL,
     ended_at bigint NOT NULL,
+    began bigint NOT NULL DEFAULT 0,
     PRIMARY KEY (batch, id));
   CREATE TABLE hulld.servers (
     owner text PRIMARY KEY,
@@ -54,10 +56,11 @@ constexpr char kSharedTables[] = R"(
 constexpr char kPrepareFollow[] = R"(
     PREPARE hulld_follow(bigint, bigint) AS
       SELECT s.batch, s.revision, s.epoch, s.pruned, s.owner, c.id, c.revision, c.ended_at,
-        h.record, b.body, s.store_id
+        h.record, b.body, s.store_id, s.hulls, s.vertices, c.began
       FROM hulld.store s
       LEFT JOIN (
-        SELECT id, max(revision) AS revision, max(ended_at) AS ended_at
+        SELECT id, max(revision) AS revision, max(ended_at) AS ended_at,
+          min(nullif(began, 0)) AS began
         FROM hulld.changes WHERE batch > $1 GROUP BY id LIMIT $2) c ON true
       LEFT JOIN hulld.hulls h ON h.hull_id = c.id
       LEFT JOIN hulld.bodies b ON b.body_id = c.id;
@@ -73,15 +76,15 @@ constexpr char kPrepareShared[] = R"(
       WITH joined AS (
         UPDATE hulld.store SET owner = $1, epoch = epoch + (owner <> $1)::integer,
           written_in = epoch + (owner <> $1)::integer
-        RETURNING epoch, batch, revision, store_id, relaxed),
+        RETURNING epoch, batch, revision, store_id, relaxed, hulls, vertices),
       noted AS (
         INSERT INTO hulld.epochs (epoch, owner, batch, revision)
         SELECT epoch, $1, batch, revision FROM joined ON CONFLICT (epoch) DO NOTHING)
-      SELECT epoch, batch, revision, store_id, relaxed FROM joined;
+      SELECT epoch, batch, revision, store_id, relaxed, hulls, vertices FROM joined;
     PREPARE hulld_turn AS SELECT batch FROM hulld.store FOR UPDATE;
-    PREPARE hulld_put_changes(bigint, text[], bigint[], bigint[]) AS
-      INSERT INTO hulld.changes (batch, id, revision, ended_at)
-      SELECT $1, * FROM unnest($2, $3, $4);
+    PREPARE hulld_put_changes(bigint, text[], bigint[], bigint[], bigint[]) AS
+      INSERT INTO hulld.changes (batch, id, revision, ended_at, began)
+      SELECT $1, * FROM unnest($2, $3, $4, $5);
     PREPARE hulld_put_server(text, bigint) AS
       INSERT INTO hulld.servers (owner, batch) VALUES ($1, $2)
       ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch, seen = now();
@@ -100,25 +103,43 @@ Statement AskForOthers(uint64_t batch) {
           .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
 }
 
+// The create_revision of the incarnation that a change ends; 0: it ends none.
+uint64_t BeganOfEnded(const Change& change) {
+  if (change.replaced.has_value()) return change.replaced->record.create_revision;
+  if (!change.deleted) return 0;
+  return change.body != nullptr ? change.body->record.create_revision
+                                : change.hull.record.create_revision;
+}
+
 // What a batch tells the other servers.
 Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
-  std::map<std::string, std::pair<uint64_t, uint64_t>> rows;
+  struct Row {
+    uint64_t revision = 0;
+    uint64_t ended_at = 0;
+    uint64_t began = 0;
+  };
+  std::map<std::string, Row> rows;
   for (const Change* change : changes) {
-    auto& [revision, ended_at] = rows[change->id()];
-    revision = change->revision;
-    if (change->deleted || change->replaced.has_value()) ended_at = revision;
+    Row& row = rows[change->id()];
+    row.revision = change->revision;
+    const uint64_t began = BeganOfEnded(*change);
+    if (began != 0 || change->deleted) row.ended_at = row.revision;
+    if (row.began == 0) row.began = began;
   }
   using Element = ArrayParameter::Element;
   ArrayParameter ids(Element::kText);
   ArrayParameter revisions(Element::kBigint);
   ArrayParameter ends(Element::kBigint);
+  ArrayParameter began(Element::kBigint);
   for (const auto& [id, row] : rows) {
     ids.Add(id);
-    revisions.Add(EncodeBigint(row.first));
-    ends.Add(EncodeBigint(row.second));
+    revisions.Add(EncodeBigint(row.revision));
+    ends.Add(EncodeBigint(row.ended_at));
+    began.Add(EncodeBigint(row.began));
   }
-  return {.name = "hulld_put_changes",
-          .parameters = {EncodeBigint(batch), ids.Take(), revisions.Take(), ends.Take()}};
+  return {
+      .name = "hulld_put_changes",
+      .parameters = {EncodeBigint(batch), ids.Take(), revisions.Take(), ends.Take(), began.Take()}};
 }
 
 absl::Status Moved() { return absl::AbortedError("another server changed the hull meanwhile"); }
@@ -171,6 +192,7 @@ absl::Status PostgresStore::Join() {
   seen_batch_ = batch_;
   revision_ = joined->bigint(0, 2);
   id_ = std::string(joined->at(0, 3));
+  totals_ = {joined->bigint(0, 5), joined->bigint(0, 6)};
   spdlog::info(
       "hulls live in {}, PostgreSQL {}; an acknowledged change is committed there "
       "(synchronous_commit = {}); other servers may be active beside this one; epoch {}",
@@ -222,6 +244,7 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
     OtherChange& other = others_.by_id[id];
     other.revision = rows.bigint(i, 6);
     other.ended_at = std::max(other.ended_at, rows.bigint(i, 7));
+    if (other.former_began == 0 && !rows.at(i, 13).empty()) other.former_began = rows.bigint(i, 13);
     other.hull.reset();
     other.body.reset();
     if (!rows.at(i, 8).empty()) {
@@ -235,7 +258,10 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
   batch_ = rows.bigint(0, 0);
   seen_batch_ = batch_;
   revision_ = rows.bigint(0, 1);
-  if (!others_.by_id.empty()) others_.revision = revision_;
+  totals_ = {rows.bigint(0, 11), rows.bigint(0, 12)};
+  if (others_.by_id.empty()) return absl::OkStatus();
+  others_.revision = revision_;
+  others_.totals = totals_;
   return absl::OkStatus();
 }
 
@@ -303,7 +329,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
     if (!others_.by_id.contains(change->id())) kept.push_back(change);
   }
   if (status.ok() && !kept.empty()) {
-    const SharedBatch next = {batch_ + 1, NumberChanges(kept, revision_)};
+    const SharedBatch next = {batch_ + 1, NumberChanges(kept, revision_), AddedBy(kept)};
     std::vector<Statement> statements = StatementsOf(kept);
     statements.push_back(ChangesRow(kept, next.number));
     statements.push_back(
@@ -312,9 +338,7 @@ absl::Status PostgresStore::AttemptShared(std::span<Change* const> changes, Shar
       statements.push_back(
           {.name = "hulld_prune", .parameters = {EncodeBigint(next.number - kKeptBatches)}});
     }
-    statements.push_back({.name = "hulld_fence",
-                          .parameters = {EncodeBigint(next.revision), EncodeBigint(next.number),
-                                         EncodeBigint(epoch())}});
+    statements.push_back(Fence(next.revision, next.number, next.added));
     statements.push_back({.text = "COMMIT"});
     writer_->TakeWarned();
     *batch = next;
@@ -347,6 +371,7 @@ void PostgresStore::KeepShared(const SharedBatch& batch) {
   batch_ = batch.number;
   seen_batch_ = batch_;
   revision_ = batch.revision;
+  totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices};
   if (notices_ != nullptr) notices_->Send(batch.number);
 }
 

@@ -72,15 +72,20 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
   return status;
 }
 
+// Writes what is so after the batch, if this is still of its epoch.
+Statement PostgresStore::Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const {
+  return {.name = "hulld_fence",
+          .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch()),
+                         EncodeBigint(added.hulls), EncodeBigint(added.vertices)}};
+}
+
 // One transaction. Lost: it may have been committed. Other errors: it was not.
 absl::Status PostgresStore::Attempt(std::span<const Change* const> changes, uint64_t revision,
                                     uint64_t batch) {
   std::vector<Statement> statements;
   statements.push_back({.text = "BEGIN"});
   // First, so that a server that was superseded writes nothing.
-  statements.push_back(
-      {.name = "hulld_fence",
-       .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch())}});
+  statements.push_back(Fence(revision, batch, AddedBy(changes)));
   std::ranges::move(StatementsOf(changes), std::back_inserter(statements));
   statements.push_back({.text = "COMMIT"});
   writer_->TakeWarned();
@@ -157,8 +162,10 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
   const uint64_t batch = batch_ + 1;
   const uint64_t revision = NumberChanges(changes, revision_);
   const auto keep = [&] {
+    const StoreTotals added = AddedBy(changes);
     batch_ = batch;
     revision_ = revision;
+    totals_ = {totals_.hulls + added.hulls, totals_.vertices + added.vertices};
     return absl::OkStatus();
   };
   const Clock::time_point deadline = Clock::now() + options_.patience;

@@ -111,6 +111,11 @@ class PostgresStore : public Store {
   void OnOthers(std::function<void()> others) override;
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
+  bool finds_records() const override { return true; }
+  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override;
+  absl::StatusOr<FoundHulls> ListHulls(const std::string& prefix, const std::string& after,
+                                       size_t most) override;
+  StoreTotals totals() const override { return totals_; }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
@@ -126,10 +131,8 @@ class PostgresStore : public Store {
   absl::StatusOr<std::string> MakeCopy() override;
   void OnEnded(std::function<void()> ended) override;
 
-  // The version of the tables. Those of a database that holds all slots stay in the former one, so
-  // that a hulld that knows nothing of slots opens these alone.
-  static constexpr uint64_t kFormat = 2;
-  static constexpr uint64_t kFormatWithoutSlots = 1;
+  // The version of the tables. Format 2 knows slots, format 3 what the store holds, counted.
+  static constexpr uint64_t kFormat = 3;
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
 
@@ -140,6 +143,8 @@ class PostgresStore : public Store {
   struct SharedBatch {
     uint64_t number = 0;
     uint64_t revision = 0;
+    // What it adds to the totals, modulo 2^64.
+    StoreTotals added = {};
   };
 
   PostgresStore(PostgresOptions options, Conninfo conninfo);
@@ -158,6 +163,7 @@ class PostgresStore : public Store {
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);
   absl::Status MakeTables(Session& session);
+  absl::Status AddTotals(Session& session) const;
   absl::Status CheckSlots(Session& session);
   absl::Status TakeSlots(Session& session);
   absl::Status BeginPatiently();
@@ -177,6 +183,7 @@ class PostgresStore : public Store {
   absl::Status ended() const;
 
   // Committing. batch: its number.
+  Statement Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const;
   absl::Status Attempt(std::span<const Change* const> changes, uint64_t revision, uint64_t batch);
   absl::StatusOr<bool> FindOutcome(uint64_t batch, std::chrono::steady_clock::time_point deadline);
   absl::StatusOr<bool> Reclaim(uint64_t batch);
@@ -223,6 +230,8 @@ class PostgresStore : public Store {
   const std::string owner_;
   std::string id_;
   uint64_t revision_ = 0;
+  // As of that.
+  StoreTotals totals_;
   Durability durability_ = Durability::kSync;
   // The value of synchronous_commit.
   std::string synchronous_commit_;

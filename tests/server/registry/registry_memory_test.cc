@@ -21,7 +21,7 @@ TEST_F(RegistryMemory, HullsAreReadAtFirstUse) {
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(hulls_->Put(std::to_string(i), CubeCorners()).ok());
   Start();
   EXPECT_EQ(hulls_->registry().Cache().bytes, 0);
-  EXPECT_EQ(hulls_->registry().List("", "", 100).hulls.size(), 10);
+  EXPECT_EQ(hulls_->registry().List("", "", 100)->hulls.size(), 10);
   EXPECT_EQ(hulls_->registry().Cache().loads, 0);
   ASSERT_TRUE(hulls_->View("3").ok());
   EXPECT_EQ(hulls_->registry().Cache().loads, 1);

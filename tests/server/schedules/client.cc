@@ -220,7 +220,12 @@ void Client::List() {
     if (MayFail(call, fresh, false)) return;
     Fail(call, absl::StrCat("wrong: ", fresh.ToString()));
   }
-  const HullPage page = simulation_.registry.List("", "", kHulls);
+  const absl::StatusOr<HullPage> listed_page = simulation_.registry.List("", "", kHulls);
+  if (!listed_page.ok()) {
+    if (MayFail(call, listed_page.status(), false)) return;
+    Fail(call, absl::StrCat("wrong: ", listed_page.status().ToString()));
+  }
+  const HullPage& page = *listed_page;
   for (call.hull = 0; call.hull < kHulls; ++call.hull) {
     const auto listed = std::ranges::find_if(page.hulls, [&](const ListedHull& hull) {
       return hull.record.hull_id == HullName(call.hull);

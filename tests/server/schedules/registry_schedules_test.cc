@@ -32,6 +32,7 @@ void ExpectAllReached(const Reached& reached) {
   EXPECT_GT(reached.told, 100);
   EXPECT_GT(reached.loads, 100);
   EXPECT_GT(reached.sequences, 100);
+  EXPECT_GT(reached.lookups, 1000);
   EXPECT_GT(reached.evictions, 100);
   EXPECT_GT(reached.recovered, 100);
   EXPECT_GT(reached.kills, 100);

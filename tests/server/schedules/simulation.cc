@@ -77,6 +77,7 @@ void RunClients(Simulation& simulation) {
 void CountStore(const SimulatedStore::Counts& counts, Reached& reached) {
   reached.loads += counts.loads;
   reached.sequences += counts.sequences;
+  reached.lookups += counts.lookups;
   reached.recovered += counts.recovered;
   reached.kills += counts.kills;
   reached.revived += counts.revived;
@@ -98,6 +99,7 @@ void SimulateServers(const Plan& plan, SimulatedStore& database, Reached& reache
     SharedStore store(database);
     WorkerPool writers(2);
     Registry registry(store, limits, writers);
+    if (plan.finds_records) registry.KeepRecords(plan.records);
     if (!registry.Load().ok())
       Scheduler::Current().Fail("what the database keeps cannot be loaded");
     Simulation simulation{plan, database, registry, reached};
@@ -161,6 +163,8 @@ Plan::Plan(Random& random) {
   cancellations = rarely(2);
   preparations = random.OneIn(2) ? 0 : rarely(1);
   repetitions = rarely(2);
+  finds_records = random.OneIn(2);
+  records = random.Below(3);
   if (!random.OneIn(3)) return;
   servers = 2;
   // A watch may be told of several changes as one.
@@ -172,6 +176,7 @@ Plan::Plan(Random& random) {
 void Simulate(Reached& reached) {
   const Plan plan(Scheduler::Current().random());
   SimulatedStore store(plan.faults);
+  store.SetFindsRecords(plan.finds_records);
   if (plan.servers > 1) {
     SimulateServers(plan, store, reached);
     return CountStore(store.counts(), reached);
@@ -181,6 +186,7 @@ void Simulate(Reached& reached) {
   const auto run = [&](const auto& body) {
     WorkerPool writers(2);
     Registry registry(store, limits, writers);
+    if (plan.finds_records) registry.KeepRecords(plan.records);
     if (!registry.Load().ok()) Scheduler::Current().Fail("what the store keeps cannot be loaded");
     Simulation simulation{plan, store, registry, reached};
     body(simulation);

@@ -28,6 +28,7 @@ struct Reached {
   uint64_t told = 0;
   uint64_t loads = 0;
   uint64_t sequences = 0;
+  uint64_t lookups = 0;
   uint64_t evictions = 0;
   uint64_t recovered = 0;
   uint64_t kills = 0;
@@ -57,6 +58,9 @@ struct Plan {
   uint64_t memory_limit = 0;
   // Whether that is never reached but by pressure.
   bool has_memory = false;
+  // Whether the store finds records, and how many of them a server keeps.
+  bool finds_records = false;
+  size_t records = 0;
   // Over one database; and of each its clients.
   size_t servers = 1;
   size_t clients = 0;

@@ -40,6 +40,8 @@ void Watcher::Run() {
   if (is_refused_) return;
   while (!is_ending_) {
     const absl::StatusOr<WatchPiece> piece = registry.TakeChanges(*watch_);
+    // What is there cannot be read: once more.
+    if (absl::IsUnavailable(piece.status()) && simulation_.store.failed() > 0) continue;
     if (!piece.ok()) Scheduler::Current().Fail(piece.status().ToString());
     if (piece->anew) told_ = {};
     for (const HullChange& change : piece->changes) Take(change);

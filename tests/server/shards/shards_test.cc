@@ -29,7 +29,7 @@ TEST_F(ShardsTest, AHullLivesInTheShardOfItsIdAndNowhereElse) {
     const std::string id = IdIn(shard);
     ASSERT_TRUE(Create(id).ok());
     for (size_t other = 0; other < kShards; ++other) {
-      EXPECT_EQ(shards_->at(other).List("", "", 10).hulls.size(), other <= shard ? 1 : 0);
+      EXPECT_EQ(shards_->at(other).List("", "", 10)->hulls.size(), other <= shard ? 1 : 0);
     }
     EXPECT_EQ(shards_->store_id_of(id), stores_[shard]->id());
   }
@@ -64,7 +64,7 @@ TEST_F(ShardsTest, ListsAreMergedInTheOrderOfIdsAndInPages) {
     std::vector<std::string> listed;
     std::string after;
     while (true) {
-      const ShardsHullPage page = shards_->List("list/", after, page_size);
+      const ShardsHullPage page = shards_->List("list/", after, page_size).value();
       EXPECT_EQ(page.revisions.size(), kShards);
       EXPECT_LE(page.hulls.size(), page_size);
       for (const ListedHull& hull : page.hulls) listed.push_back(hull.record.hull_id);

@@ -96,7 +96,7 @@ TEST_P(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   FillThree();
   Flip(HullKey("b"));
   Start();
-  const HullPage page = hulls_->registry().List("", "", 10);
+  const HullPage page = hulls_->registry().List("", "", 10).value();
   ASSERT_EQ(page.hulls.size(), 3);
   EXPECT_FALSE(page.hulls[0].damaged);
   EXPECT_TRUE(page.hulls[1].damaged);

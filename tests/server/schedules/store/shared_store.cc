@@ -19,7 +19,10 @@ absl::Status Moved() { return absl::AbortedError("another server changed the hul
 }  // namespace
 
 SharedStore::SharedStore(SimulatedStore& database)
-    : database_(database), seen_(database.log_.size()), revision_(database.ledger_.revision()) {
+    : database_(database),
+      seen_(database.log_.size()),
+      revision_(database.ledger_.revision()),
+      totals_(database.totals()) {
   const std::lock_guard lock(database_.servers_mutex_);
   database_.servers_.push_back(this);
 }
@@ -106,18 +109,22 @@ absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
 // What others did since this knew of it, up to now.
 void SharedStore::NoteOthers() {
   revision_ = database_.ledger_.revision();
+  totals_ = database_.totals();
   for (; seen_ < database_.log_.size(); ++seen_) {
     const SimulatedStore::Logged& logged = database_.log_[seen_];
     OtherChange& other = others_.by_id[logged.hull_id];
     other.revision = logged.revision;
     other.ended_at = std::max(other.ended_at, logged.ended_at);
+    if (other.former_began == 0) other.former_began = logged.former_began;
     other.hull.reset();
     const auto found = database_.hulls_.find(logged.hull_id);
     if (found == database_.hulls_.end()) continue;
     other.hull = found->second.stored;
     other.revision = found->second.stored.record.revision;
   }
-  if (!others_.by_id.empty()) others_.revision = revision_;
+  if (others_.by_id.empty()) return;
+  others_.revision = revision_;
+  others_.totals = totals_;
 }
 
 absl::Status SharedStore::Follow() {
@@ -172,6 +179,7 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
   if (is_unknown) return absl::UnavailableError("nobody can tell whether it was committed");
   seen_ = database_.log_.size();
   revision_ = database_.ledger_.revision();
+  totals_ = database_.totals();
   return absl::OkStatus();
 }
 

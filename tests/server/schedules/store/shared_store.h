@@ -32,6 +32,15 @@ class SharedStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
+  bool finds_records() const override { return database_.finds_records(); }
+  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override {
+    return database_.FindHulls(ids);
+  }
+  absl::StatusOr<FoundHulls> ListHulls(const std::string& prefix, const std::string& after,
+                                       size_t most) override {
+    return database_.ListHulls(prefix, after, most);
+  }
+  StoreTotals totals() const override { return totals_; }
   absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override { return database_.MakeCopy(); }
@@ -53,6 +62,8 @@ class SharedStore : public Store {
   // Changes of the database that this knows of.
   size_t seen_ = 0;
   uint64_t revision_ = 0;
+  // As of that.
+  StoreTotals totals_;
   OtherChanges others_;
   // Guarded by the database's mutex.
   std::function<void()> on_others_;

@@ -64,6 +64,50 @@ absl::StatusOr<uint64_t> SimulatedStore::LoadSequence(const HullRecord& hull,
   return sequence;
 }
 
+absl::StatusOr<FoundHulls> SimulatedStore::FindHulls(std::span<const std::string> ids) {
+  Scheduler& scheduler = Scheduler::Current();
+  ++counts_.lookups;
+  scheduler.Note("store: is asked for records:", ids.size());
+  if (Dice().OneIn(faults_.read)) {
+    ++counts_.failed_reads;
+    ++counts_.failed_lookups;
+    return absl::UnavailableError("the disk does not answer");
+  }
+  FoundHulls found;
+  found.revision = ledger_.revision();
+  for (const std::string& id : ids) {
+    const auto kept = hulls_.find(id);
+    if (kept != hulls_.end()) found.hulls.emplace(id, kept->second.stored);
+  }
+  scheduler.Note("store: has found records at revision", found.revision, found.hulls.size());
+  return found;
+}
+
+absl::StatusOr<FoundHulls> SimulatedStore::ListHulls(const std::string& prefix,
+                                                     const std::string& after, size_t most) {
+  // All of them in one step.
+  absl::StatusOr<FoundHulls> found = FindHulls({});
+  if (!found.ok()) return found;
+  found->revision = ledger_.revision();
+  found->more = false;
+  for (const auto& [id, kept] : hulls_) {
+    if (!id.starts_with(prefix) || id <= after) continue;
+    found->more = found->hulls.size() == most;
+    if (found->more) break;
+    found->hulls.emplace(id, kept.stored);
+  }
+  Scheduler::Current().Note("store: has listed records at revision", found->revision,
+                            found->hulls.size());
+  return found;
+}
+
+StoreTotals SimulatedStore::totals() const {
+  StoreTotals totals;
+  totals.hulls = hulls_.size();
+  for (const auto& [id, kept] : hulls_) totals.vertices += kept.stored.record.vertex_count;
+  return totals;
+}
+
 absl::Status SimulatedStore::Commit(std::span<Change* const> changes) {
   Scheduler& scheduler = Scheduler::Current();
   if (is_busy_) scheduler.Fail("two calls commit at the same time");
@@ -152,7 +196,10 @@ void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
   if (auto fault = ledger_.Keep(change, nobody_waits)) Scheduler::Current().Fail(*fault);
   const HullRecord& record = change.hull.record;
   const bool ends = change.deleted || change.replaced.has_value();
-  log_.push_back({record.hull_id, change.revision, ends ? change.revision : 0});
+  const uint64_t began = change.deleted                ? record.create_revision
+                         : change.replaced.has_value() ? change.replaced->record.create_revision
+                                                       : 0;
+  log_.push_back({record.hull_id, change.revision, ends ? change.revision : 0, began});
   if (change.deleted) {
     hulls_.erase(record.hull_id);
     return;

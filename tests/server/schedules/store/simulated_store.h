@@ -46,6 +46,8 @@ class SimulatedStore : public Store {
     uint64_t failed_reads = 0;
     uint64_t loads = 0;
     uint64_t sequences = 0;
+    uint64_t lookups = 0;
+    uint64_t failed_lookups = 0;
     uint64_t kills = 0;
     uint64_t revived = 0;
     // Changes that another server's superseded (SharedStore).
@@ -65,14 +67,24 @@ class SimulatedStore : public Store {
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
+  bool finds_records() const override { return finds_records_; }
+  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override;
+  absl::StatusOr<FoundHulls> ListHulls(const std::string& prefix, const std::string& after,
+                                       size_t most) override;
+  StoreTotals totals() const override;
   absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override;
 
+  // Before it is used.
+  void SetFindsRecords(bool finds_records) { finds_records_ = finds_records; }
   Ledger& ledger() { return ledger_; }
   const Counts& counts() const { return counts_; }
   // Failures that calls may have been answered with by now; and with them one that they may yet.
-  uint64_t answered_failures() const { return failed() - (is_failing_ ? 1 : 0) - failing_servers_; }
+  // One lookup of a record may answer many calls, also such as come while it is under way.
+  uint64_t answered_failures() const {
+    return failed() - (is_failing_ ? 1 : 0) - failing_servers_ - counts_.failed_lookups;
+  }
   uint64_t failed() const { return counts_.refused + counts_.unknown + counts_.failed_reads; }
   bool was_full() const { return was_full_; }
   bool is_damaged(uint64_t create_revision) const { return damaged_.contains(create_revision); }
@@ -100,12 +112,15 @@ class SimulatedStore : public Store {
     std::string hull_id;
     uint64_t revision = 0;
     uint64_t ended_at = 0;
+    // Of that incarnation.
+    uint64_t former_began = 0;
   };
 
   absl::Status RefuseBatch(std::span<const Change* const> changes);
   void Keep(const Change& change, bool nobody_waits);
 
   StoreFaults faults_;
+  bool finds_records_ = false;
   Ledger ledger_;
   Counts counts_;
   std::map<std::string, Kept> hulls_;

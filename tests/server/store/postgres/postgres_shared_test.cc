@@ -97,7 +97,10 @@ class PostgresShared : public PostgresTest {
   static std::vector<std::string> Listed(PostgresRegistry& server) {
     EXPECT_TRUE(server.registry().AwaitOthers({}).ok());
     std::vector<std::string> ids;
-    for (const ListedHull& hull : server.registry().List("", "", 100).hulls) {
+    const absl::StatusOr<HullPage> page = server.registry().List("", "", 100);
+    EXPECT_TRUE(page.ok()) << page.status();
+    if (!page.ok()) return ids;
+    for (const ListedHull& hull : page->hulls) {
       ids.push_back(hull.record.hull_id);
     }
     return ids;
