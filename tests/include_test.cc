@@ -88,6 +88,7 @@ constexpr std::string_view kRooms[] = {
     "server/registry/memory",
     "server/registry",
     "server/registry/bodies",
+    "server/registry/records",
     "server/access",
     "server/shards",
     "server/migration",
