@@ -267,6 +267,8 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
 
 absl::Status PostgresStore::Follow() {
   if (absl::Status s = ended(); !s.ok()) return s;
+  // Nobody else commits.
+  if (!options_.shared) return absl::OkStatus();
   const Statement follow = AskForOthers(batch_);
   const absl::StatusOr<std::vector<Rows>> rows = follower_.Ask(std::span(&follow, 1));
   if (rows.ok()) {

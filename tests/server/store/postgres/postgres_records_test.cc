@@ -57,6 +57,15 @@ TEST_F(PostgresRecords, NoRecordIsReadUntilItIsAskedFor) {
   EXPECT_EQ(hulls_->registry().Cache().damaged, 1);
 }
 
+// What was found may be of a moment after which the registry has not heard of its own commit yet:
+// then it waits for its committer, which follows, also where nobody else commits.
+TEST_F(PostgresRecords, AServerThatIsActiveAloneHasNobodyToFollow) {
+  const auto store = Open();
+  ASSERT_TRUE(store.ok()) << store.status();
+  EXPECT_FALSE((*store)->is_shared());
+  EXPECT_TRUE((*store)->Follow().ok()) << (*store)->Follow();
+}
+
 TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
   for (const bool shared : {false, true}) {
     SCOPED_TRACE(shared);
