@@ -21,6 +21,9 @@ class CommitHold {
   // Then it ends by itself: changes wait no longer than that for one reader. Enough to look up the
   // hulls of a large call that are in memory; a choice.
   static constexpr std::chrono::milliseconds kLongest{200};
+  // The same for a reader that holds several stores, and restarts the time of all when it has the
+  // last (Extend).
+  static constexpr std::chrono::milliseconds kLongestOfSeveral{1000};
 
   // For the reader, once: waits until it has begun. CANCELLED: should_stop said so. Otherwise why
   // it cannot begin.
@@ -37,13 +40,24 @@ class CommitHold {
     }
     return status_;
   }
-  // For the reader: ends it, or what would begin. Returns whether it has lasted until now.
-  bool End() {
+  // For the reader: it lasts kLongest from now, within kLongestOfSeveral.
+  void Extend() {
     const std::lock_guard lock(mutex_);
-    const bool lasted = state_ == State::kHeld;
+    end_ = std::min(SteadyClock::now() + kLongest, last_end_);
+  }
+  // For the reader: ends it, or what would begin. Returns whether nothing was committed from its
+  // beginning until now. Waits for the store's word for that: a round trip, and until other readers
+  // of the same hold have ended it.
+  bool End() {
+    std::unique_lock lock(mutex_);
+    if (state_ == State::kHeld) {
+      state_ = State::kEnding;
+      changed_.notify_all();
+      changed_.wait(lock, [this] { return state_ != State::kEnding; });
+      return lasted_;
+    }
     state_ = State::kOver;
-    changed_.notify_all();
-    return lasted;
+    return false;
   }
 
   // For the committer: whether somebody still waits for it.
@@ -57,23 +71,41 @@ class CommitHold {
     if (state_ != State::kWanted) return;
     state_ = status.ok() ? State::kHeld : State::kOver;
     status_ = status;
+    last_end_ = SteadyClock::now() + kLongestOfSeveral;
+    end_ = SteadyClock::now() + kLongest;
     changed_.notify_all();
   }
-  // Waits until the reader ends it, or until this time; it is over then.
-  void LastUntil(SteadyClock::time_point end) {
+  // Waits until the reader ends it, or it has taken too long: then it is over.
+  void Last() {
     std::unique_lock lock(mutex_);
-    const auto left = std::max<SteadyClock::duration>(end - SteadyClock::now(), {});
-    changed_.wait_for(lock, left, [this] { return state_ != State::kHeld; });
+    while (state_ == State::kHeld) {
+      const SteadyClock::time_point now = SteadyClock::now();
+      if (now >= end_) {
+        state_ = State::kOver;
+        return;
+      }
+      changed_.wait_for(lock, end_ - now, [this] { return state_ != State::kHeld; });
+    }
+  }
+  // After Last: whether nothing was committed meanwhile.
+  void Finish(bool lasted) {
+    const std::lock_guard lock(mutex_);
+    lasted_ = lasted && state_ == State::kEnding;
     state_ = State::kOver;
+    changed_.notify_all();
   }
 
  private:
-  enum class State { kWanted, kHeld, kOver };
+  // kEnding: the reader has ended it, and waits for Finish.
+  enum class State { kWanted, kHeld, kEnding, kOver };
 
   Mutex mutex_;
   ConditionVariable changed_;
   State state_ = State::kWanted;
   absl::Status status_;
+  SteadyClock::time_point end_;
+  SteadyClock::time_point last_end_;
+  bool lasted_ = false;
 };
 
 }  // namespace hulld::server

@@ -130,9 +130,9 @@ void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
     const std::lock_guard lock(mutex_);
     ++statistics_.holds;
   }
-  const SteadyClock::time_point end = SteadyClock::now() + CommitHold::kLongest;
-  for (const auto& hold : holds) hold->LastUntil(end);
-  store_.ReleaseOthers();
+  for (const auto& hold : holds) hold->Last();
+  const bool lasted = store_.ReleaseOthers();
+  for (const auto& hold : holds) hold->Finish(lasted);
 }
 
 // Empty: this is to end.

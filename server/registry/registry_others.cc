@@ -133,14 +133,17 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
 void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other,
                         uint64_t since) {
   // What was not known to be here is told from what others say of it.
-  const bool was_known = IsKnown(id);
+  const std::shared_ptr<const Body> former_body = FindBody(id);
+  // A body may have been read at the start as of a later moment: it says nothing of what was
+  // before.
+  const bool was_body = former_body != nullptr && former_body->record().create_revision <= since;
+  const bool was_known = former_body == nullptr ? IsKnown(id) : was_body;
   const bool has_ended = !was_known && other.former_began != 0 && other.former_began <= since;
   // Not what was read when the store was loaded.
   const bool is_news = other.revision > revision_;
   if (is_news) Publish(other.revision);
   // Also of what came and went, for who has to know that there was nothing all the while.
   if (is_news) recent_changes_.Note(id);
-  const std::shared_ptr<const Body> former_body = FindBody(id);
   TakeOverBody(locked, id, other);
   const std::shared_ptr<const Body> body = FindBody(id);
   const HullPointer former = hulls_.Find(id);

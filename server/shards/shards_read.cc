@@ -201,6 +201,7 @@ absl::StatusOr<Shards::Look> Shards::LookWhileHeld(KnownInShards& known,
     if (absl::IsCancelled(status)) return status;
     if (!status.ok()) return absl::AbortedError(status.message());
   }
+  for (const auto& hold : held.all) hold->Extend();
   if (on_part_) on_part_();
   ShardsPlan now = plan;
   // The one that is not held is asked while the others are.

@@ -202,8 +202,9 @@ class Store {
   // while Commit, Recover or Follow runs, nor may these run in between. UNAVAILABLE: the store
   // cannot be asked, or others hold it.
   virtual absl::Status HoldOthers() { return absl::OkStatus(); }
-  // Requires that HoldOthers returned OK.
-  virtual void ReleaseOthers() {}
+  // Requires that HoldOthers returned OK. Returns whether nobody has committed since; false also
+  // where that is not known.
+  virtual bool ReleaseOthers() { return true; }
   // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
   virtual void OnOthers(std::function<void()> others) { (void)others; }
 

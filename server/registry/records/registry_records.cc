@@ -23,6 +23,10 @@ namespace {
 // IDs in one question to the store, and threads that ask.
 constexpr size_t kMostAtOnce = Registry::kMostLookupsPerHold;
 constexpr size_t kMostThreads = 2;
+// Who takes turns for the threads that read: what is due under IDs, and what watches are told, with
+// those that load points.
+constexpr ClientId kRecordReader = 1;
+constexpr ClientId kWatchReader = 2;
 // How soon who waits notices that its call was cancelled.
 constexpr std::chrono::milliseconds kCancellationPoll(20);
 
@@ -55,20 +59,25 @@ void Registry::WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
   due_readings_.push_back(reading);
   if (reading_threads_ == kMostThreads) return;
   ++reading_threads_;
-  loaders_->Submit([this] { ReadDue(); });
+  loaders_->Submit([this] { ReadDue(); }, kRecordReader);
 }
 
-// Who comes while a question is under way is in the next one.
+// One question; who comes while it is under way is in the next one. In between others get the
+// thread, so that they do not wait as long as more comes.
 void Registry::ReadDue() {
   Locked locked(mutex_);
-  while (!due_readings_.empty()) {
+  if (!due_readings_.empty()) {
     const auto first = due_readings_.begin();
     const auto last = first + std::min<ptrdiff_t>(due_readings_.size(), kMostAtOnce);
     const Readings taken(first, last);
     due_readings_.erase(first, last);
     ReadRecords(locked, taken);
   }
-  --reading_threads_;
+  if (due_readings_.empty()) {
+    --reading_threads_;
+  } else {
+    loaders_->Submit([this] { ReadDue(); }, kRecordReader);
+  }
 }
 
 // For a reader: makes an ID known, and with it others that are due. Releases the mutex. Why it
@@ -243,21 +252,22 @@ void Registry::ReadPresent(Locked& locked, ChangeWatch& watch) {
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = feed_.TargetOf(watch);
   watch.is_reading = true;
-  loaders_->Submit([this, kept = watch.shared_from_this(), reading = ++watch.readings,
-                    asked_at = revision_, after = watch.last_id, prefix = target.prefix,
-                    ids = target.ids] {
-    absl::StatusOr<FoundHulls> found =
-        ids.empty() ? store_.ListHulls(prefix, after, ChangeFeed::kMostPerPiece)
-                    : store_.FindHulls(std::span(ids).first(1));
-    Locked later(mutex_);
-    WhenReached(later, asked_at, std::move(found),
-                [this, kept, reading](Locked& now, const absl::StatusOr<FoundHulls>& reached) {
-                  if (!kept->is_reading || kept->readings != reading) return;
-                  kept->is_reading = false;
-                  kept->found = reached;
-                  feed_.Wake(now, kept);
-                });
-  });
+  loaders_->Submit(
+      [this, kept = watch.shared_from_this(), reading = ++watch.readings, asked_at = revision_,
+       after = watch.last_id, prefix = target.prefix, ids = target.ids] {
+        absl::StatusOr<FoundHulls> found =
+            ids.empty() ? store_.ListHulls(prefix, after, ChangeFeed::kMostPerPiece)
+                        : store_.FindHulls(std::span(ids).first(1));
+        Locked later(mutex_);
+        WhenReached(later, asked_at, std::move(found),
+                    [this, kept, reading](Locked& now, const absl::StatusOr<FoundHulls>& reached) {
+                      if (!kept->is_reading || kept->readings != reading) return;
+                      kept->is_reading = false;
+                      kept->found = reached;
+                      feed_.Wake(now, kept);
+                    });
+      },
+      kWatchReader);
   HULLD_CHECK(locked.Holds(mutex_));
 }
 

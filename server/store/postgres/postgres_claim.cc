@@ -42,9 +42,9 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
                                                     " at most; run the hulld that wrote it"));
 }
 
-// Whether the database holds the slots that this is to serve. A database that holds nothing yet,
-// and all slots so far, takes the ones that it is given.
-absl::Status PostgresStore::CheckSlots(Session& session) {
+// Whether the database holds the slots that this is to serve, or is to take them, as one that holds
+// nothing yet, and all slots so far, does. Changes nothing.
+absl::StatusOr<bool> PostgresStore::CheckSlots(Session& session) {
   const absl::StatusOr<Rows> column = session.Run(
       "SELECT 1 FROM pg_attribute WHERE attrelid = 'hulld.store'::regclass AND attname = 'slots'");
   if (!column.ok()) return column.status();
@@ -55,8 +55,11 @@ absl::Status PostgresStore::CheckSlots(Session& session) {
     if (slots->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
     held = std::string(slots->at(0, 0));
   }
-  if (held == options_.slots) return absl::OkStatus();
-  if (held.empty()) return TakeSlots(session);
+  if (held == options_.slots) return true;
+  if (held.empty()) {
+    if (absl::Status s = CheckIsEmpty(session); !s.ok()) return s;
+    return false;
+  }
   if (options_.slots.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat("this database is one of several shards, and holds slots ", held,
@@ -70,22 +73,24 @@ absl::Status PostgresStore::CheckSlots(Session& session) {
                    "the hulls to other databases (hulld migrate)"));
 }
 
+absl::Status PostgresStore::CheckIsEmpty(Session& session) {
+  const absl::StatusOr<Rows> held = session.Run(
+      "SELECT revision > 0 OR EXISTS (SELECT 1 FROM hulld.hulls) OR EXISTS "
+      "(SELECT 1 FROM hulld.bodies) FROM hulld.store");
+  if (!held.ok()) return held.status();
+  if (held->count() != 1) return absl::DataLossError("the row of hulld.store is missing");
+  if (held->at(0, 0) == "f") return absl::OkStatus();
+  return absl::FailedPreconditionError(absl::StrCat(
+      "this database holds hulls of all slots, and the file of --postgres-shards gives it ",
+      options_.slots,
+      ": end all servers and copy them to other databases, which that file names (hulld "
+      "migrate)"));
+}
+
 // Servers that are active over it with all slots, which know nothing of this, are shut out.
 absl::Status PostgresStore::TakeSlots(Session& session) {
-  const absl::StatusOr<Rows> locked = session.Run("BEGIN; SELECT 1 FROM hulld.store FOR UPDATE");
-  absl::StatusOr<Rows> held =
-      !locked.ok() ? locked.status()
-                   : session.Run(
-                         "SELECT revision > 0 OR EXISTS (SELECT 1 FROM hulld.hulls) OR EXISTS "
-                         "(SELECT 1 FROM hulld.bodies) FROM hulld.store");
-  absl::Status status = held.status();
-  if (held.ok() && held->at(0, 0) != "f") {
-    status = absl::FailedPreconditionError(absl::StrCat(
-        "this database holds hulls of all slots, and the file of --postgres-shards gives it ",
-        options_.slots,
-        ": end all servers and copy them to other databases, which that file names (hulld "
-        "migrate)"));
-  }
+  absl::Status status = session.Run("BEGIN; SELECT 1 FROM hulld.store FOR UPDATE").status();
+  if (status.ok()) status = CheckIsEmpty(session);
   if (status.ok()) {
     status = session
                  .Run(absl::StrCat("ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS slots text; "

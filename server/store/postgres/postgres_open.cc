@@ -314,8 +314,11 @@ absl::Status PostgresStore::CheckServer(Session& session) {
 
 absl::Status PostgresStore::MakeSchema(Session& session) {
   if (absl::Status s = MakeTables(session); !s.ok()) return s;
+  // Before a former format is given up.
+  const absl::StatusOr<bool> has_slots = CheckSlots(session);
+  if (!has_slots.ok()) return has_slots.status();
   if (absl::Status s = AddTotals(session); !s.ok()) return s;
-  return CheckSlots(session);
+  return *has_slots ? absl::OkStatus() : TakeSlots(session);
 }
 
 // What tables of a former format lack, counted. Nobody commits meanwhile, and servers that would

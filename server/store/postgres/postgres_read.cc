@@ -114,11 +114,14 @@ absl::StatusOr<FoundHulls> PostgresStore::FindHulls(std::span<const std::string>
   return FoundIn(rows->front(), "", ids.size());
 }
 
-// One row more tells whether there are others.
+// One row more tells whether there are others. A prefix that no ID can have may hold characters
+// that the database does not know: it is asked for what comes after all IDs.
 absl::StatusOr<FoundHulls> PostgresStore::ListHulls(const std::string& prefix,
                                                     const std::string& after, size_t most) {
+  const bool may_be = std::ranges::all_of(prefix, [](char c) { return c > ' ' && c <= '~'; });
   const absl::StatusOr<std::vector<Rows>> rows =
-      Read({{.name = "hulld_list_hulls", .parameters = {prefix, after, EncodeBigint(most + 1)}}});
+      Read({{.name = "hulld_list_hulls",
+             .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1)}}});
   if (!rows.ok()) return rows.status();
   return FoundIn(rows->front(), prefix, most);
 }

@@ -103,12 +103,14 @@ Statement AskForOthers(uint64_t batch) {
           .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
 }
 
-// The create_revision of the incarnation that a change ends; 0: it ends none.
+// The create_revision of the incarnation that a change ends; 0: it ends none. Of a damaged hull
+// nobody knows it: it was there before, which is what others need to know.
 uint64_t BeganOfEnded(const Change& change) {
-  if (change.replaced.has_value()) return change.replaced->record.create_revision;
+  const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
+  if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
   if (!change.deleted) return 0;
-  return change.body != nullptr ? change.body->record.create_revision
-                                : change.hull.record.create_revision;
+  return known(change.body != nullptr ? change.body->record.create_revision
+                                      : change.hull.record.create_revision);
 }
 
 // What a batch tells the other servers.
@@ -316,8 +318,12 @@ absl::Status PostgresStore::HoldOthers() {
       absl::StrCat("cannot hold the database's turn: ", status.message()));
 }
 
-void PostgresStore::ReleaseOthers() {
-  if (options_.shared && writer_ != nullptr) GiveTurnBack(absl::OkStatus());
+// The database may have ended the session, and the turn with it. What it answers is of the session
+// that took it.
+bool PostgresStore::ReleaseOthers() {
+  if (!options_.shared) return true;
+  if (writer_ != nullptr) GiveTurnBack(absl::OkStatus());
+  return writer_ != nullptr;
 }
 
 // One transaction, in two round trips. The first takes the turn, which lasts until the end of the

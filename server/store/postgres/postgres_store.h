@@ -105,7 +105,7 @@ class PostgresStore : public Store {
   absl::Status Follow() override;
   OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
   absl::Status HoldOthers() override;
-  void ReleaseOthers() override;
+  bool ReleaseOthers() override;
   std::vector<std::optional<std::vector<Vector>>> LoadGrowth(
       std::span<const HullGrowth> hulls) override;
   void OnOthers(std::function<void()> others) override;
@@ -164,7 +164,8 @@ class PostgresStore : public Store {
   absl::Status MakeSchema(Session& session);
   absl::Status MakeTables(Session& session);
   absl::Status AddTotals(Session& session) const;
-  absl::Status CheckSlots(Session& session);
+  absl::StatusOr<bool> CheckSlots(Session& session);
+  absl::Status CheckIsEmpty(Session& session);
   absl::Status TakeSlots(Session& session);
   absl::Status BeginPatiently();
   absl::Status Begin();

@@ -104,6 +104,15 @@ class SharedStore : public GatedStore {
     return growth;
   }
 
+  absl::Status HoldOthers() override { return can_hold; }
+  bool ReleaseOthers() override {
+    ++releases;
+    return keeps_hold;
+  }
+
+  absl::Status can_hold;
+  std::atomic<bool> keeps_hold = true;
+  std::atomic<int> releases = 0;
   OtherChanges others;
   OtherChanges found_by_follow;
   std::atomic<int> follows = 0;
@@ -398,6 +407,54 @@ TEST(Committer, WhatHullsGrewByIsAskedForOnceOthersAreKnown) {
   // What could not be asked is not asked again at once.
   store.can_follow = absl::UnavailableError("no database");
   EXPECT_THAT(follow(), ElementsAre("other changed", "unreadable changed", "wanted changed"));
+}
+
+TEST(Committer, AHoldLastedIfTheStoreSaysSoAtItsEnd) {
+  SharedStore store;
+  FairMutex order;
+  Committer committer(store, order);
+  committer.SetOthers([](Locked&, const OtherChanges&) {});
+  const auto hold = [&] {
+    const auto made = std::make_shared<CommitHold>();
+    const Locked locked(order);
+    committer.Hold(locked, made);
+    return made;
+  };
+  const auto kept = hold();
+  ASSERT_TRUE(kept->Await({}).ok());
+  // What is submitted meanwhile waits.
+  std::promise<void> committed;
+  {
+    const Locked locked(order);
+    committer.Submit(locked, Change(), [&](Locked&, const absl::Status& status, const Change&) {
+      EXPECT_TRUE(status.ok()) << status;
+      committed.set_value();
+    });
+  }
+  EXPECT_TRUE(store.batches().empty());
+  EXPECT_EQ(store.releases, 0);
+  EXPECT_TRUE(kept->End());
+  committed.get_future().get();
+  EXPECT_EQ(store.releases, 1);
+
+  store.keeps_hold = false;
+  const auto lost = hold();
+  ASSERT_TRUE(lost->Await({}).ok());
+  lost->Extend();
+  EXPECT_FALSE(lost->End());
+  EXPECT_EQ(store.releases, 2);
+  store.keeps_hold = true;
+
+  // One that takes too long is over by itself.
+  const auto forgotten = hold();
+  ASSERT_TRUE(forgotten->Await({}).ok());
+  while (store.releases < 3) std::this_thread::yield();
+  EXPECT_FALSE(forgotten->End());
+  EXPECT_EQ(committer.Statistics().holds, 3);
+
+  store.can_hold = absl::UnavailableError("no database");
+  EXPECT_TRUE(absl::IsUnavailable(hold()->Await({})));
+  EXPECT_EQ(store.releases, 3);
 }
 
 TEST(CommitterDeathTest, ASubmissionWithoutTheMutexOfTheOrderEndsTheProcess) {

@@ -72,46 +72,85 @@ class Server {
   std::unique_ptr<Shards> shards_;
 };
 
-// The writer counts, first in the one hull and then in the other, so at every instant both say the
-// same or the first is one ahead. Between any two looks it gets on by several steps, if it can:
-// only where a shard is held does it not.
-TEST(HeldShards, APairThatNeverStandsStillIsAnsweredAsItWasAtAnInstant) {
-  if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
-  const std::vector<std::string> databases = {PostgresCluster::Shared().MakeDatabase(),
-                                              PostgresCluster::Shared().MakeDatabase()};
-  Server writer(databases);
-  Server reader(databases);
-  const std::string ids[] = {writer.IdIn(0), writer.IdIn(1)};
-  std::atomic<uint64_t> steps = 0;
-  std::atomic<bool> is_over = false;
-  const auto write = [&](uint64_t number) {
-    for (const std::string& id : ids) {
-      writer.Replace(id, number);
-      ++steps;
+// A writer counts, first in the one hull and then in the other, so at every instant both say the
+// same or the first is one ahead. Between any two looks of a reader it gets on by several steps, if
+// it can: only where a shard is held does it not.
+class HeldShards : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+    databases_ = {PostgresCluster::Shared().MakeDatabase(),
+                  PostgresCluster::Shared().MakeDatabase()};
+    writer_ = std::make_unique<Server>(databases_);
+    reader_ = std::make_unique<Server>(databases_);
+    ids_ = {writer_->IdIn(0), writer_->IdIn(1)};
+    Write(1);
+    writing_ = std::async(std::launch::async, [this] {
+      for (uint64_t number = 2; !is_over_; ++number) Write(number);
+    });
+  }
+  void TearDown() override {
+    is_over_ = true;
+    if (writing_.valid()) writing_.wait();
+  }
+
+  void Write(uint64_t number) {
+    for (const std::string& id : ids_) {
+      writer_->Replace(id, number);
+      ++steps_;
     }
-  };
-  write(1);
-  std::future<void> writing = std::async(std::launch::async, [&] {
-    for (uint64_t number = 2; !is_over; ++number) write(number);
-  });
-  reader.shards().OnPart([&] {
-    const uint64_t enough = steps + 3;
+  }
+  void LetTheWriterGoOn() const {
+    const uint64_t enough = steps_ + 3;
     const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(60);
-    while (steps < enough && std::chrono::steady_clock::now() < end) std::this_thread::yield();
-  });
-  for (int i = 0; i < 4; ++i) {
+    while (steps_ < enough && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+  }
+  void ExpectAPairOfOneInstant(size_t first) {
     KnownInShards known;
-    const size_t first = i % 2;
-    const std::vector<std::string> asked = {ids[first], ids[1 - first]};
-    const auto resolved = reader.shards().Refresh(asked, known, {}, {});
+    const std::vector<std::string> asked = {ids_[first], ids_[1 - first]};
+    const auto resolved = reader_->shards().Refresh(asked, known, {}, {});
     ASSERT_TRUE(resolved.ok()) << resolved.status();
     const uint64_t a = resolved->hulls[first]->record.counts.received;
     const uint64_t b = resolved->hulls[1 - first]->record.counts.received;
     EXPECT_TRUE(a == b || a == b + 1) << a << " " << b;
   }
-  is_over = true;
-  writing.wait();
-  EXPECT_GE(reader.shards().Commits().holds, 2);
+  uint64_t holds() const { return reader_->shards().Commits().holds; }
+
+  std::vector<std::string> databases_;
+  std::unique_ptr<Server> writer_;
+  std::unique_ptr<Server> reader_;
+  std::vector<std::string> ids_;
+  std::atomic<uint64_t> steps_ = 0;
+  std::atomic<bool> is_over_ = false;
+  std::future<void> writing_;
+};
+
+TEST_F(HeldShards, APairThatNeverStandsStillIsAnsweredAsItWasAtAnInstant) {
+  reader_->shards().OnPart([this] { LetTheWriterGoOn(); });
+  for (const size_t first : {0, 1, 0, 1}) ExpectAPairOfOneInstant(first);
+  EXPECT_GE(holds(), 2);
+}
+
+// The database ends the session that holds the turn: others commit, and the reader holds again.
+TEST_F(HeldShards, WhereTheTurnIsLostTheReaderLooksOn) {
+  uint64_t lost = 0;
+  reader_->shards().OnPart([this, &lost] {
+    if (holds() > lost && lost < 2) {
+      lost = holds();
+      for (const std::string& database : databases_) {
+        PostgresCluster::Shared().Ask(
+            database,
+            "SELECT pg_terminate_backend(a.pid) FROM pg_locks l JOIN pg_stat_activity a USING "
+            "(pid) "
+            "WHERE l.relation = 'hulld.store'::regclass AND l.mode = 'RowShareLock' AND l.granted "
+            "AND a.state = 'idle in transaction' AND a.datname = current_database()");
+      }
+    }
+    LetTheWriterGoOn();
+  });
+  for (const size_t first : {0, 1}) ExpectAPairOfOneInstant(first);
+  EXPECT_GT(holds(), lost);
+  EXPECT_GE(lost, 1);
 }
 
 }  // namespace

@@ -66,6 +66,18 @@ TEST_F(PostgresRecords, AServerThatIsActiveAloneHasNobodyToFollow) {
   EXPECT_TRUE((*store)->Follow().ok()) << (*store)->Follow();
 }
 
+TEST_F(PostgresRecords, APrefixThatNoIdHasListsNothing) {
+  Start();
+  FillSome();
+  for (const std::string& prefix : {std::string("a\0", 2), std::string("\xff\xfe"),
+                                    std::string("\xc3\xa9"), std::string("a b")}) {
+    const auto page = hulls_->registry().List(prefix, "", 10, {});
+    ASSERT_TRUE(page.ok()) << page.status();
+    EXPECT_TRUE(page->hulls.empty());
+  }
+  EXPECT_EQ(hulls_->store().failures().read, 0);
+}
+
 TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
   for (const bool shared : {false, true}) {
     SCOPED_TRACE(shared);
@@ -102,6 +114,12 @@ TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
     Ask("ALTER TABLE IF EXISTS hulld.changes DROP COLUMN began");
     Ask("UPDATE hulld.store SET format = 1");
     const std::string epoch = Ask("SELECT epoch FROM hulld.store").front();
+    // A server that is refused leaves it to those that are active.
+    options_.slots = "0-511";
+    EXPECT_TRUE(absl::IsFailedPrecondition(Open().status()));
+    options_.slots.clear();
+    EXPECT_EQ(Ask("SELECT format FROM hulld.store").front(), "1");
+    EXPECT_EQ(Ask("SELECT epoch FROM hulld.store").front(), epoch);
     Start();
     EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
     EXPECT_EQ(hulls_->registry().Sizes().vertex_count, 16);
