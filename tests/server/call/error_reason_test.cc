@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <map>
 #include <optional>
 #include <string>
@@ -95,6 +96,8 @@ TEST_F(ErrorReasons, LimitsNameTheirFlagAndTheirNumber) {
   config.limits.max_calls = 1;
   Restart(config);
   Create("first");
+  // A call gives its place back after its reply has gone out.
+  ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
   Expect(MakeClient().CreateHull("second").status(), absl::StatusCode::kResourceExhausted,
          v1::ERROR_REASON_LIMIT_EXCEEDED, {{"flag", "max-hulls"}, {"limit", "1"}});
   ASSERT_TRUE(server_->WaitIdle(std::chrono::minutes(5)));
