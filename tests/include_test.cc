@@ -11,6 +11,8 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/source_tree.h"
+
 // Dependencies point one way. Reads the source tree.
 namespace hulld {
 namespace {
@@ -34,7 +36,7 @@ std::optional<std::string> HeaderOf(std::string line) {
 
 std::vector<Include> IncludesUnder(const std::string& directory) {
   std::vector<Include> result;
-  const fs::path root = HULLD_SOURCE_DIR;
+  const fs::path root = SourceTree();
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / directory)) {
     const std::string extension = entry.path().extension().string();
     if (extension != ".h" && extension != ".cc") continue;
@@ -152,7 +154,7 @@ TEST(Includes, RoomsUseOnlyWhatIsBelowThem) {
 
 TEST(Includes, NoRoomIsCrowded) {
   constexpr int kMostFiles = 24;
-  const fs::path root = HULLD_SOURCE_DIR;
+  const fs::path root = SourceTree();
   for (const std::string top : {"core", "server", "client", "tests", "proto", "docker"}) {
     std::map<std::string, int> files;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / top)) {
@@ -176,7 +178,7 @@ struct TestProgram {
 
 std::vector<TestProgram> TestPrograms() {
   std::vector<TestProgram> programs;
-  const fs::path tests = fs::path(HULLD_SOURCE_DIR) / "tests";
+  const fs::path tests = SourceTree() / "tests";
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(tests)) {
     if (entry.path().filename() != "CMakeLists.txt") continue;
     std::ifstream file(entry.path());

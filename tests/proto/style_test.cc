@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "tests/proto/contract_files.h"
+#include "tests/source_tree.h"
 
 namespace hulld {
 namespace {
@@ -192,7 +193,7 @@ TEST_F(ContractStyle, EveryErrorReasonSaysItsCode) {
 }
 
 TEST_F(ContractStyle, LinesHoldAHundredCharactersAtMost) {
-  const std::filesystem::path root = std::string(HULLD_SOURCE_DIR) + "/proto";
+  const std::filesystem::path root = SourceTree() / "proto";
   int lines = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {
     if (entry.path().extension() != ".proto") continue;

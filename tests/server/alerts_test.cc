@@ -22,13 +22,15 @@
 #include "tests/server/harness/test_certificates.h"
 #include "tests/server/harness/test_server.h"
 #include "tests/server/harness/test_tokens.h"
+#include "tests/source_tree.h"
 
 namespace hulld::server {
 namespace {
 
 using Fault = FaultyFileSystem::Fault;
 
-constexpr char kRules[] = HULLD_SOURCE_DIR "/docker/prometheus/hulld.rules.yml";
+std::string RulesFolder() { return (SourceTree() / "docker/prometheus/").string(); }
+
 constexpr int kStepSeconds = 15;
 constexpr int kStepsPerMinute = 60 / kStepSeconds;
 
@@ -87,7 +89,8 @@ class Alerts : public ServerTest {
   void ExpectFiring(const std::vector<std::string>& alerts) {
     const std::string path = directory_ + "/test.yml";
     std::ofstream file(path);
-    file << "rule_files: [" << kRules << "]\nevaluation_interval: " << kStepSeconds
+    file << "rule_files: [" << RulesFolder()
+         << "hulld.rules.yml]\nevaluation_interval: " << kStepSeconds
          << "s\ntests:\n  - interval: " << kStepSeconds << "s\n    input_series:\n"
          << "      - {series: 'up{job=\"hulld\", instance=\"a\"}', values: '1x" << steps_ << "'}\n";
     for (const auto& [name, values] : series_) {
@@ -118,10 +121,11 @@ class Alerts : public ServerTest {
 };
 
 TEST_F(Alerts, TheRulesAndTheirOwnTestsAreSound) {
-  const auto [sound, findings] = RunCommand(absl::StrCat("promtool check rules ", kRules));
+  const auto [sound, findings] =
+      RunCommand(absl::StrCat("promtool check rules ", RulesFolder(), "hulld.rules.yml"));
   EXPECT_TRUE(sound) << findings;
   const auto [passed, failures] =
-      RunCommand("promtool test rules " HULLD_SOURCE_DIR "/docker/prometheus/hulld.*_test.yml");
+      RunCommand(absl::StrCat("promtool test rules ", RulesFolder(), "hulld.*_test.yml"));
   EXPECT_TRUE(passed) << failures;
 }
 

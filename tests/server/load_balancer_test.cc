@@ -18,20 +18,19 @@
 #include "client/appender.h"
 #include "client/client.h"
 #include "tests/server/harness/hulld_process.h"
+#include "tests/source_tree.h"
 
 namespace hulld::server {
 namespace {
 
 constexpr char kHaproxy[] = "/usr/sbin/haproxy";
-constexpr char kSettings[] = HULLD_SOURCE_DIR "/docker/haproxy/haproxy.cfg";
-
 // Two servers and a third that nobody started.
 class LoadBalancer : public ::testing::Test {
  protected:
   void SetUp() override {
     if (access(kHaproxy, X_OK) != 0) GTEST_SKIP() << kHaproxy << " is not installed";
     std::ostringstream text;
-    text << std::ifstream(kSettings).rdbuf();
+    text << std::ifstream(SourceTree() / "docker/haproxy/haproxy.cfg").rdbuf();
     for (int i = 0; i < 2; ++i) {
       servers_[i] = Start();
       addresses_[i] = AddressIn(servers_[i]->ReadLineWith("listening on "));

@@ -1,10 +1,11 @@
 #include "tests/bench/hulls/clouds.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <random>
 #include <sstream>
+
+#include "tests/source_tree.h"
 
 namespace hulld::bench {
 namespace {
@@ -65,9 +66,7 @@ std::vector<Vector> RotatedLattice(int n) {
 }
 
 std::vector<Vector> ObjVertices(const std::string& file) {
-  const char* folder = std::getenv("HULLD_DATA");
-  std::ifstream in((folder != nullptr ? folder : HULLD_SOURCE_DIR "/../shared/data") +
-                   std::string("/") + file);
+  std::ifstream in(RealData() / file);
   std::vector<Vector> points;
   for (std::string line; std::getline(in, line);) {
     std::istringstream words(line);

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -11,6 +10,7 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/collision.h"
 #include "tests/bench/bench_random.h"
+#include "tests/source_tree.h"
 
 namespace hulld::bench {
 namespace {
@@ -67,13 +67,9 @@ std::array<double, 4> AxisPermutation(Random& random) {
 
 void AddHulls(const std::string& name, Random& random, QuerySet& set) {
   if (name == "ur5") {
-    const char* data = std::getenv("HULLD_DATA");
-    const std::filesystem::path folder =
-        data != nullptr ? std::filesystem::path(data)
-                        : std::filesystem::path(HULLD_SOURCE_DIR) / "../shared/data";
     for (const char* link :
          {"base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3"}) {
-      const std::vector<Vector> points = ReadStl(folder / "ur5" / (std::string(link) + ".stl"));
+      const std::vector<Vector> points = ReadStl(RealData() / "ur5" / (std::string(link) + ".stl"));
       if (!points.empty()) set.hulls.push_back(BuildHull(points));
     }
     return;

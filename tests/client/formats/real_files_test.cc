@@ -5,12 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <filesystem>
 #include <sstream>
 
 #include "client/formats/mesh_file.h"
 #include "tests/client/formats/point_reading.h"
+#include "tests/source_tree.h"
 
 namespace hulld {
 namespace {
@@ -21,11 +21,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 fs::path Models() { return "/usr/share/assimp/models"; }
-
-fs::path Data() {
-  if (const char* named = std::getenv("HULLD_DATA"); named != nullptr) return named;
-  return fs::path(HULLD_SOURCE_DIR) / "../shared/data";
-}
 
 #define SKIP_WITHOUT(path) \
   if (!fs::exists(path)) GTEST_SKIP() << "skipped: no data at " << (path)
@@ -166,12 +161,12 @@ TEST(RealFiles, EveryModelOfAKnownFormatIsReadOrRefused) {
 }
 
 TEST(RealFiles, Scans) {
-  SKIP_WITHOUT(Data());
-  ExpectObjRead(Data() / "stanford-bunny.obj", 35947);
-  ExpectObjRead(Data() / "rocker-arm.obj", 10044);
-  ExpectObjRead(Data() / "spot.obj", 2930);
+  SKIP_WITHOUT(RealData());
+  ExpectObjRead(RealData() / "stanford-bunny.obj", 35947);
+  ExpectObjRead(RealData() / "rocker-arm.obj", 10044);
+  ExpectObjRead(RealData() / "spot.obj", 2930);
   int links = 0;
-  for (const auto& entry : fs::directory_iterator(Data() / "ur5")) {
+  for (const auto& entry : fs::directory_iterator(RealData() / "ur5")) {
     const PointsRead read = ReadPath(entry.path());
     ASSERT_TRUE(read.status.ok()) << read.status;
     EXPECT_GT(read.counts.points, 100u);

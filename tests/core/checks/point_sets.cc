@@ -7,6 +7,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "tests/source_tree.h"
+
 namespace hulld {
 namespace {
 
@@ -162,10 +164,7 @@ void Shuffle(Random& random, std::vector<Vector>& points) {
 }
 
 std::optional<std::vector<Vector>> MeshVertices(const std::string& name) {
-  const char* data = std::getenv("HULLD_DATA");
-  const std::string directory = data ? data : HULLD_SOURCE_DIR "/../shared/data";
-  const std::string candidates[] = {directory + "/" + name,
-                                    "/usr/share/assimp/models/OBJ/spider.obj"};
+  const std::string candidates[] = {RealData() / name, "/usr/share/assimp/models/OBJ/spider.obj"};
   for (const std::string& path : candidates) {
     std::vector<Vector> vertices = ReadObjVertices(path);
     if (!vertices.empty()) return vertices;
