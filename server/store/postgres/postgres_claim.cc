@@ -24,7 +24,7 @@ absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<Rows> exists = session.Run("SELECT to_regclass('hulld.store') IS NOT NULL");
   if (!exists.ok()) return exists.status();
   if (exists->at(0, 0) != "t") return false;
-  const absl::StatusOr<Rows> format = session.Run("SELECT format FROM hulld.store");
+  const absl::StatusOr<Rows> format = RunPatiently(session, "SELECT format FROM hulld.store");
   if (!format.ok()) return format.status();
   uint64_t number = 0;
   if (format->count() != 1 || !absl::SimpleAtoi(std::string(format->at(0, 0)), &number)) {

@@ -18,6 +18,7 @@ namespace {
 
 constexpr int kMostReaders = 8;
 constexpr int kLeastServerVersion = 140'000;
+constexpr char kLockNotAvailable[] = "55P03";
 // Between attempts of who waits for its turn.
 constexpr std::chrono::milliseconds kFirstTurnPause{10};
 constexpr std::chrono::milliseconds kLongestTurnPause{250};
@@ -118,7 +119,6 @@ constexpr char kSettings[] = R"(
   SET default_transaction_isolation = 'read committed';
   SET enable_seqscan = off;
   SET jit = off;
-  SET lock_timeout = '15s';
   SET idle_in_transaction_session_timeout = '10s';
   SET client_connection_check_interval = '2s';
   SET tcp_keepalives_idle = 5;
@@ -262,7 +262,11 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenSession(
     const std::string& settings) const {
   absl::StatusOr<std::unique_ptr<Session>> session = Session::Open(conninfo_, options_.answer_time);
   if (!session.ok()) return session;
-  const absl::Status set = (*session)->Run(absl::StrCat(kSettings, settings)).status();
+  const absl::Status set =
+      (*session)
+          ->Run(absl::StrCat(kSettings, "SET lock_timeout = ", options_.lock_time.count(), ";",
+                             settings))
+          .status();
   if (!set.ok()) return set;
   return session;
 }
@@ -289,6 +293,19 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenKeeper() const {
 absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
   return OpenSession(absl::StrCat("SET statement_timeout = ", options_.answer_time.count(),
                                   "; SET synchronous_commit = off"));
+}
+
+// Of the tables of a former format, a server that starts makes those of its own, and shuts all
+// others out meanwhile: for minutes where hulls are counted by hundreds of millions.
+absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::string& sql) const {
+  for (bool is_first = true;; is_first = false) {
+    absl::StatusOr<Rows> rows = session.Run(sql);
+    if (SqlState(rows.status()) != kLockNotAvailable) return rows;
+    if (is_first) spdlog::info("another hulld changes the tables: this one waits until that ends");
+    if (options_.should_stop && options_.should_stop()) {
+      return absl::CancelledError("told to end before another hulld had changed the tables");
+    }
+  }
 }
 
 // What the server is and how it commits.
@@ -339,6 +356,10 @@ absl::Status PostgresStore::AddTotals(Session& session) const {
   StoreTotals totals;
   std::string last;
   for (uint64_t counted = kCountedAtOnce; status.ok() && counted == kCountedAtOnce;) {
+    if (options_.should_stop && options_.should_stop()) {
+      status = absl::CancelledError("told to end before all was counted; nothing was changed");
+      break;
+    }
     const absl::StatusOr<Rows> part = session.Ask(
         {.name = "hulld_count_after", .parameters = {last, EncodeBigint(kCountedAtOnce)}});
     status = part.status();

@@ -163,7 +163,7 @@ std::string PostgresStore::PrepareShared() { return absl::StrCat(kPrepareFollow,
 // Servers that start at the same time make the tables one after the other.
 absl::Status PostgresStore::MakeSharedSchema(Session& session) {
   const absl::Status locked =
-      session.Run(absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status();
+      RunPatiently(session, absl::StrCat("SELECT pg_advisory_lock(", kSchemaLock, ")")).status();
   if (!locked.ok()) return locked;
   absl::Status made = MakeSchema(session);
   if (made.ok()) made = MakeSharedTables(session);

@@ -40,9 +40,12 @@ struct PostgresOptions {
   // Which slots of IDs this database holds, as a text that is the same for the same slots; empty:
   // all. The database remembers it once it is opened with some.
   std::string slots;
-  // Asked while this waits for the active server; may be empty.
+  // Asked while this waits for the active server, or for one that changes the tables, or changes
+  // them; may be empty.
   std::function<bool()> should_stop;
-  // How long nothing may come from the database while an answer is due. Longer than kLockTime.
+  // How long a statement waits for a lock.
+  std::chrono::milliseconds lock_time{15'000};
+  // How long nothing may come from the database while an answer is due. Longer than lock_time.
   std::chrono::milliseconds answer_time{30'000};
   // How long a commit tries to find out what became of it, or to repeat what did not happen, when
   // it has lost its session; and how long Open tries to get the sessions after the first.
@@ -160,6 +163,7 @@ class PostgresStore : public Store {
 
   // Opening, in this order.
   absl::Status CheckServer(Session& session);
+  absl::StatusOr<Rows> RunPatiently(Session& session, const std::string& sql) const;
   absl::Status WaitForTurn();
   absl::Status MakeSchema(Session& session);
   absl::Status MakeTables(Session& session);

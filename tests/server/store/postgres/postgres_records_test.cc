@@ -132,6 +132,40 @@ TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
   }
 }
 
+TEST_F(PostgresRecords, AServerThatIsToldToEndLeavesTablesAsTheyWere) {
+  Start();
+  FillSome();
+  hulls_ = nullptr;
+  Ask("ALTER TABLE hulld.store DROP COLUMN hulls, DROP COLUMN vertices");
+  Ask("UPDATE hulld.store SET format = 1");
+  options_.should_stop = [] { return true; };
+  EXPECT_TRUE(absl::IsCancelled(Open().status()));
+  EXPECT_EQ(Ask("SELECT format FROM hulld.store").front(), "1");
+  options_.should_stop = {};
+  Start();
+  EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
+}
+
+// As while another server counts what tables of a former format hold.
+TEST_F(PostgresRecords, AServerWaitsWhileAnotherChangesTheTables) {
+  Start();
+  FillSome();
+  hulls_ = nullptr;
+  options_.lock_time = std::chrono::milliseconds(10);
+  for (const bool shared : {false, true}) {
+    SCOPED_TRACE(shared);
+    options_.shared = shared;
+    auto other = Session::Open(*Conninfo::Parse(options_.conninfo), std::chrono::minutes(1));
+    ASSERT_TRUE(other.ok()) << other.status();
+    ASSERT_TRUE((*other)->Run("BEGIN; LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE").ok());
+    options_.should_stop = [] { return true; };
+    EXPECT_TRUE(absl::IsCancelled(Open().status()));
+    options_.should_stop = [&] { return !(*other)->Run("COMMIT").ok(); };
+    Start();
+    EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
+  }
+}
+
 // HULLD_RECORDS in the environment: how many, by hand; it prints what a start takes, and what
 // reading all of them would.
 TEST_F(PostgresRecords, AServerStartsOverManyHulls) {
