@@ -450,7 +450,8 @@ TEST_F(WatchCollisions, EachEventIsExactAtItsRevisions) {
     for (const std::string& id : ids) last = std::max(last, Get(id).hull().revision());
     while (revision < last && !HasFatalFailure()) read();
 
-    ASSERT_GT(events.size(), 20);
+    // How many depends on how fast they are read: what changed twice in between is told once.
+    ASSERT_GT(events.size(), 5);
     for (const auto& [update, event] : events) {
       const uint32_t a = event.placement_a();
       const uint32_t b = event.placement_b();
