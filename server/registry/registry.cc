@@ -81,16 +81,8 @@ absl::Status Registry::Load() {
     kept_hulls_ = store_.totals().hulls;
     vertex_count_ = store_.totals().vertices;
   } else {
-    status = store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
-      if (stored.ok()) {
-        hulls_.AddResting(*stored);
-        vertex_count_ += stored->record.vertex_count;
-        return;
-      }
-      spdlog::error("{}", std::string(stored.status().message()));
-      StoredHull nothing;
-      nothing.record.hull_id = id;
-      MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
+    status = store_.ForEachHull([this](const std::string& id, absl::StatusOr<StoredHull> stored) {
+      AddStored(id, stored);
     });
   }
   if (cache_.damaged > 0) {
@@ -448,6 +440,19 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
 
 void Registry::NoteChange(const RegisteredHull& hull) {
   recent_changes_.Note(hull.committed.record.hull_id);
+}
+
+// Adds what the store holds under an ID of which no hull is here: at rest, or as damaged.
+void Registry::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
+  if (stored.ok()) {
+    hulls_.AddResting(*stored);
+    if (!is_cache_) vertex_count_ += stored->record.vertex_count;
+    return;
+  }
+  spdlog::error("{}", std::string(stored.status().message()));
+  StoredHull nothing;
+  nothing.record.hull_id = id;
+  MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
 }
 
 // Several threads may find the same damage.

@@ -2,7 +2,6 @@
 // on the committer's thread, so that nothing of it is being committed here meanwhile.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -158,7 +157,12 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
     Forget(locked, former, Gone(id, other.hull.has_value() ? "replaced" : "deleted"));
     AdvanceLater(former);
   }
-  const HullPointer hull = other.hull.has_value() ? TakeOverHull(id, *other.hull) : nullptr;
+  HullPointer hull;
+  if (other.hull.has_value()) {
+    AddStored(id, *other.hull);
+    hull = hulls_.Find(id);
+    NoteChange(*hull);
+  }
   if (!is_news) return;
   const bool is_deletion = !other.body.has_value() && other.ended_at == other.revision;
   if (body != nullptr && body->damage().ok()) {
@@ -213,24 +217,6 @@ bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const Ot
   NoteChange(*hull);
   if (is_news) feed_.NoteChanged(locked, hull);
   return true;
-}
-
-// Adds a hull that was not known.
-Registry::HullPointer Registry::TakeOverHull(const std::string& id,
-                                             const absl::StatusOr<StoredHull>& stored) {
-  if (stored.ok()) {
-    hulls_.AddResting(*stored);
-    if (!is_cache_) vertex_count_ += stored->record.vertex_count;
-    HullPointer hull = hulls_.Find(id);
-    NoteChange(*hull);
-    return hull;
-  }
-  spdlog::error("{}", std::string(stored.status().message()));
-  StoredHull nothing;
-  nothing.record.hull_id = id;
-  HullPointer hull = hulls_.Insert(nothing, HullState::Present());
-  MarkDamaged(*hull, stored.status());
-  return hull;
 }
 
 void Registry::TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other) {
