@@ -1,7 +1,6 @@
 // Other servers over the same store: what they committed is taken over as of one of their batches,
 // on the committer's thread, so that nothing of it is being committed here meanwhile.
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <chrono>
@@ -131,11 +130,11 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
 // since: the revision up to which everything was taken over before.
 void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other,
                         uint64_t since) {
-  // What was not known to be here is told from what others say of it.
   const std::shared_ptr<const Body> former_body = FindBody(id);
   // A body may have been read at the start as of a later moment: it says nothing of what was
   // before.
   const bool was_body = former_body != nullptr && former_body->record().create_revision <= since;
+  // What was not known to be here is told from what others say of it.
   const bool was_known = former_body == nullptr ? IsKnown(id) : was_body;
   const bool has_ended = !was_known && other.former_began != 0 && other.former_began <= since;
   // Not what was read when the store was loaded.
