@@ -3,20 +3,14 @@
 #include <absl/status/status.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
-namespace {
-
-// How soon who waits notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
-
-}  // namespace
 
 absl::Status Registry::AwaitOthers(const std::function<bool()>& should_stop) {
   if (!store_.is_shared()) return absl::OkStatus();
@@ -40,8 +34,8 @@ absl::Status Registry::AwaitOthers(Locked& locked, const std::function<bool()>& 
   });
   const auto is_over = [&] { return wait->status.has_value(); };
   while (!is_over()) {
-    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kCancellationPoll, is_over); });
-    if (should_stop && should_stop()) return absl::CancelledError("the call was cancelled");
+    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });
+    if (Stopped(should_stop)) return Cancelled();
   }
   return *wait->status;
 }

@@ -23,18 +23,12 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
 namespace {
-
-// How soon who waits notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
-
-bool Stopped(const std::function<bool()>& should_stop) { return should_stop && should_stop(); }
-
-absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
 
 // holds: as Shards::Refresh.
 absl::Status CheckThat(const std::function<bool()>& holds) {
@@ -83,7 +77,7 @@ absl::StatusOr<std::chrono::nanoseconds> Shards::AwaitFreshIn(
     std::unique_lock lock(answers->mutex);
     const auto is_over = [&] { return answers->due == 0; };
     while (!is_over()) {
-      answers->changed.wait_for(lock, kCancellationPoll, is_over);
+      answers->changed.wait_for(lock, kStopPoll, is_over);
       if (is_over()) break;
       lock.unlock();
       if (Stopped(should_stop)) return Cancelled();
