@@ -421,4 +421,25 @@ void Registry::SchedulePreparing(const HullPointer& hull) {
   });
 }
 
+absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
+                                        size_t page_size,
+                                        const std::function<bool()>& should_stop) {
+  if (is_cache_) return ListFound(prefix, after, page_size, should_stop);
+  HullPage page;
+  const std::lock_guard lock(mutex_);
+  page.store_revision = revision_;
+  const HullTable::Entries& all = hulls_.entries();
+  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
+  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
+    if (!next->second.visible()) continue;
+    if (page.hulls.size() == page_size) {
+      page.more = true;
+      break;
+    }
+    HullChange hull = next->second.Describe(next->first);
+    page.hulls.push_back({std::move(hull.record), hull.damaged});
+  }
+  return page;
+}
+
 }  // namespace hulld::server
