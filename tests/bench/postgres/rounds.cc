@@ -44,7 +44,7 @@ void RunOnce(Subject& subject) {
   subject.p99.push_back(Percentile(taken, 0.99));
 }
 
-// Of neighbours in one round.
+// Median of the ratios within each round.
 double MedianRatio(const std::vector<double>& values, const std::vector<double>& peers) {
   std::vector<double> ratios;
   for (size_t i = 0; i < std::min(values.size(), peers.size()); ++i) {

@@ -120,7 +120,7 @@ void MeasureIngest(const Arguments& arguments) {
     const auto run = [&chunks, stub, round = 0]() mutable {
       const Clock::time_point start = Clock::now();
       SendAll(*stub, "ingest/" + std::to_string(++round), chunks);
-      // Of a point, in the place of a request.
+      // For each point, in the place of each request.
       return std::vector<double>(1, 1e6 * Since(start) / kPoints);
     };
     subjects.push_back({.name = kind, .server = servers.back().get(), .run = run});
