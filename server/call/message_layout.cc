@@ -264,41 +264,45 @@ void MessageLayout::Count(Input& input, uint64_t most, int depth, uint64_t& byte
       case WireFormat::WIRETYPE_END_GROUP:
         if (--groups < 0) return;
         break;
-      case WireFormat::WIRETYPE_LENGTH_DELIMITED: {
-        // Parsing allocates before it finds that a length is malformed.
-        const bool is_message = field.kind == Field::Kind::kMessage;
-        bytes += is_message ? field.message->own_bytes_ : kAllocation;
-        if (field.is_repeated && !is_number) bytes += kListedPointer;
-        uint64_t read = 0;
-        if (!input.ReadVarint(&read)) return;
-        const auto length = static_cast<uint32_t>(read);
-        if (length > INT32_MAX) return;
-        if (is_message) {
-          if (depth >= kDeepest) return;
-          if (!input.CountMessage(*field.message, length, most, depth + 1, bytes)) return;
-          break;
-        }
-        if (is_number && field.is_repeated && field.is_varint) {
-          uint64_t count = 0;
-          const bool whole = input.CountVarints(length, count);
-          bytes += kSlack * count * field.element_bytes;
-          if (!whole) return;
-          break;
-        }
-        if (is_number && field.is_repeated) {
-          bytes += kSlack * length;
-        } else if (field.kind == Field::Kind::kText) {
-          bytes += kText + length;
-        } else {
-          bytes += kUnknown + length;
-        }
-        if (!input.Skip(length)) return;
+      case WireFormat::WIRETYPE_LENGTH_DELIMITED:
+        if (!CountDelimited(input, field, most, depth, bytes)) return;
         break;
-      }
       default:
         return;
     }
   }
+}
+
+// Counts a field that begins with its length. False: it is malformed, or too deep.
+template <typename Input>
+bool MessageLayout::CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
+                                   uint64_t& bytes) {
+  const bool is_number = field.kind == Field::Kind::kNumber;
+  const bool is_message = field.kind == Field::Kind::kMessage;
+  // Parsing allocates before it finds that a length is malformed.
+  bytes += is_message ? field.message->own_bytes_ : kAllocation;
+  if (field.is_repeated && !is_number) bytes += kListedPointer;
+  uint64_t read = 0;
+  if (!input.ReadVarint(&read)) return false;
+  const auto length = static_cast<uint32_t>(read);
+  if (length > INT32_MAX) return false;
+  if (is_message) {
+    return depth < kDeepest && input.CountMessage(*field.message, length, most, depth + 1, bytes);
+  }
+  if (is_number && field.is_repeated && field.is_varint) {
+    uint64_t count = 0;
+    const bool is_whole = input.CountVarints(length, count);
+    bytes += kSlack * count * field.element_bytes;
+    return is_whole;
+  }
+  if (is_number && field.is_repeated) {
+    bytes += kSlack * length;
+  } else if (field.kind == Field::Kind::kText) {
+    bytes += kText + length;
+  } else {
+    bytes += kUnknown + length;
+  }
+  return input.Skip(length);
 }
 
 }  // namespace hulld::server

@@ -42,6 +42,9 @@ class MessageLayout {
 
   template <typename Input>
   void Count(Input& input, uint64_t most, int depth, uint64_t& bytes) const;
+  template <typename Input>
+  static bool CountDelimited(Input& input, const Field& field, uint64_t most, int depth,
+                             uint64_t& bytes);
   const Field& FieldAt(int number) const;
 
   // By number; those in between are unknown.

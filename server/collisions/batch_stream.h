@@ -67,6 +67,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   bool IsForTeam(const PlacedPair& pair) const;
   // Each answers the next pair of the piece; by the textbook, a part of that at least. CANCELLED.
   absl::Status Answer(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
+  absl::Status AnswerRelation(PairsPiece& piece, BatchColumns* columns, RungCounts* counts);
   absl::Status AnswerByTextbook(PairsPiece& piece, Clock::time_point end, BatchColumns* columns,
                                 RungCounts* counts);
   absl::Status Add(PlacedAnswer answer, PairsPiece& piece, BatchColumns* columns,
@@ -83,7 +84,7 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
   // The same for a pair that is worth the team.
   QueryOptions team_options_;
   PlacementTable table_;
-  // Every pair is one of hulls, and the relation is all that is wanted.
+  // Every pair is one of hulls, and the relation is all that is wanted: AnswerRelation.
   bool is_plain_ = false;
 
   // Guarded by the mutex.

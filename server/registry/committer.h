@@ -94,7 +94,8 @@ class Committer {
   // Holds the store still from when Others was told of all that other servers had committed; what
   // was submitted before is committed or refused by then, and what is submitted later waits until
   // the hold ends. Requires that `locked` holds `order`. Cost: two round trips to a store that is
-  // shared, for all who wait; what needs this thread waits meanwhile (CommitHold::kLongest).
+  // shared, for all who wait; what needs this thread waits meanwhile, at most
+  // CommitHold::kLongestOfSeveral.
   void Hold(const Locked& locked, std::shared_ptr<CommitHold> hold);
   // Others is to be told soon, if there is anything to tell. Takes no lock but the queue's.
   void FollowSoon();

@@ -81,16 +81,8 @@ absl::Status Registry::Load() {
     kept_hulls_ = store_.totals().hulls;
     vertex_count_ = store_.totals().vertices;
   } else {
-    status = store_.ForEachHull([&](const std::string& id, absl::StatusOr<StoredHull> stored) {
-      if (stored.ok()) {
-        hulls_.AddResting(*stored);
-        vertex_count_ += stored->record.vertex_count;
-        return;
-      }
-      spdlog::error("{}", std::string(stored.status().message()));
-      StoredHull nothing;
-      nothing.record.hull_id = id;
-      MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
+    status = store_.ForEachHull([this](const std::string& id, absl::StatusOr<StoredHull> stored) {
+      AddStored(id, stored);
     });
   }
   if (cache_.damaged > 0) {
@@ -450,33 +442,25 @@ void Registry::NoteChange(const RegisteredHull& hull) {
   recent_changes_.Note(hull.committed.record.hull_id);
 }
 
+// Adds what the store holds under an ID of which no hull is here: at rest, or as damaged.
+void Registry::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
+  if (stored.ok()) {
+    hulls_.AddResting(*stored);
+    if (!is_cache_) vertex_count_ += stored->record.vertex_count;
+    return;
+  }
+  spdlog::error("{}", std::string(stored.status().message()));
+  StoredHull nothing;
+  nothing.record.hull_id = id;
+  MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
+}
+
 // Several threads may find the same damage.
 void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
   if (hull.state.damaged() || hull.state.life() != HullState::Life::kPresent) return;
   hull.state.Damage(damage);
   NoteChange(hull);
   ++cache_.damaged;
-}
-
-absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
-                                        size_t page_size,
-                                        const std::function<bool()>& should_stop) {
-  if (is_cache_) return ListFound(prefix, after, page_size, should_stop);
-  HullPage page;
-  const std::lock_guard lock(mutex_);
-  page.store_revision = revision_;
-  const HullTable::Entries& all = hulls_.entries();
-  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
-  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
-    if (!next->second.visible()) continue;
-    if (page.hulls.size() == page_size) {
-      page.more = true;
-      break;
-    }
-    HullChange hull = next->second.Describe(next->first);
-    page.hulls.push_back({std::move(hull.record), hull.damaged});
-  }
-  return page;
 }
 
 HoldStatistics Registry::Holds() const {

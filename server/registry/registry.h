@@ -333,7 +333,6 @@ class Registry {
   void TakeOver(Locked& locked, const std::string& id, const OtherChange& other, uint64_t since);
   bool TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
                        bool is_news);
-  HullPointer TakeOverHull(const std::string& id, const absl::StatusOr<StoredHull>& stored);
   void TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other);
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
@@ -377,6 +376,7 @@ class Registry {
   static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);
   void Prepare(Locked& locked, RegisteredHull& hull);
   void SchedulePreparing(const HullPointer& hull);
+  void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
   void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
   // Readers are given something else of it from now on.
   void NoteChange(const RegisteredHull& hull);

@@ -8,6 +8,7 @@
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/status_map.h"
+#include "server/contract/stopped_call.h"
 #include "server/registry/memory/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
@@ -273,12 +274,12 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
-    if (!pending.should_stop || !pending.should_stop()) {
+    if (!Stopped(pending.should_stop)) {
       // Its turn comes again.
       hull->Requeue(std::move(pending));
       return;
     }
-    built = absl::CancelledError("the call was cancelled");
+    built = Cancelled();
   }
   if (!built.ok()) return AnswerChunk(locked, pending.done, sequence, built.status());
   SubmitChunk(locked, hull, pending, *std::move(built));
@@ -415,9 +416,7 @@ absl::StatusOr<PointCounts> Registry::AddPoints(
     if (!made.ok()) return made.status();
     builder = *std::move(made);
   }
-  if (pending.should_stop && pending.should_stop()) {
-    return absl::CancelledError("the call was cancelled");
-  }
+  if (Stopped(pending.should_stop)) return Cancelled();
   AddLimits limits;
   limits.max_vertices = static_cast<size_t>(limits_.max_vertices_per_hull);
   limits.should_stop = pending.should_stop;

@@ -1,24 +1,16 @@
 // Other servers over the same store: what they committed is taken over as of one of their batches,
 // on the committer's thread, so that nothing of it is being committed here meanwhile.
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
-namespace {
-
-// How soon who waits notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
-
-}  // namespace
 
 absl::Status Registry::AwaitOthers(const std::function<bool()>& should_stop) {
   if (!store_.is_shared()) return absl::OkStatus();
@@ -42,8 +34,8 @@ absl::Status Registry::AwaitOthers(Locked& locked, const std::function<bool()>& 
   });
   const auto is_over = [&] { return wait->status.has_value(); };
   while (!is_over()) {
-    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kCancellationPoll, is_over); });
-    if (should_stop && should_stop()) return absl::CancelledError("the call was cancelled");
+    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });
+    if (Stopped(should_stop)) return Cancelled();
   }
   return *wait->status;
 }
@@ -132,11 +124,11 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
 // since: the revision up to which everything was taken over before.
 void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other,
                         uint64_t since) {
-  // What was not known to be here is told from what others say of it.
   const std::shared_ptr<const Body> former_body = FindBody(id);
   // A body may have been read at the start as of a later moment: it says nothing of what was
   // before.
   const bool was_body = former_body != nullptr && former_body->record().create_revision <= since;
+  // What was not known to be here is told from what others say of it.
   const bool was_known = former_body == nullptr ? IsKnown(id) : was_body;
   const bool has_ended = !was_known && other.former_began != 0 && other.former_began <= since;
   // Not what was read when the store was loaded.
@@ -158,7 +150,12 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
     Forget(locked, former, Gone(id, other.hull.has_value() ? "replaced" : "deleted"));
     AdvanceLater(former);
   }
-  const HullPointer hull = other.hull.has_value() ? TakeOverHull(id, *other.hull) : nullptr;
+  HullPointer hull;
+  if (other.hull.has_value()) {
+    AddStored(id, *other.hull);
+    hull = hulls_.Find(id);
+    NoteChange(*hull);
+  }
   if (!is_news) return;
   const bool is_deletion = !other.body.has_value() && other.ended_at == other.revision;
   if (body != nullptr && body->damage().ok()) {
@@ -213,24 +210,6 @@ bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const Ot
   NoteChange(*hull);
   if (is_news) feed_.NoteChanged(locked, hull);
   return true;
-}
-
-// Adds a hull that was not known.
-Registry::HullPointer Registry::TakeOverHull(const std::string& id,
-                                             const absl::StatusOr<StoredHull>& stored) {
-  if (stored.ok()) {
-    hulls_.AddResting(*stored);
-    if (!is_cache_) vertex_count_ += stored->record.vertex_count;
-    HullPointer hull = hulls_.Find(id);
-    NoteChange(*hull);
-    return hull;
-  }
-  spdlog::error("{}", std::string(stored.status().message()));
-  StoredHull nothing;
-  nothing.record.hull_id = id;
-  HullPointer hull = hulls_.Insert(nothing, HullState::Present());
-  MarkDamaged(*hull, stored.status());
-  return hull;
 }
 
 void Registry::TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other) {

@@ -10,19 +10,13 @@
 #include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
+#include "server/contract/stopped_call.h"
 #include "server/registry/memory/hull_loader.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
 namespace {
-
-// How soon a reader that waits for the store notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
-
-bool Stopped(const std::function<bool()>& should_stop) { return should_stop && should_stop(); }
-
-absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
 
 absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
   return WithReason(
@@ -349,7 +343,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
       const auto may_go_on = [&] {
         return !hull.loading && !(failed && hull.state.life() == HullState::Life::kEnding);
       };
-      locked.WaitOn([&](auto& lock) { hull.changed.wait_for(lock, kCancellationPoll, may_go_on); });
+      locked.WaitOn([&](auto& lock) { hull.changed.wait_for(lock, kStopPoll, may_go_on); });
       if (Stopped(should_stop)) return Cancelled();
       continue;
     }
@@ -425,6 +419,27 @@ void Registry::SchedulePreparing(const HullPointer& hull) {
     Prepare(locked, *hull);
     memory_.Evict(locked);
   });
+}
+
+absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
+                                        size_t page_size,
+                                        const std::function<bool()>& should_stop) {
+  if (is_cache_) return ListFound(prefix, after, page_size, should_stop);
+  HullPage page;
+  const std::lock_guard lock(mutex_);
+  page.store_revision = revision_;
+  const HullTable::Entries& all = hulls_.entries();
+  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
+  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
+    if (!next->second.visible()) continue;
+    if (page.hulls.size() == page_size) {
+      page.more = true;
+      break;
+    }
+    HullChange hull = next->second.Describe(next->first);
+    page.hulls.push_back({std::move(hull.record), hull.damaged});
+  }
+  return page;
 }
 
 }  // namespace hulld::server

@@ -157,10 +157,9 @@ class Shards {
   absl::StatusOr<Look> LookOnce(KnownInShards& known, const std::function<bool()>& should_stop,
                                 const ShardsPlan& plan, const std::function<bool()>& holds);
   absl::StatusOr<Look> LookAt(KnownInShards& known, std::span<const size_t> to_ask,
-                              const std::function<bool()>& should_stop, const ShardsPlan& plan,
-                              const std::function<bool()>& holds);
+                              const std::function<bool()>& should_stop, const ShardsPlan& plan);
   absl::StatusOr<Look> LookWhileHeld(KnownInShards& known, const std::function<bool()>& should_stop,
-                                     const ShardsPlan& plan, const std::function<bool()>& holds);
+                                     const ShardsPlan& plan);
   absl::StatusOr<Look> LookUntilOneInstant(KnownInShards& known, Look before,
                                            const std::function<bool()>& should_stop,
                                            ShardsPlan plan, const std::function<bool()>& holds);

@@ -23,18 +23,18 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
 namespace {
 
-// How soon who waits notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
-
-bool Stopped(const std::function<bool()>& should_stop) { return should_stop && should_stop(); }
-
-absl::Status Cancelled() { return absl::CancelledError("the call was cancelled"); }
+// holds: as Shards::Refresh.
+absl::Status CheckThat(const std::function<bool()>& holds) {
+  if (!holds || holds()) return absl::OkStatus();
+  return absl::AbortedError("bodies changed meanwhile");
+}
 
 // What several registries were asked for.
 struct Answers {
@@ -77,7 +77,7 @@ absl::StatusOr<std::chrono::nanoseconds> Shards::AwaitFreshIn(
     std::unique_lock lock(answers->mutex);
     const auto is_over = [&] { return answers->due == 0; };
     while (!is_over()) {
-      answers->changed.wait_for(lock, kCancellationPoll, is_over);
+      answers->changed.wait_for(lock, kStopPoll, is_over);
       if (is_over()) break;
       lock.unlock();
       if (Stopped(should_stop)) return Cancelled();
@@ -149,14 +149,16 @@ absl::StatusOr<Shards::Look> Shards::LookOnce(KnownInShards& known,
                                               const std::function<bool()>& holds) {
   std::vector<size_t> shards;
   for (const Part& part : known.parts_) shards.push_back(part.shard);
-  return LookAt(known, shards, should_stop, plan, holds);
+  absl::StatusOr<Look> look = LookAt(known, shards, should_stop, plan);
+  if (!look.ok()) return look;
+  if (absl::Status s = CheckThat(holds); !s.ok()) return s;
+  return look;
 }
 
 // to_ask: of the shards of the call those that are to be as fresh as the plan says; the others are.
 absl::StatusOr<Shards::Look> Shards::LookAt(KnownInShards& known, std::span<const size_t> to_ask,
                                             const std::function<bool()>& should_stop,
-                                            const ShardsPlan& plan,
-                                            const std::function<bool()>& holds) {
+                                            const ShardsPlan& plan) {
   const auto staleness = AwaitFreshIn(to_ask, plan.freshness, should_stop);
   if (!staleness.ok()) return staleness.status();
   Look look;
@@ -171,15 +173,13 @@ absl::StatusOr<Shards::Look> Shards::LookAt(KnownInShards& known, std::span<cons
     look.lookups.push_back(part.known.lookups());
     if (on_part_) on_part_();
   }
-  if (holds && !holds()) return absl::AbortedError("bodies changed meanwhile");
   return look;
 }
 
 // ABORTED: changes could not be held back, or not for as long as the look took.
 absl::StatusOr<Shards::Look> Shards::LookWhileHeld(KnownInShards& known,
                                                    const std::function<bool()>& should_stop,
-                                                   const ShardsPlan& plan,
-                                                   const std::function<bool()>& holds) {
+                                                   const ShardsPlan& plan) {
   struct Holds {
     ~Holds() { EndAll(); }
     // Whether all have lasted.
@@ -206,7 +206,7 @@ absl::StatusOr<Shards::Look> Shards::LookWhileHeld(KnownInShards& known,
   ShardsPlan now = plan;
   // The one that is not held is asked while the others are.
   now.freshness.began = SteadyClock::now();
-  absl::StatusOr<Look> look = LookAt(known, std::span(shards).last(1), should_stop, now, holds);
+  absl::StatusOr<Look> look = LookAt(known, std::span(shards).last(1), should_stop, now);
   if (look.ok() && !held.EndAll()) return absl::AbortedError("changes were held back too long");
   return look;
 }
@@ -235,8 +235,11 @@ absl::StatusOr<Shards::Look> Shards::LookUntilOneInstant(KnownInShards& known, L
     // The question is to be asked after the last look.
     plan.freshness.began = SteadyClock::now();
     if (looks % kLooks == 0) {
-      absl::StatusOr<Look> held = LookWhileHeld(known, should_stop, plan, {});
-      if (held.ok() && holds && !holds()) return absl::AbortedError("bodies changed meanwhile");
+      absl::StatusOr<Look> held = LookWhileHeld(known, should_stop, plan);
+      if (held.ok()) {
+        if (absl::Status s = CheckThat(holds); !s.ok()) return s;
+        return held;
+      }
       if (!absl::IsAborted(held.status())) return held;
       plan.freshness.began = SteadyClock::now();
     }
@@ -295,7 +298,7 @@ absl::StatusOr<ShardsResolved> Shards::Refresh(std::span<const std::string> ids,
     absl::StatusOr<Resolved> resolved =
         at(shard).Refresh(ids, known.only_, should_stop, plan.Of(shard));
     if (!resolved.ok()) return resolved.status();
-    if (holds && !holds()) return absl::AbortedError("bodies changed meanwhile");
+    if (absl::Status s = CheckThat(holds); !s.ok()) return s;
     return ShardsResolved{{{{shard, resolved->store_revision}}, resolved->staleness},
                           std::move(resolved->hulls)};
   }

@@ -15,11 +15,32 @@ function read_rows(file,   path, line, fields, names, count, i, key) {
     for (i = 1; i <= count; i++) cell[key, names[i]] = fields[i]
     order[++rows] = key
   }
-  if (!(file in seen)) {
-    print "tables.awk: cannot read " path > "/dev/stderr"
-    exit 1
-  }
-  files = files (files == "" ? "" : ", ") "[`" file ".csv`](" results file ".csv)"
+  if (!(file in seen)) unreadable(path)
+  cite(file)
+}
+
+# For files whose rows are told apart by their place alone: next_row(FILE, FIELDS) reads the next
+# one after the head. False after the last; then again from the first.
+function next_row(file, fields,   path, line) {
+  path = "results/" file ".csv"
+  if (!(file in opened) && (getline line < path) <= 0) unreadable(path)
+  opened[file] = 1
+  cite(file)
+  if ((getline line < path) > 0) return split_row(line, fields)
+  close(path)
+  delete opened[file]
+  return 0
+}
+
+function unreadable(path) {
+  print "tables.awk: cannot read " path > "/dev/stderr"
+  exit 1
+}
+
+# Names the file below the table (measured), once.
+function cite(file,   link) {
+  link = "[`" file ".csv`](" results file ".csv)"
+  if (index(files, link) == 0) files = files (files == "" ? "" : ", ") link
 }
 
 # Splits at commas that are not within quotes.
@@ -147,6 +168,14 @@ function set_name(set) {
   sub(/^sphere:/, "", set)
   return set
 }
+# The same, short, where the vertices are told elsewhere; of a scene, "N of SET".
+function set_label(set) {
+  sub(/of sphere:64/, "of 64 vertices", set)
+  sub(/of ur5/, "UR5 links", set)
+  sub(/^sphere:/, "", set)
+  sub(/^ur5/, "UR5", set)
+  return set
+}
 function peer_names() {
   name["FCL libccd"] = "FCL, libccd"; name["FCL indep"] = "FCL, own"; name["SAT double"] = "SAT, plain double"
   name["SAT perturbed"] = "SAT, perturbed by 1e-9"; name["GJK double"] = "GJK, plain double"; name["GJK float"] = "GJK, float"
@@ -193,17 +222,14 @@ function touching(   s, p, n, key) {
   measured()
 }
 
-function lengths(question,   s, p, n, m, key, label) {
+function lengths(question,   s, p, n, m, key) {
   read_rows("query_" question "_" machine)
   head("| hulls | hulld | FCL, libccd | FCL, own | libccd GJK | Bullet |")
   m = split(question == "contact" ? "sphere:64 deep,sphere:512 deep,ur5 graze,ur5 deep" \
                                   : "sphere:64 close,sphere:512 close,ur5 far,ur5 close,ur5 gap", sets, ",")
   n = split("hulld,FCL libccd,FCL indep,libccd GJK,Bullet", peers, ",")
   for (s = 1; s <= m; s++) {
-    label = sets[s]
-    sub(/^sphere:/, "", label)
-    sub(/^ur5/, "UR5", label)
-    printf "| %s |", label
+    printf "| %s |", set_label(sets[s])
     for (p = 1; p <= n; p++) {
       key = sets[s] SUBSEP peers[p]
       if ((key, "ns") in cell) printf " %s (%.0e) |", short(cell[key, "ns"]), cell[key, "largest_error"]
@@ -230,32 +256,26 @@ function motion(   s, r, at) {
   measured()
 }
 
-function batch(   s, n, one, two, label) {
+function batch(   s, n, one, two) {
   read_rows("query_batch_" machine)
   head("| pairs | one thread, ns | two threads, ns | on two threads | gain |")
   n = split("sphere:8 deep,sphere:64 deep,sphere:64 close,sphere:512 close,ur5 deep,ur5 close", sets, ",")
   for (s = 1; s <= n; s++) {
     one = cell[sets[s] " 1 thread" SUBSEP "hulld", "ns"]
     two = cell[sets[s] " 2 threads" SUBSEP "hulld", "ns"]
-    label = sets[s]
-    sub(/^sphere:/, "", label)
-    sub(/^ur5/, "UR5", label)
-    printf "| %s | %.0f | %.0f | %s | %.1f |\n", label, one, two, million(1e9 / two), one / two
+    printf "| %s | %.0f | %.0f | %s | %.1f |\n", set_label(sets[s]), one, two, million(1e9 / two), one / two
   }
   measured()
 }
 
-function scenes(   s, n, ours, theirs, label) {
+function scenes(   s, n, ours, theirs) {
   read_rows("query_scene_" machine)
   head("| scene | colliding pairs | hulld, ms | FCL, tree, ms | FCL / hulld |")
   n = split("1000 of sphere:64,10000 of sphere:64,1000 of ur5,10000 of ur5", sets, ",")
   for (s = 1; s <= n; s++) {
     ours = cell[sets[s] SUBSEP "hulld", "ns"]
     theirs = cell[sets[s] SUBSEP "FCL tree", "ns"]
-    label = sets[s]
-    sub(/of sphere:64/, "of 64 vertices", label)
-    sub(/of ur5/, "UR5 links", label)
-    printf "| %s | %s | %.3g | %.3g | %.1f |\n", label, cell[sets[s] SUBSEP "hulld", "pairs"], ours / 1e6, theirs / 1e6, theirs / ours
+    printf "| %s | %s | %.3g | %.3g | %.1f |\n", set_label(sets[s]), cell[sets[s] SUBSEP "hulld", "pairs"], ours / 1e6, theirs / 1e6, theirs / ours
   }
   measured()
 }
@@ -326,24 +346,19 @@ function start(   i, key) {
   measured()
 }
 
-function overload(   line, fields, row) {
+function overload(   fields) {
   head("| clients that send batches | CheckCollision: p50 | p99 | p99.9 | p99 / idle | pairs of batches |")
-  while ((getline line < ("results/server_overload_" machine ".csv")) > 0) {
-    split_row(line, fields)
-    if (row++ == 0) continue
+  while (next_row("server_overload_" machine, fields)) {
     printf "| %d | %.0f us | %.0f us | %.1f ms | %.1f | %s |\n", fields[2], fields[4], fields[5], fields[6] / 1000, fields[8],
            (fields[9] > 0 ? million(fields[9]) : "-")
   }
-  files = "[`server_overload_" machine ".csv`](" results "server_overload_" machine ".csv)"
   measured()
 }
 
 # One row per workload and size: hulld's step, Bullet's, and how many times faster hulld is.
-function live(   line, fields, row, key, order_of, i, n, part) {
+function live(   fields, key, order_of, i, n, part) {
   head("| a step | vertices | hulld: p50 | p99 | Bullet: p50 | with its box | hulld faster | with its box |")
-  while ((getline line < ("results/query_live_" machine ".csv")) > 0) {
-    split_row(line, fields)
-    if (row++ == 0) continue
+  while (next_row("query_live_" machine, fields)) {
     key = fields[1] SUBSEP fields[3]
     if (fields[2] == "hulld") order_of[++n] = key
     step[key, fields[2]] = fields[4]
@@ -357,48 +372,38 @@ function live(   line, fields, row, key, order_of, i, n, part) {
            unit(1000 * slowest[key, "hulld"]), unit(1000 * step[key, "Bullet"]), unit(1000 * boxed[key, "Bullet"]),
            times(step[key, "Bullet"] / step[key, "hulld"]), times(boxed[key, "Bullet"] / boxed[key, "hulld"])
   }
-  files = "[`query_live_" machine ".csv`](" results "query_live_" machine ".csv)"
   measured()
 }
 
-function live_service(   line, fields, row, reader) {
+function live_service(   fields, reader) {
   head("| vertices | question | p50 | p99 | p50 / at rest | p99 / at rest | chunks of the writer |")
-  while ((getline line < ("results/server_live_" machine ".csv")) > 0) {
-    split_row(line, fields)
-    if (row++ == 0) continue
+  while (next_row("server_live_" machine, fields)) {
     reader = fields[4] != ""
     printf "| %d | %s | %s | %s | %s | %s | %s |\n", fields[1], fields[2], (reader ? unit(1000 * fields[4]) : "-"),
            (reader ? unit(1000 * fields[5]) : "-"), (reader ? sprintf("%.2f", fields[6]) : "-"),
            (reader ? sprintf("%.2f", fields[7]) : "-"), (fields[8] > 0 ? sprintf("%.0f/s", fields[8]) : "-")
   }
-  files = "[`server_live_" machine ".csv`](" results "server_live_" machine ".csv)"
   measured()
 }
 
 # p99 is left out where there are too few times for it.
-function live_work(   line, fields, row, enough) {
+function live_work(   fields, enough) {
   head("| work | | p50 | p99 | p50 / first | p99 / first | a second |")
-  while ((getline line < ("results/server_live_work_" machine ".csv")) > 0) {
-    split_row(line, fields)
-    if (row++ == 0) continue
+  while (next_row("server_live_work_" machine, fields)) {
     enough = fields[3] + 0 >= 20
     printf "| %s | %s | %s | %s | %.2f | %s | %s |\n", fields[1], fields[2], unit(1000 * fields[4]),
            (enough ? unit(1000 * fields[5]) : "-"), fields[6], (enough ? sprintf("%.2f", fields[7]) : "-"),
            sprintf(fields[8] + 0 < 100 ? "%.3g" : "%.0f", fields[8])
   }
-  files = "[`server_live_work_" machine ".csv`](" results "server_live_work_" machine ".csv)"
   measured()
 }
 
-function busy(   line, fields, row) {
+function busy(   fields) {
   head("| work | beside | p50, ms | p99, ms | p50 / alone | p99 / alone |")
-  while ((getline line < ("results/server_busy_" machine ".csv")) > 0) {
-    split_row(line, fields)
-    if (row++ == 0) continue
+  while (next_row("server_busy_" machine, fields)) {
     sub(/^alone$/, "nothing", fields[2])
     printf "| %s | %s | %.3g | %.3g | %.2f | %.2f |\n", fields[1], fields[2], fields[4], fields[5], fields[6], fields[7]
   }
-  files = "[`server_busy_" machine ".csv`](" results "server_busy_" machine ".csv)"
   measured()
 }
 
@@ -420,14 +425,10 @@ function pair(what, set,   peers, n, i, best) {
           cell[set, "hulld", "wrong"] " / " cell[set, best, "wrong"])
 }
 # One point and one question of a growing hull.
-function grown(vertices,   path, line, fields, step) {
-  path = "results/query_live_" machine ".csv"
-  while ((getline line < path) > 0) {
-    split_row(line, fields)
+function grown(vertices,   fields, step) {
+  while (next_row("query_live_" machine, fields)) {
     if (fields[1] == "1 point, 1 question" && fields[3] == vertices) step[fields[2]] = 1000 * fields[4]
   }
-  close(path)
-  if (index(files, "query_live") == 0) files = files ", [`query_live_" machine ".csv`](" results "query_live_" machine ".csv)"
   compare("one point more, then a question, hull of " vertices, step["hulld"], "Bullet", step["Bullet"], "-")
 }
 # Over PostgreSQL: what a row of results/postgres/ is called.

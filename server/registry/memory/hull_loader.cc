@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/numeric/orientation.h"
+#include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
 #include "server/store/store_errors.h"
 
@@ -48,9 +49,7 @@ absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& s
 class LoadJob {
  public:
   LoadJob(Store& store, std::span<const StoredHull> stored)
-      : store_(store),
-        stored_(stored.begin(), stored.end()),
-        loaded_(stored.size(), absl::CancelledError("the call was cancelled")) {}
+      : store_(store), stored_(stored.begin(), stored.end()), loaded_(stored.size(), Cancelled()) {}
 
   size_t size() const { return stored_.size(); }
 
@@ -58,7 +57,7 @@ class LoadJob {
   void Work(const std::function<bool()>& should_stop) {
     for (size_t i = next_++; i < size(); i = next_++) {
       if (!is_stopped_) loaded_[i] = LoadLive(store_, stored_[i]);
-      if (should_stop && should_stop()) is_stopped_ = true;
+      if (Stopped(should_stop)) is_stopped_ = true;
       const std::lock_guard lock(mutex_);
       if (++ended_ == size()) all_ended_.notify_all();
     }

@@ -1,19 +1,16 @@
 #include "server/registry/memory/served_hull.h"
 
-#include <chrono>
 #include <mutex>
 #include <utility>
 #include <vector>
 
 #include "core/base/check.h"
 #include "core/hull/growth/hull_builder.h"
+#include "server/contract/stopped_call.h"
 #include "server/registry/memory/hull_loader.h"
 
 namespace hulld::server {
 namespace {
-
-// How soon a reader that waits for another notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
 
 std::vector<Vector> PointsOf(const QueryHull& version) {
   std::vector<Vector> points;
@@ -48,8 +45,8 @@ absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& rec
                                  const std::function<bool()>& should_stop) {
   std::unique_lock lock(mutex_);
   while (making_) {
-    changed_.wait_for(lock, kCancellationPoll);
-    if (should_stop && should_stop()) return absl::CancelledError("the call was cancelled");
+    changed_.wait_for(lock, kStopPoll);
+    if (Stopped(should_stop)) return Cancelled();
   }
   if (is_made()) return absl::OkStatus();
   making_ = true;

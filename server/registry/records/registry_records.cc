@@ -7,7 +7,6 @@
 // changes are of IDs that are known, so none comes in between.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
-#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -164,12 +163,7 @@ void Registry::TakeRecord(const std::string& id, const FoundHulls& found) {
   HULLD_CHECK(!IsKnown(id));
   const auto hull = found.hulls.find(id);
   if (hull == found.hulls.end()) return hulls_.NoteAbsent(id);
-  const absl::StatusOr<StoredHull>& stored = hull->second;
-  if (stored.ok()) return hulls_.AddResting(*stored);
-  spdlog::error("{}", std::string(stored.status().message()));
-  StoredHull nothing;
-  nothing.record.hull_id = id;
-  MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
+  AddStored(id, hull->second);
 }
 
 void Registry::EndReading(Locked& locked, Reading& reading, const absl::Status& status) {

@@ -4,10 +4,12 @@
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 
 namespace hulld::bench {
 
@@ -49,6 +51,21 @@ ChildServer::ChildServer(std::vector<std::string> command) {
 ChildServer::~ChildServer() {
   kill(pid_, SIGKILL);
   waitpid(pid_, nullptr, 0);
+}
+
+double ChildServer::ProcessorSeconds() const {
+  clockid_t clock;
+  timespec time = {};
+  if (clock_getcpuclockid(pid_, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+double ChildServer::ResidentMebibytes() const {
+  std::ifstream status("/proc/" + std::to_string(pid_) + "/statm");
+  double total = 0;
+  double resident = 0;
+  status >> total >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
 }  // namespace hulld::bench

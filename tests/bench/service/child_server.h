@@ -20,6 +20,10 @@ class ChildServer {
 
   const std::string& address() const { return address_; }
   pid_t pid() const { return pid_; }
+  // Processor time of all its threads so far, in seconds; ResidentMebibytes: what it holds in
+  // memory.
+  double ProcessorSeconds() const;
+  double ResidentMebibytes() const;
 
  private:
   pid_t pid_ = -1;

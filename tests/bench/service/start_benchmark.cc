@@ -9,7 +9,6 @@
 // are in the page cache: this is a restart of the program, not of the machine.
 
 #include <grpcpp/grpcpp.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,7 +16,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
@@ -67,14 +65,6 @@ void Check(const std::string& address, int hulls) {
   Require(stub->CheckCollision(&context, request, &response), "CheckCollision");
 }
 
-double ResidentMebibytes(pid_t pid) {
-  std::ifstream status("/proc/" + std::to_string(pid) + "/statm");
-  double total = 0;
-  double resident = 0;
-  status >> total >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
-
 double DirectoryMebibytes(const std::string& directory) {
   double bytes = 0;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(directory)) {
@@ -113,7 +103,7 @@ void Measure(int hulls, int points) {
     listening.push_back(passed());
     if (hulls > 0) Check(server.address(), hulls);
     answered.push_back(passed());
-    memory.push_back(ResidentMebibytes(server.pid()));
+    memory.push_back(server.ResidentMebibytes());
   }
   std::printf("%d,%d,%.1f,%.1f,%.1f,%.1f,%.1f\n", hulls, points, fill_s, Median(listening),
               Median(answered), Median(memory), DirectoryMebibytes(directory));

@@ -13,7 +13,6 @@
 //                      much the server's resident memory grew meanwhile
 
 #include <grpcpp/grpcpp.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -21,7 +20,6 @@
 #include <condition_variable>
 #include <cstdint>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -47,14 +45,6 @@ constexpr std::chrono::seconds kFloodTime(5);
 
 double Microseconds(Clock::duration duration) {
   return std::chrono::duration<double, std::micro>(duration).count();
-}
-
-double ResidentMebibytes(pid_t pid) {
-  std::ifstream status("/proc/" + std::to_string(pid) + "/statm");
-  double total = 0;
-  double resident = 0;
-  status >> total >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
 std::shared_ptr<grpc::Channel> Connect(const std::string& address) {
@@ -272,7 +262,7 @@ void MeasureFlood(const ChildServer& server) {
     v1::WatchHullsResponse message;
     while (reader->Read(&message)) events += message.events_size();
   });
-  const double before = ResidentMebibytes(server.pid());
+  const double before = server.ResidentMebibytes();
   std::atomic<bool> ending = false;
   std::atomic<uint64_t> changes = 0;
   std::vector<std::thread> writers;
@@ -292,7 +282,7 @@ void MeasureFlood(const ChildServer& server) {
   ending = true;
   for (std::thread& writer : writers) writer.join();
   const double seconds = Microseconds(Clock::now() - start) * 1e-6;
-  const double grown = ResidentMebibytes(server.pid()) - before;
+  const double grown = server.ResidentMebibytes() - before;
   std::printf("flood,%d,,,%.0f,%.0f,%.1f\n", kFloodHulls, static_cast<double>(changes) / seconds,
               static_cast<double>(events) / seconds, grown);
   context.TryCancel();
