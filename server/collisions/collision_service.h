@@ -12,7 +12,9 @@
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
+#include "server/shards/body_resolution.h"
 #include "server/shards/shards.h"
+#include "server/shards/waiting_calls.h"
 
 namespace hulld::server {
 
@@ -57,6 +59,7 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
+  void AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call);
   void AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved, CheckCall* call);
   void AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call);
   // Answers the query on the thread that suits it.
@@ -72,6 +75,7 @@ class CollisionService : public CollisionServiceOfBytes {
   WorkerPool& long_readers_;
   TaskPool& pool_;
   Executor& executor_;
+  WaitingCalls waiting_;
 };
 
 }  // namespace hulld::server
