@@ -3,6 +3,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <cstddef>
 #include <memory>
 
 #include "hulld/v1/collision.grpc.pb.h"
@@ -43,6 +44,9 @@ class CollisionService : public CollisionServiceOfBytes {
         long_readers_(long_readers),
         pool_(pool),
         executor_(executor) {}
+
+  // Calls that wait for the store without a thread.
+  size_t waiting() const { return waiting_.count(); }
 
   grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
                                            const grpc::ByteBuffer* request,
