@@ -138,7 +138,8 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, Stores stores
   admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this](Rpc rpc) {
     if (UsesWriters(rpc)) return writers_.waiting();
-    return readers_.waiting() + long_readers_.waiting() + pool_.waiting();
+    return readers_.waiting() + long_readers_.waiting() + pool_.waiting() +
+           collision_service_.waiting();
   });
   guard_->OnTokensChanged([this] {
     const size_t ended = admission_.EndRevoked(

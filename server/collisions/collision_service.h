@@ -3,6 +3,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <cstddef>
 #include <memory>
 
 #include "hulld/v1/collision.grpc.pb.h"
@@ -12,7 +13,9 @@
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
+#include "server/shards/body_resolution.h"
 #include "server/shards/shards.h"
+#include "server/shards/waiting_calls.h"
 
 namespace hulld::server {
 
@@ -42,6 +45,9 @@ class CollisionService : public CollisionServiceOfBytes {
         pool_(pool),
         executor_(executor) {}
 
+  // Calls that wait for the store without a thread.
+  size_t waiting() const { return waiting_.count(); }
+
   grpc::ServerUnaryReactor* CheckCollision(grpc::CallbackServerContext* context,
                                            const grpc::ByteBuffer* request,
                                            grpc::ByteBuffer* response) override;
@@ -57,6 +63,7 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
+  void AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call);
   void AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved, CheckCall* call);
   void AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call);
   // Answers the query on the thread that suits it.
@@ -72,6 +79,7 @@ class CollisionService : public CollisionServiceOfBytes {
   WorkerPool& long_readers_;
   TaskPool& pool_;
   Executor& executor_;
+  WaitingCalls waiting_;
 };
 
 }  // namespace hulld::server

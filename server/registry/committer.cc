@@ -51,6 +51,38 @@ void Committer::Follow(const Locked& locked, Follower follower) {
   ready_.notify_one();
 }
 
+void Committer::FollowNow(Locked& locked, Follower follower) {
+  HULLD_CHECK(locked.Holds(order_));
+  bool may_ask = false;
+  {
+    const std::lock_guard lock(mutex_);
+    may_ask = store_.is_shared() && is_idle_ && !is_asking_ && !asked_.asked.has_value() &&
+              queue_.empty() && followers_.empty() && holds_.empty();
+    followers_.push_back(std::move(follower));
+    if (may_ask) is_asking_ = true;
+  }
+  if (may_ask) {
+    locked.Afterwards([this] { AskNow(); });
+  } else {
+    ready_.notify_one();
+  }
+}
+
+// Those who come meanwhile are told of the next question.
+void Committer::AskNow() {
+  {
+    const std::lock_guard lock(mutex_);
+    asked_.asked = SteadyClock::now();
+    asked_.followers = std::exchange(followers_, {});
+  }
+  store_.StartFollow();
+  {
+    const std::lock_guard lock(mutex_);
+    is_asking_ = false;
+  }
+  ready_.notify_one();
+}
+
 void Committer::Hold(const Locked& locked, std::shared_ptr<CommitHold> hold) {
   HULLD_CHECK(locked.Holds(order_));
   {
@@ -90,7 +122,7 @@ void Committer::Run() {
 
 void Committer::CommitAndFollow(Round round) {
   // Before anything is sent: a commit asks as well.
-  const SteadyClock::time_point asked = SteadyClock::now();
+  const SteadyClock::time_point asked = round.asked.has_value() ? *round.asked : SteadyClock::now();
   absl::Status status;
   if (!round.batch.empty()) status = Write(round.batch);
   if (!status.ok()) {
@@ -138,10 +170,15 @@ void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
 // Empty: this is to end.
 Committer::Round Committer::WaitForRound() {
   std::unique_lock lock(mutex_);
+  is_idle_ = true;
   ready_.wait(lock, [this] {
-    return ending_ || !queue_.empty() || !followers_.empty() || !holds_.empty();
+    if (is_asking_) return false;
+    return ending_ || asked_.asked.has_value() || !queue_.empty() || !followers_.empty() ||
+           !holds_.empty();
   });
-  return {std::exchange(queue_, {}), std::exchange(followers_, {}), std::exchange(holds_, {})};
+  is_idle_ = false;
+  if (asked_.asked.has_value()) return std::exchange(asked_, {});
+  return {std::exchange(queue_, {}), std::exchange(followers_, {}), std::exchange(holds_, {}), {}};
 }
 
 absl::Status Committer::Write(std::vector<Pending>& batch) {

@@ -91,6 +91,9 @@ class Committer {
   }
   // Requires that `locked` holds `order`. Cost: a question to the store, one for all who wait.
   void Follow(const Locked& locked, Follower follower);
+  // The same for who waits: where nothing else is under way, the question is sent on this thread as
+  // soon as `order` is let go of, and not once the committer's thread has woken up.
+  void FollowNow(Locked& locked, Follower follower);
   // Holds the store still from when Others was told of all that other servers had committed; what
   // was submitted before is committed or refused by then, and what is submitted later waits until
   // the hold ends. Requires that `locked` holds `order`. Cost: two round trips to a store that is
@@ -121,10 +124,13 @@ class Committer {
     std::vector<Pending> batch;
     std::vector<Follower> followers;
     std::vector<std::shared_ptr<CommitHold>> holds;
+    // Set: the store was asked for the followers at this time, and nothing else is to be done.
+    std::optional<SteadyClock::time_point> asked;
   };
 
   void Run();
   Round WaitForRound();
+  void AskNow();
   void CommitAndFollow(Round round);
   void HoldFor(std::vector<std::shared_ptr<CommitHold>> holds);
   absl::Status Write(std::vector<Pending>& batch);
@@ -148,6 +154,12 @@ class Committer {
   std::vector<Follower> followers_;
   std::vector<std::shared_ptr<CommitHold>> holds_;
   CommitStatistics statistics_;
+  // The committer's thread waits for something to do.
+  bool is_idle_ = false;
+  // AskNow is due, or under way: until it is done, the store is its own.
+  bool is_asking_ = false;
+  // What AskNow left.
+  Round asked_;
   bool ending_ = false;
   Thread thread_;
 };

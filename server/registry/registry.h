@@ -164,6 +164,8 @@ class Registry {
   // or another thread, without any lock: for who asks several registries at once. UNAVAILABLE: as
   // AwaitOthers. Cost: as that, but nobody waits.
   void StartFollow(std::function<void(const absl::Status&)> done);
+  // The same where what is here is not as fresh as this; false, and nothing, where it is.
+  bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done);
 
   // Has nothing committed here for a while (Committer::Hold). What is resolved meanwhile of what is
   // here (Freshness::OfWhatIsHere) is what the store holds all the while.

@@ -24,14 +24,14 @@ absl::Status Registry::AwaitOthers(Locked& locked, const std::function<bool()>& 
     ConditionVariable changed;
     std::optional<absl::Status> status;
   };
-  // What is due does not wait meanwhile.
-  locked.Unlock();
-  locked.Lock();
   const auto wait = std::make_shared<Wait>();
-  committer_.Follow(locked, [wait](Locked&, const absl::Status& status) {
+  committer_.FollowNow(locked, [wait](Locked&, const absl::Status& status) {
     wait->status = status;
     wait->changed.notify_all();
   });
+  // What is due does not wait meanwhile.
+  locked.Unlock();
+  locked.Lock();
   const auto is_over = [&] { return wait->status.has_value(); };
   while (!is_over()) {
     locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });
@@ -46,7 +46,17 @@ void Registry::StartFollow(std::function<void(const absl::Status&)> done) {
     later.Afterwards([done, status] { done(status); });
   };
   if (!store_.is_shared()) return tell(locked, absl::OkStatus());
-  committer_.Follow(locked, tell);
+  committer_.FollowNow(locked, tell);
+}
+
+bool Registry::StartFresh(const Freshness& freshness,
+                          std::function<void(const absl::Status&)> done) {
+  Locked locked(mutex_);
+  if (!store_.is_shared() || TryFresh(locked, freshness).has_value()) return false;
+  committer_.FollowNow(locked, [done = std::move(done)](Locked& later, const absl::Status& status) {
+    later.Afterwards([done, status] { done(status); });
+  });
+  return true;
 }
 
 void Registry::Hold(std::shared_ptr<CommitHold> hold) {

@@ -88,6 +88,9 @@ class Shards {
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const ShardsFreshness& freshness,
                                                       const std::function<bool()>& should_stop);
   std::optional<std::chrono::nanoseconds> TryFresh(const ShardsFreshness& freshness);
+  // As Registry::StartFresh for a call that names these, if they are in one shard; false otherwise.
+  bool StartFresh(std::span<const std::string> ids, const ShardsFreshness& freshness,
+                  std::function<void(const absl::Status&)> done);
   // In the byte order of the IDs, across shards.
   absl::StatusOr<ShardsHullPage> List(const std::string& prefix, const std::string& after,
                                       size_t page_size,

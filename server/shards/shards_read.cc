@@ -117,6 +117,15 @@ std::optional<std::chrono::nanoseconds> Shards::TryFresh(const ShardsFreshness& 
   return staleness;
 }
 
+bool Shards::StartFresh(std::span<const std::string> ids, const ShardsFreshness& freshness,
+                        std::function<void(const absl::Status&)> done) {
+  const size_t shard = ids.empty() ? 0 : shard_of(ids.front());
+  for (const std::string& id : ids) {
+    if (shard_of(id) != shard) return false;
+  }
+  return at(shard).StartFresh(freshness.Of(shard), std::move(done));
+}
+
 // Finds out which shards the call concerns; once. A call that names nothing concerns the first.
 void Shards::Begin(std::span<const std::string> ids, std::span<const std::string> also,
                    KnownInShards& known) const {

@@ -188,6 +188,10 @@ class Store {
   // the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
   virtual bool is_shared() const { return false; }
   virtual absl::Status Follow() { return absl::OkStatus(); }
+  // Sends what the next Follow asks, which then finds out what others have committed by the time of
+  // this call. Waits for nothing, so on any thread; Follow comes before anything else that may not
+  // run while it does. Where it cannot be sent, Follow asks as ever.
+  virtual void StartFollow() {}
   // What Commit and Follow found, whether they failed or not, since this was called last.
   virtual OtherChanges TakeOthers() { return {}; }
   // For each hull the points of its deltas between the two versions, in their order; none where

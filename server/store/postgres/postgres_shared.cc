@@ -267,12 +267,24 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
   return absl::OkStatus();
 }
 
+void PostgresStore::StartFollow() {
+  if (!options_.shared || !ended().ok()) return;
+  const Statement follow = AskForOthers(batch_);
+  following_ = follower_.TryStart(std::span(&follow, 1));
+}
+
 absl::Status PostgresStore::Follow() {
-  if (absl::Status s = ended(); !s.ok()) return s;
+  std::unique_ptr<Session> asked = std::exchange(following_, nullptr);
+  if (absl::Status s = ended(); !s.ok()) {
+    follower_.GiveUp(std::move(asked));
+    return s;
+  }
   // Nobody else commits.
   if (!options_.shared) return absl::OkStatus();
   const Statement follow = AskForOthers(batch_);
-  const absl::StatusOr<std::vector<Rows>> rows = follower_.Ask(std::span(&follow, 1));
+  const absl::StatusOr<std::vector<Rows>> rows =
+      asked != nullptr ? follower_.Finish(std::move(asked), std::span(&follow, 1))
+                       : follower_.Ask(std::span(&follow, 1));
   if (rows.ok()) {
     const absl::Status noted = NoteOthers(rows->front());
     if (went_back_) GiveNewId();

@@ -106,6 +106,7 @@ class PostgresStore : public Store {
   uint64_t revision() const override { return revision_; }
   bool is_shared() const override { return options_.shared; }
   absl::Status Follow() override;
+  void StartFollow() override;
   OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
   absl::Status HoldOthers() override;
   bool ReleaseOthers() override;
@@ -249,6 +250,8 @@ class PostgresStore : public Store {
   // Shared: batch_, for the keeper; and what others did up to it that nobody asked for yet.
   std::atomic<uint64_t> seen_batch_ = 0;
   OtherChanges others_;
+  // Shared: what Follow is to take the answer from; null: it has to ask.
+  std::unique_ptr<Session> following_;
   // The database was found to have lost batches.
   bool went_back_ = false;
   // Set: what became of batch_ + 1 is not known.

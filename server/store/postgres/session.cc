@@ -177,13 +177,25 @@ absl::Status Session::Send(const Statement& statement) {
 }
 
 absl::StatusOr<std::vector<Rows>> Session::Ask(std::span<const Statement> statements) {
+  if (absl::Status s = Start(statements); !s.ok()) return s;
+  return Finish();
+}
+
+absl::Status Session::Start(std::span<const Statement> statements) {
   if (!lost_.ok()) return lost_;
   PGconn* const connection = connection_.get();
   if (PQenterPipelineMode(connection) == 0) return Lost("a statement is under way");
   for (const Statement& statement : statements) {
     if (absl::Status s = Send(statement); !s.ok()) return s;
   }
+  // Sends what the connection takes at once.
   if (PQpipelineSync(connection) == 0) return Lost(OneLine(PQerrorMessage(connection)));
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<Rows>> Session::Finish() {
+  if (!lost_.ok()) return lost_;
+  PGconn* const connection = connection_.get();
   std::vector<Rows> rows;
   absl::Status failure;
   bool synced = false;

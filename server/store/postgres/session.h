@@ -58,6 +58,10 @@ class Session {
   // that they began stays open then, without being able to commit.
   absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
   absl::StatusOr<Rows> Ask(Statement statement);
+  // The two halves of Ask: what is sent, and what comes of it. Start waits for nothing; Finish is
+  // next after it, on any thread.
+  absl::Status Start(std::span<const Statement> statements);
+  absl::StatusOr<std::vector<Rows>> Finish();
 
   // Waits until something comes from the database, `wake` can be read, or `longest` is over;
   // negative: never. wake: a file descriptor.

@@ -7,17 +7,39 @@
 namespace hulld::server {
 
 absl::StatusOr<std::vector<Rows>> SessionPool::Ask(std::span<const Statement> statements) {
-  absl::Status lost;
-  for (const bool fresh : {false, true}) {
-    absl::StatusOr<std::unique_ptr<Session>> session = Take(fresh);
-    if (!session.ok()) return session.status();
-    absl::StatusOr<std::vector<Rows>> rows = (*session)->Ask(statements);
-    const bool is_lost = IsLost(rows.status());
-    GiveBack(is_lost ? nullptr : *std::move(session));
-    if (!is_lost) return rows;
-    lost = rows.status();
+  absl::StatusOr<std::unique_ptr<Session>> session = Take(false);
+  if (!session.ok()) return session.status();
+  // Finish tells of what is lost.
+  (*session)->Start(statements).IgnoreError();
+  return Finish(*std::move(session), statements);
+}
+
+std::unique_ptr<Session> SessionPool::TryStart(std::span<const Statement> statements) {
+  std::unique_ptr<Session> session;
+  {
+    const std::lock_guard lock(mutex_);
+    if (idle_.empty() || taken_ == most_) return nullptr;
+    ++taken_;
+    session = std::move(idle_.back());
+    idle_.pop_back();
   }
-  return lost;
+  session->Start(statements).IgnoreError();
+  return session;
+}
+
+absl::StatusOr<std::vector<Rows>> SessionPool::Finish(std::unique_ptr<Session> session,
+                                                      std::span<const Statement> statements) {
+  absl::StatusOr<std::vector<Rows>> rows = session->Finish();
+  for (const bool again : {true, false}) {
+    const bool is_lost = IsLost(rows.status());
+    GiveBack(is_lost ? nullptr : std::move(session));
+    if (!is_lost || !again) break;
+    absl::StatusOr<std::unique_ptr<Session>> fresh = Take(true);
+    if (!fresh.ok()) return fresh.status();
+    session = *std::move(fresh);
+    rows = session->Ask(statements);
+  }
+  return rows;
 }
 
 // fresh: those that are idle are as old as one that was lost.

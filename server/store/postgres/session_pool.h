@@ -25,6 +25,17 @@ class SessionPool {
   // database, is taken for another once.
   absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
 
+  // The two halves of Ask. TryStart waits for nothing: null where no session is idle. What is
+  // started is to be finished or given up, on any thread, before anything else is asked where there
+  // is one session.
+  std::unique_ptr<Session> TryStart(std::span<const Statement> statements);
+  // statements: the same.
+  absl::StatusOr<std::vector<Rows>> Finish(std::unique_ptr<Session> session,
+                                           std::span<const Statement> statements);
+  void GiveUp(std::unique_ptr<Session> session) {
+    if (session != nullptr) GiveBack(nullptr);
+  }
+
  private:
   absl::StatusOr<std::unique_ptr<Session>> Take(bool fresh);
   void GiveBack(std::unique_ptr<Session> session);

@@ -85,6 +85,10 @@ class SharedStore : public GatedStore {
  public:
   bool is_shared() const override { return true; }
   OtherChanges TakeOthers() override { return std::exchange(others, {}); }
+  void StartFollow() override {
+    ++starts;
+    if (on_start) on_start();
+  }
   absl::Status Follow() override {
     ++follows;
     if (found_by_follow.revision > 0) others = std::exchange(found_by_follow, {});
@@ -116,6 +120,9 @@ class SharedStore : public GatedStore {
   OtherChanges others;
   OtherChanges found_by_follow;
   std::atomic<int> follows = 0;
+  std::atomic<int> starts = 0;
+  // Called while a question is sent; may be empty.
+  std::function<void()> on_start;
   absl::Status can_follow;
 };
 
@@ -369,6 +376,61 @@ TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
   EXPECT_EQ(store.follows, 1);
   store.can_follow = absl::UnavailableError("no database");
   EXPECT_TRUE(absl::IsUnavailable(follow()));
+}
+
+// Who comes while a question is on its way waits for the next one, and so does a change.
+TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
+  SharedStore store;
+  FairMutex order;
+  // Guarded by order.
+  std::vector<std::string> events;
+  std::promise<void> told_later;
+  std::promise<void> committed;
+  Committer committer(store, order);
+  committer.SetOthers([](Locked&, const OtherChanges&) {});
+  const auto note = [&](const std::string& event) {
+    return [&, event](Locked&, const absl::Status& status) {
+      EXPECT_TRUE(status.ok());
+      events.push_back(absl::StrCat(event, " ", store.follows.load()));
+    };
+  };
+  const std::thread::id caller = std::this_thread::get_id();
+  bool has_come = false;
+  store.on_start = [&] {
+    if (std::exchange(has_come, true)) return;
+    EXPECT_EQ(std::this_thread::get_id(), caller);
+    Locked locked(order);
+    committer.FollowNow(locked, [&, note](Locked& later, const absl::Status& status) {
+      note("later")(later, status);
+      told_later.set_value();
+    });
+    committer.Submit(locked, Change(), [&](Locked& later, const absl::Status& status, Change&) {
+      note("committed")(later, status);
+      committed.set_value();
+    });
+  };
+  // The committer's thread may not have begun to wait yet: then it asks itself.
+  constexpr int kMostTries = 100'000;
+  for (int i = 0; i < kMostTries && store.starts == 0; ++i) {
+    std::promise<void> told;
+    {
+      Locked locked(order);
+      committer.FollowNow(locked, [&](Locked& later, const absl::Status& status) {
+        if (store.starts > 0) note("first")(later, status);
+        told.set_value();
+      });
+    }
+    told.get_future().wait();
+  }
+  ASSERT_GT(store.starts, 0);
+  told_later.get_future().wait();
+  committed.get_future().wait();
+  const std::lock_guard lock(order);
+  ASSERT_THAT(events, SizeIs(3));
+  EXPECT_THAT(events[0], ::testing::StartsWith("first"));
+  // A commit asks as well.
+  EXPECT_THAT(events[1], ::testing::StartsWith("committed"));
+  EXPECT_THAT(events[2], ::testing::StartsWith("later"));
 }
 
 // Others is told what hulls grew by where that was wanted and could be had.

@@ -244,6 +244,20 @@ void Client::List() {
   ++simulation_.reached.answers;
 }
 
+// As a call that has no thread to wait with. Whether it was told that all is fresh.
+bool Client::AwaitFresh(const Freshness& freshness) {
+  const auto told = std::make_shared<Event>();
+  const auto fresh = std::make_shared<absl::Status>();
+  const bool asks = simulation_.registry.StartFresh(freshness, [=](const absl::Status& status) {
+    if (told->is_set()) Scheduler::Current().Fail("a reader is told twice");
+    *fresh = status;
+    told->Set();
+  });
+  if (!asks) return false;
+  told->Wait();
+  return fresh->ok();
+}
+
 // All hulls, or one of them, in one of the three ways.
 void Client::Read() {
   const Plan& plan = simulation_.plan;
@@ -258,7 +272,11 @@ void Client::Read() {
   Scheduler::Current().Note("reads hulls in way", way, ids.size());
   absl::StatusOr<Resolved> resolved = absl::UnknownError("");
   if (way == 1) {
+    read_plan.freshness.began = SteadyClock::now();
     std::optional<Resolved> tried = simulation_.registry.TryResolve(ids, read_plan);
+    if (!tried.has_value() && AwaitFresh(read_plan.freshness)) {
+      tried = simulation_.registry.TryResolve(ids, read_plan);
+    }
     if (!tried.has_value()) return;
     resolved = *std::move(tried);
   } else if (way == 2) {

@@ -61,6 +61,7 @@ class Client {
   void Delete();
   void Replace();
   void List();
+  bool AwaitFresh(const Freshness& freshness);
   void Read();
   void Press();
 

@@ -20,9 +20,7 @@ absl::Status Moved() { return absl::AbortedError("another server changed the hul
 
 SharedStore::SharedStore(SimulatedStore& database)
     : database_(database),
-      seen_(database.log_.size()),
-      revision_(database.ledger_.revision()),
-      totals_(database.totals()) {
+      known_{database.log_.size(), database.ledger_.revision(), database.totals()} {
   const std::lock_guard lock(database_.servers_mutex_);
   database_.servers_.push_back(this);
 }
@@ -41,7 +39,7 @@ void SharedStore::Begin(const char* what, uint64_t number) {
 }
 
 absl::Status SharedStore::End(const char* what, const absl::Status& status) {
-  Scheduler::Current().Note(status.ok() ? what : "database: refuses", revision_, seen_);
+  Scheduler::Current().Note(status.ok() ? what : "database: refuses", known_.revision, known_.seen);
   is_busy_ = false;
   return status;
 }
@@ -108,11 +106,11 @@ absl::StatusOr<uint64_t> SharedStore::LoadSequence(const HullRecord& hull,
 
 // What others did since this knew of it, up to now.
 void SharedStore::NoteOthers() {
-  revision_ = database_.ledger_.revision();
-  totals_ = database_.totals();
-  for (; seen_ < database_.log_.size(); ++seen_) {
-    const SimulatedStore::Logged& logged = database_.log_[seen_];
-    OtherChange& other = others_.by_id[logged.hull_id];
+  known_.revision = database_.ledger_.revision();
+  known_.totals = database_.totals();
+  for (; known_.seen < database_.log_.size(); ++known_.seen) {
+    const SimulatedStore::Logged& logged = database_.log_[known_.seen];
+    OtherChange& other = known_.others.by_id[logged.hull_id];
     other.revision = logged.revision;
     other.ended_at = std::max(other.ended_at, logged.ended_at);
     if (other.former_began == 0) other.former_began = logged.former_began;
@@ -122,21 +120,34 @@ void SharedStore::NoteOthers() {
     other.hull = found->second.stored;
     other.revision = found->second.stored.record.revision;
   }
-  if (others_.by_id.empty()) return;
-  others_.revision = revision_;
-  others_.totals = totals_;
+  if (known_.others.by_id.empty()) return;
+  known_.others.revision = known_.revision;
+  known_.others.totals = known_.totals;
+}
+
+void SharedStore::StartFollow() {
+  Begin("database: is sent the question what others did since change", known_.seen);
+  if (!Dice().OneIn(database_.faults_.read)) {
+    const Known before = known_;
+    NoteOthers();
+    started_ = std::exchange(known_, before);
+  }
+  End("database: has the question, at revision, change", absl::OkStatus()).IgnoreError();
 }
 
 absl::Status SharedStore::Follow() {
-  Begin("database: is asked what others did since change", seen_);
+  Begin("database: is asked what others did since change", known_.seen);
   absl::Status status;
   // A server that cannot ask when it starts ends.
   if (std::exchange(has_followed_, true) && Dice().OneIn(database_.faults_.read)) {
     ++database_.counts_.failed_reads;
     status = absl::UnavailableError("the database does not answer");
+  } else if (started_.has_value()) {
+    known_ = *std::move(started_);
   } else {
     NoteOthers();
   }
+  started_.reset();
   return End("database: has told what others did up to revision, change", status);
 }
 
@@ -161,11 +172,11 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
   NoteOthers();
   std::vector<Change*> kept;
   for (Change* change : changes) {
-    if (!others_.by_id.contains(change->id())) kept.push_back(change);
+    if (!known_.others.by_id.contains(change->id())) kept.push_back(change);
   }
   database_.counts_.superseded += changes.size() - kept.size();
   if (kept.empty()) return absl::OkStatus();
-  NumberChanges(kept, revision_);
+  NumberChanges(kept, known_.revision);
   if (Dice().OneIn(faults.refused)) return refuse(absl::UnavailableError("the session ended"));
   if (Dice().OneIn(faults.full)) {
     database_.was_full_ = true;
@@ -177,9 +188,9 @@ absl::Status SharedStore::CommitInTurn(std::span<Change* const> changes) {
     for (const Change* change : kept) database_.Keep(*change, is_unknown);
   }
   if (is_unknown) return absl::UnavailableError("nobody can tell whether it was committed");
-  seen_ = database_.log_.size();
-  revision_ = database_.ledger_.revision();
-  totals_ = database_.totals();
+  known_.seen = database_.log_.size();
+  known_.revision = database_.ledger_.revision();
+  known_.totals = database_.totals();
   return absl::OkStatus();
 }
 

@@ -25,7 +25,7 @@ class SharedStore : public Store {
   Durability durability() const override { return Durability::kSync; }
   bool keeps_hulls() const override { return true; }
   bool is_shared() const override { return true; }
-  uint64_t revision() const override { return revision_; }
+  uint64_t revision() const override { return known_.revision; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   // There are none.
   absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
@@ -40,12 +40,13 @@ class SharedStore : public Store {
                                        size_t most) override {
     return database_.ListHulls(prefix, after, most);
   }
-  StoreTotals totals() const override { return totals_; }
+  StoreTotals totals() const override { return known_.totals; }
   absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
   absl::StatusOr<std::string> MakeCopy() override { return database_.MakeCopy(); }
   absl::Status Follow() override;
-  OtherChanges TakeOthers() override { return std::exchange(others_, {}); }
+  void StartFollow() override;
+  OtherChanges TakeOthers() override { return std::exchange(known_.others, {}); }
   void OnOthers(std::function<void()> others) override;
 
  private:
@@ -58,13 +59,21 @@ class SharedStore : public Store {
   // What is kept of a hull, if it is the one of the record.
   const SimulatedStore::Kept* Find(const HullRecord& record) const;
 
+  // What this knows of the database.
+  struct Known {
+    // Its changes.
+    size_t seen = 0;
+    uint64_t revision = 0;
+    // As of that.
+    StoreTotals totals = {};
+    // That nobody took yet.
+    OtherChanges others = {};
+  };
+
   SimulatedStore& database_;
-  // Changes of the database that this knows of.
-  size_t seen_ = 0;
-  uint64_t revision_ = 0;
-  // As of that.
-  StoreTotals totals_;
-  OtherChanges others_;
+  Known known_;
+  // What is on its way to Follow: of when it was asked for.
+  std::optional<Known> started_;
   // Guarded by the database's mutex.
   std::function<void()> on_others_;
   bool is_busy_ = false;
