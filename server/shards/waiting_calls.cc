@@ -3,6 +3,8 @@
 #include <iterator>
 #include <utility>
 
+#include "server/contract/stopped_call.h"
+
 namespace hulld::server {
 
 WaitingCalls::Wait::Done WaitingCalls::Wait::Take() {
@@ -24,9 +26,9 @@ bool WaitingCalls::Wait::EndIfStopped() {
   {
     const std::lock_guard lock(mutex_);
     if (done_ == nullptr) return false;
-    if (!should_stop_ || !should_stop_()) return true;
+    if (!Stopped(should_stop_)) return true;
   }
-  Tell(absl::CancelledError("the call was cancelled"));
+  Tell(Cancelled());
   return false;
 }
 
@@ -58,7 +60,7 @@ void WaitingCalls::Run() {
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return ending_ || !waits_.empty(); });
-    changed_.wait_for(lock, kPoll, [this] { return ending_; });
+    changed_.wait_for(lock, kStopPoll, [this] { return ending_; });
     if (ending_) return;
     std::vector<std::shared_ptr<Wait>> looked_at = std::exchange(waits_, {});
     lock.unlock();

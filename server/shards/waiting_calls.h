@@ -4,7 +4,6 @@
 #include <absl/status/status.h>
 
 #include <atomic>
-#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -20,9 +19,6 @@ namespace hulld::server {
 // nobody waits for any more; it sleeps while there are none. Thread-safe.
 class WaitingCalls {
  public:
-  // How soon a call that was cancelled ends.
-  static constexpr std::chrono::milliseconds kPoll{20};
-
   // One that waits. It is over once it was told or withdrawn; its functions are not called then.
   class Wait {
    public:
@@ -70,7 +66,7 @@ class WaitingCalls {
   Mutex mutex_;
   // The rest is guarded by mutex_.
   ConditionVariable changed_;
-  // Those of the last kPoll, and the ones that were not over then.
+  // Those of the last poll, and the ones that were not over then.
   std::vector<std::shared_ptr<Wait>> waits_;
   bool ending_ = false;
   Thread thread_;

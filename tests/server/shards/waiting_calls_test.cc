@@ -8,6 +8,8 @@
 #include <memory>
 #include <thread>
 
+#include "server/contract/stopped_call.h"
+
 namespace hulld::server {
 namespace {
 
@@ -65,7 +67,7 @@ TEST(WaitingCalls, NobodyIsAskedWhetherToStopOnceItIsOver) {
           alive->store(false);
           ++told;
         });
-    if (i % 100 == 0) std::this_thread::sleep_for(WaitingCalls::kPoll / 2);
+    if (i % 100 == 0) std::this_thread::sleep_for(kStopPoll / 2);
     wait->Tell(absl::OkStatus());
   }
   // None is told twice; one that the other thread ends may be told a moment later.
