@@ -23,6 +23,7 @@
 // What the registry is asked and what it answers.
 namespace hulld::server {
 
+// A body as one call sees it (bodies/served_body.h).
 struct ServedBody;
 
 // A hull as one reader sees it: what is served belongs to the record's revision. Or a body where
