@@ -150,7 +150,12 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
     std::optional<HullPointer> found = hulls_.Ask(id);
     if (!found.has_value() && !bodies_.contains(id)) {
       if (!may_wait) return WouldWait();
-      const absl::Status read = AwaitKnown(locked, ids, hulls, k, should_stop);
+      std::vector<const std::string*> wanted = {&id};
+      const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
+      for (const uint32_t due : std::span(hulls.due_).last(count)) {
+        if (due != k) wanted.push_back(&ids[hulls.hulls_[due].first]);
+      }
+      const absl::Status read = AwaitKnown(locked, wanted, should_stop);
       if (Stopped(should_stop)) return Cancelled();
       if (read.ok()) continue;
       known.view = read;

@@ -42,6 +42,8 @@ class KnownPlaced {
 
   using Bodies = std::vector<std::shared_ptr<const Body>>;
 
+  // Whether the bodies among the IDs are those of before, at the same revisions.
+  bool AreBodies(const Bodies& bodies) const;
   // Takes the bodies among the IDs; where they are others than before, nothing is known of hulls.
   void SetBodies(std::span<const std::string> ids, Bodies bodies);
   bool has_bodies() const { return !bodies_.empty(); }
