@@ -164,6 +164,10 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
   }
+  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+    body->waiting.push_back([=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
+    return;
+  }
   const HullPointer existing = Find(id);
   if (existing == nullptr) {
     return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
@@ -277,6 +281,10 @@ void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>&
   if (!IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+  }
+  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+    body->waiting.push_back([=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+    return;
   }
   const HullPointer former = Find(id);
   if (former != nullptr && !former->state.quiet()) {

@@ -320,6 +320,9 @@ class Registry {
   absl::Status LoadBodies(Locked& locked);
   // The committed body; null when there is none. The ID must be known.
   std::shared_ptr<const Body> FindBody(const std::string& id);
+  // Null where no change of it is submitted. Otherwise what is under the ID is not known before
+  // that is committed or refused, so who depends on it waits.
+  BodyTable::Entry* BodyInFlight(const std::string& id);
   void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
   void EraseBody(Locked& locked, const std::string& id);
   FoundBodies FindBodies(Locked& locked, std::span<const std::string> ids,

@@ -105,7 +105,7 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                              std::optional<uint64_t> if_revision,
                              const Reply<PutBodyResult>& done) {
   const std::string& id = body->record().body_id;
-  if (BodyTable::Entry* const entry = bodies_.Find(id); entry != nullptr && entry->in_flight) {
+  if (BodyTable::Entry* const entry = BodyInFlight(id); entry != nullptr) {
     entry->waiting.push_back(
         [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
     return;
@@ -113,6 +113,11 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   if (!IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+  }
+  if (const HullPointer hull = Find(id); hull != nullptr && hull->state.changing_life()) {
+    hull->exclusive.push_back(
+        [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+    return;
   }
   if (absl::Status s = CheckBody(locked, id, if_revision); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
@@ -230,6 +235,11 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
 std::shared_ptr<const Body> Registry::FindBody(const std::string& id) {
   const BodyTable::Entry* const entry = bodies_.Find(id);
   return entry == nullptr ? nullptr : entry->committed();
+}
+
+BodyTable::Entry* Registry::BodyInFlight(const std::string& id) {
+  BodyTable::Entry* const entry = bodies_.Find(id);
+  return entry != nullptr && entry->in_flight ? entry : nullptr;
 }
 
 absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const std::string& after,
