@@ -105,9 +105,12 @@ grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* c
                                                   grpc::ByteBuffer* response) {
   return ListCall::Start(
       *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
-        EndFresh(shards_, readers_, call, [this, call](std::chrono::nanoseconds staleness) {
-          return List(call->request(), call->call(), staleness, &call->response());
-        });
+        EndFresh(
+            shards_, readers_, call,
+            [this, call](std::chrono::nanoseconds staleness) {
+              return List(call->request(), call->call(), staleness, &call->response());
+            },
+            !shards_.any_store().finds_records());
       });
 }
 
@@ -156,7 +159,9 @@ absl::Status BodyService::Get(const v1::GetBodyRequest& request, const Call& cal
   const auto staleness =
       registry.AwaitFresh(freshness->Of(shard), [&call] { return call.ShouldStop(); });
   if (!staleness.ok()) return staleness.status();
-  const FoundBodies found = registry.FindBodies(std::span(&id, 1));
+  const FoundBodies found =
+      registry.FindBodies(std::span(&id, 1), [&call] { return call.ShouldStop(); });
+  if (!found.status.ok()) return found.status;
   const std::shared_ptr<const Body>& body = found.bodies.front();
   if (body == nullptr) return BodyNotFound(id);
   if (!body->damage().ok()) return body->damage();
@@ -181,15 +186,17 @@ absl::Status BodyService::List(const v1::ListBodiesRequest& request, const Call&
   const absl::StatusOr<std::string> after = DecodePageToken(request.page_token(), *prefix);
   if (!after.ok()) return after.status();
   const uint32_t asked = request.page_size() == 0 ? Config::kDefaultPageSize : request.page_size();
-  const ShardsBodyPage page =
-      shards_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize));
-  EncodeHeader(shards_.store_ids(), ShardsAsOf{page.revisions, staleness},
+  const absl::StatusOr<ShardsBodyPage> page =
+      shards_.ListBodies(*prefix, *after, std::min(asked, Config::kMaxPageSize),
+                         [&call] { return call.ShouldStop(); });
+  if (!page.ok()) return page.status();
+  EncodeHeader(shards_.store_ids(), ShardsAsOf{page->revisions, staleness},
                response->mutable_header());
-  for (const std::shared_ptr<const Body>& body : page.bodies) {
+  for (const std::shared_ptr<const Body>& body : page->bodies) {
     EncodeBody(*body, response->add_bodies());
   }
-  if (page.more) {
-    response->set_next_page_token(EncodePageToken(*prefix, page.bodies.back()->record().body_id));
+  if (page->more) {
+    response->set_next_page_token(EncodePageToken(*prefix, page->bodies.back()->record().body_id));
   }
   return absl::OkStatus();
 }

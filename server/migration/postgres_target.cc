@@ -27,8 +27,8 @@ constexpr char kPrepare[] = R"(
     SET search_path = '';
     SET synchronous_commit = on;
     PREPARE migrate_fence(bigint) AS UPDATE hulld.store SET written_in = $1;
-    PREPARE migrate_count(bigint, bigint) AS
-      UPDATE hulld.store SET hulls = hulls + $1, vertices = vertices + $2;
+    PREPARE migrate_count(bigint, bigint, bigint) AS
+      UPDATE hulld.store SET hulls = hulls + $1, vertices = vertices + $2, bodies = bodies + $3;
     PREPARE migrate_finish(bigint) AS UPDATE hulld.store SET revision = $1;)";
 
 // The store has the claim, and is read; a session of its own writes, fenced by the epoch of that
@@ -60,7 +60,8 @@ class PostgresTarget : public MigrationTarget {
     for (const char* text :
          {"DELETE FROM hulld.hulls", "DELETE FROM hulld.bodies", "DELETE FROM hulld.writers",
           "DELETE FROM hulld.bases", "DELETE FROM hulld.deltas",
-          "UPDATE hulld.store SET hulls = 0, vertices = 0", "DROP TABLE IF EXISTS hulld.migration",
+          "UPDATE hulld.store SET hulls = 0, vertices = 0, bodies = 0",
+          "DROP TABLE IF EXISTS hulld.migration",
           "CREATE TABLE hulld.migration (store_id text NOT NULL, revision bigint NOT NULL)",
           "PREPARE migrate_begin(text, bigint) AS INSERT INTO hulld.migration VALUES ($1, $2)"}) {
       statements.push_back({.text = text});
@@ -72,16 +73,22 @@ class PostgresTarget : public MigrationTarget {
   }
 
   absl::Status Add(std::span<const Change* const> changes) override {
-    // A hull may be several changes, all of them here.
+    // A hull may be several changes, all of them here; a body is one.
     std::map<std::string_view, uint64_t> vertices;
+    uint64_t bodies = 0;
     for (const Change* change : changes) {
-      if (change->body == nullptr) vertices[change->id()] = change->hull.record.vertex_count;
+      if (change->body == nullptr) {
+        vertices[change->id()] = change->hull.record.vertex_count;
+      } else {
+        ++bodies;
+      }
     }
     uint64_t sum = 0;
     for (const auto& [id, count] : vertices) sum += count;
     std::vector<Statement> statements = StatementsOf(changes);
-    statements.push_back({.name = "migrate_count",
-                          .parameters = {EncodeBigint(vertices.size()), EncodeBigint(sum)}});
+    statements.push_back(
+        {.name = "migrate_count",
+         .parameters = {EncodeBigint(vertices.size()), EncodeBigint(sum), EncodeBigint(bodies)}});
     return Transact(std::move(statements));
   }
 

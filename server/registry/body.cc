@@ -23,14 +23,14 @@ std::shared_ptr<const PieceBoxes> Body::BoxesOf(std::span<const BodyPiece> piece
   return boxes;
 }
 
-HullChange Body::Describe() const {
+HullChange Body::Describe(const StoredBody& stored, const absl::Status& damage) {
   HullChange change;
-  change.record.hull_id = record().body_id;
-  change.record.create_revision = record().create_revision;
-  change.record.revision = record().revision;
+  change.record.hull_id = stored.record.body_id;
+  change.record.create_revision = stored.record.create_revision;
+  change.record.revision = stored.record.revision;
   change.is_body = true;
-  change.piece_count = pieces().size();
-  change.damaged = !damage_.ok();
+  change.piece_count = stored.pieces.size();
+  change.damaged = !damage.ok();
   return change;
 }
 

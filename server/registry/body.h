@@ -2,19 +2,17 @@
 #define HULLD_SERVER_REGISTRY_BODY_H_
 
 #include <absl/status/status.h>
+#include <absl/status/statusor.h>
 
 #include <cstdint>
-#include <deque>
-#include <functional>
 #include <memory>
-#include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/query/body/query_body.h"
 #include "server/process/synchronization.h"
-#include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/registry_types.h"
 #include "server/store/body_record.h"
@@ -25,14 +23,16 @@ namespace hulld::server {
 // first question needs them, and again when a hull of a piece has changed since. Thread-safe.
 class Body {
  public:
-  Body(StoredBody stored, MemoryBudget& budget)
+  // use: for whom it is held.
+  Body(StoredBody stored, MemoryBudget& budget, MemoryUse use)
       : stored_(std::make_shared<StoredBody>(std::move(stored))),
-        charge_(budget, MemoryUse::kWriting, stored_->MemoryBytes()),
+        charge_(budget, use, stored_->MemoryBytes()),
         box_charge_(budget, MemoryUse::kReading) {}
-  // One that the store cannot give back. damage: not OK.
-  Body(const std::string& id, absl::Status damage, MemoryBudget& budget)
-      : Body(StoredBody{{id, 0, 0}, {}, {}}, budget) {
-    damage_ = std::move(damage);
+  // As the store gives it back. Not OK: it cannot.
+  Body(const std::string& id, const absl::StatusOr<StoredBody>& stored, MemoryBudget& budget,
+       MemoryUse use)
+      : Body(stored.ok() ? *stored : StoredBody{{id, 0, 0}, {}, {}}, budget, use) {
+    damage_ = stored.status();
   }
 
   const BodyRecord& record() const { return stored_->record; }
@@ -41,7 +41,8 @@ class Body {
   // OK unless the store cannot give it back.
   const absl::Status& damage() const { return damage_; }
   // As watches are told of it.
-  HullChange Describe() const;
+  HullChange Describe() const { return Describe(*stored_, damage_); }
+  static HullChange Describe(const StoredBody& stored, const absl::Status& damage);
 
   // Boxes about these pieces, which are those of this body, of hulls at these revisions.
   std::shared_ptr<const PieceBoxes> BoxesOf(std::span<const BodyPiece> pieces,
@@ -61,15 +62,6 @@ class Body {
   mutable MemoryCharge box_charge_;
   mutable std::vector<uint64_t> box_revisions_;
   mutable std::shared_ptr<const PieceBoxes> boxes_;
-};
-
-// What the registry knows of an ID that is, or is about to be, a body's. Guarded by its mutex.
-struct RegisteredBody {
-  // Null until the first is committed.
-  std::shared_ptr<const Body> committed;
-  // A change of it is submitted and neither committed nor refused; others wait for that.
-  bool in_flight = false;
-  std::deque<std::function<void(Locked&)>> waiting;
 };
 
 // ALREADY_EXISTS: a hull cannot have the ID.

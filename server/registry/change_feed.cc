@@ -105,20 +105,20 @@ void ChangeFeed::NoteDeleted(Locked& locked, const HullRecord& record, uint64_t 
   Note(locked, record.hull_id, state);
 }
 
-void ChangeFeed::NoteBodyPut(Locked& locked, const std::shared_ptr<const Body>& former,
+void ChangeFeed::NoteBodyPut(Locked& locked, const BodyRecord* former,
                              const std::shared_ptr<const Body>& body) {
   const BodyRecord& record = body->record();
-  const Life life = former == nullptr                                            ? Life::kBegan
-                    : record.create_revision != former->record().create_revision ? Life::kReplaced
-                                                                                 : Life::kChanged;
+  const Life life = former == nullptr                                   ? Life::kBegan
+                    : record.create_revision != former->create_revision ? Life::kReplaced
+                                                                        : Life::kChanged;
   Note(locked, record.body_id,
        {record.revision, record.create_revision, life, true, nullptr, body});
 }
 
-void ChangeFeed::NoteBodyDeleted(Locked& locked, const Body& body, uint64_t revision) {
-  const State state = {revision, body.record().create_revision, Life::kEnded, true};
-  RememberDeletion(body.record().body_id, state);
-  Note(locked, body.record().body_id, state);
+void ChangeFeed::NoteBodyDeleted(Locked& locked, const BodyRecord& record, uint64_t revision) {
+  const State state = {revision, record.create_revision, Life::kEnded, true};
+  RememberDeletion(record.body_id, state);
+  Note(locked, record.body_id, state);
 }
 
 void ChangeFeed::NoteBecameBody(Locked& locked, const HullRecord& former,
@@ -130,14 +130,13 @@ void ChangeFeed::NoteBecameBody(Locked& locked, const HullRecord& former,
         former.create_revision});
 }
 
-void ChangeFeed::NoteBecameHull(Locked& locked, const Body& former,
+void ChangeFeed::NoteBecameHull(Locked& locked, const BodyRecord& former,
                                 const std::shared_ptr<RegisteredHull>& hull) {
   const HullRecord& record = hull->committed.record;
-  RememberDeletion(record.hull_id,
-                   {record.revision, former.record().create_revision, Life::kEnded, true});
+  RememberDeletion(record.hull_id, {record.revision, former.create_revision, Life::kEnded, true});
   Note(locked, record.hull_id,
        {record.revision, record.create_revision, Life::kReplaced, false, hull, nullptr,
-        former.record().create_revision});
+        former.create_revision});
 }
 
 void ChangeFeed::NoteOther(const Locked& locked, uint64_t revision) {
@@ -161,7 +160,7 @@ std::optional<ChangeFeed::State> ChangeFeed::AsToldTo(const WatchTarget& target,
 void ChangeFeed::Note(Locked& locked, const std::string& id, const State& state) {
   HULLD_CHECK(locked.Holds(order_) && state.revision > revision_);
   revision_ = state.revision;
-  if (state.life != Life::kEnded) gone_.erase(id);
+  if (state.life != Life::kEnded) NoteBegan(id, state.is_body);
   const auto note_for = [&](const Interests& interests) {
     for (const auto& interest : interests) {
       const std::optional<State> told = AsToldTo(interest->target, state);
@@ -215,15 +214,25 @@ void ChangeFeed::NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& i
   if (due_.size() == 1) locked.Afterwards([this] { wake_.notify_one(); });
 }
 
+void ChangeFeed::NoteBegan(const std::string& id, bool is_body) {
+  const auto found = gone_.find(id);
+  if (found == gone_.end()) return;
+  if (is_body) {
+    found->second.is_body_now = true;
+  } else {
+    gone_.erase(found);
+  }
+}
+
 void ChangeFeed::RememberDeletion(const std::string& id, const State& state) {
   deletions_.push_back({state.revision, id, state.is_body});
   // The key is to be that of the last one.
   gone_.erase(id);
-  gone_.emplace(deletions_.back().id, state.revision);
+  gone_.emplace(deletions_.back().id, Gone{state.revision});
   if (deletions_.size() <= kMostDeletions) return;
   deletions_begin_ = deletions_.front().revision;
   const auto first = gone_.find(deletions_.front().id);
-  if (first != gone_.end() && first->second == deletions_begin_) gone_.erase(first);
+  if (first != gone_.end() && first->second.revision == deletions_begin_) gone_.erase(first);
   deletions_.pop_front();
 }
 

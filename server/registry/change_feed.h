@@ -49,9 +49,9 @@ struct ChangeWatch : std::enable_shared_from_this<ChangeWatch> {
   // The last deletion that was told, by its revision; the last hull that was told, by its ID.
   uint64_t last_deletion = 0;
   std::string last_id;
-  // Where a store finds records: the hulls that are told next, or why they could not be read, while
+  // Where a store finds records: those that are told next, or why they could not be read, while
   // they are there; whether they are being read; and how often that was begun.
-  std::optional<absl::StatusOr<FoundHulls>> found;
+  std::optional<absl::StatusOr<FoundRecords>> found;
   bool is_reading = false;
   uint64_t readings = 0;
   // Every change up to this one was told, once the stages before kChanges are over.
@@ -114,14 +114,14 @@ class ChangeFeed {
   void NoteChanged(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteReplaced(Locked& locked, const std::shared_ptr<RegisteredHull>& hull);
   void NoteDeleted(Locked& locked, const HullRecord& record, uint64_t revision);
-  // The same of a body. former: what it takes the place of, if anything.
-  void NoteBodyPut(Locked& locked, const std::shared_ptr<const Body>& former,
+  // The same of a body. former: that of which it takes the place; null for none.
+  void NoteBodyPut(Locked& locked, const BodyRecord* former,
                    const std::shared_ptr<const Body>& body);
-  void NoteBodyDeleted(Locked& locked, const Body& body, uint64_t revision);
+  void NoteBodyDeleted(Locked& locked, const BodyRecord& record, uint64_t revision);
   // Other servers made one of the other, by more than one change; told as one.
   void NoteBecameBody(Locked& locked, const HullRecord& former,
                       const std::shared_ptr<const Body>& body);
-  void NoteBecameHull(Locked& locked, const Body& former,
+  void NoteBecameHull(Locked& locked, const BodyRecord& former,
                       const std::shared_ptr<RegisteredHull>& hull);
   // What cannot be told was given this revision: watches that wait are told that it moved on.
   void NoteOther(const Locked& locked, uint64_t revision);
@@ -155,8 +155,12 @@ class ChangeFeed {
   void Arm(ChangeWatch& watch);
   // A watch that waits comes for its next piece.
   void Wake(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
-  // Whether an ID that is among the deletions that are remembered began anew since.
-  bool BeganAnew(const std::string& id) const { return !gone_.contains(id); }
+  // Whether an ID that is among the deletions that are remembered began anew since, as a hull, or
+  // as a body where these count.
+  bool BeganAnew(const std::string& id, bool bodies) const {
+    const auto found = gone_.find(id);
+    return found == gone_.end() || (bodies && found->second.is_body_now);
+  }
 
   // Has a watch come for its next piece although nothing changed.
   void Nudge(Locked& locked, const std::shared_ptr<ChangeWatch>& watch);
@@ -196,6 +200,7 @@ class ChangeFeed {
   static std::optional<State> AsToldTo(const WatchTarget& target, const State& state);
   void NoteFor(Locked& locked, const std::shared_ptr<WatchInterest>& interest,
                const std::string& id, const State& state);
+  void NoteBegan(const std::string& id, bool is_body);
   void RememberDeletion(const std::string& id, const State& state);
   std::shared_ptr<WatchInterest> FindInterest(const WatchTarget& target) const;
   void AddInterest(const std::shared_ptr<WatchInterest>& interest);
@@ -218,9 +223,13 @@ class ChangeFeed {
   // In the order of revisions. What went up to deletions_begin_ is not remembered.
   std::deque<Deletion> deletions_;
   uint64_t deletions_begin_ = 0;
-  // Of these the last of each ID, where nothing began under the ID since: its revision, by the ID
-  // in `deletions_`.
-  std::unordered_map<std::string_view, uint64_t> gone_;
+  // Of these the last of each ID, where no hull began under the ID since: its revision, and whether
+  // a body did; by the ID in `deletions_`.
+  struct Gone {
+    uint64_t revision;
+    bool is_body_now = false;
+  };
+  std::unordered_map<std::string_view, Gone> gone_;
 
   // By a prefix, and by an ID: the interests in it.
   std::unordered_map<std::string, Interests, Hash, std::equal_to<>> by_prefix_;

@@ -8,6 +8,7 @@
 #include <functional>
 #include <mutex>
 
+#include "server/contract/stopped_call.h"
 #include "server/process/synchronization.h"
 
 namespace hulld::server {
@@ -28,15 +29,14 @@ class CommitHold {
   // For the reader, once: waits until it has begun. CANCELLED: should_stop said so. Otherwise why
   // it cannot begin.
   absl::Status Await(const std::function<bool()>& should_stop) {
-    constexpr std::chrono::milliseconds kCancellationPoll(20);
     std::unique_lock lock(mutex_);
     while (state_ == State::kWanted) {
-      changed_.wait_for(lock, kCancellationPoll, [this] { return state_ != State::kWanted; });
+      changed_.wait_for(lock, kStopPoll, [this] { return state_ != State::kWanted; });
       if (state_ != State::kWanted) break;
       lock.unlock();
-      const bool stopped = should_stop && should_stop();
+      const bool stopped = Stopped(should_stop);
       lock.lock();
-      if (stopped) return absl::CancelledError("the call was cancelled");
+      if (stopped) return Cancelled();
     }
     return status_;
   }

@@ -94,6 +94,11 @@ void HullTable::NoteAbsent(const std::string& id) {
   place->second.is_absent_ = true;
 }
 
+void HullTable::ForgetAbsent(const std::string& id) {
+  const auto found = entries_.find(id);
+  if (found != entries_.end() && found->second.is_absent_) entries_.erase(found);
+}
+
 HullTable::HullPointer HullTable::Insert(const StoredHull& stored, const HullState& state) {
   auto hull = std::make_shared<RegisteredHull>(stored, state, readable_, budget_);
   Insert(hull);

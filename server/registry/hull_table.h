@@ -27,8 +27,8 @@ namespace hulld::server {
 // pass over all of them.
 //
 // Where the store finds records, this is a cache of them, and of IDs of which it is known that
-// there is no hull: what is not here is not known. The hand then drops what it finds at rest, and
-// not looked for since it came by last, once there is more than was asked for.
+// there is neither hull nor body: what is not here is not known. The hand then drops what it finds
+// at rest, and not looked for since it came by last, once there is more than was asked for.
 //
 // Guarded by the registry's mutex.
 class HullTable {
@@ -103,8 +103,10 @@ class HullTable {
   HullPointer Find(const std::string& id) { return Ask(id).value_or(nullptr); }
   // Adds a hull of the store, at rest. Requires that there is none with its ID.
   void AddResting(const StoredHull& stored);
-  // There is no hull with this ID. Requires that none is known.
+  // There is nothing under this ID. Requires that nothing is known.
   void NoteAbsent(const std::string& id);
+  // A body has the ID, so that there is no hull while that is known (BodyTable), but something.
+  void ForgetAbsent(const std::string& id);
   // Adds a hull that is in use. Requires that there is none with its ID.
   HullPointer Insert(const StoredHull& stored, const HullState& state);
   void Insert(const HullPointer& hull);

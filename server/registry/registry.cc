@@ -28,6 +28,9 @@ size_t MostRecords(uint64_t memory_limit) {
   return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
 }
 
+// Of the limit, what bodies that nobody uses may take: one in so many.
+constexpr uint64_t kBodiesShare = 16;
+
 // The rest is for writers, whose hulls stay in memory where no store keeps them.
 uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
@@ -45,7 +48,10 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       hulls_(store.keeps_hulls(), memory_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
-  if (is_cache_) hulls_.KeepAtMost(MostRecords(limits_.memory_limit));
+  if (is_cache_) {
+    hulls_.KeepAtMost(MostRecords(limits_.memory_limit));
+    bodies_.KeepAtMost(limits_.memory_limit / kBodiesShare);
+  }
   preparers_.emplace(1, preparers);
   loaders_.emplace(std::max(1, DefaultThreads() - 1), loaders);
   if (!store.is_shared()) return;
@@ -80,6 +86,7 @@ absl::Status Registry::Load() {
   if (is_cache_) {
     kept_hulls_ = store_.totals().hulls;
     vertex_count_ = store_.totals().vertices;
+    kept_bodies_ = store_.totals().bodies;
   } else {
     status = store_.ForEachHull([this](const std::string& id, absl::StatusOr<StoredHull> stored) {
       AddStored(id, stored);
@@ -89,7 +96,8 @@ absl::Status Registry::Load() {
     spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
   }
   if (!status.ok()) return status;
-  if (absl::Status s = LoadBodies(); !s.ok() || !store_.is_shared()) return s;
+  if (!is_cache_) status = LoadBodies(locked);
+  if (!status.ok() || !store_.is_shared()) return status;
   // What was read was not of one moment.
   const SteadyClock::time_point asked = SteadyClock::now();
   const absl::Status followed = store_.Follow();
@@ -125,9 +133,10 @@ void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Statu
 absl::Status Registry::CheckHullCount() const {
   const uint64_t elsewhere = held_elsewhere_ ? held_elsewhere_() : 0;
   const uint64_t hulls = HullCount();
-  if (hulls + bodies_.size() + elsewhere < limits_.max_hulls) return absl::OkStatus();
+  const uint64_t bodies = BodyCount();
+  if (hulls + bodies + elsewhere < limits_.max_hulls) return absl::OkStatus();
   std::string held = absl::StrCat("the store holds ", hulls, " hulls");
-  if (!bodies_.empty()) absl::StrAppend(&held, " and ", bodies_.size(), " bodies");
+  if (bodies > 0) absl::StrAppend(&held, " and ", bodies, " bodies");
   if (elsewhere > 0) absl::StrAppend(&held, ", and other shards ", elsewhere);
   return LimitExceeded(held, limits_.max_hulls, "max-hulls");
 }
@@ -146,6 +155,10 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
   if (!IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
+  }
+  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+    body->waiting.push_back([=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
+    return;
   }
   const HullPointer existing = Find(id);
   if (existing == nullptr) {
@@ -260,6 +273,10 @@ void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>&
   if (!IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+  }
+  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+    body->waiting.push_back([=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+    return;
   }
   const HullPointer former = Find(id);
   if (former != nullptr && !former->state.quiet()) {
@@ -470,7 +487,7 @@ HoldStatistics Registry::Holds() const {
 
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(mutex_);
-  return {revision_, HullCount() - creating_, vertex_count_, bodies_.size()};
+  return {revision_, HullCount() - creating_, vertex_count_, kept_bodies_};
 }
 
 CacheStatistics Registry::Cache() const {

@@ -18,6 +18,7 @@
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
+#include "server/registry/bodies/body_table.h"
 #include "server/registry/body.h"
 #include "server/registry/change_feed.h"
 #include "server/registry/committer.h"
@@ -42,7 +43,8 @@ struct PendingChunk;
 // Where the store finds records, hulls are not read when a server starts: the table holds records
 // of those that were asked for lately, and what is not in it is not known until it is read
 // (records/registry_records.cc). So whatever depends on what there is under an ID first makes that
-// known, and looks again when it is done with waiting. Bodies are all in memory.
+// known, and looks again when it is done with waiting. So it is with bodies, which have a table of
+// their own; an ID of which it is known that there is neither is in that of hulls.
 //
 // The registry owns IDs, revisions and the rules of change: what may follow what, and what readers
 // see. HullState says what a hull can be in, the Committer brings changes to the store, and the
@@ -97,12 +99,15 @@ class Registry {
   Registry& operator=(const Registry&) = delete;
   ~Registry();
 
-  // Reads the records of all hulls that the store holds, unless it finds records, and all bodies;
-  // before any other call. Damaged ones are logged, and answered with DATA_LOSS later.
+  // Reads the records of all hulls and bodies that the store holds, unless it finds records; before
+  // any other call. Damaged ones are logged, and answered with DATA_LOSS later.
   absl::Status Load();
-  // Of a store that finds records, how many are kept in memory while nobody uses them, instead of
-  // what a part of --memory-limit holds. Before Load; for tests.
-  void KeepRecords(size_t most) { hulls_.KeepAtMost(most); }
+  // Of a store that finds records, how many of hulls, and small ones of bodies, are kept in memory
+  // while nobody uses them, instead of what a part of --memory-limit holds. Before Load; for tests.
+  void KeepRecords(size_t most) {
+    hulls_.KeepAtMost(most);
+    bodies_.KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
+  }
 
   const Store& store() const { return store_; }
   const Limits& limits() const { return limits_; }
@@ -135,12 +140,20 @@ class Registry {
   // Removes a body. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
   void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
-  // As List.
-  BodyPage ListBodies(const std::string& prefix, const std::string& after, size_t page_size) const;
-  // Cost: O(log n) each; others pass after each kMostLookupsPerHold.
-  FoundBodies FindBodies(std::span<const std::string> ids) const;
+  // As List. A page may hold less than page_size although there are more.
+  absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
+                                      size_t page_size,
+                                      const std::function<bool()>& should_stop = {});
+  // What is not known is read from the store, hence not for gRPC's threads. The status:
+  // UNAVAILABLE: it cannot be read; CANCELLED: should_stop said so; RESOURCE_EXHAUSTED: it would
+  // have to be, and readers hold more than their share of --memory-limit. Cost: O(log n) each, and
+  // a question to the store for each kMostLookupsPerHold; others pass in between.
+  FoundBodies FindBodies(std::span<const std::string> ids,
+                         const std::function<bool()>& should_stop = {});
+  // The same, but nullopt, at once, where the store would have to be read.
+  std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids);
   // Whether there may be a body. Takes no lock.
-  bool has_bodies() const { return body_count_.load(std::memory_order_relaxed) > 0; }
+  bool has_bodies() const { return BodyCount() > 0; }
 
   // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
   // Where the store finds records, it is asked, hence not for gRPC's threads then. UNAVAILABLE: it
@@ -177,7 +190,7 @@ class Registry {
     held_elsewhere_ = std::move(held_elsewhere);
   }
   // How many hulls and bodies are here. Takes no lock.
-  uint64_t held() const { return HullCount() + body_count_.load(std::memory_order_relaxed); }
+  uint64_t held() const { return HullCount() + BodyCount(); }
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -301,9 +314,21 @@ class Registry {
   static void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement);
 
   absl::Status NoSuchHull(const std::string& id) const;
-  absl::Status LoadBodies();
-  // The committed body; null when there is none.
-  std::shared_ptr<const Body> FindBody(const std::string& id) const;
+  // Those whose creation is in flight included. Takes no lock.
+  uint64_t BodyCount() const {
+    return kept_bodies_.load(std::memory_order_relaxed) +
+           creating_bodies_.load(std::memory_order_relaxed);
+  }
+  absl::Status LoadBodies(Locked& locked);
+  // The committed body; null when there is none. The ID must be known.
+  std::shared_ptr<const Body> FindBody(const std::string& id);
+  // Null where no change of it is submitted. Otherwise what is under the ID is not known before
+  // that is committed or refused, so who depends on it waits.
+  BodyTable::Entry* BodyInFlight(const std::string& id);
+  void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
+  void EraseBody(Locked& locked, const std::string& id);
+  FoundBodies FindBodies(Locked& locked, std::span<const std::string> ids,
+                         const std::function<bool()>& should_stop, bool may_wait);
   void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                      std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
   absl::Status CheckBody(Locked& locked, const std::string& id,
@@ -336,6 +361,8 @@ class Registry {
   bool TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
                        bool is_news);
   void TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other);
+  std::optional<BodyRecord> FormerBody(const std::string& id, const OtherChange& other,
+                                       uint64_t since);
 
   void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
   void Advance(Locked& locked, const HullPointer& hull);
@@ -400,28 +427,39 @@ class Registry {
   };
   using Readings = std::vector<std::shared_ptr<Reading>>;
   // Told with the mutex held, once what was found is of no later moment than what is known here.
-  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundHulls>&)>;
+  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
+  // For whom a body that was read is held.
+  MemoryUse UseOfRead() const { return is_cache_ ? MemoryUse::kReading : MemoryUse::kWriting; }
   // Whether it is known what there is under an ID. Cost: O(log n).
   bool IsKnown(const std::string& id) const { return hulls_.Knows(id) || bodies_.contains(id); }
   // Has the record of an ID that is not known read, and goes on with `next`, which must look anew
   // whether it is known then; or refuses.
   void WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
                  std::function<void(Locked&)> next);
-  absl::Status AwaitKnown(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
-                          uint32_t k, const std::function<bool()>& should_stop);
+  absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
+                          const std::function<bool()>& should_stop);
+  absl::Status ReadMissing(Locked& locked, std::span<const std::string> ids,
+                           const std::function<bool()>& should_stop, bool may_wait);
   void ReadDue();
   void ReadRecords(Locked& locked, const Readings& readings);
-  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundHulls> found,
+  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                    FoundTaker take);
   void TakeRecords(Locked& locked, const Readings& readings,
-                   const absl::StatusOr<FoundHulls>& found);
-  void TakeRecord(const std::string& id, const FoundHulls& found);
+                   const absl::StatusOr<FoundRecords>& found);
+  void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
   void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
   // What other servers did of it is in the table, in the place of what is being read.
   void EndReadingOf(const std::string& id);
-  absl::StatusOr<HullPage> ListFound(const std::string& prefix, const std::string& after,
-                                     size_t page_size, const std::function<bool()>& should_stop);
+  absl::StatusOr<FoundRecords> ListFound(const std::string& prefix, const std::string& after,
+                                         size_t page_size, RecordKinds kinds,
+                                         const std::function<bool()>& should_stop);
+  absl::StatusOr<HullPage> ListFoundHulls(const std::string& prefix, const std::string& after,
+                                          size_t page_size,
+                                          const std::function<bool()>& should_stop);
+  absl::StatusOr<BodyPage> ListFoundBodies(const std::string& prefix, const std::string& after,
+                                           size_t page_size,
+                                           const std::function<bool()>& should_stop);
   HullChange DescribeFound(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
   void ReadPresent(Locked& locked, ChangeWatch& watch);
   absl::Status TakePresentFound(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
@@ -445,13 +483,15 @@ class Registry {
   uint64_t last_watch_ = 0;
   HullTable hulls_;
   // No ID is in both.
-  std::map<std::string, RegisteredBody> bodies_;
+  BodyTable bodies_;
   // What goes on once all that other servers did is taken over.
   std::vector<std::function<void(Locked&)>> after_others_;
   // May be empty.
   std::function<uint64_t()> held_elsewhere_;
-  // As many as bodies_ holds.
-  std::atomic<size_t> body_count_ = 0;
+  // How many bodies the store holds at revision_, and those whose creation is not committed yet.
+  // Changed under the mutex.
+  std::atomic<uint64_t> kept_bodies_ = 0;
+  std::atomic<uint64_t> creating_bodies_ = 0;
   // Those of hulls_ whose creation is not committed yet. Changed under the mutex.
   std::atomic<uint64_t> creating_ = 0;
   // Where hulls_ is a cache: how many the store holds at revision_. Changed under the mutex.

@@ -129,6 +129,10 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
       RunOpen(request);
     });
   }
+  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+    body->waiting.push_back([this, request](Locked&) { RunOpen(request); });
+    return;
+  }
   const HullPointer hull = Find(id);
   if (hull == nullptr) {
     if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));

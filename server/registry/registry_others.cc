@@ -118,10 +118,12 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
     TakeOver(locked, *id, others.by_id.at(*id), since);
     EndReadingOf(*id);
     hulls_.RestSome();
+    bodies_.DropSome(locked);
   }
   if (is_cache_ && others.revision > 0) {
     kept_hulls_ = others.totals.hulls;
     vertex_count_ = others.totals.vertices;
+    kept_bodies_ = others.totals.bodies;
   }
   if (others.revision > revision_) {
     Publish(others.revision);
@@ -134,20 +136,15 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
 // since: the revision up to which everything was taken over before.
 void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange& other,
                         uint64_t since) {
-  const std::shared_ptr<const Body> former_body = FindBody(id);
-  // A body may have been read at the start as of a later moment: it says nothing of what was
-  // before.
-  const bool was_body = former_body != nullptr && former_body->record().create_revision <= since;
+  const std::optional<BodyRecord> former_body = FormerBody(id, other, since);
   // What was not known to be here is told from what others say of it.
-  const bool was_known = former_body == nullptr ? IsKnown(id) : was_body;
+  const bool was_known = IsKnown(id);
   const bool has_ended = !was_known && other.former_began != 0 && other.former_began <= since;
   // Not what was read when the store was loaded.
   const bool is_news = other.revision > revision_;
   if (is_news) Publish(other.revision);
   // Also of what came and went, for who has to know that there was nothing all the while.
   if (is_news) recent_changes_.Note(id);
-  TakeOverBody(locked, id, other);
-  const std::shared_ptr<const Body> body = FindBody(id);
   const HullPointer former = hulls_.Find(id);
   if (former != nullptr && TakeOverVersion(locked, former, other, is_news)) {
     return AdvanceLater(former);
@@ -160,6 +157,8 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
     Forget(locked, former, Gone(id, other.hull.has_value() ? "replaced" : "deleted"));
     AdvanceLater(former);
   }
+  TakeOverBody(locked, id, other);
+  const std::shared_ptr<const Body> body = FindBody(id);
   HullPointer hull;
   if (other.hull.has_value()) {
     AddStored(id, *other.hull);
@@ -171,16 +170,16 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
   if (body != nullptr && body->damage().ok()) {
     if (former != nullptr) {
       feed_.NoteBecameBody(locked, former->committed.record, body);
-    } else if (has_ended) {
+    } else if (has_ended && !other.former_was_body) {
       HullRecord ended;
       ended.hull_id = id;
       ended.create_revision = other.former_began;
       feed_.NoteBecameBody(locked, ended, body);
     } else {
-      feed_.NoteBodyPut(locked, former_body, body);
+      feed_.NoteBodyPut(locked, former_body.has_value() ? &*former_body : nullptr, body);
     }
   } else if (hull != nullptr && !hull->state.damaged()) {
-    if (former_body != nullptr) {
+    if (former_body.has_value()) {
       feed_.NoteBecameHull(locked, *former_body, hull);
     } else if (!was_known && hull->committed.record.create_revision <= since) {
       feed_.NoteChanged(locked, hull);
@@ -189,7 +188,7 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
     } else {
       feed_.NoteCreated(locked, hull);
     }
-  } else if (former_body != nullptr && body == nullptr && hull == nullptr) {
+  } else if (former_body.has_value() && body == nullptr && hull == nullptr) {
     feed_.NoteBodyDeleted(locked, *former_body, other.revision);
   } else if (hull == nullptr && (former != nullptr || is_deletion)) {
     // Of one that was never known here, who resumes a watch may know.
@@ -202,6 +201,21 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
   } else {
     feed_.NoteOther(locked, other.revision);
   }
+}
+
+// The body that there was when everything was taken over up to `since`, if there was one.
+std::optional<BodyRecord> Registry::FormerBody(const std::string& id, const OtherChange& other,
+                                               uint64_t since) {
+  if (IsKnown(id)) {
+    const std::shared_ptr<const Body> body = FindBody(id);
+    return body == nullptr ? std::nullopt : std::optional(body->record());
+  }
+  if (other.former_was_body && other.former_began <= since) {
+    return BodyRecord{id, other.former_began, 0};
+  }
+  const bool was_there = other.former_began == 0 && other.body.has_value() && other.body->ok() &&
+                         (*other.body)->record.create_revision <= since;
+  return was_there ? std::optional((*other.body)->record) : std::nullopt;
 }
 
 // Whether it is another version of the hull that was known.
@@ -223,20 +237,15 @@ bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const Ot
 }
 
 void Registry::TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other) {
-  const auto found = bodies_.find(id);
-  if (!other.body.has_value()) {
-    if (found == bodies_.end()) return;
-    HULLD_CHECK(!found->second.in_flight);
-    locked.Discard(std::move(found->second.committed));
-    bodies_.erase(found);
-    --body_count_;
-    return;
+  const BodyTable::Entry* const entry = bodies_.Find(id);
+  HULLD_CHECK(entry == nullptr || !entry->in_flight);
+  if (other.body.has_value()) {
+    if (!is_cache_ && entry == nullptr) ++kept_bodies_;
+    AddBody(locked, id, *other.body);
+  } else if (entry != nullptr) {
+    if (!is_cache_) --kept_bodies_;
+    EraseBody(locked, id);
   }
-  if (found == bodies_.end()) ++body_count_;
-  const auto body = other.body->ok()
-                        ? std::make_shared<const Body>(**other.body, memory_)
-                        : std::make_shared<const Body>(id, other.body->status(), memory_);
-  locked.Discard(std::exchange(bodies_[id].committed, body));
 }
 
 }  // namespace hulld::server

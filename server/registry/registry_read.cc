@@ -144,7 +144,12 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
     std::optional<HullPointer> found = hulls_.Ask(id);
     if (!found.has_value() && !bodies_.contains(id)) {
       if (!may_wait) return WouldWait();
-      const absl::Status read = AwaitKnown(locked, ids, hulls, k, should_stop);
+      std::vector<const std::string*> wanted = {&id};
+      const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
+      for (const uint32_t due : std::span(hulls.due_).last(count)) {
+        if (due != k) wanted.push_back(&ids[hulls.hulls_[due].first]);
+      }
+      const absl::Status read = AwaitKnown(locked, wanted, should_stop);
       if (Stopped(should_stop)) return Cancelled();
       if (read.ok()) continue;
       known.view = read;
@@ -424,7 +429,7 @@ void Registry::SchedulePreparing(const HullPointer& hull) {
 absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
                                         size_t page_size,
                                         const std::function<bool()>& should_stop) {
-  if (is_cache_) return ListFound(prefix, after, page_size, should_stop);
+  if (is_cache_) return ListFoundHulls(prefix, after, page_size, should_stop);
   HullPage page;
   const std::lock_guard lock(mutex_);
   page.store_revision = revision_;

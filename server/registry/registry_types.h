@@ -23,6 +23,7 @@
 // What the registry is asked and what it answers.
 namespace hulld::server {
 
+// A body as one call sees it (bodies/served_body.h).
 struct ServedBody;
 
 // A hull as one reader sees it: what is served belongs to the record's revision. Or a body where
@@ -134,11 +135,13 @@ struct BodyPage {
   bool more = false;
 };
 
-// Bodies by ID, in the order asked for; null where there is none. Up to
-// Registry::kMostLookupsPerHold of them were all current at the revision.
+// Bodies by ID, in the order asked for, each of some moment of the call; null where there is none.
+// The last one was current at the revision.
 struct FoundBodies {
   uint64_t store_revision = 0;
   std::vector<std::shared_ptr<const Body>> bodies;
+  // Why some could not be looked for, which then are null, too.
+  absl::Status status;
 };
 
 struct RegistrySizes {

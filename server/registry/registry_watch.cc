@@ -45,7 +45,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
   const bool tells_bodies = feed_.TargetOf(watch).bodies;
   const auto is_there = [this, tells_bodies](const std::string& id) {
     if (bodies_.contains(id)) return tells_bodies && FindBody(id) != nullptr;
-    return hulls_.Knows(id) ? hulls_.IsVisible(id) : feed_.BeganAnew(id);
+    return hulls_.Knows(id) ? hulls_.IsVisible(id) : feed_.BeganAnew(id, tells_bodies);
   };
   switch (watch.stage) {
     case ChangeWatch::Stage::kDeletions:
@@ -83,10 +83,11 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   };
   auto hull = begin_of(hulls_.entries());
   const auto hulls_end = hulls_.entries().end();
-  auto body = target.bodies ? begin_of(bodies_) : bodies_.end();
+  const auto bodies_end = bodies_.entries().end();
+  auto body = target.bodies ? begin_of(bodies_.entries()) : bodies_end;
   for (size_t looked_at = 0;; ++looked_at) {
     const bool has_hull = hull != hulls_end && is_watched(hull->first);
-    const bool has_body = body != bodies_.end() && is_watched(body->first);
+    const bool has_body = body != bodies_end && is_watched(body->first);
     if (!has_hull && !has_body) break;
     if (looked_at == ChangeFeed::kMostPerPiece) return;
     if (!has_body || (has_hull && hull->first < body->first)) {
@@ -97,7 +98,7 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
       ++hull;
     } else {
       watch.last_id = body->first;
-      const auto& committed = body->second.committed;
+      const std::shared_ptr<const Body>& committed = body->second.committed();
       if (committed != nullptr && is_new(committed->record().revision)) {
         piece->changes.push_back(committed->Describe());
       }

@@ -91,18 +91,34 @@ ShardsPlan PlanOf(const PlacedLookup& lookup) {
   return lookup.canonical ? ShardsPlan{.freshness = lookup.plan.freshness} : lookup.plan;
 }
 
-// The bodies among the IDs; empty where there are none.
-Bodies BodiesAmong(const Shards& shards, std::span<const std::string> ids) {
-  if (!shards.has_bodies()) return {};
-  Bodies bodies = shards.FindBodies(ids);
-  if (std::ranges::all_of(bodies, [](const auto& body) { return body == nullptr; })) return {};
-  return bodies;
+// The bodies among the IDs; empty where there are none. What cannot be read now is not among them:
+// who looks for a hull under the ID is told why. CANCELLED, RESOURCE_EXHAUSTED: as FindBodies.
+absl::StatusOr<Bodies> BodiesAmong(Shards& shards, std::span<const std::string> ids,
+                                   const std::function<bool()>& should_stop) {
+  if (!shards.has_bodies()) return Bodies();
+  FoundBodies found = shards.FindBodies(ids, should_stop);
+  if (!found.status.ok() && !absl::IsUnavailable(found.status)) return found.status;
+  if (std::ranges::all_of(found.bodies, [](const auto& body) { return body == nullptr; })) {
+    return Bodies();
+  }
+  return std::move(found.bodies);
+}
+
+// One that was read again is another object. Of those that are damaged no more is known.
+bool IsSameBody(const std::shared_ptr<const Body>& a, const std::shared_ptr<const Body>& b) {
+  if (a == b) return true;
+  return a != nullptr && b != nullptr && a->record().revision == b->record().revision &&
+         a->damage().code() == b->damage().code();
 }
 
 }  // namespace
 
+bool KnownPlaced::AreBodies(const Bodies& bodies) const {
+  return std::ranges::equal(bodies, bodies_, IsSameBody);
+}
+
 void KnownPlaced::SetBodies(std::span<const std::string> ids, Bodies bodies) {
-  if (bodies == bodies_) return;
+  if (AreBodies(bodies)) return;
   bodies_ = std::move(bodies);
   hull_ids_.clear();
   index_of_.clear();
@@ -153,15 +169,16 @@ absl::StatusOr<ShardsResolved> ResolvePlaced(Shards& shards, std::span<const std
 absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std::string> ids,
                                              KnownPlaced& known, const PlacedLookup& lookup,
                                              const std::function<bool()>& should_stop) {
-  Bodies bodies = BodiesAmong(shards, ids);
+  absl::StatusOr<Bodies> bodies = BodiesAmong(shards, ids, should_stop);
   absl::StatusOr<ShardsResolved> hulls;
   bool have_changed = true;
   while (have_changed) {
+    if (!bodies.ok()) return bodies.status();
     have_changed = false;
-    known.SetBodies(ids, std::move(bodies));
+    known.SetBodies(ids, *std::move(bodies));
     const auto holds = [&] {
-      bodies = BodiesAmong(shards, ids);
-      have_changed = bodies != known.bodies_;
+      bodies = BodiesAmong(shards, ids, should_stop);
+      have_changed = !bodies.ok() || !known.AreBodies(*bodies);
       return !have_changed;
     };
     // The shards of the bodies belong to the call, too.
@@ -192,7 +209,12 @@ absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std
 
 std::optional<ShardsResolved> TryResolvePlaced(Shards& shards, std::span<const std::string> ids,
                                                const PlacedLookup& lookup) {
-  if (!BodiesAmong(shards, ids).empty()) return std::nullopt;
+  if (shards.has_bodies()) {
+    const std::optional<FoundBodies> found = shards.TryFindBodies(ids);
+    if (!found.has_value()) return std::nullopt;
+    const auto is_none = [](const auto& body) { return body == nullptr; };
+    if (!std::ranges::all_of(found->bodies, is_none)) return std::nullopt;
+  }
   std::optional<ShardsResolved> resolved = shards.TryResolve(ids, PlanOf(lookup));
   if (!resolved.has_value()) return resolved;
   for (const absl::StatusOr<HullView>& hull : resolved->hulls) {

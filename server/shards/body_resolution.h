@@ -12,24 +12,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "core/query/body/query_body.h"
+#include "server/registry/bodies/served_body.h"
 #include "server/registry/body.h"
 #include "server/shards/known_in_shards.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
-
-// A body as one call sees it, with the hulls of its pieces, which it keeps; counted against
-// --memory-limit while it is there.
-struct ServedBody {
-  std::shared_ptr<const Body> body;
-  // In the order of Body::hull_ids().
-  std::vector<HullView> hulls;
-  QueryBody query;
-  MemoryCharge charge;
-
-  const HullView& hull_of(uint32_t piece) const { return hulls[body->pieces()[piece].hull]; }
-};
 
 // How hulls are looked up for questions.
 struct PlacedLookup {
@@ -54,6 +42,8 @@ class KnownPlaced {
 
   using Bodies = std::vector<std::shared_ptr<const Body>>;
 
+  // Whether the bodies among the IDs are those of before, at the same revisions.
+  bool AreBodies(const Bodies& bodies) const;
   // Takes the bodies among the IDs; where they are others than before, nothing is known of hulls.
   void SetBodies(std::span<const std::string> ids, Bodies bodies);
   bool has_bodies() const { return !bodies_.empty(); }

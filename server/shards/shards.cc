@@ -21,25 +21,39 @@ Limits LimitsOfShard(Limits limits, size_t shards) {
   return limits;
 }
 
-// The first of some sorted pages, all of them merged. id_of: of an entry.
-template <typename Page, typename Entries, typename IdOf>
-Page MergePages(const std::vector<Entries>& pages, bool any_more, size_t page_size,
-                Entries Page::*entries, const IdOf& id_of) {
-  Page merged;
+// The first of some sorted pages, all of them merged. A page that is not its shard's last may hold
+// few: what comes after its end is not known, so that nothing that does is in the merged one.
+// id_of: of an entry.
+template <typename Page, typename IdOf>
+auto MergePages(const std::vector<Page>& pages, size_t page_size, const IdOf& id_of) {
+  std::pair<decltype(pages.front().entries), bool> merged;
+  auto& [entries, more] = merged;
   std::vector<size_t> next(pages.size());
-  while ((merged.*entries).size() < page_size) {
+  const auto is_at_end = [&](size_t i) { return next[i] == pages[i].entries.size(); };
+  while (entries.size() < page_size) {
     std::optional<size_t> first;
+    bool is_known = true;
     for (size_t i = 0; i < pages.size(); ++i) {
-      if (next[i] == pages[i].size()) continue;
-      if (!first || id_of(pages[i][next[i]]) < id_of(pages[*first][next[*first]])) first = i;
+      if (is_at_end(i)) {
+        is_known = is_known && !pages[i].more;
+      } else if (!first ||
+                 id_of(pages[i].entries[next[i]]) < id_of(pages[*first].entries[next[*first]])) {
+        first = i;
+      }
     }
-    if (!first) break;
-    (merged.*entries).push_back(pages[*first][next[*first]++]);
+    if (!first || !is_known) break;
+    entries.push_back(pages[*first].entries[next[*first]++]);
   }
-  merged.more = any_more;
-  for (size_t i = 0; i < pages.size(); ++i) merged.more |= next[i] < pages[i].size();
+  for (size_t i = 0; i < pages.size(); ++i) more |= pages[i].more || !is_at_end(i);
   return merged;
 }
+
+// One shard's part of a list.
+template <typename Entry>
+struct PartOfList {
+  std::vector<Entry> entries;
+  bool more = false;
+};
 
 }  // namespace
 
@@ -96,49 +110,44 @@ absl::Status Shards::CheckMemory(MemoryUse use) {
 absl::StatusOr<ShardsHullPage> Shards::List(const std::string& prefix, const std::string& after,
                                             size_t page_size,
                                             const std::function<bool()>& should_stop) {
-  std::vector<std::vector<ListedHull>> pages;
+  std::vector<PartOfList<ListedHull>> parts;
   ShardRevisions revisions;
-  bool more = false;
   for (size_t shard = 0; shard < size(); ++shard) {
     absl::StatusOr<HullPage> page = at(shard).List(prefix, after, page_size, should_stop);
     if (!page.ok()) return page.status();
     revisions.push_back({shard, page->store_revision});
-    more |= page->more;
-    if (size() == 1) return ShardsHullPage{std::move(revisions), std::move(page->hulls), more};
-    pages.push_back(std::move(page->hulls));
+    parts.push_back({std::move(page->hulls), page->more});
   }
-  auto merged = MergePages<ShardsHullPage>(
-      pages, more, page_size, &ShardsHullPage::hulls,
-      [](const ListedHull& hull) -> const std::string& { return hull.record.hull_id; });
-  merged.revisions = std::move(revisions);
-  return merged;
+  auto [hulls, more] =
+      MergePages(parts, page_size,
+                 [](const ListedHull& hull) -> const std::string& { return hull.record.hull_id; });
+  return ShardsHullPage{std::move(revisions), std::move(hulls), more};
 }
 
-ShardsBodyPage Shards::ListBodies(const std::string& prefix, const std::string& after,
-                                  size_t page_size) const {
-  std::vector<std::vector<std::shared_ptr<const Body>>> pages;
+absl::StatusOr<ShardsBodyPage> Shards::ListBodies(const std::string& prefix,
+                                                  const std::string& after, size_t page_size,
+                                                  const std::function<bool()>& should_stop) {
+  std::vector<PartOfList<std::shared_ptr<const Body>>> parts;
   ShardRevisions revisions;
-  bool more = false;
   for (size_t shard = 0; shard < size(); ++shard) {
-    BodyPage page = at(shard).ListBodies(prefix, after, page_size);
-    revisions.push_back({shard, page.store_revision});
-    more |= page.more;
-    if (size() == 1) return {std::move(revisions), std::move(page.bodies), more};
-    pages.push_back(std::move(page.bodies));
+    absl::StatusOr<BodyPage> page = at(shard).ListBodies(prefix, after, page_size, should_stop);
+    if (!page.ok()) return page.status();
+    revisions.push_back({shard, page->store_revision});
+    parts.push_back({std::move(page->bodies), page->more});
   }
-  auto merged =
-      MergePages<ShardsBodyPage>(pages, more, page_size, &ShardsBodyPage::bodies,
-                                 [](const std::shared_ptr<const Body>& body) -> const std::string& {
-                                   return body->record().body_id;
-                                 });
-  merged.revisions = std::move(revisions);
-  return merged;
+  auto [bodies, more] = MergePages(
+      parts, page_size, [](const std::shared_ptr<const Body>& body) -> const std::string& {
+        return body->record().body_id;
+      });
+  return ShardsBodyPage{std::move(revisions), std::move(bodies), more};
 }
 
-std::vector<std::shared_ptr<const Body>> Shards::FindBodies(
-    std::span<const std::string> ids) const {
-  if (size() == 1) return at(0).FindBodies(ids).bodies;
-  std::vector<std::shared_ptr<const Body>> bodies(ids.size());
+FoundBodies Shards::FindBodiesInEach(
+    std::span<const std::string> ids,
+    const std::function<FoundBodies(Registry&, std::span<const std::string>)>& find) {
+  if (size() == 1) return find(at(0), ids);
+  FoundBodies all;
+  all.bodies.resize(ids.size());
   std::vector<std::vector<size_t>> places(size());
   for (size_t i = 0; i < ids.size(); ++i) places[shard_of(ids[i])].push_back(i);
   for (size_t shard = 0; shard < size(); ++shard) {
@@ -146,12 +155,31 @@ std::vector<std::shared_ptr<const Body>> Shards::FindBodies(
     std::vector<std::string> asked;
     asked.reserve(places[shard].size());
     for (const size_t i : places[shard]) asked.push_back(ids[i]);
-    FoundBodies found = at(shard).FindBodies(asked);
+    FoundBodies found = find(at(shard), asked);
+    all.status.Update(found.status);
     for (size_t k = 0; k < places[shard].size(); ++k) {
-      bodies[places[shard][k]] = std::move(found.bodies[k]);
+      all.bodies[places[shard][k]] = std::move(found.bodies[k]);
     }
   }
-  return bodies;
+  return all;
+}
+
+FoundBodies Shards::FindBodies(std::span<const std::string> ids,
+                               const std::function<bool()>& should_stop) {
+  return FindBodiesInEach(ids, [&](Registry& registry, std::span<const std::string> some) {
+    return registry.FindBodies(some, should_stop);
+  });
+}
+
+std::optional<FoundBodies> Shards::TryFindBodies(std::span<const std::string> ids) {
+  FoundBodies all =
+      FindBodiesInEach(ids, [](Registry& registry, std::span<const std::string> some) {
+        std::optional<FoundBodies> found = registry.TryFindBodies(some);
+        if (found.has_value()) return *std::move(found);
+        return FoundBodies{0, std::vector<std::shared_ptr<const Body>>(some.size()),
+                           absl::UnavailableError("it would have to wait")};
+      });
+  return all.status.ok() ? std::optional(std::move(all)) : std::nullopt;
 }
 
 bool Shards::has_bodies() const {

@@ -95,10 +95,13 @@ class Shards {
   absl::StatusOr<ShardsHullPage> List(const std::string& prefix, const std::string& after,
                                       size_t page_size,
                                       const std::function<bool()>& should_stop = {});
-  ShardsBodyPage ListBodies(const std::string& prefix, const std::string& after,
-                            size_t page_size) const;
-  // As Registry::FindBodies.
-  std::vector<std::shared_ptr<const Body>> FindBodies(std::span<const std::string> ids) const;
+  absl::StatusOr<ShardsBodyPage> ListBodies(const std::string& prefix, const std::string& after,
+                                            size_t page_size,
+                                            const std::function<bool()>& should_stop = {});
+  // As those of Registry, but for the revision, which is none.
+  FoundBodies FindBodies(std::span<const std::string> ids,
+                         const std::function<bool()>& should_stop);
+  std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids);
   bool has_bodies() const;
 
   // As Registry::Refresh. A read that is linearizable and concerns several shards is of one
@@ -152,6 +155,9 @@ class Shards {
     std::vector<uint64_t> lookups;
   };
 
+  FoundBodies FindBodiesInEach(
+      std::span<const std::string> ids,
+      const std::function<FoundBodies(Registry&, std::span<const std::string>)>& find);
   void Begin(std::span<const std::string> ids, std::span<const std::string> also,
              KnownInShards& known) const;
   absl::StatusOr<std::chrono::nanoseconds> AwaitFreshIn(std::span<const size_t> shards,

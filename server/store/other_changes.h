@@ -22,8 +22,10 @@ struct OtherChange {
   uint64_t revision = 0;
   // At which an incarnation ended last; 0: none did.
   uint64_t ended_at = 0;
-  // create_revision of the first incarnation that ended; 0: none did, or that is not known.
+  // create_revision of the first incarnation that ended, and whether it was a body's; 0: none did,
+  // or that is not known.
   uint64_t former_began = 0;
+  bool former_was_body = false;
   // What there is by now: one of the two, or nothing. DATA_LOSS: it is damaged.
   std::optional<absl::StatusOr<StoredHull>> hull;
   std::optional<absl::StatusOr<StoredBody>> body;
@@ -36,6 +38,7 @@ struct OtherChange {
 struct StoreTotals {
   uint64_t hulls = 0;
   uint64_t vertices = 0;
+  uint64_t bodies = 0;
 };
 
 // What other servers committed to a store that is shared (Store::is_shared), up to a moment.

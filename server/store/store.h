@@ -56,6 +56,8 @@ struct Change {
   // Whether this is a new incarnation of the hull, or the beginning of the body.
   bool begins = false;
   bool deleted = false;
+  // Of a body that begins: whether there is one whose place it takes, as one that is damaged.
+  bool replaces_body = false;
   // A change of a hull that neither begins nor ends: its revisions when all changes that were
   // submitted before are committed, and those of the same batch are not.
   std::shared_ptr<const HullRevisions> before;
@@ -85,14 +87,21 @@ using StoredHullVisitor = std::function<void(const std::string&, absl::StatusOr<
 // The same for bodies.
 using StoredBodyVisitor = std::function<void(const std::string&, absl::StatusOr<StoredBody>)>;
 
-// What a store holds of hulls that were asked for, all of it of one moment.
-struct FoundHulls {
+// What a store holds of hulls and bodies that were asked for, all of it of one moment.
+struct FoundRecords {
   // The store's at that moment.
   uint64_t revision = 0;
-  // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull.
+  // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull, or the body.
   std::map<std::string, absl::StatusOr<StoredHull>> hulls;
+  std::map<std::string, absl::StatusOr<StoredBody>> bodies;
   // Of a list: whether there are others after these.
   bool more = false;
+};
+
+// What a list is of.
+struct RecordKinds {
+  bool hulls = false;
+  bool bodies = false;
 };
 
 // Operations that failed so far, each counted once, by what the system refused.
@@ -146,14 +155,18 @@ class Store {
   // them at first. What is found holds everything that was committed by the time of the call, by
   // this server or another. UNAVAILABLE: the store cannot be read.
   virtual bool finds_records() const { return false; }
-  virtual absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> /*ids*/) {
+  // What there is under these IDs, hulls and bodies.
+  virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {
     return absl::UnimplementedError("this store does not find records");
   }
-  // At most so many hulls whose IDs start with `prefix` and come after `after`, in byte order.
-  virtual absl::StatusOr<FoundHulls> ListHulls(const std::string& /*prefix*/,
-                                               const std::string& /*after*/, size_t /*most*/) {
+  // At most so many, of these kinds, whose IDs start with `prefix` and come after `after`, in byte
+  // order. Fewer, but one at least, where they take more than kMostListedBytes.
+  virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
+                                                   const std::string& /*after*/, size_t /*most*/,
+                                                   RecordKinds /*kinds*/) {
     return absl::UnimplementedError("this store does not find records");
   }
+  static constexpr uint64_t kMostListedBytes = 16 << 20;
   // What there is at revision(), where records are found. Never while Commit runs.
   virtual StoreTotals totals() const { return {}; }
 

@@ -177,7 +177,7 @@ absl::Status CollisionWatch::HandleOpen(v1::CollisionWatchOpen& open) {
   if (absl::Status s = WatchHulls(); !s.ok()) return s;
   std::vector<size_t> all_hulls(table_.hull_ids().size());
   std::iota(all_hulls.begin(), all_hulls.end(), size_t{0});
-  FollowPieces(all_hulls);
+  if (absl::Status s = FollowPieces(all_hulls); !s.ok()) return s;
 
   // It is worth the wait, as each hull is asked about again and again.
   const uint64_t per_hull = 2 * table_.size() / std::max<size_t>(1, table_.hull_ids().size());
@@ -219,15 +219,17 @@ absl::Status CollisionWatch::WatchHulls() {
 
 // From now on changes of the hulls of pieces are noticed, of those of the table's that are bodies.
 // A body that changes after this is noticed itself: then it is followed, and resolved, once more.
-void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
-  if (!shards_.has_bodies() && pieces_.MemoryBytes() == 0) return;
+// As Shards::FindBodies where a body cannot be read.
+absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
+  if (!shards_.has_bodies() && pieces_.MemoryBytes() == 0) return absl::OkStatus();
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(table_.hull_ids()[k]);
-  const std::vector<std::shared_ptr<const Body>> found = shards_.FindBodies(ids);
+  const FoundBodies found = shards_.FindBodies(ids, [this] { return call().ShouldStop(); });
+  if (!found.status.ok()) return found.status;
   FollowedPieces::Difference difference;
   for (size_t n = 0; n < hulls.size(); ++n) {
-    const std::shared_ptr<const Body>& body = found[n];
+    const std::shared_ptr<const Body>& body = found.bodies[n];
     const bool is_asked = body != nullptr && CheckPiecePrefix(*body, call().caller().prefix).ok();
     pieces_.Set(hulls[n], is_asked ? body->hull_ids() : std::vector<std::string>(), &difference);
   }
@@ -236,8 +238,10 @@ void CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   const auto is_placed = [this](const std::string& id) { return hulls_of_.contains(id); };
   std::erase_if(difference.added, is_placed);
   std::erase_if(difference.dropped, is_placed);
-  if (difference.added.empty() && difference.dropped.empty()) return;
-  watch_->WatchAlso(difference.added, difference.dropped);
+  if (!difference.added.empty() || !difference.dropped.empty()) {
+    watch_->WatchAlso(difference.added, difference.dropped);
+  }
+  return absl::OkStatus();
 }
 
 // The client is to hear of a hull, or of a body and the hulls of its pieces.
@@ -306,7 +310,7 @@ absl::Status CollisionWatch::HandleChanges(const ShardsWatchPiece& piece) {
   const std::vector<size_t> hulls = ConcernedBy(piece);
   const bool has_moved_on = TakeLater(piece.revisions, &revisions_);
   if (hulls.empty() && !has_moved_on) return absl::OkStatus();
-  FollowPieces(hulls);
+  if (absl::Status s = FollowPieces(hulls); !s.ok()) return s;
   if (absl::Status s = table_.ResolveSome(shards_, options_, hulls); !s.ok()) return s;
   std::vector<uint32_t> changed;
   for (const size_t k : hulls) {

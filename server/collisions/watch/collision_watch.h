@@ -67,7 +67,7 @@ class CollisionWatch : public ReadingStream<QueuedStream<BidiReactor, v1::WatchC
   absl::Status HandleMessage();
   absl::Status HandleOpen(v1::CollisionWatchOpen& open);
   absl::Status WatchHulls();
-  void FollowPieces(std::span<const size_t> hulls);
+  absl::Status FollowPieces(std::span<const size_t> hulls);
   std::vector<size_t> ConcernedBy(const ShardsWatchPiece& piece) const;
   void TellOf(size_t hull);
   void TellOfPieces(size_t hull);

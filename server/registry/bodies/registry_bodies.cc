@@ -1,9 +1,10 @@
 // Bodies: which there are, and how they begin, change and end. A body is small beside the hulls of
-// its pieces, so all of it is in memory at all times, counted as what calls hold for long is.
+// its pieces, so what is known of one is all of it, counted as what calls hold for long is.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/check.h"
@@ -37,24 +38,34 @@ absl::Status HullHasTheId(const std::string& id) {
 
 }  // namespace
 
-absl::Status Registry::LoadBodies() {
-  return store_.ForEachBody([this](const std::string& id, absl::StatusOr<StoredBody> stored) {
+absl::Status Registry::LoadBodies(Locked& locked) {
+  return store_.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
     // Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
     if (hulls_.contains(id)) {
       spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
       return;
     }
-    std::shared_ptr<const Body> body;
-    if (stored.ok()) {
-      body = std::make_shared<const Body>(*std::move(stored), memory_);
-    } else {
-      spdlog::error("{}", std::string(stored.status().message()));
-      ++cache_.damaged;
-      body = std::make_shared<const Body>(id, stored.status(), memory_);
-    }
-    bodies_[id].committed = std::move(body);
-    ++body_count_;
+    AddBody(locked, id, stored);
+    ++kept_bodies_;
   });
+}
+
+// What the store holds, in the place of what was known.
+void Registry::AddBody(Locked& locked, const std::string& id,
+                       const absl::StatusOr<StoredBody>& stored) {
+  if (!stored.ok()) {
+    spdlog::error("{}", std::string(stored.status().message()));
+    ++cache_.damaged;
+  }
+  bodies_.Add(id);
+  bodies_.Set(locked, id, std::make_shared<const Body>(id, stored, memory_, UseOfRead()));
+  hulls_.ForgetAbsent(id);
+}
+
+// There is none any more.
+void Registry::EraseBody(Locked& locked, const std::string& id) {
+  bodies_.Erase(locked, id);
+  if (is_cache_) hulls_.NoteAbsent(id);
 }
 
 // NOT_FOUND, which says so where the ID is a body's.
@@ -68,7 +79,7 @@ absl::Status Registry::NoSuchHull(const std::string& id) const {
 void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());
-  const auto shared = std::make_shared<Body>(std::move(body), memory_);
+  const auto shared = std::make_shared<Body>(std::move(body), memory_, MemoryUse::kWriting);
   WhenFresh(done, [=, this](Locked& locked) {
     // Counted by now. What waits for others is not counted twice.
     if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
@@ -82,20 +93,20 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
 absl::Status Registry::CheckBody(Locked&, const std::string& id,
                                  std::optional<uint64_t> if_revision) {
   if (hulls_.contains(id)) return HullHasTheId(id);
-  const auto found = bodies_.find(id);
-  const uint64_t revision = found == bodies_.end() ? 0 : found->second.committed->record().revision;
+  const std::shared_ptr<const Body> body = FindBody(id);
+  const uint64_t revision = body == nullptr ? 0 : body->record().revision;
   if (if_revision.has_value() && *if_revision != revision) {
     return BodyMismatch(id, revision, *if_revision);
   }
-  return found == bodies_.end() ? CheckHullCount() : absl::OkStatus();
+  return body == nullptr ? CheckHullCount() : absl::OkStatus();
 }
 
 void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                              std::optional<uint64_t> if_revision,
                              const Reply<PutBodyResult>& done) {
   const std::string& id = body->record().body_id;
-  if (const auto found = bodies_.find(id); found != bodies_.end() && found->second.in_flight) {
-    found->second.waiting.push_back(
+  if (BodyTable::Entry* const entry = BodyInFlight(id); entry != nullptr) {
+    entry->waiting.push_back(
         [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
     return;
   }
@@ -103,19 +114,29 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
   }
+  if (const HullPointer hull = Find(id); hull != nullptr && hull->state.changing_life()) {
+    hull->exclusive.push_back(
+        [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+    return;
+  }
   if (absl::Status s = CheckBody(locked, id, if_revision); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
   }
-  const auto [entry, is_new] = bodies_.try_emplace(id);
-  if (is_new) ++body_count_;
+  const bool is_new = !bodies_.contains(id);
+  const BodyTable::Entry& entry = bodies_.Add(id);
+  hulls_.ForgetAbsent(id);
+  if (is_new) ++creating_bodies_;
   Change change;
   change.body = body->stored();
   uint64_t& created = change.body->record.create_revision;
-  created = is_new ? 0 : entry->second.committed->record().create_revision;
+  created = is_new ? 0 : entry.committed()->record().create_revision;
   // One that was damaged begins anew.
   change.begins = created == 0;
+  change.replaces_body = change.begins && !is_new;
   SubmitBody(locked, std::move(change),
-             [=, this, is_new = is_new](Locked& later, const absl::Status& status, const Change&) {
+             [=, this](Locked& later, const absl::Status& status, const Change&) {
+               if (is_new) --creating_bodies_;
+               if (is_new && status.ok()) ++kept_bodies_;
                if (Committer::IsSuperseded(status)) {
                  return Again(later, [=, this](Locked& again) {
                    PutBodyLocked(again, body, if_revision, done);
@@ -123,7 +144,7 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                }
                const BodyRecord& record = body->record();
                if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
-               later.Discard(std::exchange(bodies_.at(record.body_id).committed, body));
+               bodies_.Set(later, record.body_id, body);
                Answer<PutBodyResult>(
                    later, done, PutBodyResult{revision_, record, body->pieces().size(), is_new});
              });
@@ -140,8 +161,8 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { DeleteBodyLocked(later, id, if_revision, done); });
   }
-  const auto found = bodies_.find(id);
-  if (found == bodies_.end()) {
+  BodyTable::Entry* const entry = bodies_.Find(id);
+  if (entry == nullptr) {
     const absl::Status missing =
         hulls_.contains(id)
             ? WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
@@ -149,12 +170,12 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
             : BodyNotFound(id);
     return Answer<uint64_t>(locked, done, missing);
   }
-  if (found->second.in_flight) {
-    found->second.waiting.push_back(
+  if (entry->in_flight) {
+    entry->waiting.push_back(
         [=, this](Locked& later) { DeleteBodyLocked(later, id, if_revision, done); });
     return;
   }
-  const std::shared_ptr<const Body> body = found->second.committed;
+  const std::shared_ptr<const Body> body = entry->committed();
   if (if_revision.has_value() && *if_revision != body->record().revision) {
     return Answer<uint64_t>(locked, done, BodyMismatch(id, body->record().revision, *if_revision));
   }
@@ -169,7 +190,8 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
                  });
                }
                if (!status.ok()) return Answer<uint64_t>(later, done, status);
-               later.Discard(std::exchange(bodies_.at(id).committed, nullptr));
+               --kept_bodies_;
+               bodies_.Set(later, id, nullptr);
                Answer<uint64_t>(later, done, deletion.revision);
              });
 }
@@ -178,76 +200,104 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
 // body goes on.
 void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
-  HULLD_CHECK(!std::exchange(bodies_.at(id).in_flight, true));
-  committer_.Submit(locked, std::move(change),
-                    [this, id, finish = std::move(finish)](
-                        Locked& later, const absl::Status& status, Change& committed) {
-                      const std::shared_ptr<const Body> former = bodies_.at(id).committed;
-                      if (status.ok()) Publish(committed.revision);
-                      // Where readers look for a hull with this ID.
-                      if (status.ok()) recent_changes_.Note(id);
-                      finish(later, status, committed);
-                      RegisteredBody& body = bodies_.at(id);
-                      if (status.ok() && body.committed != nullptr) {
-                        feed_.NoteBodyPut(later, former, body.committed);
-                      } else if (status.ok()) {
-                        feed_.NoteBodyDeleted(later, *former, committed.revision);
-                      }
-                      body.in_flight = false;
-                      std::deque<std::function<void(Locked&)>> waiting =
-                          std::exchange(body.waiting, {});
-                      // Nothing was there before a creation that was refused, nor is after a
-                      // deletion.
-                      if (body.committed == nullptr) {
-                        bodies_.erase(id);
-                        --body_count_;
-                      }
-                      for (auto& next : waiting) {
-                        if (Committer::IsSuperseded(status)) {
-                          after_others_.push_back(std::move(next));
-                        } else {
-                          next(later);
-                        }
-                      }
-                    });
+  HULLD_CHECK(!std::exchange(bodies_.Find(id)->in_flight, true));
+  committer_.Submit(
+      locked, std::move(change),
+      [this, id, finish = std::move(finish)](Locked& later, const absl::Status& status,
+                                             Change& committed) {
+        const std::shared_ptr<const Body> former = FindBody(id);
+        if (status.ok()) Publish(committed.revision);
+        // Where readers look for a hull with this ID.
+        if (status.ok()) recent_changes_.Note(id);
+        finish(later, status, committed);
+        BodyTable::Entry& entry = *bodies_.Find(id);
+        if (status.ok() && entry.committed() != nullptr) {
+          const BodyRecord* const before = former == nullptr ? nullptr : &former->record();
+          feed_.NoteBodyPut(later, before, entry.committed());
+        } else if (status.ok()) {
+          feed_.NoteBodyDeleted(later, former->record(), committed.revision);
+        }
+        entry.in_flight = false;
+        std::deque<std::function<void(Locked&)>> waiting = std::exchange(entry.waiting, {});
+        // Nothing was there before a creation that was refused, nor is after a deletion.
+        if (entry.committed() == nullptr) EraseBody(later, id);
+        for (auto& next : waiting) {
+          if (Committer::IsSuperseded(status)) {
+            after_others_.push_back(std::move(next));
+          } else {
+            next(later);
+          }
+        }
+        bodies_.DropSome(later);
+      });
 }
 
-std::shared_ptr<const Body> Registry::FindBody(const std::string& id) const {
-  const auto found = bodies_.find(id);
-  return found == bodies_.end() ? nullptr : found->second.committed;
+std::shared_ptr<const Body> Registry::FindBody(const std::string& id) {
+  const BodyTable::Entry* const entry = bodies_.Find(id);
+  return entry == nullptr ? nullptr : entry->committed();
 }
 
-BodyPage Registry::ListBodies(const std::string& prefix, const std::string& after,
-                              size_t page_size) const {
+BodyTable::Entry* Registry::BodyInFlight(const std::string& id) {
+  BodyTable::Entry* const entry = bodies_.Find(id);
+  return entry != nullptr && entry->in_flight ? entry : nullptr;
+}
+
+absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const std::string& after,
+                                              size_t page_size,
+                                              const std::function<bool()>& should_stop) {
+  if (is_cache_) return ListFoundBodies(prefix, after, page_size, should_stop);
   BodyPage page;
   const std::lock_guard lock(mutex_);
   page.store_revision = revision_;
-  auto next = after.empty() ? bodies_.lower_bound(prefix) : bodies_.upper_bound(after);
-  for (; next != bodies_.end() && next->first.starts_with(prefix); ++next) {
-    if (next->second.committed == nullptr) continue;
+  const BodyTable::Entries& all = bodies_.entries();
+  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
+  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
+    const std::shared_ptr<const Body>& body = next->second.committed();
+    if (body == nullptr) continue;
     if (page.bodies.size() == page_size) {
       page.more = true;
       break;
     }
-    page.bodies.push_back(next->second.committed);
+    page.bodies.push_back(body);
   }
   return page;
 }
 
-FoundBodies Registry::FindBodies(std::span<const std::string> ids) const {
+// kMostLookupsPerHold at a time. Of those what is not known is read, all at once; who reads much
+// may drop it again meanwhile, so what was found before is not looked for again.
+FoundBodies Registry::FindBodies(Locked& locked, std::span<const std::string> ids,
+                                 const std::function<bool()>& should_stop, bool may_wait) {
   FoundBodies found;
-  found.bodies.reserve(ids.size());
-  Locked locked(mutex_);
-  for (const std::string& id : ids) {
-    if (locked.lookups() == kMostLookupsPerHold) {
+  found.bodies.resize(ids.size());
+  for (size_t first = 0; first < ids.size(); first += kMostLookupsPerHold) {
+    if (first > 0) {
       locked.Unlock();
       locked.Lock();
     }
-    found.bodies.push_back(FindBody(id));
-    locked.NoteLookup();
+    const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
+    for (size_t i = first; i < end; ++i) {
+      while (found.status.ok() && !IsKnown(ids[i])) {
+        found.status = ReadMissing(locked, ids.subspan(i, end - i), should_stop, may_wait);
+      }
+      // Also what could not be read may be known by now.
+      found.bodies[i] = FindBody(ids[i]);
+      locked.NoteLookup();
+    }
   }
   found.store_revision = revision_;
   return found;
+}
+
+FoundBodies Registry::FindBodies(std::span<const std::string> ids,
+                                 const std::function<bool()>& should_stop) {
+  Locked locked(mutex_);
+  return FindBodies(locked, ids, should_stop, true);
+}
+
+std::optional<FoundBodies> Registry::TryFindBodies(std::span<const std::string> ids) {
+  Locked locked(mutex_);
+  FoundBodies found = FindBodies(locked, ids, {}, false);
+  return found.status.ok() ? std::optional(std::move(found)) : std::nullopt;
 }
 
 }  // namespace hulld::server

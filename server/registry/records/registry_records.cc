@@ -9,10 +9,10 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "core/base/check.h"
+#include "server/contract/stopped_call.h"
 #include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 
@@ -26,8 +26,6 @@ constexpr size_t kMostThreads = 2;
 // those that load points.
 constexpr ClientId kRecordReader = 1;
 constexpr ClientId kWatchReader = 2;
-// How soon who waits notices that its call was cancelled.
-constexpr std::chrono::milliseconds kCancellationPoll(20);
 
 // The store was asked after it had said to be at `asked_at`.
 absl::Status WentBack(uint64_t found, uint64_t asked_at) {
@@ -40,6 +38,11 @@ absl::Status IsAhead(uint64_t found, uint64_t known) {
   return absl::UnavailableError(absl::StrCat("the store holds changes up to revision ", found,
                                              ", and only those up to ", known,
                                              " are known to be committed; try again"));
+}
+
+// Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
+void NoteBodyUnderHull(const std::string& id) {
+  spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
 }
 
 }  // namespace
@@ -79,41 +82,52 @@ void Registry::ReadDue() {
   }
 }
 
-// For a reader: makes an ID known, and with it others that are due. Releases the mutex. Why it
-// could not be read, or CANCELLED; OK: it was known at some moment since.
-absl::Status Registry::AwaitKnown(Locked& locked, std::span<const std::string> ids,
-                                  KnownHulls& hulls, uint32_t k,
+// For a reader: makes the first ID known, and with it others, at most kMostAtOnce, that are due.
+// Releases the mutex. Why it could not be read, or CANCELLED; OK: it was known at some moment
+// since.
+absl::Status Registry::AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
                                   const std::function<bool()>& should_stop) {
+  HULLD_CHECK(!ids.empty() && ids.size() <= kMostAtOnce);
   // What is due does not wait meanwhile.
   locked.Unlock();
   locked.Lock();
   Readings own;
   std::shared_ptr<Reading> awaited;
-  const auto read = [&](uint32_t hull) {
-    const std::string& id = ids[hulls.hulls_[hull].first];
-    if (IsKnown(id)) return;
-    std::shared_ptr<Reading>& reading = readings_[id];
+  for (const std::string* const id : ids) {
+    locked.NoteLookup();
+    if (IsKnown(*id)) {
+      if (awaited == nullptr) return absl::OkStatus();
+      continue;
+    }
+    std::shared_ptr<Reading>& reading = readings_[*id];
     if (reading == nullptr) {
       reading = std::make_shared<Reading>();
-      reading->id = id;
+      reading->id = *id;
       own.push_back(reading);
     }
-    if (hull == k) awaited = reading;
-  };
-  read(k);
-  if (awaited == nullptr) return absl::OkStatus();
-  const size_t count = std::min(hulls.due_.size(), kMostAtOnce - 1);
-  for (const uint32_t due : std::span(hulls.due_).last(count)) {
-    locked.NoteLookup();
-    if (due != k) read(due);
+    if (awaited == nullptr) awaited = reading;
   }
   if (!own.empty()) ReadRecords(locked, own);
   const auto is_over = [&] { return awaited->is_over; };
   while (!is_over()) {
-    if (should_stop && should_stop()) return absl::CancelledError("the call was cancelled");
-    locked.WaitOn([&](auto& lock) { awaited->over.wait_for(lock, kCancellationPoll, is_over); });
+    if (Stopped(should_stop)) return Cancelled();
+    locked.WaitOn([&](auto& lock) { awaited->over.wait_for(lock, kStopPoll, is_over); });
   }
   return awaited->status;
+}
+
+// The same for those of these IDs that are not known, of which the first is one.
+absl::Status Registry::ReadMissing(Locked& locked, std::span<const std::string> ids,
+                                   const std::function<bool()>& should_stop, bool may_wait) {
+  if (!may_wait) return absl::UnavailableError("it would have to wait");
+  if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  std::vector<const std::string*> missing;
+  for (const std::string& id : ids) {
+    if (!IsKnown(id)) missing.push_back(&id);
+  }
+  const absl::Status read = AwaitKnown(locked, missing, should_stop);
+  if (Stopped(should_stop)) return Cancelled();
+  return read;
 }
 
 // Releases the mutex meanwhile. They may be over later than that.
@@ -123,21 +137,21 @@ void Registry::ReadRecords(Locked& locked, const Readings& readings) {
   for (const auto& reading : readings) ids.push_back(reading->id);
   const uint64_t asked_at = revision_;
   locked.Unlock();
-  absl::StatusOr<FoundHulls> found = store_.FindHulls(ids);
+  absl::StatusOr<FoundRecords> found = store_.FindRecords(ids);
   locked.Lock();
   WhenReached(locked, asked_at, std::move(found),
-              [this, readings](Locked& later, const absl::StatusOr<FoundHulls>& reached) {
+              [this, readings](Locked& later, const absl::StatusOr<FoundRecords>& reached) {
                 TakeRecords(later, readings, reached);
               });
 }
 
 // asked_at: what was known here when the store was asked.
-void Registry::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundHulls> found,
+void Registry::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                            FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
   if (!found.ok() || found->revision <= revision_) return take(locked, found);
   // After this round of the committer, what the store held is known here.
-  const auto kept = std::make_shared<const FoundHulls>(*std::move(found));
+  const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.Follow(
       locked, [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
         if (!status.ok()) return take(later, status);
@@ -147,22 +161,26 @@ void Registry::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<Fou
 }
 
 void Registry::TakeRecords(Locked& locked, const Readings& readings,
-                           const absl::StatusOr<FoundHulls>& found) {
+                           const absl::StatusOr<FoundRecords>& found) {
   // Before, so that what comes now is there for who waits for it.
   for (size_t i = 0; i < readings.size(); ++i) hulls_.RestSome();
+  bodies_.DropSome(locked);
   Readings open;
   for (const auto& reading : readings) {
     if (reading->is_over) continue;
-    if (found.ok()) TakeRecord(reading->id, *found);
+    if (found.ok()) TakeRecord(locked, reading->id, *found);
     open.push_back(reading);
   }
   for (const auto& reading : open) EndReading(locked, *reading, found.status());
 }
 
-void Registry::TakeRecord(const std::string& id, const FoundHulls& found) {
+void Registry::TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found) {
   HULLD_CHECK(!IsKnown(id));
   const auto hull = found.hulls.find(id);
-  if (hull == found.hulls.end()) return hulls_.NoteAbsent(id);
+  const auto body = found.bodies.find(id);
+  if (hull == found.hulls.end() && body == found.bodies.end()) return hulls_.NoteAbsent(id);
+  if (hull == found.hulls.end()) return AddBody(locked, id, body->second);
+  if (body != found.bodies.end()) NoteBodyUnderHull(id);
   AddStored(id, hull->second);
 }
 
@@ -193,25 +211,52 @@ void Registry::EndReadingOf(const std::string& id) {
   }
 }
 
-absl::StatusOr<HullPage> Registry::ListFound(const std::string& prefix, const std::string& after,
-                                             size_t page_size,
-                                             const std::function<bool()>& should_stop) {
+// What the store lists, once it is of no later moment than what is known here.
+absl::StatusOr<FoundRecords> Registry::ListFound(const std::string& prefix,
+                                                 const std::string& after, size_t page_size,
+                                                 RecordKinds kinds,
+                                                 const std::function<bool()>& should_stop) {
   uint64_t asked_at = 0;
   {
     const std::lock_guard lock(mutex_);
     asked_at = revision_;
   }
-  const absl::StatusOr<FoundHulls> found = store_.ListHulls(prefix, after, page_size);
-  if (!found.ok()) return found.status();
+  absl::StatusOr<FoundRecords> found = store_.ListRecords(prefix, after, page_size, kinds);
+  if (!found.ok()) return found;
   if (found->revision < asked_at) return WentBack(found->revision, asked_at);
+  Locked locked(mutex_);
+  if (found->revision <= revision_) return found;
+  if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
+  if (found->revision > revision_) return IsAhead(found->revision, revision_);
+  return found;
+}
+
+absl::StatusOr<BodyPage> Registry::ListFoundBodies(const std::string& prefix,
+                                                   const std::string& after, size_t page_size,
+                                                   const std::function<bool()>& should_stop) {
+  if (absl::Status s = CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  const absl::StatusOr<FoundRecords> found =
+      ListFound(prefix, after, page_size, {.bodies = true}, should_stop);
+  if (!found.ok()) return found.status();
+  BodyPage page;
+  page.store_revision = found->revision;
+  page.more = found->more;
+  for (const auto& [id, stored] : found->bodies) {
+    page.bodies.push_back(std::make_shared<const Body>(id, stored, memory_, MemoryUse::kReading));
+  }
+  return page;
+}
+
+absl::StatusOr<HullPage> Registry::ListFoundHulls(const std::string& prefix,
+                                                  const std::string& after, size_t page_size,
+                                                  const std::function<bool()>& should_stop) {
+  const absl::StatusOr<FoundRecords> found =
+      ListFound(prefix, after, page_size, {.hulls = true}, should_stop);
+  if (!found.ok()) return found.status();
   HullPage page;
   page.store_revision = found->revision;
   page.more = found->more;
   Locked locked(mutex_);
-  if (found->revision > revision_) {
-    if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
-    if (found->revision > revision_) return IsAhead(found->revision, revision_);
-  }
   for (const auto& [id, stored] : found->hulls) {
     if (locked.lookups() == kMostLookupsPerHold) {
       locked.Unlock();
@@ -248,18 +293,21 @@ void Registry::ReadPresent(Locked& locked, ChangeWatch& watch) {
   watch.is_reading = true;
   loaders_->Submit(
       [this, kept = watch.shared_from_this(), reading = ++watch.readings, asked_at = revision_,
-       after = watch.last_id, prefix = target.prefix, ids = target.ids] {
-        absl::StatusOr<FoundHulls> found =
-            ids.empty() ? store_.ListHulls(prefix, after, ChangeFeed::kMostPerPiece)
-                        : store_.FindHulls(std::span(ids).first(1));
+       after = watch.last_id, prefix = target.prefix, ids = target.ids, bodies = target.bodies] {
+        absl::StatusOr<FoundRecords> found =
+            ids.empty() ? store_.ListRecords(prefix, after, ChangeFeed::kMostPerPiece,
+                                             {.hulls = true, .bodies = bodies})
+                        : store_.FindRecords(std::span(ids).first(1));
+        if (found.ok() && !bodies) found->bodies.clear();
         Locked later(mutex_);
-        WhenReached(later, asked_at, std::move(found),
-                    [this, kept, reading](Locked& now, const absl::StatusOr<FoundHulls>& reached) {
-                      if (!kept->is_reading || kept->readings != reading) return;
-                      kept->is_reading = false;
-                      kept->found = reached;
-                      feed_.Wake(now, kept);
-                    });
+        WhenReached(
+            later, asked_at, std::move(found),
+            [this, kept, reading](Locked& now, const absl::StatusOr<FoundRecords>& reached) {
+              if (!kept->is_reading || kept->readings != reading) return;
+              kept->is_reading = false;
+              kept->found = reached;
+              feed_.Wake(now, kept);
+            });
       },
       kWatchReader);
   HULLD_CHECK(locked.Holds(mutex_));
@@ -274,45 +322,29 @@ absl::Status Registry::TakePresentFound(Locked& locked, ChangeWatch& watch, Watc
     return absl::OkStatus();
   }
   if (!watch.found->ok()) return std::exchange(watch.found, std::nullopt)->status();
-  FoundHulls& found = **watch.found;
-  const WatchTarget& target = feed_.TargetOf(watch);
-  const auto is_watched = [&](const std::string& id) {
-    return target.ids.empty() ? id.starts_with(target.prefix) : id == target.ids.front();
-  };
+  const FoundRecords found = **std::exchange(watch.found, std::nullopt);
   // What is damaged has no revision that can be read.
   const auto tell = [&](HullChange change) {
     const bool is_new = watch.after_revision == 0 || change.record.revision > watch.after_revision;
     if (is_new) piece->changes.push_back(std::move(change));
   };
-  auto body = bodies_.end();
-  if (target.bodies) {
-    const std::string& prefix = target.ids.empty() ? target.prefix : target.ids.front();
-    body = watch.last_id.empty() ? bodies_.lower_bound(prefix) : bodies_.upper_bound(watch.last_id);
-  }
-  for (size_t looked_at = 0;; ++looked_at) {
-    const bool has_hull = !found.hulls.empty();
-    // Those after the last hull that was read come with the hulls that follow.
-    if (!has_hull && found.more) {
-      watch.found.reset();
-      return absl::OkStatus();
-    }
-    const bool has_body = body != bodies_.end() && is_watched(body->first);
-    if (!has_hull && !has_body) break;
-    if (looked_at == ChangeFeed::kMostPerPiece) return absl::OkStatus();
-    if (!has_body || (has_hull && found.hulls.begin()->first < body->first)) {
-      const auto hull = found.hulls.begin();
-      watch.last_id = hull->first;
-      // What was read may be a body by now.
-      if (!bodies_.contains(hull->first)) tell(DescribeFound(hull->first, hull->second));
-      found.hulls.erase(hull);
+  auto hull = found.hulls.begin();
+  auto body = found.bodies.begin();
+  while (hull != found.hulls.end() || body != found.bodies.end()) {
+    const bool is_hull =
+        body == found.bodies.end() || (hull != found.hulls.end() && hull->first < body->first);
+    watch.last_id = is_hull ? hull->first : body->first;
+    if (is_hull) {
+      tell(DescribeFound(hull->first, hull->second));
+      ++hull;
     } else {
-      watch.last_id = body->first;
-      const auto& committed = body->second.committed;
-      if (committed != nullptr) tell(committed->Describe());
+      const absl::StatusOr<StoredBody>& stored = body->second;
+      const StoredBody nothing = {{body->first, 0, 0}, {}, {}};
+      tell(Body::Describe(stored.ok() ? *stored : nothing, stored.status()));
       ++body;
     }
   }
-  watch.found.reset();
+  if (found.more) return absl::OkStatus();
   watch.stage = ChangeWatch::Stage::kChanges;
   watch.synced_at = revision_;
   return absl::OkStatus();

@@ -186,7 +186,14 @@ std::string PrepareBatchStatements() {
 StoreTotals AddedBy(std::span<const Change* const> changes) {
   StoreTotals added;
   for (const Change* change : changes) {
-    if (change->body != nullptr) continue;
+    if (change->body != nullptr) {
+      if (change->deleted) {
+        --added.bodies;
+      } else if (change->begins && !change->replaces_body) {
+        ++added.bodies;
+      }
+      continue;
+    }
     const uint64_t vertices = change->hull.record.vertex_count;
     if (change->deleted) {
       --added.hulls;

@@ -28,8 +28,8 @@ constexpr std::chrono::milliseconds kLongestTurnPause{250};
 // own epoch as `written_in`, and store_fence refuses it when that is not the same. `relaxed`: with
 // synchronous_commit = off, from the start of a server until it ends in order.
 //
-// A database that holds some slots of IDs has a column `slots`, which says which. `hulls` and
-// `vertices` are how many there are of them.
+// A database that holds some slots of IDs has a column `slots`, which says which. `hulls`,
+// `vertices` and `bodies` are how many there are of them.
 //
 // hulld.migration is there while a migration fills the store, and names its source.
 //
@@ -52,6 +52,7 @@ constexpr char kTables[] = R"(
     relaxed boolean NOT NULL,
     hulls bigint NOT NULL DEFAULT 0,
     vertices bigint NOT NULL DEFAULT 0,
+    bodies bigint NOT NULL DEFAULT 0,
     CONSTRAINT store_fence CHECK (written_in = epoch));
   CREATE TABLE hulld.epochs (
     epoch bigint PRIMARY KEY,
@@ -94,13 +95,20 @@ constexpr char kAddTotals[] = R"(
   LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE;
   ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS hulls bigint NOT NULL DEFAULT 0;
   ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS vertices bigint NOT NULL DEFAULT 0;
-  ALTER TABLE IF EXISTS hulld.changes ADD COLUMN IF NOT EXISTS began bigint NOT NULL DEFAULT 0;)";
+  ALTER TABLE hulld.store ADD COLUMN IF NOT EXISTS bodies bigint NOT NULL DEFAULT 0;
+  ALTER TABLE IF EXISTS hulld.changes ADD COLUMN IF NOT EXISTS began bigint NOT NULL DEFAULT 0;
+  ALTER TABLE IF EXISTS hulld.changes
+    ADD COLUMN IF NOT EXISTS body_began bigint NOT NULL DEFAULT 0;)";
 
-// Hulls that are counted at a time: some 70 ms.
+// Hulls, or bodies, that are counted at a time: some 70 ms.
 constexpr uint64_t kCountedAtOnce = 100'000;
+constexpr uint64_t kFormatThatCountsHulls = 3;
 // A record holds numbers of 8 bytes, the lowest first; the fourth is that of the vertices.
 constexpr char kPrepareCount[] = R"(
-    PREPARE hulld_count_after(text, bigint) AS
+    PREPARE hulld_count_bodies_after(text, bigint) AS
+      SELECT count(*), 0::bigint, coalesce(max(body_id), '')
+      FROM (SELECT body_id FROM hulld.bodies WHERE body_id > $1 ORDER BY body_id LIMIT $2) b;
+    PREPARE hulld_count_hulls_after(text, bigint) AS
       SELECT count(*), coalesce(sum(
           CASE WHEN length(record) >= 32 THEN
             get_byte(record, 24)::bigint + (get_byte(record, 25)::bigint << 8) +
@@ -109,6 +117,32 @@ constexpr char kPrepareCount[] = R"(
           ELSE 0 END), 0)::bigint, coalesce(max(hull_id), '')
       FROM (SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2) h;
     )";
+
+// What a table holds.
+struct Counted {
+  uint64_t rows = 0;
+  uint64_t vertices = 0;
+};
+
+// Portion by portion, so that no statement takes long. CANCELLED: should_stop said so.
+absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
+                                 const std::function<bool()>& should_stop) {
+  Counted all;
+  std::string last;
+  for (uint64_t counted = kCountedAtOnce; counted == kCountedAtOnce;) {
+    if (should_stop && should_stop()) {
+      return absl::CancelledError("told to end before all was counted; nothing was changed");
+    }
+    const absl::StatusOr<Rows> part =
+        session.Ask({.name = statement, .parameters = {last, EncodeBigint(kCountedAtOnce)}});
+    if (!part.ok()) return part.status();
+    counted = part->bigint(0, 0);
+    all.rows += counted;
+    all.vertices += part->bigint(0, 1);
+    last = std::string(part->at(0, 2));
+  }
+  return all;
+}
 
 // Of every session. The database gives up what is asked by a server that is gone, or that stands
 // still while it holds locks; the times are a choice, as those in conninfo.cc, and shorter than
@@ -126,18 +160,18 @@ constexpr char kSettings[] = R"(
   SET tcp_keepalives_count = 3;)";
 
 constexpr char kPrepareClaims[] = R"(
-    PREPARE hulld_fence(bigint, bigint, bigint, bigint, bigint) AS
+    PREPARE hulld_fence(bigint, bigint, bigint, bigint, bigint, bigint) AS
       UPDATE hulld.store SET revision = $1, batch = $2, written_in = $3, hulls = hulls + $4,
-        vertices = vertices + $5;
+        vertices = vertices + $5, bodies = bodies + $6;
     PREPARE hulld_claim(text, text, boolean) AS
       WITH claimed AS (
         UPDATE hulld.store SET epoch = epoch + 1, written_in = epoch + 1, owner = $1,
           store_id = CASE WHEN relaxed THEN $2 ELSE store_id END, relaxed = $3
-        RETURNING epoch, batch, revision, store_id, hulls, vertices),
+        RETURNING epoch, batch, revision, store_id, hulls, vertices, bodies),
       noted AS (
         INSERT INTO hulld.epochs (epoch, owner, batch, revision)
         SELECT epoch, $1, batch, revision FROM claimed)
-      SELECT epoch, batch, revision, store_id, hulls, vertices FROM claimed;
+      SELECT epoch, batch, revision, store_id, hulls, vertices, bodies FROM claimed;
     PREPARE hulld_reclaim(text) AS
       WITH claimed AS (
         UPDATE hulld.store SET epoch = epoch + 1, written_in = epoch + 1 WHERE owner = $1
@@ -159,14 +193,27 @@ constexpr char kPrepareReads[] = R"(
       SELECT hull_id, record FROM hulld.hulls WHERE hull_id > $1 ORDER BY hull_id LIMIT $2;
     PREPARE hulld_bodies_after(text, integer) AS
       SELECT body_id, body FROM hulld.bodies WHERE body_id > $1 ORDER BY body_id LIMIT $2;
-    PREPARE hulld_find_hulls(text[]) AS
-      SELECT s.revision, h.hull_id, h.record
-      FROM hulld.store s LEFT JOIN hulld.hulls h ON h.hull_id = ANY ($1);
-    PREPARE hulld_list_hulls(text, text, bigint) AS
-      SELECT s.revision, h.hull_id, h.record
+    PREPARE hulld_find(text[]) AS
+      SELECT s.revision, r.id, r.is_body, false, r.value
       FROM hulld.store s LEFT JOIN (
-        SELECT hull_id, record FROM hulld.hulls WHERE hull_id >= $1 AND hull_id > $2
-        ORDER BY hull_id LIMIT $3) h ON true ORDER BY h.hull_id;
+        SELECT hull_id AS id, false AS is_body, record AS value
+        FROM hulld.hulls WHERE hull_id = ANY ($1)
+        UNION ALL
+        SELECT body_id, true, body FROM hulld.bodies WHERE body_id = ANY ($1)) r ON true;
+    PREPARE hulld_list(text, text, bigint, boolean, boolean, bigint) AS
+      SELECT s.revision, r.id, r.is_body, r.before > $6,
+        CASE WHEN r.before <= $6 THEN r.value END
+      FROM hulld.store s LEFT JOIN (
+        SELECT id, is_body, value,
+          sum(length(value)) OVER (ORDER BY id) - length(value) AS before
+        FROM (
+          (SELECT hull_id AS id, false AS is_body, record AS value FROM hulld.hulls
+           WHERE $4 AND hull_id >= $1 AND hull_id > $2 ORDER BY hull_id LIMIT $3)
+          UNION ALL
+          (SELECT body_id, true, body FROM hulld.bodies
+           WHERE $5 AND body_id >= $1 AND body_id > $2 ORDER BY body_id LIMIT $3)
+          ORDER BY id LIMIT $3) listed) r ON true
+      ORDER BY r.id;
     PREPARE hulld_base(text, bigint, bigint) AS
       SELECT part, vertices FROM hulld.bases
       WHERE hull_id = $1 AND incarnation = $2 AND revision = $3 ORDER BY part;
@@ -353,30 +400,29 @@ absl::Status PostgresStore::AddTotals(Session& session) const {
                kFormat);
   absl::Status status = session.Run(kAddTotals).status();
   if (status.ok()) status = session.Run(kPrepareCount).status();
-  StoreTotals totals;
-  std::string last;
-  for (uint64_t counted = kCountedAtOnce; status.ok() && counted == kCountedAtOnce;) {
-    if (options_.should_stop && options_.should_stop()) {
-      status = absl::CancelledError("told to end before all was counted; nothing was changed");
-      break;
+  std::string counted;
+  if (status.ok() && number < kFormatThatCountsHulls) {
+    const absl::StatusOr<Counted> hulls =
+        CountAll(session, "hulld_count_hulls_after", options_.should_stop);
+    status = hulls.status();
+    if (hulls.ok()) {
+      counted = absl::StrCat("hulls = ", hulls->rows, ", vertices = ", hulls->vertices, ", ");
     }
-    const absl::StatusOr<Rows> part = session.Ask(
-        {.name = "hulld_count_after", .parameters = {last, EncodeBigint(kCountedAtOnce)}});
-    status = part.status();
-    if (!status.ok()) break;
-    counted = part->bigint(0, 0);
-    totals.hulls += counted;
-    totals.vertices += part->bigint(0, 1);
-    last = std::string(part->at(0, 2));
+  }
+  if (status.ok()) {
+    const absl::StatusOr<Counted> bodies =
+        CountAll(session, "hulld_count_bodies_after", options_.should_stop);
+    status = bodies.status();
+    if (bodies.ok()) absl::StrAppend(&counted, "bodies = ", bodies->rows, ", ");
   }
   if (status.ok()) {
     status = session
-                 .Run(absl::StrCat("UPDATE hulld.store SET hulls = ", totals.hulls,
-                                   ", vertices = ", totals.vertices, ", format = ", kFormat,
+                 .Run(absl::StrCat("UPDATE hulld.store SET ", counted, "format = ", kFormat,
                                    ", owner = '', epoch = epoch + 1, written_in = epoch + 1; "
                                    "INSERT INTO hulld.epochs (epoch, owner, batch, revision) "
                                    "SELECT epoch, owner, batch, revision FROM hulld.store; "
-                                   "DEALLOCATE hulld_count_after; COMMIT"))
+                                   "DEALLOCATE hulld_count_hulls_after; "
+                                   "DEALLOCATE hulld_count_bodies_after; COMMIT"))
                  .status();
   }
   if (!status.ok()) session.Run("ROLLBACK").status().IgnoreError();
@@ -418,7 +464,7 @@ absl::Status PostgresStore::Begin() {
   batch_ = claimed->bigint(0, 1);
   revision_ = claimed->bigint(0, 2);
   id_ = std::string(claimed->at(0, 3));
-  totals_ = {claimed->bigint(0, 4), claimed->bigint(0, 5)};
+  totals_ = {claimed->bigint(0, 4), claimed->bigint(0, 5), claimed->bigint(0, 6)};
   if (id_ != former->at(0, 0)) {
     spdlog::warn(
         "store {} was open with synchronous_commit = off and was not closed: what it acknowledged "

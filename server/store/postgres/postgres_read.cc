@@ -1,4 +1,4 @@
-// How the store is read: all hulls, the vertices of one, a sequence.
+// How the store is read: records, the vertices of a hull, a sequence.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
 
@@ -24,17 +24,26 @@ Statement AskForDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
                          EncodeBigint(up_to)}};
 }
 
-// rows: the store's revision and a hull each; without one where there is none.
-absl::StatusOr<FoundHulls> FoundIn(const Rows& rows, std::string_view prefix, size_t most) {
+// A boolean in PostgreSQL's binary format.
+std::string EncodeBoolean(bool value) { return std::string(1, value ? '\1' : '\0'); }
+
+// rows: the store's revision, and of a hull or body each its ID, whether it is a body, whether its
+// value is left out, and that; without an ID where there is none.
+absl::StatusOr<FoundRecords> FoundIn(const Rows& rows, std::string_view prefix, size_t most) {
   if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
-  FoundHulls found;
+  FoundRecords found;
   found.revision = rows.bigint(0, 0);
   for (int i = 0; i < rows.count(); ++i) {
     const std::string id(rows.at(i, 1));
     if (id.empty() || !id.starts_with(prefix)) break;
-    found.more = found.hulls.size() == most;
+    const bool is_left_out = rows.at(i, 3) == EncodeBoolean(true);
+    found.more = is_left_out || found.hulls.size() + found.bodies.size() == most;
     if (found.more) break;
-    found.hulls.emplace(id, UnsealStoredHull(id, rows.at(i, 2)));
+    if (rows.at(i, 2) == EncodeBoolean(true)) {
+      found.bodies.emplace(id, UnsealStoredBody(id, rows.at(i, 4)));
+    } else {
+      found.hulls.emplace(id, UnsealStoredHull(id, rows.at(i, 4)));
+    }
   }
   return found;
 }
@@ -105,23 +114,26 @@ absl::Status PostgresStore::ForEachBody(const StoredBodyVisitor& visit) {
   });
 }
 
-absl::StatusOr<FoundHulls> PostgresStore::FindHulls(std::span<const std::string> ids) {
+absl::StatusOr<FoundRecords> PostgresStore::FindRecords(std::span<const std::string> ids) {
   ArrayParameter asked(ArrayParameter::Element::kText);
   for (const std::string& id : ids) asked.Add(id);
   const absl::StatusOr<std::vector<Rows>> rows =
-      Read({{.name = "hulld_find_hulls", .parameters = {asked.Take()}}});
+      Read({{.name = "hulld_find", .parameters = {asked.Take()}}});
   if (!rows.ok()) return rows.status();
-  return FoundIn(rows->front(), "", ids.size());
+  return FoundIn(rows->front(), "", SIZE_MAX);
 }
 
 // One row more tells whether there are others. A prefix that no ID can have may hold characters
 // that the database does not know: it is asked for what comes after all IDs.
-absl::StatusOr<FoundHulls> PostgresStore::ListHulls(const std::string& prefix,
-                                                    const std::string& after, size_t most) {
+absl::StatusOr<FoundRecords> PostgresStore::ListRecords(const std::string& prefix,
+                                                        const std::string& after, size_t most,
+                                                        RecordKinds kinds) {
   const bool may_be = std::ranges::all_of(prefix, [](char c) { return c > ' ' && c <= '~'; });
   const absl::StatusOr<std::vector<Rows>> rows =
-      Read({{.name = "hulld_list_hulls",
-             .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1)}}});
+      Read({{.name = "hulld_list",
+             .parameters = {may_be ? prefix : "\x7f", after, EncodeBigint(most + 1),
+                            EncodeBoolean(kinds.hulls), EncodeBoolean(kinds.bodies),
+                            EncodeBigint(kMostListedBytes)}}});
   if (!rows.ok()) return rows.status();
   return FoundIn(rows->front(), prefix, most);
 }

@@ -33,7 +33,8 @@ constexpr std::chrono::milliseconds kLongestPause{500};
 
 // hulld.changes tells which IDs each batch changed, for the other servers: `revision` is the
 // store's after the last change of the ID in the batch, `ended_at` that at which an incarnation of
-// it ended, or 0; `began` the create_revision of the first that did. hulld.store.pruned: batches up
+// it ended, or 0; `began` the create_revision of the first that did where that was a hull,
+// `body_began` where it was a body. hulld.store.pruned: batches up
 // to this one are not told any more. hulld.servers tells the last batch of each server, for one
 // that lost the answer to its COMMIT.
 constexpr char kSharedTables[] = R"(
@@ -44,6 +45,7 @@ constexpr char kSharedTables[] = R"(
     revision bigint NOT NULL,
     ended_at bigint NOT NULL,
     began bigint NOT NULL DEFAULT 0,
+    body_began bigint NOT NULL DEFAULT 0,
     PRIMARY KEY (batch, id));
   CREATE TABLE hulld.servers (
     owner text PRIMARY KEY,
@@ -56,11 +58,11 @@ constexpr char kSharedTables[] = R"(
 constexpr char kPrepareFollow[] = R"(
     PREPARE hulld_follow(bigint, bigint) AS
       SELECT s.batch, s.revision, s.epoch, s.pruned, s.owner, c.id, c.revision, c.ended_at,
-        h.record, b.body, s.store_id, s.hulls, s.vertices, c.began
+        h.record, b.body, s.store_id, s.hulls, s.vertices, c.began, c.body_began, s.bodies
       FROM hulld.store s
       LEFT JOIN (
         SELECT id, max(revision) AS revision, max(ended_at) AS ended_at,
-          min(nullif(began, 0)) AS began
+          min(nullif(began, 0)) AS began, min(nullif(body_began, 0)) AS body_began
         FROM hulld.changes WHERE batch > $1 GROUP BY id LIMIT $2) c ON true
       LEFT JOIN hulld.hulls h ON h.hull_id = c.id
       LEFT JOIN hulld.bodies b ON b.body_id = c.id;
@@ -76,15 +78,15 @@ constexpr char kPrepareShared[] = R"(
       WITH joined AS (
         UPDATE hulld.store SET owner = $1, epoch = epoch + (owner <> $1)::integer,
           written_in = epoch + (owner <> $1)::integer
-        RETURNING epoch, batch, revision, store_id, relaxed, hulls, vertices),
+        RETURNING epoch, batch, revision, store_id, relaxed, hulls, vertices, bodies),
       noted AS (
         INSERT INTO hulld.epochs (epoch, owner, batch, revision)
         SELECT epoch, $1, batch, revision FROM joined ON CONFLICT (epoch) DO NOTHING)
-      SELECT epoch, batch, revision, store_id, relaxed, hulls, vertices FROM joined;
+      SELECT epoch, batch, revision, store_id, relaxed, hulls, vertices, bodies FROM joined;
     PREPARE hulld_turn AS SELECT batch FROM hulld.store FOR UPDATE;
-    PREPARE hulld_put_changes(bigint, text[], bigint[], bigint[], bigint[]) AS
-      INSERT INTO hulld.changes (batch, id, revision, ended_at, began)
-      SELECT $1, * FROM unnest($2, $3, $4, $5);
+    PREPARE hulld_put_changes(bigint, text[], bigint[], bigint[], bigint[], bigint[]) AS
+      INSERT INTO hulld.changes (batch, id, revision, ended_at, began, body_began)
+      SELECT $1, * FROM unnest($2, $3, $4, $5, $6);
     PREPARE hulld_put_server(text, bigint) AS
       INSERT INTO hulld.servers (owner, batch) VALUES ($1, $2)
       ON CONFLICT (owner) DO UPDATE SET batch = excluded.batch, seen = now();
@@ -119,6 +121,7 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
     uint64_t revision = 0;
     uint64_t ended_at = 0;
     uint64_t began = 0;
+    bool was_body = false;
   };
   std::map<std::string, Row> rows;
   for (const Change* change : changes) {
@@ -126,6 +129,7 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
     row.revision = change->revision;
     const uint64_t began = BeganOfEnded(*change);
     if (began != 0 || change->deleted) row.ended_at = row.revision;
+    if (row.began == 0) row.was_body = change->body != nullptr;
     if (row.began == 0) row.began = began;
   }
   using Element = ArrayParameter::Element;
@@ -133,15 +137,28 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
   ArrayParameter revisions(Element::kBigint);
   ArrayParameter ends(Element::kBigint);
   ArrayParameter began(Element::kBigint);
+  ArrayParameter bodies_began(Element::kBigint);
   for (const auto& [id, row] : rows) {
     ids.Add(id);
     revisions.Add(EncodeBigint(row.revision));
     ends.Add(EncodeBigint(row.ended_at));
-    began.Add(EncodeBigint(row.began));
+    began.Add(EncodeBigint(row.was_body ? 0 : row.began));
+    bodies_began.Add(EncodeBigint(row.was_body ? row.began : 0));
   }
-  return {
-      .name = "hulld_put_changes",
-      .parameters = {EncodeBigint(batch), ids.Take(), revisions.Take(), ends.Take(), began.Take()}};
+  return {.name = "hulld_put_changes",
+          .parameters = {EncodeBigint(batch), ids.Take(), revisions.Take(), ends.Take(),
+                         began.Take(), bodies_began.Take()}};
+}
+
+// Which incarnation ended first. rows: of hulld_follow.
+void NoteFormer(const Rows& rows, int row, OtherChange& other) {
+  const auto began = [&](int column) {
+    return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
+  };
+  const uint64_t first = std::min(began(13), began(14));
+  if (first == UINT64_MAX) return;
+  other.former_began = first;
+  other.former_was_body = first == began(14);
 }
 
 absl::Status Moved() { return absl::AbortedError("another server changed the hull meanwhile"); }
@@ -194,7 +211,7 @@ absl::Status PostgresStore::Join() {
   seen_batch_ = batch_;
   revision_ = joined->bigint(0, 2);
   id_ = std::string(joined->at(0, 3));
-  totals_ = {joined->bigint(0, 5), joined->bigint(0, 6)};
+  totals_ = {joined->bigint(0, 5), joined->bigint(0, 6), joined->bigint(0, 7)};
   spdlog::info(
       "hulls live in {}, PostgreSQL {}; an acknowledged change is committed there "
       "(synchronous_commit = {}); other servers may be active beside this one; epoch {}",
@@ -246,7 +263,7 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
     OtherChange& other = others_.by_id[id];
     other.revision = rows.bigint(i, 6);
     other.ended_at = std::max(other.ended_at, rows.bigint(i, 7));
-    if (other.former_began == 0 && !rows.at(i, 13).empty()) other.former_began = rows.bigint(i, 13);
+    if (other.former_began == 0) NoteFormer(rows, i, other);
     other.hull.reset();
     other.body.reset();
     if (!rows.at(i, 8).empty()) {
@@ -260,7 +277,7 @@ absl::Status PostgresStore::NoteOthers(const Rows& rows) {
   batch_ = rows.bigint(0, 0);
   seen_batch_ = batch_;
   revision_ = rows.bigint(0, 1);
-  totals_ = {rows.bigint(0, 11), rows.bigint(0, 12)};
+  totals_ = {rows.bigint(0, 11), rows.bigint(0, 12), rows.bigint(0, 15)};
   if (others_.by_id.empty()) return absl::OkStatus();
   others_.revision = revision_;
   others_.totals = totals_;
@@ -391,7 +408,8 @@ void PostgresStore::KeepShared(const SharedBatch& batch) {
   batch_ = batch.number;
   seen_batch_ = batch_;
   revision_ = batch.revision;
-  totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices};
+  totals_ = {totals_.hulls + batch.added.hulls, totals_.vertices + batch.added.vertices,
+             totals_.bodies + batch.added.bodies};
   if (notices_ != nullptr) notices_->Send(batch.number);
 }
 

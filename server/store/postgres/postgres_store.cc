@@ -76,7 +76,8 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
 Statement PostgresStore::Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const {
   return {.name = "hulld_fence",
           .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch()),
-                         EncodeBigint(added.hulls), EncodeBigint(added.vertices)}};
+                         EncodeBigint(added.hulls), EncodeBigint(added.vertices),
+                         EncodeBigint(added.bodies)}};
 }
 
 // One transaction. Lost: it may have been committed. Other errors: it was not.
@@ -165,7 +166,8 @@ absl::Status PostgresStore::Commit(std::span<Change* const> changes) {
     const StoreTotals added = AddedBy(changes);
     batch_ = batch;
     revision_ = revision;
-    totals_ = {totals_.hulls + added.hulls, totals_.vertices + added.vertices};
+    totals_ = {totals_.hulls + added.hulls, totals_.vertices + added.vertices,
+               totals_.bodies + added.bodies};
     return absl::OkStatus();
   };
   const Clock::time_point deadline = Clock::now() + options_.patience;

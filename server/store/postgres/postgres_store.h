@@ -116,9 +116,9 @@ class PostgresStore : public Store {
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   bool finds_records() const override { return true; }
-  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override;
-  absl::StatusOr<FoundHulls> ListHulls(const std::string& prefix, const std::string& after,
-                                       size_t most) override;
+  absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override;
+  absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
+                                           size_t most, RecordKinds kinds) override;
   StoreTotals totals() const override { return totals_; }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
@@ -135,8 +135,9 @@ class PostgresStore : public Store {
   absl::StatusOr<std::string> MakeCopy() override;
   void OnEnded(std::function<void()> ended) override;
 
-  // The version of the tables. Format 2 knows slots, format 3 what the store holds, counted.
-  static constexpr uint64_t kFormat = 3;
+  // The version of the tables. Format 2 knows slots, format 3 how many hulls and vertices
+  // the store holds, format 4 how many bodies, too.
+  static constexpr uint64_t kFormat = 4;
   // The epoch of this server, which only grows.
   uint64_t epoch() const { return epoch_.load(); }
 

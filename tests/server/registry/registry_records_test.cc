@@ -3,6 +3,7 @@
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <string>
 #include <vector>
@@ -14,34 +15,66 @@
 namespace hulld::server {
 namespace {
 
-// Holds any number of empty hulls, "h" and a number each.
+// Holds any number of empty hulls, "h" and a number each, and of bodies, "b" and a number.
 class VastStore : public MemoryStore {
  public:
   static constexpr uint64_t kHulls = uint64_t{1} << 40;
+  static constexpr uint64_t kBodies = uint64_t{1} << 39;
 
   bool keeps_hulls() const override { return true; }
   bool finds_records() const override { return true; }
   uint64_t revision() const override { return kHulls; }
-  StoreTotals totals() const override { return {kHulls, 0}; }
+  StoreTotals totals() const override { return {kHulls, 0, kBodies}; }
   absl::Status ForEachHull(const StoredHullVisitor&) override {
     ADD_FAILURE() << "all hulls are read";
     return absl::OkStatus();
   }
-  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override {
+  absl::Status ForEachBody(const StoredBodyVisitor&) override {
+    ADD_FAILURE() << "all bodies are read";
+    return absl::OkStatus();
+  }
+  absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override {
     ++questions;
     records += ids.size();
-    FoundHulls found;
+    if (is_gone) return absl::UnavailableError("it cannot be asked");
+    FoundRecords found;
     found.revision = kHulls;
     for (const std::string& id : ids) {
       if (id.starts_with("h")) found.hulls.emplace(id, HullOf(id));
+      if (id.starts_with("b")) found.bodies.emplace(id, BodyOf(id));
+    }
+    return found;
+  }
+  // As many as are asked for, but no more than eight.
+  absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
+                                           size_t most, RecordKinds kinds) override {
+    EXPECT_TRUE(kinds.bodies && !kinds.hulls);
+    ++questions;
+    FoundRecords found;
+    found.revision = kHulls;
+    found.more = true;
+    const uint64_t first = after.empty() ? 10 : std::stoull(after.substr(1)) + 1;
+    for (uint64_t i = 0; i < std::min<uint64_t>(most, 8); ++i) {
+      const std::string id = absl::StrCat(prefix, first + i);
+      found.bodies.emplace(id, BodyOf(id));
     }
     return found;
   }
 
   std::atomic<uint64_t> questions = 0;
   std::atomic<uint64_t> records = 0;
+  std::atomic<bool> is_gone = false;
+  // Of each body.
+  size_t pieces = 1;
 
  private:
+  StoredBody BodyOf(const std::string& id) const {
+    StoredBody body;
+    body.record = {id, 1, std::stoull(id.substr(1)) + 1};
+    body.hull_ids = {"h1"};
+    body.pieces.assign(pieces, StoredPiece());
+    return body;
+  }
   static StoredHull HullOf(const std::string& id) {
     StoredHull hull;
     hull.record.hull_id = id;
@@ -56,10 +89,19 @@ class RegistryRecords : public ::testing::Test {
     registry_.KeepRecords(most);
     ASSERT_TRUE(registry_.Load().ok());
   }
-  static std::vector<std::string> Ids(uint64_t first, uint64_t count) {
+  static std::vector<std::string> Ids(uint64_t first, uint64_t count, const char* kind = "h") {
     std::vector<std::string> ids;
-    for (uint64_t i = 0; i < count; ++i) ids.push_back(absl::StrCat("h", first + i));
+    for (uint64_t i = 0; i < count; ++i) ids.push_back(absl::StrCat(kind, first + i));
     return ids;
+  }
+  void ExpectBodies(const std::vector<std::string>& ids) {
+    const FoundBodies found = registry_.FindBodies(ids);
+    ASSERT_TRUE(found.status.ok()) << found.status;
+    ASSERT_EQ(found.bodies.size(), ids.size());
+    for (size_t i = 0; i < ids.size(); ++i) {
+      ASSERT_NE(found.bodies[i], nullptr) << ids[i];
+      EXPECT_EQ(found.bodies[i]->record().body_id, ids[i]);
+    }
   }
   void ExpectThere(const std::vector<std::string>& ids) {
     const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
@@ -84,6 +126,8 @@ TEST_F(RegistryRecords, TheStartReadsNothing) {
   Start(1000);
   EXPECT_EQ(store_.questions, 0);
   EXPECT_EQ(registry_.Sizes().hull_count, VastStore::kHulls);
+  EXPECT_EQ(registry_.Sizes().body_count, VastStore::kBodies);
+  EXPECT_TRUE(registry_.has_bodies());
 }
 
 TEST_F(RegistryRecords, EachIsReadOnceAndManyAtATime) {
@@ -133,6 +177,95 @@ TEST_F(RegistryRecords, NoMoreAreKeptThanItIsTold) {
 TEST_F(RegistryRecords, ACallMayNameMoreThanAreKept) {
   Start(10);
   ExpectThere(Ids(0, 3000));
+}
+
+TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
+  Start(1000);
+  ExpectBodies(Ids(0, 512, "b"));
+  EXPECT_EQ(store_.records, 512);
+  EXPECT_EQ(store_.questions, 4);
+  ExpectBodies(Ids(0, 512, "b"));
+  EXPECT_EQ(store_.questions, 4);
+}
+
+// Who looks for bodies among hulls learns what there is under all of the IDs at once.
+TEST_F(RegistryRecords, WhatIsNoBodyIsKnownByThen) {
+  Start(1000);
+  const std::vector<std::string> ids = {"h1", "b2", "none"};
+  EXPECT_FALSE(registry_.TryFindBodies(ids).has_value());
+  EXPECT_EQ(store_.questions, 0);
+  const FoundBodies found = registry_.FindBodies(ids);
+  ASSERT_TRUE(found.status.ok()) << found.status;
+  EXPECT_EQ(found.bodies[0], nullptr);
+  EXPECT_NE(found.bodies[1], nullptr);
+  EXPECT_EQ(found.bodies[2], nullptr);
+  EXPECT_EQ(store_.questions, 1);
+  EXPECT_TRUE(registry_.TryFindBodies(ids).has_value());
+  const absl::StatusOr<Resolved> resolved = registry_.Resolve(ids, {});
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  EXPECT_TRUE(resolved->hulls[0].ok());
+  EXPECT_TRUE(absl::IsNotFound(resolved->hulls[1].status()));
+  EXPECT_TRUE(absl::IsNotFound(resolved->hulls[2].status()));
+  EXPECT_EQ(store_.records, 3);
+}
+
+TEST_F(RegistryRecords, BodiesThatNobodyUsesAreBoundedInBytes) {
+  Start(100);
+  const uint64_t before = registry_.Cache().bytes;
+  for (uint64_t first = 0; first < 20'000; first += 100) ExpectBodies(Ids(first, 100, "b"));
+  EXPECT_LE(registry_.Cache().bytes - before, 400 * BodyTable::kBytesOfEntry);
+  const uint64_t records = store_.records;
+  // Those of now are here, those of before are not.
+  ExpectBodies({"b19999"});
+  EXPECT_EQ(store_.records, records);
+  ExpectBodies({"b0"});
+  EXPECT_EQ(store_.records, records + 1);
+  // Fewer of larger ones.
+  store_.pieces = 10'000;
+  for (uint64_t i = 0; i < 50; ++i) ExpectBodies({absl::StrCat("b", 30'000 + i)});
+  EXPECT_LE(registry_.Cache().bytes - before, 2 * 10'000 * sizeof(StoredPiece));
+}
+
+// It would be in memory twice otherwise.
+TEST_F(RegistryRecords, ABodyThatSomebodyHoldsStaysKnown) {
+  Start(1);
+  const std::vector<std::string> ids = {"b7"};
+  const FoundBodies held = registry_.FindBodies(ids);
+  for (uint64_t first = 100; first < 1000; first += 10) ExpectBodies(Ids(first, 10, "b"));
+  EXPECT_EQ(registry_.FindBodies(ids).bodies.front(), held.bodies.front());
+}
+
+TEST_F(RegistryRecords, ACallMayNameMoreBodiesThanAreKept) {
+  Start(10);
+  ExpectBodies(Ids(0, 3000, "b"));
+}
+
+TEST_F(RegistryRecords, WhyABodyCannotBeReadIsTold) {
+  Start(1000);
+  ExpectBodies({"b1"});
+  store_.is_gone = true;
+  const std::vector<std::string> ids = {"b1", "b2"};
+  const FoundBodies found = registry_.FindBodies(ids);
+  EXPECT_TRUE(absl::IsUnavailable(found.status)) << found.status;
+  EXPECT_NE(found.bodies[0], nullptr);
+  EXPECT_EQ(found.bodies[1], nullptr);
+  store_.is_gone = false;
+  ExpectBodies(ids);
+}
+
+TEST_F(RegistryRecords, BodiesAreListedPageByPageWithoutBeingKept) {
+  Start(1000);
+  std::string after;
+  for (int i = 0; i < 10; ++i) {
+    const absl::StatusOr<BodyPage> page = registry_.ListBodies("b", after, 5);
+    ASSERT_TRUE(page.ok()) << page.status();
+    ASSERT_EQ(page->bodies.size(), 5);
+    EXPECT_TRUE(page->more);
+    after = page->bodies.back()->record().body_id;
+  }
+  EXPECT_EQ(after, "b59");
+  EXPECT_EQ(store_.questions, 10);
+  EXPECT_FALSE(registry_.TryFindBodies(Ids(10, 1, "b")).has_value());
 }
 
 }  // namespace

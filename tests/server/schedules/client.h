@@ -22,6 +22,7 @@ class Client {
   explicit Client(Simulation& simulation) : simulation_(simulation) {}
 
   // A few calls, one after another.
+  static constexpr uint32_t kMostCalls = 3;
   void Run();
 
   // What a registry that was opened anew must answer: what the store kept.
@@ -63,6 +64,14 @@ class Client {
   void List();
   bool AwaitFresh(const Freshness& freshness);
   void Read();
+  void UseBodies();
+  void PutBody();
+  void DeleteBody();
+  void FindBodies();
+  void ListBodies();
+  void CheckBody(const Call& call, std::optional<uint64_t> revision, const Body* body);
+  // Whether the ID may have been that of the other kind.
+  bool MayBeOther(const Call& call, const absl::Status& status, bool is_body);
   void Press();
 
   void CheckView(const Call& call, uint64_t revision, const absl::StatusOr<HullView>& view);

@@ -71,6 +71,7 @@ bool Client::OpenStream(const std::shared_ptr<Stream>& stream, bool create_if_ab
   const auto check = [&](const absl::StatusOr<OpenResult>& result) {
     if (result.ok()) return CheckOpened(call, *stream, *result);
     if (absl::IsNotFound(result.status()) && !create_if_absent) return CheckNotFound(call);
+    if (create_if_absent && MayBeOther(call, result.status(), true)) return;
     if (MayFail(call, result.status(), false)) return;
     Fail(call, absl::StrCat("wrong: ", result.status().ToString()));
   };

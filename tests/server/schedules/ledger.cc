@@ -52,11 +52,13 @@ Ledger::Ledger() {
 }
 
 std::optional<std::string> Ledger::Keep(const Change& change, bool nobody_waits) {
-  const size_t hull = HullOf(change.hull.record.hull_id);
+  const size_t hull = HullOf(change.id());
   State state = Last(hull);
   state.is_claimed = nobody_waits;
   std::string fault;
-  if (change.deleted) {
+  if (change.body != nullptr) {
+    fault = KeepBody(change, state);
+  } else if (change.deleted) {
     fault = KeepEnd(change, state);
   } else if (change.writer.has_value()) {
     fault = KeepChunk(change, state);
@@ -66,8 +68,8 @@ std::optional<std::string> Ledger::Keep(const Change& change, bool nobody_waits)
   const bool is_new = state.revision != Last(hull).revision;
   if (fault.empty() && is_new && state.revision <= revision_) fault = "its revision is not new";
   if (!fault.empty()) {
-    return absl::StrCat("the store was given a wrong change of hull ", change.hull.record.hull_id,
-                        " at revision ", change.revision, ": ", fault, "\n", Describe(hull));
+    return absl::StrCat("the store was given a wrong change of hull ", change.id(), " at revision ",
+                        change.revision, ": ", fault, "\n", Describe(hull));
   }
   revision_ = std::max(revision_, state.revision);
   states_[hull].push_back(std::move(state));
@@ -85,6 +87,7 @@ std::string Ledger::KeepEnd(const Change& change, State& state) {
 // A creation, or a replacement with or without a hull to replace.
 std::string Ledger::KeepBeginning(const Change& change, State& state) {
   const HullRecord& record = change.hull.record;
+  if (state.is_body) return "the ID is a body's";
   if (change.replaced.has_value() != state.exists) return "there is, or is not, a hull already";
   if (state.exists && change.replaced->record != state.record) return "it replaces another hull";
   const std::optional<CurveSet> points = SetOf(change.vertices);
@@ -97,6 +100,30 @@ std::string Ledger::KeepBeginning(const Change& change, State& state) {
                 .record = record,
                 .revision = change.revision,
                 .points = *points,
+                .is_claimed = state.is_claimed};
+  return {};
+}
+
+// Put, or deleted.
+std::string Ledger::KeepBody(const Change& change, State& state) {
+  const BodyRecord& record = change.body->record;
+  if (state.exists) return "the ID is a hull's";
+  if (change.deleted && !state.is_body) return "there is no body to delete";
+  const bool is_it = record.create_revision == state.record.create_revision &&
+                     record.revision == state.record.revision;
+  if (change.deleted && !is_it) return "it deletes another body than there is";
+  if (!change.deleted) {
+    const uint64_t created = state.is_body ? state.record.create_revision : change.revision;
+    if (record.create_revision != created) return "the body has another beginning";
+    if (record.revision != change.revision) return "its record is of another revision";
+  }
+  HullRecord now;
+  now.hull_id = record.body_id;
+  now.create_revision = record.create_revision;
+  now.revision = record.revision;
+  state = State{.is_body = !change.deleted,
+                .record = now,
+                .revision = change.revision,
                 .is_claimed = state.is_claimed};
   return {};
 }
@@ -172,10 +199,12 @@ std::optional<std::string> Ledger::Unclaimed() const {
 }
 
 std::string Ledger::Describe(const State& state) {
-  std::string text =
-      absl::StrCat(state.exists ? "hull of " : "none, of ", state.record.create_revision, " at ",
-                   state.revision, ", points ", absl::Hex(state.points), ", received ",
-                   state.record.counts.received, ", sequences");
+  std::string text = absl::StrCat(state.exists    ? "hull of "
+                                  : state.is_body ? "body of "
+                                                  : "none, of ",
+                                  state.record.create_revision, " at ", state.revision, ", points ",
+                                  absl::Hex(state.points), ", received ",
+                                  state.record.counts.received, ", sequences");
   for (const uint64_t sequence : state.sequences) absl::StrAppend(&text, " ", sequence);
   return text;
 }

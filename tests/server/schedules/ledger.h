@@ -16,7 +16,7 @@
 
 namespace hulld::server {
 
-// The hulls and the writers of a schedule, by number.
+// The hulls, any of which may be a body, and the writers of a schedule, by number.
 inline constexpr size_t kHulls = 2;
 inline constexpr size_t kWriters = 2;
 std::string HullName(size_t hull);
@@ -33,7 +33,9 @@ class Ledger {
   // A hull after a change of it.
   struct State {
     bool exists = false;
-    // Of the hull that is there, or that went.
+    // There is a body under the ID; then no hull exists.
+    bool is_body = false;
+    // Of the hull that is there, or that went; of a body, its revisions alone.
     HullRecord record;
     // The store's, when the hull last became another for readers.
     uint64_t revision = 0;
@@ -97,6 +99,7 @@ class Ledger {
   std::string KeepEnd(const Change& change, State& state);
   std::string KeepBeginning(const Change& change, State& state);
   std::string KeepChunk(const Change& change, State& state);
+  std::string KeepBody(const Change& change, State& state);
 
   std::array<std::vector<State>, kHulls> states_;
   uint64_t revision_ = 0;

@@ -29,6 +29,10 @@ struct Reached {
   uint64_t loads = 0;
   uint64_t sequences = 0;
   uint64_t lookups = 0;
+  uint64_t bodies_put = 0;
+  uint64_t bodies_deleted = 0;
+  uint64_t bodies_found = 0;
+  uint64_t kinds_refused = 0;
   uint64_t evictions = 0;
   uint64_t recovered = 0;
   uint64_t kills = 0;
@@ -74,6 +78,7 @@ struct Plan {
   uint32_t streams = 0;
   uint32_t reads = 0;
   uint32_t listings = 0;
+  uint32_t bodies = 0;
   uint32_t pressure = 0;
   // One in so many; 0: none.
   uint32_t conditions = 0;

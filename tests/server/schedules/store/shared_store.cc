@@ -113,8 +113,17 @@ void SharedStore::NoteOthers() {
     OtherChange& other = known_.others.by_id[logged.hull_id];
     other.revision = logged.revision;
     other.ended_at = std::max(other.ended_at, logged.ended_at);
-    if (other.former_began == 0) other.former_began = logged.former_began;
+    if (other.former_began == 0) {
+      other.former_began = logged.former_began;
+      other.former_was_body = logged.former_was_body;
+    }
     other.hull.reset();
+    other.body.reset();
+    const auto body = database_.bodies_.find(logged.hull_id);
+    if (body != database_.bodies_.end()) {
+      other.body = body->second;
+      other.revision = body->second.record.revision;
+    }
     const auto found = database_.hulls_.find(logged.hull_id);
     if (found == database_.hulls_.end()) continue;
     other.hull = found->second.stored;

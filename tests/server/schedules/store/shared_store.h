@@ -27,18 +27,18 @@ class SharedStore : public Store {
   bool is_shared() const override { return true; }
   uint64_t revision() const override { return known_.revision; }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  // There are none.
+  // There are none, unless records are found.
   absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   bool finds_records() const override { return database_.finds_records(); }
-  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override {
-    return database_.FindHulls(ids);
+  absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override {
+    return database_.FindRecords(ids);
   }
-  absl::StatusOr<FoundHulls> ListHulls(const std::string& prefix, const std::string& after,
-                                       size_t most) override {
-    return database_.ListHulls(prefix, after, most);
+  absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
+                                           size_t most, RecordKinds kinds) override {
+    return database_.ListRecords(prefix, after, most, kinds);
   }
   StoreTotals totals() const override { return known_.totals; }
   absl::Status Commit(std::span<Change* const> changes) override;

@@ -21,6 +21,11 @@ absl::Status SimulatedStore::ForEachHull(const StoredHullVisitor& visit) {
   return absl::OkStatus();
 }
 
+absl::Status SimulatedStore::ForEachBody(const StoredBodyVisitor& visit) {
+  for (const auto& [id, body] : bodies_) visit(id, body);
+  return absl::OkStatus();
+}
+
 absl::StatusOr<std::vector<Vector>> SimulatedStore::LoadVertices(const StoredHull& hull) {
   Scheduler& scheduler = Scheduler::Current();
   ++counts_.loads;
@@ -64,7 +69,7 @@ absl::StatusOr<uint64_t> SimulatedStore::LoadSequence(const HullRecord& hull,
   return sequence;
 }
 
-absl::StatusOr<FoundHulls> SimulatedStore::FindHulls(std::span<const std::string> ids) {
+absl::StatusOr<FoundRecords> SimulatedStore::FindRecords(std::span<const std::string> ids) {
   Scheduler& scheduler = Scheduler::Current();
   ++counts_.lookups;
   scheduler.Note("store: is asked for records:", ids.size());
@@ -73,37 +78,49 @@ absl::StatusOr<FoundHulls> SimulatedStore::FindHulls(std::span<const std::string
     ++counts_.failed_lookups;
     return absl::UnavailableError("the disk does not answer");
   }
-  FoundHulls found;
+  FoundRecords found;
   found.revision = ledger_.revision();
   for (const std::string& id : ids) {
     const auto kept = hulls_.find(id);
     if (kept != hulls_.end()) found.hulls.emplace(id, kept->second.stored);
+    const auto body = bodies_.find(id);
+    if (body != bodies_.end()) found.bodies.emplace(id, body->second);
   }
-  scheduler.Note("store: has found records at revision", found.revision, found.hulls.size());
+  scheduler.Note("store: has found records at revision", found.revision,
+                 found.hulls.size() + found.bodies.size());
   return found;
 }
 
-absl::StatusOr<FoundHulls> SimulatedStore::ListHulls(const std::string& prefix,
-                                                     const std::string& after, size_t most) {
+absl::StatusOr<FoundRecords> SimulatedStore::ListRecords(const std::string& prefix,
+                                                         const std::string& after, size_t most,
+                                                         RecordKinds kinds) {
   // All of them in one step.
-  absl::StatusOr<FoundHulls> found = FindHulls({});
+  absl::StatusOr<FoundRecords> found = FindRecords({});
   if (!found.ok()) return found;
   found->revision = ledger_.revision();
   found->more = false;
-  for (const auto& [id, kept] : hulls_) {
-    if (!id.starts_with(prefix) || id <= after) continue;
-    found->more = found->hulls.size() == most;
+  size_t listed = 0;
+  for (size_t hull = 0; hull < kHulls; ++hull) {
+    const std::string id = HullName(hull);
+    const auto kept = hulls_.find(id);
+    const auto body = bodies_.find(id);
+    const bool has_hull = kinds.hulls && kept != hulls_.end();
+    const bool has_body = kinds.bodies && body != bodies_.end();
+    if ((!has_hull && !has_body) || !id.starts_with(prefix) || id <= after) continue;
+    found->more = listed == most;
     if (found->more) break;
-    found->hulls.emplace(id, kept.stored);
+    ++listed;
+    if (has_hull) found->hulls.emplace(id, kept->second.stored);
+    if (has_body) found->bodies.emplace(id, body->second);
   }
-  Scheduler::Current().Note("store: has listed records at revision", found->revision,
-                            found->hulls.size());
+  Scheduler::Current().Note("store: has listed records at revision", found->revision, listed);
   return found;
 }
 
 StoreTotals SimulatedStore::totals() const {
   StoreTotals totals;
   totals.hulls = hulls_.size();
+  totals.bodies = bodies_.size();
   for (const auto& [id, kept] : hulls_) totals.vertices += kept.stored.record.vertex_count;
   return totals;
 }
@@ -192,14 +209,26 @@ void SimulatedStore::Reopen(const StoreFaults& faults) {
   unknown_.clear();
 }
 
+void SimulatedStore::KeepBody(const Change& change) {
+  const BodyRecord& record = change.body->record;
+  log_.push_back({record.body_id, change.revision, change.deleted ? change.revision : 0,
+                  change.deleted ? record.create_revision : 0, true});
+  if (change.deleted) {
+    bodies_.erase(record.body_id);
+  } else {
+    bodies_[record.body_id] = *change.body;
+  }
+}
+
 void SimulatedStore::Keep(const Change& change, bool nobody_waits) {
   if (auto fault = ledger_.Keep(change, nobody_waits)) Scheduler::Current().Fail(*fault);
+  if (change.body != nullptr) return KeepBody(change);
   const HullRecord& record = change.hull.record;
   const bool ends = change.deleted || change.replaced.has_value();
   const uint64_t began = change.deleted                ? record.create_revision
                          : change.replaced.has_value() ? change.replaced->record.create_revision
                                                        : 0;
-  log_.push_back({record.hull_id, change.revision, ends ? change.revision : 0, began});
+  log_.push_back({record.hull_id, change.revision, ends ? change.revision : 0, began, false});
   if (change.deleted) {
     hulls_.erase(record.hull_id);
     return;

@@ -62,15 +62,14 @@ class SimulatedStore : public Store {
   bool keeps_hulls() const override { return true; }
   uint64_t revision() const override { return ledger_.revision(); }
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
-  // There are none.
-  absl::Status ForEachBody(const StoredBodyVisitor&) override { return absl::OkStatus(); }
+  absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   bool finds_records() const override { return finds_records_; }
-  absl::StatusOr<FoundHulls> FindHulls(std::span<const std::string> ids) override;
-  absl::StatusOr<FoundHulls> ListHulls(const std::string& prefix, const std::string& after,
-                                       size_t most) override;
+  absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> ids) override;
+  absl::StatusOr<FoundRecords> ListRecords(const std::string& prefix, const std::string& after,
+                                           size_t most, RecordKinds kinds) override;
   StoreTotals totals() const override;
   absl::Status Commit(std::span<Change* const> changes) override;
   absl::Status Recover() override;
@@ -106,24 +105,27 @@ class SimulatedStore : public Store {
     std::map<std::string, uint64_t> sequences;
   };
 
-  // A change that was kept: of which hull, at which revision, and whether an incarnation ended
-  // then.
+  // A change that was kept: of which hull or body, at which revision, and whether an incarnation
+  // ended then.
   struct Logged {
     std::string hull_id;
     uint64_t revision = 0;
     uint64_t ended_at = 0;
-    // Of that incarnation.
+    // Of that incarnation, and whether it was a body's.
     uint64_t former_began = 0;
+    bool former_was_body = false;
   };
 
   absl::Status RefuseBatch(std::span<const Change* const> changes);
   void Keep(const Change& change, bool nobody_waits);
+  void KeepBody(const Change& change);
 
   StoreFaults faults_;
   bool finds_records_ = false;
   Ledger ledger_;
   Counts counts_;
   std::map<std::string, Kept> hulls_;
+  std::map<std::string, StoredBody> bodies_;
   // What the next process may find.
   std::vector<Change> unknown_;
   // Incarnations, by their first revisions.

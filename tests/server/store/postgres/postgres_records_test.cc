@@ -2,6 +2,7 @@
 // batch.
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
@@ -9,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <semaphore>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +25,8 @@ class PostgresRecords : public PostgresTest {
   // As the database counts them.
   std::string Counted() const { return Ask("SELECT count(*) FROM hulld.hulls").front(); }
   std::string Kept() const { return Ask("SELECT hulls FROM hulld.store").front(); }
+  std::string CountedBodies() const { return Ask("SELECT count(*) FROM hulld.bodies").front(); }
+  std::string KeptBodies() const { return Ask("SELECT bodies FROM hulld.store").front(); }
   uint64_t KeptVertices() const {
     return std::stoull(Ask("SELECT vertices FROM hulld.store").front());
   }
@@ -33,6 +37,31 @@ class PostgresRecords : public PostgresTest {
     file >> size >> resident;
     return resident;
   }
+  static absl::StatusOr<PutBodyResult> PutBody(PostgresRegistry& server, const std::string& id,
+                                               size_t pieces = 1) {
+    StoredBody body;
+    body.record.body_id = id;
+    body.hull_ids = {"a"};
+    body.pieces.assign(pieces, StoredPiece());
+    return PostgresRegistry::Wait<PutBodyResult>([&](Reply<PutBodyResult> done) {
+      server.registry().PutBody(std::move(body), std::nullopt, std::move(done));
+    });
+  }
+  static absl::StatusOr<uint64_t> DeleteBody(PostgresRegistry& server, const std::string& id) {
+    return PostgresRegistry::Wait<uint64_t>([&](Reply<uint64_t> done) {
+      server.registry().DeleteBody(id, std::nullopt, std::move(done));
+    });
+  }
+  // DATA_LOSS, NOT_FOUND: none can be had.
+  static absl::StatusOr<BodyRecord> FindBody(PostgresRegistry& server, const std::string& id) {
+    const FoundBodies found = server.registry().FindBodies(std::span(&id, 1));
+    if (!found.status.ok()) return found.status;
+    const std::shared_ptr<const Body>& body = found.bodies.front();
+    if (body == nullptr) return absl::NotFoundError("none");
+    if (!body->damage().ok()) return body->damage();
+    return body->record();
+  }
+  void StartOverMany(bool bodies);
   // Hulls of 8 vertices, and one that is gone.
   void FillSome() {
     ASSERT_TRUE(hulls_->Put("a", CubeCorners()).ok());
@@ -101,6 +130,13 @@ TEST_F(PostgresRecords, WhatThereIsIsCountedWithEachBatch) {
   EXPECT_EQ(other->registry().Sizes().vertex_count, hulls_->registry().Sizes().vertex_count);
   EXPECT_EQ(KeptVertices(), hulls_->registry().Sizes().vertex_count);
   EXPECT_EQ(Kept(), Counted());
+  for (const char* id : {"body-1", "body-2"}) ASSERT_TRUE(PutBody(*hulls_, id).ok());
+  ASSERT_TRUE(PutBody(*hulls_, "body-1").ok());
+  ASSERT_TRUE(DeleteBody(*hulls_, "body-2").ok());
+  ASSERT_TRUE(other->registry().AwaitOthers({}).ok());
+  EXPECT_EQ(hulls_->registry().Sizes().body_count, 1);
+  EXPECT_EQ(other->registry().Sizes().body_count, 1);
+  EXPECT_EQ(KeptBodies(), CountedBodies());
 }
 
 TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
@@ -109,9 +145,10 @@ TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
     options_.shared = shared;
     Start();
     if (!shared) FillSome();
+    ASSERT_TRUE(PutBody(*hulls_, "body").ok());
     hulls_ = nullptr;
-    Ask("ALTER TABLE hulld.store DROP COLUMN hulls, DROP COLUMN vertices");
-    Ask("ALTER TABLE IF EXISTS hulld.changes DROP COLUMN began");
+    Ask("ALTER TABLE hulld.store DROP COLUMN hulls, DROP COLUMN vertices, DROP COLUMN bodies");
+    Ask("ALTER TABLE IF EXISTS hulld.changes DROP COLUMN began, DROP COLUMN body_began");
     Ask("UPDATE hulld.store SET format = 1");
     const std::string epoch = Ask("SELECT epoch FROM hulld.store").front();
     // A server that is refused leaves it to those that are active.
@@ -123,7 +160,8 @@ TEST_F(PostgresRecords, TablesOfFormerFormatsAreCountedOnce) {
     Start();
     EXPECT_EQ(hulls_->registry().Sizes().hull_count, 3);
     EXPECT_EQ(hulls_->registry().Sizes().vertex_count, 16);
-    EXPECT_EQ(Ask("SELECT format FROM hulld.store").front(), "3");
+    EXPECT_EQ(hulls_->registry().Sizes().body_count, 1);
+    EXPECT_EQ(Ask("SELECT format FROM hulld.store").front(), "4");
     EXPECT_NE(Ask("SELECT epoch FROM hulld.store").front(), epoch);
     EXPECT_TRUE(hulls_->View("a").ok());
     ASSERT_TRUE(hulls_->Create("d").ok());
@@ -166,11 +204,143 @@ TEST_F(PostgresRecords, AServerWaitsWhileAnotherChangesTheTables) {
   }
 }
 
+// Hulls were counted by then.
+TEST_F(PostgresRecords, OfFormat3OnlyBodiesAreCounted) {
+  options_.shared = true;
+  Start();
+  FillSome();
+  ASSERT_TRUE(PutBody(*hulls_, "body").ok());
+  hulls_ = nullptr;
+  Ask("ALTER TABLE hulld.store DROP COLUMN bodies");
+  Ask("ALTER TABLE hulld.changes DROP COLUMN body_began");
+  Ask("UPDATE hulld.store SET format = 3, hulls = 7");
+  Start();
+  EXPECT_EQ(hulls_->registry().Sizes().hull_count, 7);
+  EXPECT_EQ(hulls_->registry().Sizes().body_count, 1);
+  ASSERT_TRUE(DeleteBody(*hulls_, "body").ok());
+  EXPECT_EQ(KeptBodies(), "0");
+}
+
+TEST_F(PostgresRecords, NoBodyIsReadUntilItIsAskedFor) {
+  for (const bool shared : {false, true}) {
+    SCOPED_TRACE(shared);
+    options_.shared = shared;
+    Start();
+    FillSome();
+    for (const char* id : {"body-1", "body-2", "body-3"}) {
+      ASSERT_TRUE(PutBody(*hulls_, id).ok());
+    }
+    Ask("UPDATE hulld.bodies SET body = '\\x00' WHERE body_id = 'body-2'");
+    Start();
+    EXPECT_EQ(hulls_->registry().Cache().damaged, 0);
+    EXPECT_EQ(hulls_->registry().Sizes().body_count, 3);
+    EXPECT_TRUE(FindBody(*hulls_, "body-1").ok());
+    EXPECT_TRUE(absl::IsNotFound(FindBody(*hulls_, "a").status()));
+    EXPECT_TRUE(absl::IsNotFound(FindBody(*hulls_, "none").status()));
+    EXPECT_EQ(hulls_->registry().Cache().damaged, 0);
+    EXPECT_TRUE(absl::IsDataLoss(FindBody(*hulls_, "body-2").status()));
+    EXPECT_EQ(hulls_->registry().Cache().damaged, 1);
+    // One that was not looked for is in the way of a hull, too.
+    EXPECT_TRUE(absl::IsAlreadyExists(hulls_->Create("body-3").status()));
+    ASSERT_TRUE(DeleteBody(*hulls_, "body-3").ok());
+    EXPECT_TRUE(hulls_->Create("body-3").ok());
+    EXPECT_TRUE(absl::IsAlreadyExists(PutBody(*hulls_, "body-3").status()));
+    // Of a damaged one.
+    ASSERT_TRUE(PutBody(*hulls_, "body-2").ok());
+    EXPECT_EQ(KeptBodies(), CountedBodies());
+    for (const char* id : {"body-1", "body-2"}) ASSERT_TRUE(DeleteBody(*hulls_, id).ok());
+    EXPECT_EQ(KeptBodies(), "0");
+    EXPECT_EQ(hulls_->registry().Sizes().body_count, 0);
+    for (const char* id : {"a", "b", "c", "body-3"}) ASSERT_TRUE(hulls_->Delete(id).ok());
+  }
+}
+
+TEST_F(PostgresRecords, APageOfLargeBodiesIsShortAndSaysThatThereAreMore) {
+  Start();
+  constexpr size_t kPieces = 10'000;
+  // Some 600 KB each: more than one page takes.
+  constexpr int kBodies = 40;
+  for (int i = 0; i < kBodies; ++i) {
+    ASSERT_TRUE(PutBody(*hulls_, absl::StrCat("large-", 100 + i), kPieces).ok());
+  }
+  Start();
+  std::vector<std::string> listed;
+  size_t pages = 0;
+  for (std::string after;;) {
+    const absl::StatusOr<BodyPage> page = hulls_->registry().ListBodies("large-", after, 1000);
+    ASSERT_TRUE(page.ok()) << page.status();
+    ASSERT_FALSE(page->bodies.empty());
+    ++pages;
+    for (const auto& body : page->bodies) listed.push_back(body->record().body_id);
+    after = listed.back();
+    if (!page->more) break;
+  }
+  EXPECT_EQ(listed.size(), kBodies);
+  EXPECT_TRUE(std::ranges::is_sorted(listed));
+  EXPECT_GT(pages, 1);
+  EXPECT_LT(pages, 4);
+}
+
+// What others did of a body that is not in memory is told as what it was.
+TEST_F(PostgresRecords, AWatchIsToldOfBodiesThatAreNotInMemory) {
+  options_.shared = true;
+  Start();
+  for (const char* id : {"changes", "ends", "to-hull"}) {
+    ASSERT_TRUE(PutBody(*hulls_, id).ok());
+  }
+  ASSERT_TRUE(hulls_->Create("to-body").ok());
+  const std::unique_ptr<PostgresRegistry> other = MakeRegistry();
+  Registry& registry = other->registry();
+  const auto open = [&](bool bodies) {
+    WatchTarget target;
+    target.bodies = bodies;
+    const auto watch = registry.OpenWatch(target, {}, [] {});
+    EXPECT_TRUE(watch.ok()) << watch.status();
+    return *watch;
+  };
+  const auto of_all = open(true);
+  const auto of_hulls = open(false);
+  ASSERT_TRUE(PutBody(*hulls_, "changes").ok());
+  ASSERT_TRUE(DeleteBody(*hulls_, "ends").ok());
+  ASSERT_TRUE(DeleteBody(*hulls_, "to-hull").ok());
+  ASSERT_TRUE(hulls_->Create("to-hull").ok());
+  ASSERT_TRUE(hulls_->Delete("to-body").ok());
+  ASSERT_TRUE(PutBody(*hulls_, "to-body").ok());
+  ASSERT_TRUE(PutBody(*hulls_, "new").ok());
+  ASSERT_TRUE(registry.AwaitOthers({}).ok());
+  struct Told {
+    std::string id;
+    ChangeKind kind;
+    bool is_body;
+    bool operator==(const Told&) const = default;
+  };
+  const auto told = [&](const std::shared_ptr<ChangeWatch>& watch) {
+    std::vector<Told> all;
+    const absl::StatusOr<WatchPiece> piece = registry.TakeChanges(*watch);
+    EXPECT_TRUE(piece.ok()) << piece.status();
+    for (const HullChange& change : piece->changes) {
+      all.push_back({change.record.hull_id, change.kind, change.is_body});
+    }
+    registry.CloseWatch(watch);
+    return all;
+  };
+  const std::vector<Told> expected = {{"changes", ChangeKind::kChanged, true},
+                                      {"ends", ChangeKind::kDeleted, true},
+                                      {"to-hull", ChangeKind::kReplaced, false},
+                                      {"to-body", ChangeKind::kReplaced, true},
+                                      {"new", ChangeKind::kCreated, true}};
+  EXPECT_TRUE(told(of_all) == expected);
+  const std::vector<Told> of_hulls_alone = {{"to-hull", ChangeKind::kCreated, false},
+                                            {"to-body", ChangeKind::kDeleted, false}};
+  EXPECT_TRUE(told(of_hulls) == of_hulls_alone);
+}
+
 // HULLD_RECORDS in the environment: how many, by hand; it prints what a start takes, and what
 // reading all of them would.
-TEST_F(PostgresRecords, AServerStartsOverManyHulls) {
+void PostgresRecords::StartOverMany(bool bodies) {
   const char* const wanted = std::getenv("HULLD_RECORDS");
   const uint64_t count = wanted == nullptr ? 20'000 : std::stoull(wanted);
+  const auto id_of = [](uint64_t i) { return absl::StrCat("id-", i); };
   {
     const auto store = Open();
     ASSERT_TRUE(store.ok()) << store.status();
@@ -178,8 +348,14 @@ TEST_F(PostgresRecords, AServerStartsOverManyHulls) {
       std::vector<Change> changes(std::min<uint64_t>(5000, count - first));
       std::vector<Change*> pointers;
       for (Change& change : changes) {
+        const std::string id = id_of(first + pointers.size());
         change.begins = true;
-        change.hull.record.hull_id = absl::StrCat("hull-", first + pointers.size());
+        if (bodies) {
+          change.body = std::make_shared<StoredBody>(
+              StoredBody{{id, 0, 0}, {"piece-1", "piece-2"}, {{0, {}}, {1, {}}, {0, {}}}});
+        } else {
+          change.hull.record.hull_id = id;
+        }
         pointers.push_back(&change);
       }
       ASSERT_TRUE((*store)->Commit(pointers).ok());
@@ -192,21 +368,36 @@ TEST_F(PostgresRecords, AServerStartsOverManyHulls) {
   const uint64_t resident_before = ResidentPages();
   const Clock::time_point start = Clock::now();
   Start();
-  EXPECT_EQ(hulls_->registry().Sizes().hull_count, count);
-  EXPECT_TRUE(hulls_->View(absl::StrCat("hull-", count - 1)).ok());
+  const RegistrySizes sizes = hulls_->registry().Sizes();
+  EXPECT_EQ(bodies ? sizes.body_count : sizes.hull_count, count);
+  const std::string last = id_of(count - 1);
+  EXPECT_TRUE(bodies ? FindBody(*hulls_, last).ok() : hulls_->View(last).ok());
   const double taken = seconds_since(start);
   const uint64_t resident = ResidentPages() - resident_before;
   const Clock::time_point all_start = Clock::now();
-  std::map<std::string, StoredHull> all;
-  const absl::Status read = hulls_->store().ForEachHull(
-      [&](const std::string& id, absl::StatusOr<StoredHull> hull) { all.emplace(id, *hull); });
+  std::map<std::string, StoredHull> all_hulls;
+  std::map<std::string, StoredBody> all_bodies;
+  const absl::Status read = bodies
+                                ? hulls_->store().ForEachBody(
+                                      [&](const std::string& id, absl::StatusOr<StoredBody> body) {
+                                        all_bodies.emplace(id, *std::move(body));
+                                      })
+                                : hulls_->store().ForEachHull(
+                                      [&](const std::string& id, absl::StatusOr<StoredHull> hull) {
+                                        all_hulls.emplace(id, *hull);
+                                      });
   ASSERT_TRUE(read.ok()) << read;
-  EXPECT_EQ(all.size(), count);
+  EXPECT_EQ(all_hulls.size() + all_bodies.size(), count);
   if (wanted == nullptr) return;
-  std::cout << count << " hulls: " << taken << " s and " << resident * 4 / 1024
-            << " MiB to the first answer; to read all of them " << seconds_since(all_start)
-            << " s, and " << (ResidentPages() - resident_before) * 4 / 1024 << " MiB with them\n";
+  std::cout << count << (bodies ? " bodies: " : " hulls: ") << taken << " s and "
+            << resident * 4 / 1024 << " MiB to the first answer; to read all of them "
+            << seconds_since(all_start) << " s, and "
+            << (ResidentPages() - resident_before) * 4 / 1024 << " MiB with them\n";
 }
+
+TEST_F(PostgresRecords, AServerStartsOverManyHulls) { StartOverMany(false); }
+
+TEST_F(PostgresRecords, AServerStartsOverManyBodies) { StartOverMany(true); }
 
 TEST_F(PostgresRecords, AListIsReadPageByPage) {
   Start();
@@ -227,23 +418,30 @@ TEST_F(PostgresRecords, AListIsReadPageByPage) {
   EXPECT_TRUE(hulls_->registry().List("", "c", 10)->hulls.empty());
 }
 
-// One that is not in memory, and one of which is known that it went, which came again since.
+// One that is not in memory, one of which is known that it went, which came again since, and one
+// that came again as a body.
 TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
   Start();
   FillSome();
+  ASSERT_TRUE(hulls_->Create("d").ok());
   Registry& registry = hulls_->registry();
   registry.KeepRecords(0);
   const uint64_t before = registry.Sizes().store_revision;
   ASSERT_TRUE(hulls_->Delete("a").ok());
   ASSERT_TRUE(hulls_->Delete("c").ok());
   ASSERT_TRUE(hulls_->Create("a").ok());
+  ASSERT_TRUE(hulls_->Delete("b").ok());
+  ASSERT_TRUE(PutBody(*hulls_, "b").ok());
   // What is known of them goes.
   for (int i = 0; i < 100; ++i) hulls_->View(absl::StrCat("none-", i)).IgnoreError();
-  const auto told = [&](uint64_t after) {
+  EXPECT_FALSE(registry.TryFindBodies(std::vector<std::string>{"b"}).has_value());
+  const auto told = [&](uint64_t after, bool bodies = false) {
     std::vector<std::pair<std::string, bool>> events;
+    WatchTarget target;
+    target.bodies = bodies;
     const auto ready = std::make_shared<std::counting_semaphore<>>(0);
     const auto watch = registry.OpenWatch(
-        {}, {.tell_present = true, .after_revision = after, .store_id = hulls_->store().id()},
+        target, {.tell_present = true, .after_revision = after, .store_id = hulls_->store().id()},
         [ready] { ready->release(); });
     EXPECT_TRUE(watch.ok()) << watch.status();
     for (bool is_synced = !watch.ok(); !is_synced;) {
@@ -260,8 +458,10 @@ TEST_F(PostgresRecords, AWatchIsToldWhatIsThereAndWhatWent) {
     return events;
   };
   using Events = std::vector<std::pair<std::string, bool>>;
-  EXPECT_EQ(told(0), (Events{{"a", true}, {"b", true}}));
-  EXPECT_EQ(told(before), (Events{{"c", false}, {"a", true}}));
+  EXPECT_EQ(told(0), (Events{{"a", true}, {"d", true}}));
+  EXPECT_EQ(told(0, true), (Events{{"a", true}, {"b", true}, {"d", true}}));
+  EXPECT_EQ(told(before), (Events{{"c", false}, {"b", false}, {"a", true}}));
+  EXPECT_EQ(told(before, true), (Events{{"c", false}, {"a", true}, {"b", true}}));
 }
 
 }  // namespace

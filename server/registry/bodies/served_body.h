@@ -1,0 +1,29 @@
+#ifndef HULLD_SERVER_REGISTRY_BODIES_SERVED_BODY_H_
+#define HULLD_SERVER_REGISTRY_BODIES_SERVED_BODY_H_
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/query/body/query_body.h"
+#include "server/registry/body.h"
+#include "server/registry/memory/memory_budget.h"
+#include "server/registry/registry_types.h"
+
+namespace hulld::server {
+
+// A body as one call sees it, with the hulls of its pieces, which it keeps; counted against
+// --memory-limit while it is there.
+struct ServedBody {
+  std::shared_ptr<const Body> body;
+  // In the order of Body::hull_ids().
+  std::vector<HullView> hulls;
+  QueryBody query;
+  MemoryCharge charge;
+
+  const HullView& hull_of(uint32_t piece) const { return hulls[body->pieces()[piece].hull]; }
+};
+
+}  // namespace hulld::server
+
+#endif  // HULLD_SERVER_REGISTRY_BODIES_SERVED_BODY_H_
