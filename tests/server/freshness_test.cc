@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <libpq-fe.h>
 
 #include <cstdlib>
 #include <memory>
@@ -26,15 +27,17 @@ namespace {
 class FreshReads : public ::testing::Test {
  protected:
   static constexpr int kServers = 3;
+  static constexpr int kCallsPerClient = 24;
 
   void SetUp() override {
     if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
     PostgresCluster& cluster = PostgresCluster::Shared();
-    const std::string conninfo = cluster.WriteConninfo(cluster.MakeDatabase());
+    database_ = cluster.MakeDatabase();
+    const std::string conninfo = cluster.WriteConninfo(database_);
     for (int i = 0; i < kServers; ++i) {
       servers_.push_back(std::make_unique<Process>(std::vector<std::string>{
           "--listen", "127.0.0.1:0", "--store", "postgres", "--postgres-conninfo-file", conninfo,
-          "--postgres-servers", "many"}));
+          "--postgres-servers", "many", "--max-calls-per-client", absl::StrCat(kCallsPerClient)}));
     }
     for (const auto& server : servers_) {
       const std::string line = server->ReadLineWith("listening on ");
@@ -67,6 +70,7 @@ class FreshReads : public ::testing::Test {
     return stub->GetHull(&context, request, &response).ok();
   }
 
+  std::string database_;
   std::vector<std::unique_ptr<Process>> servers_;
   std::vector<std::string> addresses_;
 };
@@ -89,6 +93,70 @@ TEST_F(FreshReads, TheRevisionOfAnAcknowledgementIsSeenOnEveryServer) {
       EXPECT_EQ(response.hull().counts().received(), sequence);
     }
   }
+}
+
+// They wait without a thread; what they hold is given back although the store does not answer.
+TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
+  Append(0, "h", 1);
+  const auto collisions = v1::CollisionService::NewStub(Connect(0));
+  v1::CheckCollisionRequest pair;
+  pair.mutable_a()->set_hull_id("h");
+  pair.mutable_b()->set_hull_id("h");
+  // Nobody reads the row of the store until this session ends.
+  const std::unique_ptr<PGconn, decltype(&PQfinish)> holder(
+      PQconnectdb(PostgresCluster::Shared().Conninfo(database_).c_str()), PQfinish);
+  PQclear(PQexec(holder.get(), "BEGIN; LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE"));
+  ASSERT_EQ(PQtransactionStatus(holder.get()), PQTRANS_INTRANS) << PQerrorMessage(holder.get());
+  struct Call {
+    grpc::ClientContext context;
+    v1::CheckCollisionResponse response;
+    grpc::Status status;
+  };
+  grpc::CompletionQueue queue;
+  const auto ask = [&](Call& call) {
+    collisions->AsyncCheckCollision(&call.context, pair, &queue)
+        ->Finish(&call.response, &call.status, &call);
+  };
+  const auto next = [&] {
+    void* tag = nullptr;
+    bool ok = false;
+    EXPECT_TRUE(queue.Next(&tag, &ok));
+    return static_cast<Call*>(tag);
+  };
+  // One more than may run: the first that ends is refused, and the others wait.
+  std::vector<Call> calls(kCallsPerClient + 1);
+  for (Call& call : calls) ask(call);
+  EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  const auto unanswered = [this] {
+    return PostgresCluster::Shared().Ask(
+        database_,
+        "SELECT pid || ' ' || query_start FROM pg_stat_activity WHERE wait_event_type = 'Lock' "
+        "AND datname = current_database() ORDER BY query_start LIMIT 1");
+  };
+  std::vector<std::string> first;
+  while (first.empty()) first = unanswered();
+  for (Call& call : calls) call.context.TryCancel();
+  for (int i = 0; i < kCallsPerClient; ++i) {
+    EXPECT_EQ(next()->status.error_code(), grpc::StatusCode::CANCELLED);
+  }
+  // As soon as the server noticed, another may call; it is refused before.
+  const auto hulls = v1::HullService::NewStub(Connect(0));
+  grpc::Status asked;
+  do {
+    grpc::ClientContext context;
+    v1::GetHullRequest request;
+    v1::GetHullResponse response;
+    request.set_hull_id("h");
+    request.mutable_freshness()->mutable_max_staleness()->set_seconds(3600);
+    asked = hulls->GetHull(&context, request, &response);
+  } while (asked.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(asked.ok()) << asked.error_message();
+  // The store has not answered meanwhile.
+  EXPECT_EQ(unanswered(), first);
+  PQclear(PQexec(holder.get(), "COMMIT"));
+  Call last;
+  ask(last);
+  EXPECT_TRUE(next()->status.ok()) << last.status.error_message();
 }
 
 // Every call that reads takes it: a revision that nobody was told of, and another store, are told

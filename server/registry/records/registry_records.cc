@@ -7,6 +7,7 @@
 // changes are of IDs that are known, so none comes in between.
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <utility>
