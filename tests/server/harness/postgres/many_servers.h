@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/server/harness/history_client.h"
 #include "tests/server/harness/hull_history.h"
 #include "tests/server/harness/hulld_process.h"
 
@@ -52,6 +53,10 @@ class ManyServersTest : public ::testing::Test {
     std::vector<std::string> hulls = {"shared/a", "shared/b"};
     // Clients ask how they stand to each other, too. They are in two shards.
     bool pairs = false;
+    // Bodies of these hulls, which are put, deleted, read and asked about, too.
+    std::vector<std::string> bodies = {};
+    // Reads are of any freshness.
+    bool any_freshness = false;
   };
   using Fault = std::function<void()>;
   // Clients call at random, each another server now and then, and one that is not answered goes on
@@ -78,6 +83,8 @@ class ManyServersTest : public ::testing::Test {
     std::thread reader;
   };
 
+  // As the calls say.
+  void SetUp(HistoryClient& client, const Calls& calls);
   void Call(size_t client, const Calls& calls, HullHistory& history,
             const std::function<void()>& answered);
 
