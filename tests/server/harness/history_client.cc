@@ -223,6 +223,11 @@ void HistoryClient::ChooseFreshness(const std::string& hull_id, Operation& opera
   }
 }
 
+void HistoryClient::ChooseFreshnessOfSeveral(const std::string& hull_id, Operation& operation,
+                                             v1::Freshness& freshness) {
+  if (any_freshness_ && Below(2) == 0) ChooseFreshness(hull_id, operation, freshness);
+}
+
 void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation,
                                const std::string& store_id) {
   operation.store_revision = RevisionOf(header, store_id);
@@ -428,7 +433,7 @@ bool HistoryClient::Pair(const std::string& hull_id, const std::string& other) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(hull_id);
   *request.mutable_b() = PlacementOf(other);
-  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
+  ChooseFreshnessOfSeveral(hull_id, operation, *request.mutable_freshness());
   Seen seen{.hull_id = other, .at_least_revision = LeastFor(other, request.freshness())};
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.create_revision = response.hull_a().create_revision();
@@ -517,7 +522,7 @@ bool HistoryClient::Ask(const std::string& body_id) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(body_id);
   *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
-  ChooseFreshness(body_id, operation, *request.mutable_freshness());
+  ChooseFreshnessOfSeveral(body_id, operation, *request.mutable_freshness());
   const bool is_of_one_instant = operation.max_staleness == 0;
   // A certificate names the hulls of all pieces; without, they are looked up in another way.
   operation.tells_pieces = !is_of_one_instant || Below(2) == 0;

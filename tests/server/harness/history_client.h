@@ -86,6 +86,9 @@ class HistoryClient {
   Coordinates SomePoints(int count, Operation& operation);
   // Tells request and operation, which is on this hull, of the same freshness, at random.
   void ChooseFreshness(const std::string& hull_id, Operation& operation, v1::Freshness& freshness);
+  // The same for a question about several, half of which are of one instant.
+  void ChooseFreshnessOfSeveral(const std::string& hull_id, Operation& operation,
+                                v1::Freshness& freshness);
   void ChooseRevisions(v1::Freshness& freshness);
   // The revision that is asked for of the store of this hull; 0: none, or it is not known which.
   uint64_t LeastFor(const std::string& hull_id, const v1::Freshness& freshness) const;

@@ -5,6 +5,7 @@
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -38,6 +39,8 @@ uint64_t NumberIn(const char* variable, uint64_t otherwise) {
 class ShardedHistories : public ManyServersTest {
  protected:
   static constexpr size_t kShards = 2;
+  // Several times what an answer takes that is not delayed.
+  static constexpr std::chrono::milliseconds kFar{5};
 
   void SetUp() override {
     ManyServersTest::SetUp();
@@ -138,10 +141,15 @@ class ShardedHistories : public ManyServersTest {
   uint64_t over_two_shards_ = 0;
 };
 
+// Two of the servers are far from one database, each from another one: what they find there is
+// older than what they find nearby.
 TEST_F(ShardedHistories, BodiesOverTwoShardsAreReadAtAnyFreshnessWhileServersAreKilled) {
   uint64_t runs = 0;
   ForEachRun([&](uint64_t seed) {
     BeginBehindProxies();
+    for (size_t shard = 0; shard < kShards; ++shard) {
+      proxy((seed + shard) % kServers, shard).SetDelay(kFar);
+    }
     HullHistory history;
     std::vector<Fault> faults;
     for (size_t kill = 0; kill < 3; ++kill) {
@@ -156,7 +164,7 @@ TEST_F(ShardedHistories, BodiesOverTwoShardsAreReadAtAnyFreshnessWhileServersAre
 }
 
 // The network between a server and one of its databases loses a COMMIT, or the answer to one, tells
-// nothing of what others did, or is down; the other database of that server goes on.
+// nothing of what others did, is slow, or is down; the other database of that server goes on.
 TEST_F(ShardedHistories, BodiesOverTwoShardsAreReadAtAnyFreshnessBehindANetworkThatCuts) {
   constexpr int kFaults = 6;
   uint64_t runs = 0;
@@ -168,7 +176,7 @@ TEST_F(ShardedHistories, BodiesOverTwoShardsAreReadAtAnyFreshnessBehindANetworkT
     for (int i = 0; i < kFaults; ++i) {
       const size_t victim = random() % kServers;
       CuttingProxy& network = proxy(victim, random() % kShards);
-      switch (random() % 5) {
+      switch (random() % 6) {
         case 0:
           faults.push_back([&network] { network.CutNext(Cut::kBeforeCommit); });
           break;
@@ -181,6 +189,9 @@ TEST_F(ShardedHistories, BodiesOverTwoShardsAreReadAtAnyFreshnessBehindANetworkT
         case 3:
           faults.push_back([&network] { network.SetDeaf(true); });
           faults.push_back([&network] { network.SetDeaf(false); });
+          break;
+        case 4:
+          faults.push_back([&network] { network.SetDelay(kFar); });
           break;
         default:
           faults.push_back([&network] { network.SetDown(true); });
