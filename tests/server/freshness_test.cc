@@ -23,6 +23,11 @@
 namespace hulld::server {
 namespace {
 
+int NumberIn(const char* variable, int otherwise) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::atoi(text);
+}
+
 class FreshReads : public ::testing::Test {
  protected:
   static constexpr int kServers = 3;
@@ -181,11 +186,11 @@ TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
 TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {
   constexpr int kClients = 6;
   constexpr int kCalls = 120;
-  const char* const given = std::getenv("HULLD_MANY_RUNS");
-  const int runs = given == nullptr ? 2 : std::atoi(given);
+  const int first = NumberIn("HULLD_TEST_SEED", 0);
+  const int runs = NumberIn("HULLD_MANY_RUNS", 2);
   size_t from_the_past = 0;
   size_t of_a_revision = 0;
-  for (int run = 0; run < runs; ++run) {
+  for (int run = first; run < first + runs; ++run) {
     HullHistory history;
     HistoryClient(Connect(0), history, "probe", 0).MakeProbe();
     // No server goes back behind this, so the probe is never missing.
