@@ -29,11 +29,19 @@ void ManyServersTest::SetUp() {
   if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
 }
 
-ManyServersTest::Server::Server(const std::string& conninfo_file)
-    : process(std::make_unique<Process>(std::vector<std::string>{
-          "--listen", "127.0.0.1:0", "--store", "postgres",
-          conninfo_file.ends_with(".shards") ? "--postgres-shards" : "--postgres-conninfo-file",
-          conninfo_file, "--postgres-servers", "many"})) {}
+ManyServersTest::Server::Server(const std::string& program, const std::string& conninfo_file) {
+  const std::vector<std::string> words = {
+      "--listen",
+      "127.0.0.1:0",
+      "--store",
+      "postgres",
+      conninfo_file.ends_with(".shards") ? "--postgres-shards" : "--postgres-conninfo-file",
+      conninfo_file,
+      "--postgres-servers",
+      "many"};
+  process = program.empty() ? std::make_unique<Process>(words)
+                            : std::make_unique<Process>(program, words);
+}
 
 void ManyServersTest::Server::AwaitListening() {
   const std::string line = process->ReadLineWith("listening on ");
@@ -57,7 +65,7 @@ void ManyServersTest::Begin(const std::vector<std::string>& conninfo_files) {
   addresses_.clear();
   conninfo_files_ = conninfo_files;
   for (const std::string& file : conninfo_files_) {
-    servers_.push_back(std::make_unique<Server>(file));
+    servers_.push_back(std::make_unique<Server>(program_, file));
     servers_.back()->AwaitListening();
     addresses_.push_back(servers_.back()->address);
   }
@@ -68,7 +76,7 @@ void ManyServersTest::BeginAtOnce(const std::vector<std::string>& conninfo_files
   addresses_.clear();
   conninfo_files_ = conninfo_files;
   for (const std::string& file : conninfo_files_) {
-    servers_.push_back(std::make_unique<Server>(file));
+    servers_.push_back(std::make_unique<Server>(program_, file));
   }
   for (const auto& server : servers_) {
     server->AwaitListening();
@@ -88,7 +96,7 @@ std::string ManyServersTest::address(size_t i) {
 
 void ManyServersTest::Replace(size_t i) {
   servers_[i] = nullptr;
-  servers_[i] = std::make_unique<Server>(conninfo_files_[i]);
+  servers_[i] = std::make_unique<Server>(program_, conninfo_files_[i]);
   servers_[i]->AwaitListening();
   const std::lock_guard lock(mutex_);
   addresses_[i] = servers_[i]->address;

@@ -28,6 +28,8 @@ class ManyServersTest : public ::testing::Test {
   // Skips the test without PostgreSQL.
   void SetUp() override;
 
+  // The program that is started from now on, in the place of hulld.
+  void UseProgram(const std::string& program) { program_ = program; }
   // Ends the servers that there were, and starts one for each file with a connection string, one
   // after the other, or all at once. A file whose name ends in ".shards" names several databases.
   void Begin(const std::vector<std::string>& conninfo_files);
@@ -72,7 +74,8 @@ class ManyServersTest : public ::testing::Test {
  private:
   // A process, and a thread that reads what it says, or it would wait for that.
   struct Server {
-    explicit Server(const std::string& conninfo_file);
+    // program: empty for hulld.
+    Server(const std::string& program, const std::string& conninfo_file);
     ~Server();
 
     // It must come to listen.
@@ -88,6 +91,7 @@ class ManyServersTest : public ::testing::Test {
   void Call(size_t client, const Calls& calls, HullHistory& history,
             const std::function<void()>& answered);
 
+  std::string program_;
   std::vector<std::string> conninfo_files_;
   std::vector<std::unique_ptr<Server>> servers_;
   std::mutex mutex_;
