@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <cstdlib>
 #include <memory>
@@ -45,7 +46,13 @@ class FreshReads : public ::testing::Test {
       const std::string line = server->ReadLineWith("listening on ");
       ASSERT_FALSE(line.empty());
       addresses_.push_back(AddressIn(line));
+      // What it says is read, or it would wait for that once it has said much.
+      readers_.emplace_back([&server] { server->ReadToEnd(); });
     }
+  }
+  void TearDown() override {
+    for (const auto& server : servers_) server->Signal(SIGKILL);
+    for (std::thread& reader : readers_) reader.join();
   }
 
   std::shared_ptr<grpc::Channel> Connect(size_t server, int channel = 0) const {
@@ -74,6 +81,7 @@ class FreshReads : public ::testing::Test {
 
   std::vector<std::unique_ptr<Process>> servers_;
   std::vector<std::string> addresses_;
+  std::vector<std::thread> readers_;
 };
 
 // What a server was told to remember, the next one has seen.
