@@ -4,6 +4,7 @@
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <libpq-fe.h>
+#include <signal.h>
 
 #include <cstdlib>
 #include <memory>
@@ -24,6 +25,11 @@
 namespace hulld::server {
 namespace {
 
+int NumberIn(const char* variable, int otherwise) {
+  const char* const text = std::getenv(variable);
+  return text == nullptr ? otherwise : std::atoi(text);
+}
+
 class FreshReads : public ::testing::Test {
  protected:
   static constexpr int kServers = 3;
@@ -43,7 +49,13 @@ class FreshReads : public ::testing::Test {
       const std::string line = server->ReadLineWith("listening on ");
       ASSERT_FALSE(line.empty());
       addresses_.push_back(AddressIn(line));
+      // What it says is read, or it would wait for that once it has said much.
+      readers_.emplace_back([&server] { server->ReadToEnd(); });
     }
+  }
+  void TearDown() override {
+    for (const auto& server : servers_) server->Signal(SIGKILL);
+    for (std::thread& reader : readers_) reader.join();
   }
 
   std::shared_ptr<grpc::Channel> Connect(size_t server, int channel = 0) const {
@@ -73,6 +85,7 @@ class FreshReads : public ::testing::Test {
   std::string database_;
   std::vector<std::unique_ptr<Process>> servers_;
   std::vector<std::string> addresses_;
+  std::vector<std::thread> readers_;
 };
 
 // What a server was told to remember, the next one has seen.
@@ -249,11 +262,11 @@ TEST_F(FreshReads, EveryReadRefusesWhatTheStoreHasNotGiven) {
 TEST_F(FreshReads, HistoriesHoldWhatEachFreshnessPromises) {
   constexpr int kClients = 6;
   constexpr int kCalls = 120;
-  const char* const given = std::getenv("HULLD_MANY_RUNS");
-  const int runs = given == nullptr ? 2 : std::atoi(given);
+  const int first = NumberIn("HULLD_TEST_SEED", 0);
+  const int runs = NumberIn("HULLD_MANY_RUNS", 2);
   size_t from_the_past = 0;
   size_t of_a_revision = 0;
-  for (int run = 0; run < runs; ++run) {
+  for (int run = first; run < first + runs; ++run) {
     HullHistory history;
     HistoryClient(Connect(0), history, "probe", 0).MakeProbe();
     // No server goes back behind this, so the probe is never missing.

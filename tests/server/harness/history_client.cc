@@ -4,6 +4,8 @@
 #include <chrono>
 #include <utility>
 
+#include "tests/server/harness/hull_specification.h"
+
 namespace hulld::server {
 namespace {
 
@@ -61,6 +63,28 @@ uint64_t RevisionOf(const v1::ResponseHeader& header, const std::string& store_i
   return header.revision();
 }
 
+void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen) {
+  seen.store_id = version.store_id();
+  seen.store_revision = RevisionOf(header, version.store_id());
+  seen.create_revision = version.create_revision();
+  seen.revision = version.revision();
+}
+
+// Whether an error is about this hull.
+bool IsAbout(const grpc::Status& status, const std::string& hull_id) {
+  return status.error_message().find("hull \"" + hull_id + "\"") != std::string::npos;
+}
+
+// The hull that an error says a piece of a body lacks; empty: it is about another thing.
+std::string MissingPiece(const grpc::Status& status) {
+  const std::string& said = status.error_message();
+  const std::string before = "hull \"";
+  const size_t piece = said.find("\": piece ");
+  if (piece == std::string::npos) return "";
+  const size_t begin = said.find(before, piece) + before.size();
+  return said.substr(begin, said.find('"', begin) - begin);
+}
+
 }  // namespace
 
 const Coordinates& HistoryCloud() {
@@ -77,6 +101,7 @@ HistoryClient::HistoryClient(const std::shared_ptr<grpc::Channel>& channel, Hull
 void HistoryClient::Connect(const std::shared_ptr<grpc::Channel>& channel) {
   streams_.clear();
   hulls_ = v1::HullService::NewStub(channel);
+  bodies_ = v1::BodyService::NewStub(channel);
   collisions_ = v1::CollisionService::NewStub(channel);
 }
 
@@ -119,31 +144,75 @@ Operation HistoryClient::Begin(Kind kind) {
 bool HistoryClient::End(const std::string& hull_id, Operation& operation,
                         const grpc::Status& status) {
   operation.outcome = OutcomeOf(status);
-  const bool read = operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
-                    operation.kind == Kind::kProbe || operation.kind == Kind::kPair;
+  const bool read = IsRead(operation);
   if (operation.outcome == Outcome::kUnknown) {
     // The incarnation is gone: what it did, it did before this answer.
     const bool gone = status.error_code() == grpc::StatusCode::FAILED_PRECONDITION;
     if (gone) operation.returned = history_.Tick();
+    // Every revision that is asked for was told by an answer.
+    EXPECT_FALSE(read && gone) << "hull " << hull_id << ": " << status.error_message();
     // A read that was not answered says nothing.
     if (!read) history_.Record(hull_id, operation);
     return status.error_code() != grpc::StatusCode::UNAVAILABLE;
   }
   operation.returned = history_.Tick();
   history_.Record(hull_id, operation);
-  if (operation.outcome == Outcome::kOk) revisions_[hull_id] = operation.revision;
+  if (operation.outcome == Outcome::kOk) {
+    revisions_[hull_id] = operation.revision;
+    if (tells_stores_) stores_[hull_id] = operation.store_id;
+  }
   return true;
 }
 
-void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshness) {
-  constexpr int kMostMilliseconds = 50;
-  if (!any_freshness_) return;
-  const bool is_at_least = Below(2) == 0 && last_header_.revision() > 0;
-  const bool is_bounded = Below(2) == 0;
-  if (is_at_least) {
+bool HistoryClient::EndPart(Kind kind, const Operation& whole, const Seen& seen,
+                            const grpc::Status& status) {
+  Operation part = whole;
+  part.kind = kind;
+  part.others.clear();
+  part.pieces.clear();
+  part.create_revision = seen.create_revision;
+  part.revision = seen.revision;
+  part.store_revision = seen.store_revision;
+  part.at_least_revision = seen.at_least_revision;
+  part.store_id = seen.store_id;
+  return End(seen.hull_id, part, status);
+}
+
+void HistoryClient::ChooseRevisions(v1::Freshness& freshness) {
+  if (!tells_stores_) {
     freshness.set_at_least_revision(last_header_.revision());
     freshness.set_store_id(last_header_.store_id());
-    operation.at_least_revision = last_header_.revision();
+    return;
+  }
+  for (const auto& [store_id, revision] : store_revisions_) {
+    if (Below(3) == 0) continue;
+    v1::ShardRevision* const least = freshness.add_at_least();
+    least->set_store_id(store_id);
+    least->set_revision(revision);
+  }
+}
+
+uint64_t HistoryClient::LeastFor(const std::string& hull_id, const v1::Freshness& freshness) const {
+  if (!tells_stores_) return freshness.at_least_revision();
+  const auto store = stores_.find(hull_id);
+  if (store == stores_.end()) return 0;
+  for (const v1::ShardRevision& least : freshness.at_least()) {
+    if (least.store_id() == store->second) return least.revision();
+  }
+  return 0;
+}
+
+void HistoryClient::ChooseFreshness(const std::string& hull_id, Operation& operation,
+                                    v1::Freshness& freshness) {
+  constexpr int kMostMilliseconds = 50;
+  if (!any_freshness_) return;
+  bool is_at_least = Below(2) == 0 && last_header_.revision() > 0;
+  const bool is_bounded = Below(2) == 0;
+  if (is_at_least) {
+    ChooseRevisions(freshness);
+    // No condition at all is the strongest.
+    is_at_least = freshness.at_least_revision() > 0 || freshness.at_least_size() > 0;
+    operation.at_least_revision = LeastFor(hull_id, freshness);
   }
   if (is_bounded) {
     const int nanos = 1'000'000 * (1 + Below(kMostMilliseconds));
@@ -154,6 +223,11 @@ void HistoryClient::ChooseFreshness(Operation& operation, v1::Freshness& freshne
   }
 }
 
+void HistoryClient::ChooseFreshnessOfSeveral(const std::string& hull_id, Operation& operation,
+                                             v1::Freshness& freshness) {
+  if (any_freshness_ && Below(2) == 0) ChooseFreshness(hull_id, operation, freshness);
+}
+
 void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& operation,
                                const std::string& store_id) {
   operation.store_revision = RevisionOf(header, store_id);
@@ -161,6 +235,12 @@ void HistoryClient::TakeHeader(const v1::ResponseHeader& header, Operation& oper
   operation.staleness = static_cast<uint64_t>(1'000'000'000 * header.staleness().seconds() +
                                               header.staleness().nanos());
   if (header.revision() > 0) last_header_ = header;
+  const auto note = [this](const auto& told) {
+    uint64_t& revision = store_revisions_[told.store_id()];
+    revision = std::max(revision, told.revision());
+  };
+  if (header.revision() > 0) note(header);
+  for (const v1::ShardRevision& shard : header.shards()) note(shard);
 }
 
 std::optional<uint64_t> HistoryClient::SomeRevision(const std::string& hull_id) {
@@ -301,7 +381,7 @@ bool HistoryClient::Get(const std::string& hull_id) {
   v1::GetHullRequest request;
   v1::GetHullResponse response;
   request.set_hull_id(hull_id);
-  ChooseFreshness(operation, *request.mutable_freshness());
+  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
   const grpc::Status status = hulls_->GetHull(NewContext().get(), request, &response);
   TakeRecord(response.hull(), operation);
   TakeHeader(response.header(), operation);
@@ -312,7 +392,7 @@ bool HistoryClient::Mesh(const std::string& hull_id) {
   Operation operation = Begin(Kind::kMesh);
   v1::GetHullMeshRequest request;
   request.set_hull_id(hull_id);
-  ChooseFreshness(operation, *request.mutable_freshness());
+  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
   const std::unique_ptr<grpc::ClientContext> context = NewContext();
   const auto reader = hulls_->GetHullMesh(context.get(), request);
   v1::GetHullMeshResponse part;
@@ -339,7 +419,7 @@ bool HistoryClient::Probe(const std::string& hull_id) {
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(hull_id);
   *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
-  ChooseFreshness(operation, *request.mutable_freshness());
+  ChooseFreshness(hull_id, operation, *request.mutable_freshness());
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.revision = response.hull_a().revision();
   TakeHeader(response.header(), operation, response.hull_a().store_id());
@@ -349,19 +429,143 @@ bool HistoryClient::Probe(const std::string& hull_id) {
 
 bool HistoryClient::Pair(const std::string& hull_id, const std::string& other) {
   Operation operation = Begin(Kind::kPair);
-  operation.other = other;
   v1::CheckCollisionRequest request;
   v1::CheckCollisionResponse response;
   *request.mutable_a() = PlacementOf(hull_id);
   *request.mutable_b() = PlacementOf(other);
+  ChooseFreshnessOfSeveral(hull_id, operation, *request.mutable_freshness());
+  Seen seen{.hull_id = other, .at_least_revision = LeastFor(other, request.freshness())};
   const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
   operation.create_revision = response.hull_a().create_revision();
   operation.revision = response.hull_a().revision();
-  operation.other_create_revision = response.hull_b().create_revision();
-  operation.other_revision = response.hull_b().revision();
   TakeHeader(response.header(), operation, response.hull_a().store_id());
-  operation.other_store_revision = RevisionOf(response.header(), response.hull_b().store_id());
+  TakeVersion(response.hull_b(), response.header(), seen);
+  if (operation.max_staleness == 0 || (status.ok() && operation.store_id == seen.store_id)) {
+    operation.others = {seen};
+    return End(hull_id, operation, status);
+  }
+  // Each of the two is as fresh as it must be, and they need not have been together.
+  if (!status.ok()) {
+    if (IsAbout(status, other)) return EndPart(Kind::kVersion, operation, seen, status);
+    operation.kind = Kind::kVersion;
+    return End(hull_id, operation, status);
+  }
+  EndPart(Kind::kVersion, operation, seen, status);
+  operation.kind = Kind::kVersion;
   return End(hull_id, operation, status);
+}
+
+bool HistoryClient::CallBodyAtRandom(const std::string& body_id,
+                                     const std::vector<std::string>& hulls) {
+  const int choice = Below(20);
+  if (choice < 5) return PutBody(body_id, hulls);
+  if (choice < 6) return DeleteBody(body_id, Below(2) == 0);
+  if (choice < 9) return GetBody(body_id);
+  return Ask(body_id);
+}
+
+bool HistoryClient::PutBody(const std::string& body_id, const std::vector<std::string>& hulls) {
+  Operation operation = Begin(Kind::kPut);
+  operation.if_revision = SomeRevision(body_id);
+  if (!operation.if_revision && Below(8) == 0) operation.if_revision = 0;
+  v1::PutBodyRequest request;
+  v1::PutBodyResponse response;
+  request.set_body_id(body_id);
+  if (operation.if_revision) request.set_if_revision(*operation.if_revision);
+  const int chosen = 1 + Below((1 << hulls.size()) - 1);
+  for (size_t i = 0; i < hulls.size(); ++i) {
+    if ((chosen >> i & 1) == 0) continue;
+    operation.pieces.push_back(hulls[i]);
+    *request.add_pieces() = PlacementOf(hulls[i]);
+  }
+  const grpc::Status status = bodies_->PutBody(NewContext().get(), request, &response);
+  operation.create_revision = response.body().create_revision();
+  operation.revision = response.body().revision();
+  operation.created = response.created();
+  TakeHeader(response.header(), operation);
+  return End(body_id, operation, status);
+}
+
+bool HistoryClient::DeleteBody(const std::string& body_id, bool if_known_revision) {
+  Operation operation = Begin(Kind::kDelete);
+  const auto known = revisions_.find(body_id);
+  if (if_known_revision && known != revisions_.end()) operation.if_revision = known->second;
+  v1::DeleteBodyRequest request;
+  v1::DeleteBodyResponse response;
+  request.set_body_id(body_id);
+  if (operation.if_revision) request.set_if_revision(*operation.if_revision);
+  const grpc::Status status = bodies_->DeleteBody(NewContext().get(), request, &response);
+  TakeHeader(response.header(), operation);
+  operation.revision = operation.store_revision;
+  return End(body_id, operation, status);
+}
+
+bool HistoryClient::GetBody(const std::string& body_id) {
+  Operation operation = Begin(Kind::kGetBody);
+  v1::GetBodyRequest request;
+  v1::GetBodyResponse response;
+  request.set_body_id(body_id);
+  ChooseFreshness(body_id, operation, *request.mutable_freshness());
+  const grpc::Status status = bodies_->GetBody(NewContext().get(), request, &response);
+  operation.create_revision = response.body().create_revision();
+  operation.revision = response.body().revision();
+  for (const v1::Placement& piece : response.pieces()) operation.pieces.push_back(piece.hull_id());
+  TakeHeader(response.header(), operation);
+  return End(body_id, operation, status);
+}
+
+bool HistoryClient::Ask(const std::string& body_id) {
+  Operation operation = Begin(Kind::kAsk);
+  operation.probe = Below(kCloudSize);
+  const double* at = HistoryCloud().data() + 3 * operation.probe;
+  v1::CheckCollisionRequest request;
+  v1::CheckCollisionResponse response;
+  *request.mutable_a() = PlacementOf(body_id);
+  *request.mutable_b() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
+  ChooseFreshnessOfSeveral(body_id, operation, *request.mutable_freshness());
+  const bool is_of_one_instant = operation.max_staleness == 0;
+  // A certificate names the hulls of all pieces; without, they are looked up in another way.
+  operation.tells_pieces = !is_of_one_instant || Below(2) == 0;
+  request.mutable_wanted()->set_certificate(operation.tells_pieces);
+  const grpc::Status status = collisions_->CheckCollision(NewContext().get(), request, &response);
+  operation.create_revision = response.hull_a().create_revision();
+  operation.revision = response.hull_a().revision();
+  operation.touching = response.relation() == v1::RELATION_TOUCHING;
+  TakeHeader(response.header(), operation, response.hull_a().store_id());
+  if (operation.touching) operation.deciding = response.piece_a().hull().hull_id();
+  std::vector<Seen> elsewhere;
+  const auto take = [&](const v1::HullVersion& version) {
+    Seen seen{.hull_id = version.hull_id(),
+              .at_least_revision = LeastFor(version.hull_id(), request.freshness())};
+    TakeVersion(version, response.header(), seen);
+    const bool is_together = is_of_one_instant || version.store_id() == operation.store_id;
+    (is_together ? operation.others : elsewhere).push_back(seen);
+  };
+  if (operation.tells_pieces) {
+    for (const v1::HullVersion& version : response.piece_hulls()) {
+      if (version.hull_id() == kProbeHull) continue;
+      operation.pieces.push_back(version.hull_id());
+      take(version);
+    }
+  } else if (operation.touching) {
+    take(response.piece_a().hull());
+  }
+  if (status.error_code() == grpc::StatusCode::NOT_FOUND) {
+    operation.missing = MissingPiece(status);
+    if (!is_of_one_instant && !operation.missing.empty()) {
+      const Seen seen{.hull_id = operation.missing,
+                      .at_least_revision = LeastFor(operation.missing, request.freshness())};
+      return EndPart(Kind::kVersion, operation, seen, status);
+    }
+  }
+  // A hull of another store was as it is said to be at an instant of its own.
+  for (const Seen& seen : elsewhere) {
+    const bool touches = operation.touching && seen.hull_id == operation.deciding;
+    const bool is_probed = touches || !operation.touching;
+    EndPart(is_probed ? Kind::kProbe : Kind::kVersion, operation, seen, status);
+  }
+  operation.is_part = !elsewhere.empty();
+  return End(body_id, operation, status);
 }
 
 }  // namespace hulld::server

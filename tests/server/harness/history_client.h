@@ -7,7 +7,9 @@
 #include <memory>
 #include <random>
 #include <string>
+#include <vector>
 
+#include "hulld/v1/body.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
@@ -32,7 +34,8 @@ class HistoryClient {
   // From now on reads ask for any freshness: the latest, the revision of the last answer, a bound
   // of some milliseconds, or both. Otherwise for the latest.
   void ReadAtAnyFreshness() { any_freshness_ = true; }
-  // From now on operations say which store they are of: hulls are spread over several.
+  // From now on operations say which store they are of: hulls are spread over several. A revision
+  // that is asked for is then the greatest that any answer told, of some of them or of all.
   void TellStores() { tells_stores_ = true; }
 
   // Makes kProbeHull; once per store.
@@ -60,6 +63,14 @@ class HistoryClient {
   // How two hulls of the history stand to each other.
   bool Pair(const std::string& hull_id, const std::string& other);
 
+  // One call at random on this body, whose pieces are some of these hulls, each where it is.
+  bool CallBodyAtRandom(const std::string& body_id, const std::vector<std::string>& hulls);
+  bool PutBody(const std::string& body_id, const std::vector<std::string>& hulls);
+  bool DeleteBody(const std::string& body_id, bool if_known_revision);
+  bool GetBody(const std::string& body_id);
+  // Whether it touches a point of the cloud.
+  bool Ask(const std::string& body_id);
+
  private:
   struct Stream {
     std::unique_ptr<Appender> appender;
@@ -73,8 +84,17 @@ class HistoryClient {
   Stream* OpenStream(const std::string& hull_id, bool* answered);
   // `count` points of the cloud, with repetition; tells the operation of them.
   Coordinates SomePoints(int count, Operation& operation);
-  // Tells request and operation of the same freshness, at random.
-  void ChooseFreshness(Operation& operation, v1::Freshness& freshness);
+  // Tells request and operation, which is on this hull, of the same freshness, at random.
+  void ChooseFreshness(const std::string& hull_id, Operation& operation, v1::Freshness& freshness);
+  // The same for a question about several, half of which are of one instant.
+  void ChooseFreshnessOfSeveral(const std::string& hull_id, Operation& operation,
+                                v1::Freshness& freshness);
+  void ChooseRevisions(v1::Freshness& freshness);
+  // The revision that is asked for of the store of this hull; 0: none, or it is not known which.
+  uint64_t LeastFor(const std::string& hull_id, const v1::Freshness& freshness) const;
+  // What an answer about several says of this one, recorded by itself.
+  bool EndPart(Operation::Kind kind, const Operation& whole, const Seen& seen,
+               const grpc::Status& status);
   // What an answer says of the store; of several, of the one with this ID.
   void TakeHeader(const v1::ResponseHeader& header, Operation& operation,
                   const std::string& store_id = "");
@@ -83,6 +103,7 @@ class HistoryClient {
   int Below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
 
   std::unique_ptr<v1::HullService::Stub> hulls_;
+  std::unique_ptr<v1::BodyService::Stub> bodies_;
   std::unique_ptr<v1::CollisionService::Stub> collisions_;
   HullHistory& history_;
   const std::string name_;
@@ -93,6 +114,9 @@ class HistoryClient {
   bool tells_stores_ = false;
   // Of the last answer.
   v1::ResponseHeader last_header_;
+  // Where there are several: the greatest revision told of each, and the store of each hull.
+  std::map<std::string, uint64_t> store_revisions_;
+  std::map<std::string, std::string> stores_;
 };
 
 }  // namespace hulld::server

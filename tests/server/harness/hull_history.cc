@@ -1,6 +1,7 @@
 #include "tests/server/harness/hull_history.h"
 
 #include <absl/strings/str_cat.h>
+#include <absl/strings/str_join.h>
 
 #include <algorithm>
 #include <chrono>
@@ -21,8 +22,9 @@ using Outcome = Operation::Outcome;
 bool IsOptional(const Operation& operation) { return operation.outcome == Outcome::kUnknown; }
 
 const char* Name(Kind kind) {
-  constexpr const char* kNames[] = {"create", "open", "append", "replace", "delete",
-                                    "get",    "mesh", "probe",  "pair"};
+  constexpr const char* kNames[] = {"create", "open",     "append", "replace", "delete",
+                                    "get",    "mesh",     "probe",  "pair",    "version",
+                                    "put",    "get body", "ask"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -32,8 +34,15 @@ std::string Describe(const Operation& operation) {
                                   operation.returned == UINT64_MAX ? 0 : operation.returned, "] ",
                                   kOutcomes[static_cast<int>(operation.outcome)], ", revision ",
                                   operation.revision, ", created at ", operation.create_revision);
-  if (operation.kind == Kind::kPair) {
-    absl::StrAppend(&text, ", with ", operation.other, " at revision ", operation.other_revision);
+  for (const Seen& other : operation.others) {
+    absl::StrAppend(&text, ", with ", other.hull_id, " at revision ", other.revision);
+  }
+  if (!operation.pieces.empty()) {
+    absl::StrAppend(&text, ", pieces ", absl::StrJoin(operation.pieces, " "));
+  }
+  if (operation.kind == Kind::kAsk) {
+    absl::StrAppend(&text, ", point ", operation.probe, operation.touching ? " touched" : " apart",
+                    operation.is_part ? ", a part" : "", ", missing ", operation.missing);
   }
   if (operation.if_revision) absl::StrAppend(&text, ", if_revision ", *operation.if_revision);
   if (operation.kind == Kind::kAppend || operation.kind == Kind::kOpen) {
@@ -49,9 +58,9 @@ std::string Describe(const Operation& operation) {
   return text;
 }
 
-bool IsRead(const Operation& operation) {
-  return operation.kind == Kind::kGet || operation.kind == Kind::kMesh ||
-         operation.kind == Kind::kProbe || operation.kind == Kind::kPair;
+// Whether it is of several hulls and bodies.
+bool IsJoint(const Operation& operation) {
+  return operation.kind == Kind::kPair || operation.kind == Kind::kAsk;
 }
 
 // From when on a call may have taken effect.
@@ -75,6 +84,8 @@ uint64_t ChangedAt(const Operation& operation) {
     case Kind::kCreate:
     case Kind::kReplace:
       return operation.kind == Kind::kReplace || operation.created ? operation.revision : 0;
+    case Kind::kPut:
+      return operation.revision;
     default:
       return 0;
   }
@@ -92,6 +103,12 @@ std::string FreshnessFault(const Operation& operation) {
                         " of the store to one who wants at least ", operation.at_least_revision,
                         ": ", Describe(operation));
   }
+  for (const Seen& other : operation.others) {
+    if (other.store_revision >= other.at_least_revision) continue;
+    return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
+                        other.hull_id, " to one who wants at least ", other.at_least_revision, ": ",
+                        Describe(operation));
+  }
   return "";
 }
 
@@ -103,8 +120,12 @@ class OrderSearch {
  public:
   explicit OrderSearch(const std::map<std::string, std::vector<Operation>>& operations) {
     for (const auto& [hull_id, of_hull] : operations) {
-      const size_t hull = hulls_.emplace(hull_id, hulls_.size()).first->second;
-      for (const Operation& operation : of_hull) operations_.push_back({operation, hull});
+      const size_t hull = NumberOf(hull_id);
+      for (const Operation& operation : of_hull) {
+        operations_.push_back({operation, hull});
+        for (const Seen& other : operation.others) NumberOf(other.hull_id);
+        for (const std::string& piece : operation.pieces) NumberOf(piece);
+      }
     }
     done_.assign(operations_.size(), false);
     for (Placed& operation : operations_) {
@@ -168,6 +189,10 @@ class OrderSearch {
     size_t last_before = 0;
   };
 
+  size_t NumberOf(const std::string& hull_id) {
+    return hulls_.emplace(hull_id, hulls_.size()).first->second;
+  }
+
   // Whether an operation without an answer can no longer take effect, because one that was invoked
   // after its end, at tick `latest`, has.
   bool IsTooLate(size_t i, uint64_t latest) const {
@@ -196,27 +221,51 @@ class OrderSearch {
     return candidates;
   }
 
-  // Whether a read comes after all changes that it must hold.
+  // Whether a read comes after all changes that it must hold, and a change after those to the same
+  // store that have lesser revisions.
   bool HoldsAll(size_t i) const {
-    const Placed& read = operations_[i];
-    if (!IsRead(read)) return true;
-    const uint64_t revision = std::max(read.store_revision, read.at_least_revision);
-    const bool is_pair = read.kind == Kind::kPair;
-    const size_t other = is_pair ? hulls_.at(read.other) : read.hull;
+    const Placed& operation = operations_[i];
+    const bool is_read = IsRead(operation);
+    const uint64_t revision = is_read
+                                  ? std::max(operation.store_revision, operation.at_least_revision)
+                                  : ChangedAt(operation);
+    if (!is_read && revision == 0) return true;
     for (size_t j = first_left_; j < operations_.size(); ++j) {
       const uint64_t changed_at = done_[j] ? 0 : ChangedAt(operations_[j]);
       if (changed_at == 0) continue;
       const size_t hull = operations_[j].hull;
-      if (hull == read.hull && changed_at <= revision) return false;
-      if (is_pair && hull == other && changed_at <= read.other_store_revision) return false;
+      if (!is_read) {
+        if (changed_at < revision && operations_[j].store_id == operation.store_id) return false;
+        continue;
+      }
+      if (hull == operation.hull && changed_at <= revision) return false;
+      for (const Seen& other : operation.others) {
+        const uint64_t least = std::max(other.store_revision, other.at_least_revision);
+        if (hull == hulls_.at(other.hull_id) && changed_at <= least) return false;
+      }
     }
     return true;
   }
 
   // Whether the hulls may answer so; if they may, the state is what they are after that.
   bool StepAll(State& state, const Placed& operation) const {
-    if (operation.kind != Kind::kPair) return Step(state[operation.hull], operation);
-    return StepPair(state[operation.hull], state[hulls_.at(operation.other)], operation);
+    if (!IsJoint(operation)) return Step(state[operation.hull], operation);
+    return StepJoint(
+        state[operation.hull], operation,
+        [&](const std::string& hull_id) -> SpecifiedHull& { return state[hulls_.at(hull_id)]; });
+  }
+
+  // Whether a candidate may come next without regard to the others: it is a read that fits, after
+  // which the state is the same, and no call without an answer is too late because of it.
+  bool StandsInNobodysWay(size_t i, const Node& node) const {
+    const Placed& read = operations_[i];
+    if (!IsRead(read) || !HoldsAll(i)) return false;
+    for (size_t j = first_left_; j < operations_.size() && operations_[j].invoked <= read.invoked;
+         ++j) {
+      if (!done_[j] && !IsTooLate(j, node.latest) && IsTooLate(j, read.invoked)) return false;
+    }
+    State after = node.state;
+    return StepAll(after, read) && KeyOf(after) == KeyOf(node.state);
   }
 
   std::string Key(const State& state) const {
@@ -238,6 +287,11 @@ class OrderSearch {
     }
     if (seen_.insert(Key(node.state)).second) {
       node.candidates = Candidates(latest);
+      for (const size_t i : node.candidates) {
+        if (!StandsInNobodysWay(i, node)) continue;
+        node.candidates = {i};
+        break;
+      }
       if (count > best_count_ || best_done_.empty()) {
         best_count_ = count;
         best_state_ = node.state;
@@ -379,15 +433,15 @@ std::string JointLinearizabilityFault(
 }
 
 std::string HistoryFault(const HullHistory& history) {
-  bool has_pairs = false;
+  bool is_joint = false;
   std::set<std::string> store_ids;
   for (const auto& [hull_id, operations] : history.operations()) {
     for (const Operation& operation : operations) {
-      has_pairs |= operation.kind == Kind::kPair;
+      is_joint |= IsJoint(operation);
       if (operation.outcome == Outcome::kOk) store_ids.insert(operation.store_id);
     }
   }
-  if (has_pairs) {
+  if (is_joint) {
     const std::string fault = JointLinearizabilityFault(history.operations());
     if (!fault.empty()) return fault;
   } else {

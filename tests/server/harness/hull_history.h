@@ -15,7 +15,19 @@ namespace hulld::server {
 // them has exactly these as vertices.
 using PointSet = uint64_t;
 
-// One call on one hull, as its client saw it.
+// What an answer about several says of a hull beside the first.
+struct Seen {
+  std::string hull_id;
+  uint64_t create_revision = 0;
+  uint64_t revision = 0;
+  // Of the store of this hull: as those of Operation.
+  std::string store_id = {};
+  uint64_t store_revision = 0;
+  uint64_t at_least_revision = 0;
+};
+
+// One call on one hull or body, as its client saw it. Where an answer about several is not of one
+// instant, each part of it is an operation of its own.
 struct Operation {
   enum class Kind {
     kCreate,
@@ -25,8 +37,12 @@ struct Operation {
     kDelete,
     kGet,
     kMesh,
-    kProbe,  // CheckCollision with one point of the cloud
-    kPair,   // CheckCollision with another hull of the history
+    kProbe,    // CheckCollision with one point of the cloud
+    kPair,     // CheckCollision with another hull of the history
+    kVersion,  // what an answer about several says of this hull, or body, alone
+    kPut,      // of a body
+    kGetBody,
+    kAsk,  // CheckCollision of a body with one point of the cloud
   };
   enum class Outcome {
     kOk,
@@ -60,8 +76,8 @@ struct Operation {
   std::optional<uint64_t> max_staleness = 0;
   uint64_t at_least_revision = 0;
 
-  // Pair: the ID of the other hull.
-  std::string other;
+  // Put, and what GetBody answers: the hull of each piece, in order.
+  std::vector<std::string> pieces;
 
   // What was answered.
   uint64_t store_revision = 0;
@@ -79,10 +95,17 @@ struct Operation {
   uint64_t received = 0;
   uint64_t outside = 0;
   uint64_t duplicate = 0;
-  // Pair: of the other hull.
-  uint64_t other_store_revision = 0;
-  uint64_t other_create_revision = 0;
-  uint64_t other_revision = 0;
+  // Pair: the other hull. Ask: hulls of pieces.
+  std::vector<Seen> others;
+  // Ask: `pieces` names the hulls of all pieces, each once.
+  bool tells_pieces = false;
+  // Ask, when touching: the hull of the piece that decided.
+  std::string deciding;
+  // Ask that found nothing: the hull that a piece lacks; empty: it is the body that is missing.
+  std::string missing;
+  // Ask: of the pieces, `others` has those of the body's store alone, so that nothing follows from
+  // whether it touches.
+  bool is_part = false;
 };
 
 // What clients did to hulls, by hull ID. Thread-safe while it is recorded.
@@ -117,18 +140,21 @@ class HullHistory {
 // revision of the store that it names.
 //
 // The store's revision is shared by all hulls, so that of a change is taken from the answer and
-// must be greater than all before. Search with memory of the states seen. Source: Wing and Gong
+// must be greater than all before. Search with memory of the states seen; a read that fits and
+// tells nothing new is taken at once, as it stands in the way of nothing. Source: Wing and Gong
 // 1993, Testing and Verifying Concurrent Objects; Lowe 2017, Testing for Linearizability.
 std::string LinearizabilityFault(std::vector<Operation> operations);
 
-// The same for several hulls together, by hull ID: there must be one order for all of them, so that
-// both hulls of a pair were as it says at one instant.
+// The same for several hulls and bodies together, by ID: there must be one order for all of them,
+// so that both hulls of a pair, and a body and the hulls of its pieces, were as an answer says at
+// one instant. In it, changes to one store come in the order of its revisions.
 std::string JointLinearizabilityFault(
     const std::map<std::string, std::vector<Operation>>& operations);
 
-// The same for every hull, or for all together where pairs were asked for, and that revisions of
-// the store, which all hulls share, never fall from one call to a later one, as far as that may not
-// be answered from the past, and that no two changes have the same; of each store by itself.
+// The same for every hull, or for all together where pairs or bodies were asked about, and that
+// revisions of the store, which all hulls share, never fall from one call to a later one, as far as
+// that may not be answered from the past, and that no two changes have the same; of each store by
+// itself.
 std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server

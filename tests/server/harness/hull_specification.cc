@@ -2,7 +2,9 @@
 
 #include <absl/strings/str_cat.h>
 
+#include <algorithm>
 #include <bit>
+#include <set>
 
 #include "core/base/check.h"
 
@@ -13,6 +15,7 @@ std::string SpecifiedHull::Key() const {
                                  revision, ",", revision_known, ",", grown, ",", points, ",",
                                  received, ",", outside, ",", duplicate);
   for (const auto& [writer, sequence] : writers) absl::StrAppend(&key, ",", writer, ":", sequence);
+  for (const std::string& piece : pieces) absl::StrAppend(&key, ",", piece);
   return key;
 }
 
@@ -166,6 +169,27 @@ bool StepReplace(SpecifiedHull& state, const Operation& operation) {
          SameCounts(state, operation);
 }
 
+// All pieces at once. One that there was keeps its incarnation.
+bool StepPut(SpecifiedHull& state, const Operation& operation) {
+  const bool absent_fits = operation.if_revision.value_or(0) == 0;
+  if (operation.outcome == Outcome::kAborted) {
+    return state.exists ? Mismatch(state, operation) : !absent_fits;
+  }
+  if (operation.outcome != Outcome::kOk && operation.outcome != Outcome::kUnknown) return false;
+  const bool existed = state.exists;
+  if (existed ? !Match(state, operation) : !absent_fits) return false;
+  if (existed) {
+    if (!Advance(state, operation, operation.revision)) return false;
+    state.grown = true;
+  } else if (!Create(state, operation)) {
+    return false;
+  }
+  state.pieces = operation.pieces;
+  if (operation.outcome == Outcome::kUnknown) return true;
+  return operation.created == !existed && Agree(state, operation.revision) &&
+         AgreeOnIncarnation(state, operation.create_revision);
+}
+
 bool StepDelete(SpecifiedHull& state, const Operation& operation) {
   if (operation.outcome == Outcome::kNotFound) return !state.exists;
   if (!state.exists) return false;
@@ -178,6 +202,8 @@ bool StepDelete(SpecifiedHull& state, const Operation& operation) {
   return true;
 }
 
+bool Has(const SpecifiedHull& state, int point) { return (state.points >> point & 1) != 0; }
+
 bool StepRead(SpecifiedHull& state, const Operation& operation) {
   if (operation.outcome == Outcome::kNotFound) return !state.exists;
   if (operation.outcome != Outcome::kOk || !state.exists) return false;
@@ -187,9 +213,57 @@ bool StepRead(SpecifiedHull& state, const Operation& operation) {
       return AgreeOnIncarnation(state, operation.create_revision) && SameCounts(state, operation);
     case Kind::kMesh:
       return operation.points == state.points;
+    case Kind::kVersion:
+      return AgreeOnIncarnation(state, operation.create_revision);
+    case Kind::kGetBody:
+      return AgreeOnIncarnation(state, operation.create_revision) &&
+             operation.pieces == state.pieces;
     default:
-      return operation.touching == ((state.points >> operation.probe & 1) != 0);
+      return operation.touching == Has(state, operation.probe);
   }
+}
+
+bool AgreeOnVersion(SpecifiedHull& state, uint64_t create_revision, uint64_t revision) {
+  return state.exists && Agree(state, revision) && AgreeOnIncarnation(state, create_revision);
+}
+
+bool StepPair(SpecifiedHull& hull, const Operation& operation, const FindSpecified& find) {
+  const Seen& seen = operation.others.front();
+  SpecifiedHull& other = find(seen.hull_id);
+  if (operation.outcome == Outcome::kNotFound) return !hull.exists || !other.exists;
+  if (operation.outcome != Outcome::kOk) return false;
+  return AgreeOnVersion(hull, operation.create_revision, operation.revision) &&
+         AgreeOnVersion(other, seen.create_revision, seen.revision);
+}
+
+bool HasPiece(const SpecifiedHull& body, const std::string& hull_id) {
+  return std::find(body.pieces.begin(), body.pieces.end(), hull_id) != body.pieces.end();
+}
+
+bool StepAsk(SpecifiedHull& body, const Operation& operation, const FindSpecified& find) {
+  if (operation.outcome == Outcome::kNotFound) {
+    if (operation.missing.empty()) return !body.exists;
+    return body.exists && HasPiece(body, operation.missing) && !find(operation.missing).exists;
+  }
+  if (operation.outcome != Outcome::kOk) return false;
+  if (!AgreeOnVersion(body, operation.create_revision, operation.revision)) return false;
+  if (operation.tells_pieces) {
+    const std::set<std::string> told(operation.pieces.begin(), operation.pieces.end());
+    if (told != std::set<std::string>(body.pieces.begin(), body.pieces.end())) return false;
+  }
+  for (const Seen& seen : operation.others) {
+    if (!HasPiece(body, seen.hull_id)) return false;
+    if (!AgreeOnVersion(find(seen.hull_id), seen.create_revision, seen.revision)) return false;
+  }
+  if (operation.is_part) return true;
+  bool touching = false;
+  for (const std::string& piece : body.pieces) {
+    if (!find(piece).exists) return false;
+    touching |= Has(find(piece), operation.probe);
+  }
+  if (touching != operation.touching) return false;
+  return !touching ||
+         (HasPiece(body, operation.deciding) && Has(find(operation.deciding), operation.probe));
 }
 
 }  // namespace
@@ -208,19 +282,42 @@ bool Step(SpecifiedHull& state, const Operation& operation) {
     case Kind::kGet:
     case Kind::kMesh:
     case Kind::kProbe:
+    case Kind::kVersion:
+    case Kind::kGetBody:
       return StepRead(state, operation);
+    case Kind::kPut:
+      return StepPut(state, operation);
     case Kind::kPair:
+    case Kind::kAsk:
       break;
   }
   HULLD_UNREACHABLE();
 }
 
-bool StepPair(SpecifiedHull& hull, SpecifiedHull& other, const Operation& operation) {
-  if (operation.outcome == Outcome::kNotFound) return !hull.exists || !other.exists;
-  if (operation.outcome != Outcome::kOk || !hull.exists || !other.exists) return false;
-  return Agree(hull, operation.revision) && AgreeOnIncarnation(hull, operation.create_revision) &&
-         Agree(other, operation.other_revision) &&
-         AgreeOnIncarnation(other, operation.other_create_revision);
+bool StepJoint(SpecifiedHull& hull, const Operation& operation, const FindSpecified& find) {
+  return operation.kind == Kind::kPair ? StepPair(hull, operation, find)
+                                       : StepAsk(hull, operation, find);
+}
+
+bool IsRead(const Operation& operation) {
+  switch (operation.kind) {
+    case Kind::kCreate:
+    case Kind::kOpen:
+    case Kind::kAppend:
+    case Kind::kReplace:
+    case Kind::kDelete:
+    case Kind::kPut:
+      return false;
+    case Kind::kGet:
+    case Kind::kMesh:
+    case Kind::kProbe:
+    case Kind::kPair:
+    case Kind::kVersion:
+    case Kind::kGetBody:
+    case Kind::kAsk:
+      return true;
+  }
+  HULLD_UNREACHABLE();
 }
 
 }  // namespace hulld::server

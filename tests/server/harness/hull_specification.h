@@ -2,14 +2,17 @@
 #define HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "tests/server/harness/hull_history.h"
 
 namespace hulld::server {
 
-// One hull as the specification (hull.proto) has it, doing one thing at a time.
+// One hull as the specification (hull.proto) has it, or one body (body.proto), doing one thing at a
+// time.
 struct SpecifiedHull {
   bool exists = false;
   uint64_t create_revision = 0;
@@ -18,13 +21,16 @@ struct SpecifiedHull {
   uint64_t revision = 0;
   bool revision_known = true;
   bool create_revision_known = true;
-  // Whether vertices came since its creation: until then both revisions are the same.
+  // Whether vertices came since its creation, or a body was put again: until then both revisions
+  // are the same.
   bool grown = false;
   PointSet points = 0;
   uint64_t received = 0;
   uint64_t outside = 0;
   uint64_t duplicate = 0;
   std::map<std::string, uint64_t> writers;
+  // Of a body: the hull of each.
+  std::vector<std::string> pieces;
 
   uint64_t LastSequence(const std::string& writer) const {
     const auto found = writers.find(writer);
@@ -36,10 +42,14 @@ struct SpecifiedHull {
 };
 
 // Whether the hull may answer an operation so; if it may, `hull` is what it is after that.
-// Not for a pair.
+// Not for a pair, nor for what is asked about a body.
 bool Step(SpecifiedHull& hull, const Operation& operation);
-// The same for a pair, and the other hull of it.
-bool StepPair(SpecifiedHull& hull, SpecifiedHull& other, const Operation& operation);
+// The same for these; `find` has the others that the operation names, and those of the pieces of
+// the body, by ID.
+using FindSpecified = std::function<SpecifiedHull&(const std::string& hull_id)>;
+bool StepJoint(SpecifiedHull& hull, const Operation& operation, const FindSpecified& find);
+// Whether an operation changes nothing.
+bool IsRead(const Operation& operation);
 
 }  // namespace hulld::server
 

@@ -36,10 +36,8 @@ Operation PairAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_
   operation.outcome = Outcome::kOk;
   operation.invoked = invoked;
   operation.returned = returned;
-  operation.other = "b";
   operation.store_revision = operation.create_revision = operation.revision = revision;
-  operation.other_store_revision = operation.other_create_revision = other;
-  operation.other_revision = other;
+  operation.others = {{"b", other, other, "", other}};
   return operation;
 }
 

@@ -144,6 +144,18 @@ void CuttingProxy::SetDeaf(bool deaf) {
   deaf_ = deaf;
 }
 
+void CuttingProxy::SetDelay(std::chrono::milliseconds delay) {
+  const std::lock_guard lock(mutex_);
+  delay_ = delay;
+}
+
+void CuttingProxy::AwaitDelay() {
+  std::unique_lock lock(mutex_);
+  const std::chrono::milliseconds delay = delay_;
+  lock.unlock();
+  if (delay.count() > 0) std::this_thread::sleep_for(delay);
+}
+
 void CuttingProxy::RefuseToListen() {
   const std::lock_guard lock(mutex_);
   refuses_to_listen_ = true;
@@ -188,6 +200,7 @@ void CuttingProxy::Serve(Connection& connection) {
       open = Receive(connection.client, &connection.requests) && PassRequests(connection);
     }
     if (open && sockets[1].revents != 0) {
+      AwaitDelay();
       open = Receive(connection.server, &connection.answers) && PassAnswers(connection);
     }
   }

@@ -50,6 +50,8 @@ class CuttingProxy {
   // that the server sends, as a network does that lost a connection and tells nobody.
   void CutListeners();
   void SetDeaf(bool deaf);
+  // Every piece of what the server answers comes so much later.
+  void SetDelay(std::chrono::milliseconds delay);
   // From now on LISTEN is a statement that the server does not know.
   void RefuseToListen();
   // What the server has answered so far, in bytes, and how often it was asked for this text.
@@ -70,6 +72,7 @@ class CuttingProxy {
   bool PassRequest(Connection& connection, const std::string& message);
   bool PassPiece(Connection& connection, const std::string& message);
   bool PassAnswers(Connection& connection);
+  void AwaitDelay();
   bool IsNext(Cut cut);
   void NoteQuery(Connection& connection, std::string& message);
   bool NoteAnswer(const Connection& connection, size_t bytes);
@@ -85,6 +88,7 @@ class CuttingProxy {
   bool down_ = false;
   bool down_with_cut_ = false;
   bool deaf_ = false;
+  std::chrono::milliseconds delay_{0};
   bool refuses_to_listen_ = false;
   int cuts_ = 0;
   uint64_t answered_bytes_ = 0;

@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "tests/server/harness/history_client.h"
 #include "tests/server/harness/hull_history.h"
 #include "tests/server/harness/hulld_process.h"
 
@@ -27,6 +28,8 @@ class ManyServersTest : public ::testing::Test {
   // Skips the test without PostgreSQL.
   void SetUp() override;
 
+  // The program that is started from now on, in the place of hulld.
+  void UseProgram(const std::string& program) { program_ = program; }
   // Ends the servers that there were, and starts one for each file with a connection string, one
   // after the other, or all at once. A file whose name ends in ".shards" names several databases.
   void Begin(const std::vector<std::string>& conninfo_files);
@@ -52,6 +55,10 @@ class ManyServersTest : public ::testing::Test {
     std::vector<std::string> hulls = {"shared/a", "shared/b"};
     // Clients ask how they stand to each other, too. They are in two shards.
     bool pairs = false;
+    // Bodies of these hulls, which are put, deleted, read and asked about, too.
+    std::vector<std::string> bodies = {};
+    // Reads are of any freshness.
+    bool any_freshness = false;
   };
   using Fault = std::function<void()>;
   // Clients call at random, each another server now and then, and one that is not answered goes on
@@ -67,7 +74,8 @@ class ManyServersTest : public ::testing::Test {
  private:
   // A process, and a thread that reads what it says, or it would wait for that.
   struct Server {
-    explicit Server(const std::string& conninfo_file);
+    // program: empty for hulld.
+    Server(const std::string& program, const std::string& conninfo_file);
     ~Server();
 
     // It must come to listen.
@@ -78,9 +86,12 @@ class ManyServersTest : public ::testing::Test {
     std::thread reader;
   };
 
+  // As the calls say.
+  void SetUp(HistoryClient& client, const Calls& calls);
   void Call(size_t client, const Calls& calls, HullHistory& history,
             const std::function<void()>& answered);
 
+  std::string program_;
   std::vector<std::string> conninfo_files_;
   std::vector<std::unique_ptr<Server>> servers_;
   std::mutex mutex_;

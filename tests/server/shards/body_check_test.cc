@@ -1,0 +1,252 @@
+// What the check of histories says of bodies over two stores, and of answers of any freshness.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tests/server/harness/hull_history.h"
+
+namespace hulld::server {
+namespace {
+
+using ::testing::HasSubstr;
+using Kind = Operation::Kind;
+using Outcome = Operation::Outcome;
+using Operations = std::map<std::string, std::vector<Operation>>;
+
+constexpr int kPoint = 3;
+
+Operation Answered(Kind kind, uint64_t invoked, uint64_t returned, uint64_t revision) {
+  Operation operation;
+  operation.kind = kind;
+  operation.outcome = Outcome::kOk;
+  operation.invoked = invoked;
+  operation.returned = returned;
+  operation.store_revision = operation.create_revision = operation.revision = revision;
+  return operation;
+}
+
+// A hull of one point, kPoint or the next, in the place of the one before, or of none.
+Operation ReplaceAt(uint64_t invoked, uint64_t returned, uint64_t revision, bool has_point) {
+  Operation operation = Answered(Kind::kReplace, invoked, returned, revision);
+  operation.if_absent = true;
+  operation.created = revision == 1;
+  operation.points = PointSet{1} << (has_point ? kPoint : kPoint + 1);
+  operation.sent = operation.received = operation.outside = operation.vertex_count = 1;
+  return operation;
+}
+
+Operation PutAt(uint64_t invoked, uint64_t returned, uint64_t revision,
+                std::vector<std::string> pieces, uint64_t create_revision = 10) {
+  Operation operation = Answered(Kind::kPut, invoked, returned, revision);
+  operation.create_revision = create_revision;
+  operation.created = revision == create_revision;
+  operation.pieces = std::move(pieces);
+  return operation;
+}
+
+Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision,
+                std::vector<std::string> pieces) {
+  Operation operation = PutAt(invoked, returned, revision, std::move(pieces));
+  operation.kind = Kind::kGetBody;
+  return operation;
+}
+
+// Of revisions of the body, of a and of c, with a certificate, which names these.
+Operation AskAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t a, uint64_t c,
+                bool touching) {
+  Operation operation = Answered(Kind::kAsk, invoked, returned, revision);
+  operation.create_revision = 10;
+  operation.probe = kPoint;
+  operation.touching = touching;
+  if (touching) operation.deciding = "a";
+  operation.tells_pieces = true;
+  operation.pieces = {"a", "c"};
+  operation.others = {{"a", a, a, "", a}, {"c", c, c, "", c}};
+  return operation;
+}
+
+Operation Missing(Operation operation, const std::string& missing) {
+  operation.outcome = Outcome::kNotFound;
+  operation.missing = missing;
+  operation.others.clear();
+  return operation;
+}
+
+Operation Unanswered(Operation operation) {
+  operation.outcome = Outcome::kUnknown;
+  operation.returned = UINT64_MAX;
+  return operation;
+}
+
+// a loses the point at ticks 21 to 22, and c is replaced at 31 to 32; the body has both.
+Operations With(const std::vector<Operation>& of_body) {
+  Operations operations = {{"a", {ReplaceAt(1, 2, 1, true), ReplaceAt(21, 22, 2, false)}},
+                           {"b", {PutAt(5, 6, 10, {"a", "c"})}},
+                           {"c", {ReplaceAt(3, 4, 1, false), ReplaceAt(31, 32, 2, false)}}};
+  // Three stores, as revisions begin anew.
+  for (auto& [id, of_id] : operations) {
+    for (Operation& operation : of_id) operation.store_id = id;
+  }
+  auto& all = operations["b"];
+  for (Operation operation : of_body) {
+    operation.store_id = "b";
+    all.push_back(operation);
+  }
+  return operations;
+}
+std::string FaultOf(const std::vector<Operation>& of_body) {
+  return JointLinearizabilityFault(With(of_body));
+}
+
+TEST(BodyCheck, AcceptsAnswersOfOneInstant) {
+  EXPECT_EQ(FaultOf({}), "");
+  EXPECT_EQ(FaultOf({AskAt(10, 40, 10, 1, 1, true)}), "");
+  EXPECT_EQ(FaultOf({AskAt(10, 40, 10, 2, 1, false)}), "");
+  EXPECT_EQ(FaultOf({AskAt(10, 40, 10, 2, 2, false), GetAt(10, 40, 10, {"a", "c"})}), "");
+}
+
+// Each version was there during the call, and never all of them.
+TEST(BodyCheck, RefusesHullsOfPiecesThatNeverWereTogether) {
+  EXPECT_NE(FaultOf({AskAt(10, 40, 10, 1, 2, true)}), "");
+  EXPECT_NE(FaultOf({AskAt(33, 40, 10, 2, 1, false)}), "");
+}
+
+TEST(BodyCheck, RefusesABodyAndAHullThatNeverWereTogether) {
+  const Operation put = PutAt(25, 26, 11, {"c", "a"});
+  EXPECT_EQ(FaultOf({put, AskAt(10, 40, 10, 1, 1, true)}), "");
+  EXPECT_NE(FaultOf({put, AskAt(10, 40, 11, 1, 1, true)}), "");
+  EXPECT_EQ(FaultOf({put, AskAt(10, 40, 11, 2, 2, false)}), "");
+  EXPECT_NE(FaultOf({put, AskAt(10, 40, 10, 2, 2, false)}), "");
+}
+
+TEST(BodyCheck, RefusesARelationThatDoesNotFollowFromThePieces) {
+  EXPECT_NE(FaultOf({AskAt(10, 40, 10, 1, 1, false)}), "");
+  EXPECT_NE(FaultOf({AskAt(10, 40, 10, 2, 1, true)}), "");
+  // Nor one that another piece is said to decide.
+  Operation ask = AskAt(10, 40, 10, 1, 1, true);
+  ask.deciding = "c";
+  EXPECT_NE(FaultOf({ask}), "");
+  // Nor without the names of the pieces.
+  ask = AskAt(23, 24, 10, 2, 1, true);
+  ask.tells_pieces = false;
+  ask.pieces.clear();
+  ask.others.clear();
+  EXPECT_NE(FaultOf({ask}), "");
+  ask.touching = false;
+  EXPECT_EQ(FaultOf({ask}), "");
+}
+
+TEST(BodyCheck, RefusesPiecesThatAreNotOfThatRevision) {
+  EXPECT_NE(FaultOf({GetAt(7, 8, 10, {"a"})}), "");
+  EXPECT_NE(FaultOf({GetAt(7, 8, 10, {"c", "a"})}), "");
+  EXPECT_NE(FaultOf({PutAt(7, 8, 11, {"a"}), AskAt(10, 20, 11, 1, 1, true)}), "");
+  Operation ask = AskAt(10, 20, 11, 1, 1, true);
+  ask.pieces = {"a"};
+  ask.others.pop_back();
+  EXPECT_EQ(FaultOf({PutAt(7, 8, 11, {"a"}), ask}), "");
+}
+
+TEST(BodyCheck, APutKeepsTheIncarnationAndHoldsItsCondition) {
+  EXPECT_EQ(FaultOf({PutAt(7, 8, 11, {"a"}), GetAt(9, 10, 11, {"a"})}), "");
+  EXPECT_NE(FaultOf({PutAt(7, 8, 11, {"a"}, 11)}), "");
+  EXPECT_NE(FaultOf({PutAt(7, 8, 9, {"a"})}), "");
+  Operation put = PutAt(7, 8, 11, {"a"});
+  for (const uint64_t revision : {0, 9, 10}) {
+    put.if_revision = revision;
+    put.outcome = Outcome::kOk;
+    EXPECT_EQ(FaultOf({put}).empty(), revision == 10);
+    put.outcome = Outcome::kAborted;
+    EXPECT_EQ(FaultOf({put}).empty(), revision != 10);
+  }
+}
+
+TEST(BodyCheck, APutWithoutAnAnswerMayOrMayNotHaveHappened) {
+  const Operation lost = Unanswered(PutAt(7, 8, 0, {"a"}));
+  const Operation before = GetAt(11, 12, 10, {"a", "c"});
+  const Operation after = GetAt(13, 14, 12, {"a"});
+  EXPECT_EQ(FaultOf({lost, before}), "");
+  EXPECT_EQ(FaultOf({lost, after}), "");
+  EXPECT_EQ(FaultOf({lost, before, after}), "");
+  // But not happen and then not have happened.
+  EXPECT_NE(FaultOf({lost, after, GetAt(15, 16, 10, {"a", "c"})}), "");
+}
+
+TEST(BodyCheck, NothingIsSaidToBeMissingThatIsThere) {
+  EXPECT_NE(FaultOf({Missing(AskAt(10, 40, 0, 0, 0, false), "")}), "");
+  EXPECT_NE(FaultOf({Missing(AskAt(10, 40, 0, 0, 0, false), "c")}), "");
+  EXPECT_EQ(FaultOf({Missing(AskAt(4, 40, 0, 0, 0, false), "")}), "");
+  Operation gone = Answered(Kind::kDelete, 33, 34, 3);
+  gone.store_id = "c";
+  Operations operations = With({Missing(AskAt(10, 40, 0, 0, 0, false), "c")});
+  operations["c"].push_back(gone);
+  EXPECT_EQ(JointLinearizabilityFault(operations), "");
+  // Nor a piece of a body that does not have it.
+  operations = With({PutAt(7, 8, 11, {"a"}), Missing(AskAt(10, 40, 0, 0, 0, false), "c")});
+  operations["c"].push_back(gone);
+  EXPECT_NE(JointLinearizabilityFault(operations), "");
+}
+
+// What is not linearizable is of an instant of its own in each store: the body's part, which may be
+// of the past, and what is said of the hull of another store.
+TEST(BodyCheck, APartIsAsFreshAsItSays) {
+  Operation part = AskAt(100, 101, 10, 2, 1, true);
+  part.is_part = true;
+  part.others.pop_back();
+  EXPECT_EQ(FaultOf({part}), "");
+  part.others.front().revision = part.others.front().create_revision = 1;
+  EXPECT_NE(FaultOf({part}), "");
+  // From before tick 22, and it says so.
+  part.others.front().store_revision = 1;
+  part.max_staleness = part.staleness = 79;
+  EXPECT_EQ(FaultOf({part}), "");
+  part.max_staleness = part.staleness = 77;
+  EXPECT_NE(FaultOf({part}), "");
+}
+
+TEST(BodyCheck, ARevisionThatWasAskedForIsSeenInEachStore) {
+  Operation version = Answered(Kind::kVersion, 100, 101, 1);
+  version.store_id = "c";
+  version.max_staleness = std::nullopt;
+  version.staleness = 99;
+  const auto fault_of = [](const Operation& operation) {
+    Operations operations = With({});
+    operations["c"].push_back(operation);
+    return JointLinearizabilityFault(operations);
+  };
+  EXPECT_EQ(fault_of(version), "");
+  version.at_least_revision = 2;
+  EXPECT_THAT(fault_of(version), HasSubstr("to one who wants at least 2"));
+  // It claims what it does not hold.
+  version.store_revision = 2;
+  EXPECT_NE(fault_of(version), "");
+  version.revision = version.create_revision = 2;
+  EXPECT_EQ(fault_of(version), "");
+  Operation ask = AskAt(100, 101, 10, 2, 2, false);
+  EXPECT_EQ(FaultOf({ask}), "");
+  ask.others.back().at_least_revision = 3;
+  EXPECT_THAT(FaultOf({ask}), HasSubstr("of the store of c to one who wants at least 3"));
+}
+
+// Changes of one store take effect in the order of its revisions.
+TEST(BodyCheck, RefusesAnOrderAgainstTheRevisionsOfAStore) {
+  Operations operations = With({});
+  operations["a"].push_back(ReplaceAt(41, 60, 5, true));
+  operations["b"].push_back(PutAt(41, 60, 20, {"a"}));
+  // The body that was put later has been seen with the hull from before.
+  Operation ask = AskAt(41, 60, 20, 2, 0, false);
+  ask.pieces = {"a"};
+  ask.others.pop_back();
+  operations["b"].push_back(ask);
+  operations["a"].back().store_id = operations["b"].back().store_id = "b";
+  for (Operation& operation : operations["b"]) operation.store_id = "b";
+  EXPECT_NE(JointLinearizabilityFault(operations), "");
+  operations["a"].back().store_id = "a";
+  EXPECT_EQ(JointLinearizabilityFault(operations), "");
+}
+
+}  // namespace
+}  // namespace hulld::server
