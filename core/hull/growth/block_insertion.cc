@@ -129,6 +129,12 @@ class BlockInsertion {
     std::vector<TriangleId> seen;
     for (const Vector& p : SurvivorsOf(stride)) {
       if (poll_.Step()) return;
+      // Points that follow each other often lie near each other.
+      if (!seen.empty() && surface_.IsSeenFrom(vertices_, seen.back(), p)) {
+        outside.push_back(p);
+        seen.push_back(seen.back());
+        continue;
+      }
       const std::optional<Surface::Location> location = surface_.Locate(vertices_, p);
       if (!location) {
         astray_.push_back(p);

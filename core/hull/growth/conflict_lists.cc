@@ -26,7 +26,7 @@ void ConflictLists::Take(std::span<const Vector> points) {
   Reserve(BlocksFor(points.size()));
   const List all = {static_cast<uint32_t>(end_), static_cast<uint32_t>(points.size())};
   end_ += BlocksFor(points.size());
-  if (!points.empty()) blocks_[end_ - 1] = {};
+  if (!points.empty()) blocks_[end_ - 1].Clear();
   for (size_t i = 0; i < points.size(); ++i) {
     blocks_[all.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, points[i]);
   }
@@ -201,17 +201,24 @@ int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const Triangl
 // cursors_[0] to a block beyond all lists. Requires that Reserve has made room.
 void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
   cursors_.resize(targets.size() + 1);
+  const size_t queued_before = queue_.size();
+  queue_.resize(queued_before + targets.size());
+  TriangleId* queued = queue_.data() + queued_before;
   for (size_t k = 0; k < targets.size(); ++k) {
     const uint32_t count = counts_[k + 1];
+    const size_t blocks = BlocksFor(count);
     cursors_[k + 1] = end_ * PointBlock::kSize;
-    if (count == 0) continue;
-    HULLD_CHECK(end_ + BlocksFor(count) <= capacity_);
+    // Whether a target gets points cannot be foreseen, so nothing branches on it: an empty list
+    // clears a block that is free.
+    HULLD_CHECK(end_ + blocks < capacity_);
     lists_[targets[k]] = {static_cast<uint32_t>(end_), count};
-    queue_.push_back(targets[k]);
-    end_ += BlocksFor(count);
+    *queued = targets[k];
+    queued += count > 0;
     // The last may be partly filled.
-    blocks_[end_ - 1] = {};
+    blocks_[end_ + std::max(blocks, size_t{1}) - 1].Clear();
+    end_ += blocks;
   }
+  queue_.resize(static_cast<size_t>(queued - queue_.data()));
   HULLD_CHECK(end_ < capacity_);
   cursors_[0] = end_ * PointBlock::kSize;
 }

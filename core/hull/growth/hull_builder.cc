@@ -58,11 +58,21 @@ absl::Status DescribeNotFinite(std::span<const Vector> points) {
 std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
   const size_t stride = points.size() / kExtremesSample + 1;
   std::array<uint32_t, 6> extremes{};
+  Vector lowest = points[0];
+  Vector highest = points[0];
   for (size_t i = 0; i < points.size(); i += stride) {
-    for (size_t k = 0; k < 3; ++k) {
-      if (points[i][k] < points[extremes[k]][k]) extremes[k] = static_cast<uint32_t>(i);
-      if (points[i][k] > points[extremes[k + 3]][k]) extremes[k + 3] = static_cast<uint32_t>(i);
+    const Vector& p = points[i];
+    // One branch that is rarely taken, rather than six.
+    if (!((p.x() < lowest.x()) | (p.y() < lowest.y()) | (p.z() < lowest.z()) |
+          (p.x() > highest.x()) | (p.y() > highest.y()) | (p.z() > highest.z()))) {
+      continue;
     }
+    for (int k = 0; k < 3; ++k) {
+      if (p[k] < lowest[k]) extremes[static_cast<size_t>(k)] = static_cast<uint32_t>(i);
+      if (p[k] > highest[k]) extremes[static_cast<size_t>(k) + 3] = static_cast<uint32_t>(i);
+    }
+    lowest = lowest.cwiseMin(p);
+    highest = highest.cwiseMax(p);
   }
   std::vector<uint32_t> distinct(extremes.begin(), extremes.end());
   std::sort(distinct.begin(), distinct.end());

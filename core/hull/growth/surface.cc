@@ -17,6 +17,9 @@ namespace {
 // Triangles removed and created that take about as long as a step of a poll.
 constexpr size_t kTrianglesPerStep = 64;
 
+// The edge after this one, counter-clockwise.
+uint16_t NextEdge(uint32_t edge) { return static_cast<uint16_t>(edge == 2 ? 0 : edge + 1); }
+
 // Times the power of two that brings the largest component into [1/2, 1).
 Vector WithUnitSize(const Vector& v) {
   int exponent = 0;
@@ -43,7 +46,7 @@ Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon,
   const TriangleId base = MakeBase(vertices, loop, 0, n - 1);
   Link(base, 2, static_cast<TriangleId>(n - 1), 0, false);
   alive_ = triangles_.size();
-  while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
+  while (place_of_vertex_.size() < vertices.id_bound()) place_of_vertex_.push_back(0);
   Update(vertices);
   DcheckSurface(*this, vertices);
 }
@@ -76,7 +79,9 @@ void Surface::InsertSurvivor(VertexTable& vertices, const Vector& point, size_t 
 std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const Vector& point,
                                                    TriangleId seen) {
   HULLD_DCHECK(IsAlive(seen) && IsSeenFrom(vertices, seen, point));
-  CollectRegion(vertices, seen, point, SizeWith(vertices, point));
+  const double size = SizeWith(vertices, point);
+  if (!CollectCertainRegion(seen, point, size)) CollectRegion(vertices, seen, point, size);
+  for (uint32_t k = 0; k < horizon_.size(); ++k) place_of_vertex_.Mutable(horizon_[k].tail) = k;
   RemoveVertices(vertices);
   return region_;
 }
@@ -88,7 +93,7 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
   JoinHorizon(vertices, apex);
   ++joined_;
   // Here rather than when they are needed, so that no insertion does it for many.
-  while (vertex_mark_.size() < vertices.id_bound()) vertex_mark_.push_back(0);
+  while (place_of_vertex_.size() < vertices.id_bound()) place_of_vertex_.push_back(0);
   if (directions_) {
     extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
   }
@@ -98,7 +103,7 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
 }
 
 size_t Surface::MemoryBytes() const {
-  size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + vertex_mark_.MemoryBytes();
+  size_t bytes = triangles_.MemoryBytes() + free_.MemoryBytes() + place_of_vertex_.MemoryBytes();
   if (directions_) bytes += directions_->MemoryBytes();
   if (before_ && before_->directions) bytes += before_->directions->MemoryBytes();
   if (measuring_) {
@@ -244,7 +249,6 @@ std::optional<VertexId> Surface::CornerAt(const VertexTable& vertices, TriangleI
 
 void Surface::ResetMarks() {
   for (TriangleId id = 0; id < triangles_.size(); ++id) triangles_.Mutable(id).mark = 0;
-  for (VertexId id = 0; id < vertex_mark_.size(); ++id) vertex_mark_.Mutable(id) = 0;
   mark_ = 0;
 }
 
@@ -262,34 +266,77 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
   region_.assign(1, first);
   horizon_.clear();
   triangles_.Mutable(first).mark = mark;
-  visits_.assign(1, {first, 0, 3});
-  while (!visits_.empty()) {
-    Visit& visit = visits_.back();
+  visits_.clear();
+  Visit visit = {first, 0, 3};
+  for (;;) {
     if (visit.left == 0) {
+      if (visits_.empty()) return;
+      visit = visits_.back();
       visits_.pop_back();
-      continue;
     }
-    const SurfaceTriangle& t = triangles_[visit.triangle];
     const TriangleId id = visit.triangle;
+    const SurfaceTriangle& t = triangles_[id];
     const uint32_t i = visit.edge;
-    visit.edge = static_cast<uint8_t>((i + 1) % 3);
+    visit.edge = NextEdge(i);
     --visit.left;
     const TriangleId next = t.neighbours[i];
     const SurfaceTriangle& other = triangles_[next];
     if (other.mark == mark) continue;
-    const auto back = static_cast<uint8_t>(other.neighbours[0] == id   ? 0
-                                           : other.neighbours[1] == id ? 1
-                                                                       : 2);
+    const uint16_t back = other.neighbours[0] == id ? 0 : other.neighbours[1] == id ? 1 : 2;
     HULLD_DCHECK(other.neighbours[back] == id);
     const int side = classify(next);
     if (side > 0) {
       triangles_.Mutable(next).mark = mark;
       region_.push_back(next);
-      visits_.push_back({next, static_cast<uint8_t>((back + 1) % 3), 2});
+      if (visit.left > 0) visits_.push_back(visit);
+      visit = {next, NextEdge(back), 2};
     } else {
-      horizon_.push_back({t.corners[i], t.corners[(i + 1) % 3], next, back, side == 0});
+      horizon_.push_back({t.corners[i], t.corners[visit.edge], next, back, side == 0});
     }
   }
+}
+
+// The same as CollectRegion where doubles are certain of all signs, and then the horizon is in no
+// order; else false. Which triangles a point sees cannot be foreseen, so nothing branches on it:
+// each neighbour is written to both lists, and one of them then counts it.
+bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
+  const uint32_t mark = NextMark();
+  size_t seen = 1;
+  size_t edges = 0;
+  // Room for what one triangle adds.
+  const auto make_room = [](auto& list, size_t used) {
+    if (list.size() < used + 3) list.resize(used + 8);
+  };
+  make_room(region_, seen);
+  region_[0] = first;
+  triangles_.Mutable(first).mark = mark;
+  for (size_t k = 0; k < seen; ++k) {
+    make_room(region_, seen);
+    make_room(horizon_, edges);
+    const TriangleId id = region_[k];
+    const SurfaceTriangle& t = triangles_[id];
+    bool is_certain = true;
+    for (uint32_t i = 0; i < 3; ++i) {
+      const TriangleId next = t.neighbours[i];
+      // All of them change in the end.
+      SurfaceTriangle& other = triangles_.Mutable(next);
+      const double value = other.normal.dot(point) - other.offset;
+      const double bound = static_cast<double>(other.slope) * size;
+      const bool is_seen = value > bound;
+      is_certain &= is_seen | (value < -bound);
+      region_[seen] = next;
+      seen += static_cast<size_t>(is_seen & (other.mark != mark));
+      other.mark = is_seen ? mark : other.mark;
+      const auto back = static_cast<uint16_t>((other.neighbours[1] == id) +
+                                              2 * static_cast<int>(other.neighbours[2] == id));
+      horizon_[edges] = {t.corners[i], t.corners[NextEdge(i)], next, back, false};
+      edges += static_cast<size_t>(!is_seen);
+    }
+    if (!is_certain) return false;
+  }
+  region_.resize(seen);
+  horizon_.resize(edges);
+  return true;
 }
 
 // Fills the region with the triangles that the point sees, and those round vertices that it makes
@@ -347,12 +394,11 @@ bool Surface::IsFlatAround(const VertexTable& vertices, const HorizonEdge& befor
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
 void Surface::RemoveVertices(VertexTable& vertices) {
   if (region_.size() + 2 == horizon_.size()) return;
-  for (const HorizonEdge& edge : horizon_) vertex_mark_.Mutable(edge.tail) = mark_;
   for (const TriangleId id : region_) {
     for (const VertexId v : triangles_[id].corners) {
-      if (vertex_mark_[v] == mark_) continue;
-      vertex_mark_.Mutable(v) = mark_;
-      vertices.Remove(v);
+      const uint32_t place = place_of_vertex_[v];
+      if (place < horizon_.size() && horizon_[place].tail == v) continue;
+      if (vertices.IsAlive(v)) vertices.Remove(v);
     }
   }
 }
@@ -367,8 +413,9 @@ void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
     const TriangleId id = region_[k];
     SetTriangle(vertices, id, edge.tail, edge.head, apex);
     SurfaceTriangle& t = triangles_.Mutable(id);
-    t.neighbours[1] = region_[k + 1 == new_count ? 0 : k + 1];
-    t.neighbours[2] = region_[k == 0 ? new_count - 1 : k - 1];
+    const TriangleId after = region_[place_of_vertex_[edge.head]];
+    t.neighbours[1] = after;
+    triangles_.Mutable(after).neighbours[2] = id;
     Link(id, 0, edge.beyond, edge.edge_beyond, edge.is_flat);
   }
   for (size_t k = new_count; k < old_count; ++k) {

@@ -191,12 +191,13 @@ class Surface {
   friend class SurfaceTestPeer;
 
   // An edge of the horizon, its triangle beyond, which edge it is there, and whether that triangle
-  // is in a plane with the point.
+  // is in a plane with the point. No member is of a character type, here and in Visit: a store to
+  // one may change any object, so that the compiler would load all else again.
   struct HorizonEdge {
     VertexId tail;
     VertexId head;
     TriangleId beyond;
-    uint8_t edge_beyond;
+    uint16_t edge_beyond;
     bool is_flat;
   };
   // What the steps of a walk share: the point from the center, and what a triple product of it and
@@ -208,8 +209,8 @@ class Surface {
   // A triangle of the region under traversal, the edge to cross next, and how many are left.
   struct Visit {
     TriangleId triangle;
-    uint8_t edge;
-    uint8_t left;
+    uint16_t edge;
+    uint16_t left;
   };
   // A map of directions in the making. Its corners are measured some at a time, so that no
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
@@ -265,6 +266,7 @@ class Surface {
   std::optional<Vector> FindInterior(const VertexTable& vertices) const;
   double Reach(const VertexTable& vertices, const Vector& direction, TriangleId& near);
 
+  bool CollectCertainRegion(TriangleId first, const Vector& point, double size);
   void CollectRegion(const VertexTable& vertices, TriangleId first, const Vector& point,
                      double size);
   template <typename Classify>
@@ -304,8 +306,9 @@ class Surface {
   ChunkedVector<SurfaceTriangle> triangles_;
   ChunkedVector<TriangleId> free_;
   size_t alive_ = 0;
-  // By vertex: the last traversal in whose region it was.
-  ChunkedVector<uint32_t> vertex_mark_;
+  // By vertex: where in the horizon the edge is that leaves it, if it is on the horizon at all, as
+  // that edge's tail tells; else any number.
+  ChunkedVector<uint32_t> place_of_vertex_;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.
   std::optional<DirectionMap> directions_;
