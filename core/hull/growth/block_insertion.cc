@@ -130,7 +130,7 @@ class BlockInsertion {
     for (const Vector& p : SurvivorsOf(stride)) {
       if (poll_.Step()) return;
       // Points that follow each other often lie near each other.
-      if (!seen.empty() && surface_.IsSeenFrom(vertices_, seen.back(), p)) {
+      if (!seen.empty() && surface_.IsCertainlySeenFrom(vertices_, seen.back(), p)) {
         outside.push_back(p);
         seen.push_back(seen.back());
         continue;

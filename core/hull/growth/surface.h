@@ -104,6 +104,12 @@ class Surface {
   bool IsSeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
     return SideOf(vertices, id, point, SizeWith(vertices, point)) > 0;
   }
+  // The same where doubles are certain of it, and false where they are not.
+  bool IsCertainlySeenFrom(const VertexTable& vertices, TriangleId id, const Vector& point) const {
+    const SurfaceTriangle& t = triangles_[id];
+    return t.normal.dot(point) - t.offset >
+           static_cast<double>(t.slope) * SizeWith(vertices, point);
+  }
   // True when the point lies in the triangle's plane, exactly.
   bool IsInPlane(const VertexTable& vertices, TriangleId id, const Vector& point) const {
     return SideOf(vertices, id, point, SizeWith(vertices, point)) == 0;
