@@ -172,7 +172,16 @@ Plan::Plan(Random& random) {
   repetitions = rarely(2);
   finds_records = random.OneIn(2);
   records = random.Below(3);
-  bodies = random.OneIn(2) ? 0 : 1 + weight();
+  bodies = random.OneIn(4) ? 1 + weight() : 0;
+  if (random.OneIn(16)) {
+    // Several read what is not in memory, and some of them give up.
+    clients = 3;
+    hulls = creations = streams = 1;
+    deletions = replacements = listings = bodies = preparations = 0;
+    reads = 6;
+    pressure = 3;
+    cancellations = 2;
+  }
   if (!random.OneIn(3)) return;
   servers = 2;
   // A watch may be told of several changes as one.
