@@ -88,6 +88,7 @@ constexpr std::string_view kRooms[] = {
     "server/store",
     "server/store/postgres",
     "server/registry/memory",
+    "server/registry/commit",
     "server/registry",
     "server/registry/bodies",
     "server/registry/records",

@@ -18,10 +18,10 @@
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
-#include "server/registry/bodies/body_table.h"
 #include "server/registry/body.h"
+#include "server/registry/body_table.h"
 #include "server/registry/change_feed.h"
-#include "server/registry/committer.h"
+#include "server/registry/commit/committer.h"
 #include "server/registry/hull_state.h"
 #include "server/registry/hull_table.h"
 #include "server/registry/known_hulls.h"

@@ -1,4 +1,4 @@
-#include "server/registry/committer.h"
+#include "server/registry/commit/committer.h"
 
 #include <absl/status/status.h>
 #include <absl/strings/str_cat.h>

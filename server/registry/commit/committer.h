@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_COMMITTER_H_
-#define HULLD_SERVER_REGISTRY_COMMITTER_H_
+#ifndef HULLD_SERVER_REGISTRY_COMMIT_COMMITTER_H_
+#define HULLD_SERVER_REGISTRY_COMMIT_COMMITTER_H_
 
 #include <absl/status/status.h>
 
@@ -12,7 +12,7 @@
 
 #include "server/process/metrics.h"
 #include "server/process/synchronization.h"
-#include "server/registry/commit_hold.h"
+#include "server/registry/commit/commit_hold.h"
 #include "server/registry/memory/locked.h"
 #include "server/store/store.h"
 
@@ -166,4 +166,4 @@ class Committer {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_COMMITTER_H_
+#endif  // HULLD_SERVER_REGISTRY_COMMIT_COMMITTER_H_

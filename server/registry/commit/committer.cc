@@ -1,4 +1,4 @@
-#include "server/registry/committer.h"
+#include "server/registry/commit/committer.h"
 
 #include <spdlog/spdlog.h>
 

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_COMMIT_HOLD_H_
-#define HULLD_SERVER_REGISTRY_COMMIT_HOLD_H_
+#ifndef HULLD_SERVER_REGISTRY_COMMIT_COMMIT_HOLD_H_
+#define HULLD_SERVER_REGISTRY_COMMIT_COMMIT_HOLD_H_
 
 #include <absl/status/status.h>
 
@@ -110,4 +110,4 @@ class CommitHold {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_COMMIT_HOLD_H_
+#endif  // HULLD_SERVER_REGISTRY_COMMIT_COMMIT_HOLD_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_BODIES_BODY_TABLE_H_
-#define HULLD_SERVER_REGISTRY_BODIES_BODY_TABLE_H_
+#ifndef HULLD_SERVER_REGISTRY_BODY_TABLE_H_
+#define HULLD_SERVER_REGISTRY_BODY_TABLE_H_
 
 #include <cstddef>
 #include <cstdint>
@@ -83,4 +83,4 @@ class BodyTable {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_BODIES_BODY_TABLE_H_
+#endif  // HULLD_SERVER_REGISTRY_BODY_TABLE_H_
