@@ -264,11 +264,14 @@ bool Server::WaitIdle(std::chrono::milliseconds timeout) {
 }
 
 bool Server::Drain(std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
   BeginDrain();
-  std::thread closing([this, deadline = std::chrono::system_clock::now() + timeout] {
-    grpc_server_->Shutdown(deadline);
+  std::thread closing([this, deadline] {
+    const auto left = deadline - std::chrono::steady_clock::now();
+    grpc_server_->Shutdown(std::chrono::system_clock::now() + left);
   });
-  const bool is_idle = WaitIdle(timeout);
+  // What is idle only after the deadline was cancelled, however late this thread notices.
+  const bool is_idle = admission_.WaitIdle(deadline) && std::chrono::steady_clock::now() < deadline;
   closing.join();
   return is_idle;
 }

@@ -68,7 +68,10 @@ void ServerTest::Restart(const Config& config) {
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(config);
   ASSERT_TRUE(server.ok()) << server.status().ToString();
   server_ = *std::move(server);
-  channel_ = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
+  // Not a connection that another channel had to the server before, under the same address.
+  grpc::ChannelArguments own;
+  own.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  channel_ = grpc::CreateCustomChannel(server_->address(), grpc::InsecureChannelCredentials(), own);
   hulls_ = v1::HullService::NewStub(channel_);
   collisions_ = v1::CollisionService::NewStub(channel_);
   status_ = v1::StatusService::NewStub(channel_);
