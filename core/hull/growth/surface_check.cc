@@ -99,10 +99,16 @@ const char* FindDefect(const Surface& surface, const VertexTable& vertices,
 const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
                            std::span<const TriangleId> star, VertexId apex) {
   if (const char* defect = FindDefect(surface, vertices, star)) return defect;
+  // Whatever their order, they turn about the new vertex once.
+  TriangleId next = star[0];
   for (size_t k = 0; k < star.size(); ++k) {
-    const SurfaceTriangle& t = surface.triangle(star[k]);
+    if (k > 0 && next == star[0]) return "the new triangles form more than one ring";
+    next = surface.triangle(next).neighbours[1];
+  }
+  if (next != star[0]) return "the new triangles form no ring";
+  for (const TriangleId id : star) {
+    const SurfaceTriangle& t = surface.triangle(id);
     if (t.corners[2] != apex) return "a new triangle does not end at the new vertex";
-    if (t.neighbours[1] != star[(k + 1) % star.size()]) return "the new triangles form no ring";
     const SurfaceTriangle& beyond = surface.triangle(t.neighbours[0]);
     const bool is_flat = BendAt(vertices, t, beyond, TwinOf(t, 0, beyond)) == 0;
     if (is_flat != ((t.flat & 1) != 0)) return "the horizon does not bend where it should";

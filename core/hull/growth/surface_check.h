@@ -23,8 +23,9 @@ const char* FindDefect(const Surface& surface, const VertexTable& vertices,
                        std::span<const TriangleId> ids);
 
 // Checks the triangles that an insertion created: as FindDefect, and that each has the new vertex
-// `apex` as its last corner, that each turns about the apex to the next one, and that the edges
-// opposite to the apex are flat exactly where they are said to be.
+// `apex` as its last corner, that they turn about the apex once, in whatever order they are given,
+// and that the edges opposite to the apex are flat exactly where they are said to be. Requires a
+// triangle.
 const char* FindStarDefect(const Surface& surface, const VertexTable& vertices,
                            std::span<const TriangleId> star, VertexId apex);
 

@@ -193,15 +193,12 @@ TEST_F(SurfaceCheck, FindsAStarWithoutItsApex) {
     if (t.corners[2] == last) star.push_back(id);
   });
   ASSERT_GE(star.size(), 3u);
-  // In order round the apex.
-  for (size_t k = 1; k < star.size(); ++k) {
-    std::iter_swap(star.begin() + static_cast<std::ptrdiff_t>(k),
-                   std::find(star.begin(), star.end(), Triangle(star[k - 1]).neighbours[1]));
-  }
   EXPECT_EQ(FindStarDefect(surface_, vertices_, star, last), nullptr);
   EXPECT_STREQ(FindStarDefect(surface_, vertices_, star, 0),
                "a new triangle does not end at the new vertex");
   std::swap(star[0], star[1]);
+  EXPECT_EQ(FindStarDefect(surface_, vertices_, star, last), nullptr);
+  star.pop_back();
   EXPECT_STREQ(FindStarDefect(surface_, vertices_, star, last), "the new triangles form no ring");
 }
 
