@@ -33,9 +33,9 @@ void ExpectAllReached(const Reached& reached) {
   EXPECT_GT(reached.loads, 100);
   EXPECT_GT(reached.sequences, 100);
   EXPECT_GT(reached.lookups, 1000);
-  EXPECT_GT(reached.bodies_put, 1000);
-  EXPECT_GT(reached.bodies_deleted, 100);
-  EXPECT_GT(reached.bodies_found, 100);
+  EXPECT_GT(reached.bodies_put, 500);
+  EXPECT_GT(reached.bodies_deleted, 50);
+  EXPECT_GT(reached.bodies_found, 50);
   EXPECT_GT(reached.kinds_refused, 100);
   EXPECT_GT(reached.evictions, 100);
   EXPECT_GT(reached.recovered, 100);

@@ -172,7 +172,7 @@ Plan::Plan(Random& random) {
   repetitions = rarely(2);
   finds_records = random.OneIn(2);
   records = random.Below(3);
-  bodies = random.OneIn(4) ? 1 + weight() : 0;
+  bodies = random.OneIn(2) ? 1 + weight() : 0;
   if (random.OneIn(16)) {
     // Several read what is not in memory, and some of them give up.
     clients = 3;
