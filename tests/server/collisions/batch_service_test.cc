@@ -65,8 +65,10 @@ class BatchCall : public ServerTest {
       batch.within_clearance.insert(batch.within_clearance.end(),
                                     columns.within_clearance().begin(),
                                     columns.within_clearance().end());
-      batch.problems.insert(batch.problems.end(), columns.pair_problems().begin(),
-                            columns.pair_problems().end());
+      for (v1::PairProblem problem : columns.pair_problems()) {
+        problem.set_row(part.first_pair() + problem.row());
+        batch.problems.push_back(std::move(problem));
+      }
     }
     batch.status = stream->Finish();
     return batch;
