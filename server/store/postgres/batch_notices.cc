@@ -96,8 +96,10 @@ absl::Status BatchNotices::Serve() {
   is_listening_ = true;
   Hear(*last);
   Clock::time_point next = Clock::now();
-  while (!ending_) {
+  while (true) {
+    // Before the look at what may have woken it: what comes later wakes it again.
     ClearWake();
+    if (ending_) return absl::OkStatus();
     const uint64_t batch = to_send_;
     if (batch != sent_ && Clock::now() >= next) {
       const absl::Status sent = session.Run(absl::StrCat(kNotify, ", '", batch, "'")).status();
@@ -113,7 +115,6 @@ absl::Status BatchNotices::Serve() {
     const auto longest = to_send_ == sent_ ? kForEver : UpTo(next);
     if (absl::Status s = session.AwaitNotices(wake_, longest); !s.ok()) return s;
   }
-  return absl::OkStatus();
 }
 
 void BatchNotices::Hear(uint64_t batch) {

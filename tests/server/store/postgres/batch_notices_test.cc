@@ -1,0 +1,65 @@
+#include "server/store/postgres/batch_notices.h"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <semaphore>
+
+#include "server/store/postgres/conninfo.h"
+#include "server/store/postgres/session.h"
+#include "tests/server/harness/postgres/postgres_cluster.h"
+
+namespace {
+
+// Where set, who reads an eventfd says so first, and reads it once it can be read.
+std::atomic<std::binary_semaphore*> reading = nullptr;
+
+}  // namespace
+
+// Takes the place of the C library's.
+extern "C" int eventfd_read(int fd, eventfd_t* value) {
+  if (std::binary_semaphore* const told = reading.exchange(nullptr); told != nullptr) {
+    told->release();
+    pollfd source = {fd, POLLIN, 0};
+    poll(&source, 1, -1);
+  }
+  return read(fd, value, sizeof *value) == sizeof *value ? 0 : -1;
+}
+
+namespace hulld::server {
+namespace {
+
+// The end comes between a look at whether it has come and the taking back of what wakes. A thread
+// that misses it waits until the test is ended from outside.
+TEST(BatchNotices, EndAlsoWhileTheyTakeBackWhatWokeThem) {
+  if (!PostgresCluster::IsInstalled()) GTEST_SKIP() << PostgresCluster::kMissing;
+  PostgresCluster& cluster = PostgresCluster::Shared();
+  const std::string database = cluster.MakeDatabase();
+  cluster.Ask(database,
+              "CREATE SCHEMA hulld; CREATE TABLE hulld.store (batch bigint); "
+              "INSERT INTO hulld.store VALUES (7); GRANT USAGE ON SCHEMA hulld TO hulld; "
+              "GRANT SELECT ON hulld.store TO hulld");
+  const absl::StatusOr<Conninfo> conninfo = Conninfo::Parse(cluster.Conninfo(database));
+  ASSERT_TRUE(conninfo.ok());
+  std::binary_semaphore is_reading{0};
+  uint64_t heard = 0;
+  auto notices = std::make_unique<BatchNotices>(
+      [&] { return Session::Open(*conninfo, std::chrono::seconds(20)); },
+      std::chrono::milliseconds(10),
+      [&](uint64_t batch) {
+        heard = batch;
+        reading = &is_reading;
+      },
+      "it is not asked for");
+  is_reading.acquire();
+  notices = nullptr;
+  EXPECT_EQ(heard, 7);
+}
+
+}  // namespace
+}  // namespace hulld::server
