@@ -63,10 +63,8 @@ std::vector<uint32_t> AxisExtremes(std::span<const Vector> points) {
   for (size_t i = 0; i < points.size(); i += stride) {
     const Vector& p = points[i];
     // One branch that is rarely taken, rather than six.
-    if (!((p.x() < lowest.x()) | (p.y() < lowest.y()) | (p.z() < lowest.z()) |
-          (p.x() > highest.x()) | (p.y() > highest.y()) | (p.z() > highest.z()))) {
-      continue;
-    }
+    const auto is_new = [&](int k) { return int{p[k] < lowest[k]} | int{p[k] > highest[k]}; };
+    if ((is_new(0) | is_new(1) | is_new(2)) == 0) continue;
     for (int k = 0; k < 3; ++k) {
       if (p[k] < lowest[k]) extremes[static_cast<size_t>(k)] = static_cast<uint32_t>(i);
       if (p[k] > highest[k]) extremes[static_cast<size_t>(k) + 3] = static_cast<uint32_t>(i);
