@@ -11,8 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/harness/history_client.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/history_client.h"
+#include "tests/server/harness/history/hull_history.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {

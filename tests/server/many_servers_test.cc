@@ -19,7 +19,7 @@
 #include "client/appender.h"
 #include "client/client.h"
 #include "client/verify/answer_check.h"
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 #include "tests/server/harness/postgres/cutting_proxy.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 

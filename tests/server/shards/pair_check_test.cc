@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 
 namespace hulld::server {
 namespace {

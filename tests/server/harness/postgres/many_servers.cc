@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "hulld/v1/hull.grpc.pb.h"
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
 namespace hulld::server {

@@ -12,8 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/harness/history_client.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/history_client.h"
+#include "tests/server/harness/history/hull_history.h"
 #include "tests/server/harness/hulld_process.h"
 
 namespace hulld::server {

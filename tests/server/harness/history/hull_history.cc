@@ -1,4 +1,4 @@
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "tests/server/harness/hull_specification.h"
+#include "tests/server/harness/history/hull_specification.h"
 
 namespace hulld::server {
 namespace {

@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
-#define HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_SPECIFICATION_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_SPECIFICATION_H_
 
 #include <cstdint>
 #include <functional>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 
 namespace hulld::server {
 
@@ -53,4 +53,4 @@ bool IsRead(const Operation& operation);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_SPECIFICATION_H_

@@ -1,4 +1,4 @@
-#include "tests/server/harness/hull_specification.h"
+#include "tests/server/harness/history/hull_specification.h"
 
 #include <absl/strings/str_cat.h>
 

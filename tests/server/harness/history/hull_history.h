@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
-#define HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_HISTORY_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_HISTORY_H_
 
 #include <atomic>
 #include <cstdint>
@@ -159,4 +159,4 @@ std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_HISTORY_H_

@@ -1,10 +1,10 @@
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 
 #include <algorithm>
 #include <chrono>
 #include <utility>
 
-#include "tests/server/harness/hull_specification.h"
+#include "tests/server/harness/history/hull_specification.h"
 
 namespace hulld::server {
 namespace {

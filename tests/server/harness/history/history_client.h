@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
-#define HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_HISTORY_CLIENT_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_HISTORY_CLIENT_H_
 
 #include <grpcpp/grpcpp.h>
 
@@ -13,7 +13,7 @@
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -121,4 +121,4 @@ class HistoryClient {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_HISTORY_CLIENT_H_
