@@ -42,7 +42,7 @@ struct SpecifiedHull {
 };
 
 // Whether the hull may answer an operation so; if it may, `hull` is what it is after that.
-// Not for a pair, nor for what is asked about a body.
+// Not for a pair or a batch, nor for what is asked about a body.
 bool Step(SpecifiedHull& hull, const Operation& operation);
 // The same for these; `find` has the others that the operation names, and those of the pieces of
 // the body, by ID.
