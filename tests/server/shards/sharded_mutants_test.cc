@@ -1,4 +1,5 @@
-// hulld with a defect in how it reads bodies and hulls of several shards. Histories must find it.
+// hulld with a defect in how it reads bodies and hulls of several shards, or several at once.
+// Histories must find it.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -29,7 +30,13 @@ class ShardedMutants : public ShardedHistories {
   }
 };
 
+TEST_F(ShardedMutants, ABatchLooksUpOneHullByItself) { ExpectFound(); }
+
 TEST_F(ShardedMutants, ABodyMayChangeWhileItsPiecesAreRead) { ExpectFound(); }
+
+TEST_F(ShardedMutants, AListEndsWithAFullPage) { ExpectFound(); }
+
+TEST_F(ShardedMutants, AStreamKeepsAnswersAboutHullsThatChanged) { ExpectFound(); }
 
 TEST_F(ShardedMutants, OneShardAloneIsFresh) { ExpectFound(); }
 
