@@ -13,7 +13,7 @@ namespace {
 
 class ShardedMutants : public ShardedHistories {
  protected:
-  // In the test of its name, mutants/NAME.patch. Found after six histories at most when this was
+  // In the test of its name, mutants/NAME.patch. Found after ten histories at most when this was
   // written.
   void ExpectFound() {
     constexpr uint64_t kMost = 60;
