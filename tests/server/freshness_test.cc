@@ -6,7 +6,9 @@
 #include <libpq-fe.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <list>
 #include <memory>
 #include <random>
 #include <string>
@@ -16,8 +18,8 @@
 #include "hulld/v1/body.grpc.pb.h"
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
-#include "tests/server/harness/history_client.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/history_client.h"
+#include "tests/server/harness/history/hull_history.h"
 #include "tests/server/harness/hulld_process.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 #include "tests/server/harness/test_server.h"
@@ -73,6 +75,15 @@ class FreshReads : public ::testing::Test {
     return ack.has_value() ? ack->header() : v1::ResponseHeader();
   }
 
+  // Nobody reads the row of the store until this session ends.
+  std::unique_ptr<PGconn, decltype(&PQfinish)> HoldStore() const {
+    std::unique_ptr<PGconn, decltype(&PQfinish)> holder(
+        PQconnectdb(PostgresCluster::Shared().Conninfo(database_).c_str()), PQfinish);
+    PQclear(PQexec(holder.get(), "BEGIN; LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE"));
+    EXPECT_EQ(PQtransactionStatus(holder.get()), PQTRANS_INTRANS) << PQerrorMessage(holder.get());
+    return holder;
+  }
+
   bool Knows(size_t server, const std::string& hull_id) const {
     const auto stub = v1::HullService::NewStub(Connect(server));
     grpc::ClientContext context;
@@ -115,11 +126,7 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
   v1::CheckCollisionRequest pair;
   pair.mutable_a()->set_hull_id("h");
   pair.mutable_b()->set_hull_id("h");
-  // Nobody reads the row of the store until this session ends.
-  const std::unique_ptr<PGconn, decltype(&PQfinish)> holder(
-      PQconnectdb(PostgresCluster::Shared().Conninfo(database_).c_str()), PQfinish);
-  PQclear(PQexec(holder.get(), "BEGIN; LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE"));
-  ASSERT_EQ(PQtransactionStatus(holder.get()), PQTRANS_INTRANS) << PQerrorMessage(holder.get());
+  auto holder = HoldStore();
   struct Call {
     grpc::ClientContext context;
     v1::CheckCollisionResponse response;
@@ -166,10 +173,94 @@ TEST_F(FreshReads, QuestionsThatWaitForTheStoreEndWhenTheyAreCancelled) {
   EXPECT_TRUE(asked.ok()) << asked.error_message();
   // The store has not answered meanwhile.
   EXPECT_EQ(unanswered(), first);
-  PQclear(PQexec(holder.get(), "COMMIT"));
+  holder.reset();
   Call last;
   ask(last);
   EXPECT_TRUE(next()->status.ok()) << last.status.error_message();
+}
+
+// Those that wait without a thread count as those that wait for one.
+TEST_F(FreshReads, QuestionsThatWaitForTheStoreAreBounded) {
+  constexpr int kMost = 8;
+  constexpr int kSent = 200;
+  Append(0, "h", 1);
+  const std::vector<std::string> words = {"--listen",
+                                          "127.0.0.1:0",
+                                          "--store",
+                                          "postgres",
+                                          "--postgres-conninfo-file",
+                                          PostgresCluster::Shared().WriteConninfo(database_),
+                                          "--postgres-servers",
+                                          "many",
+                                          "--max-waiting-calls",
+                                          absl::StrCat(kMost)};
+  Process server(words);
+  const auto channel = grpc::CreateChannel(AddressIn(server.ReadLineWith("listening on ")),
+                                           grpc::InsecureChannelCredentials());
+  const auto collisions = v1::CollisionService::NewStub(channel);
+  const auto hulls = v1::HullService::NewStub(channel);
+  v1::CheckCollisionRequest pair;
+  pair.mutable_a()->set_hull_id("h");
+  pair.mutable_b()->set_hull_id("h");
+  v1::GetHullRequest get;
+  get.set_hull_id("h");
+  struct Call {
+    grpc::ClientContext context;
+    v1::CheckCollisionResponse answer;
+    v1::GetHullResponse hull;
+    grpc::Status status;
+  };
+  grpc::CompletionQueue queue;
+  const auto ask = [&](Call& call, bool is_pair) {
+    if (is_pair) {
+      collisions->AsyncCheckCollision(&call.context, pair, &queue)
+          ->Finish(&call.answer, &call.status, &call);
+    } else {
+      hulls->AsyncGetHull(&call.context, get, &queue)->Finish(&call.hull, &call.status, &call);
+    }
+  };
+  const auto next = [&] {
+    void* tag = nullptr;
+    bool ok = false;
+    EXPECT_TRUE(queue.Next(&tag, &ok));
+    return static_cast<Call*>(tag);
+  };
+  const auto is_refused = [](const Call& call) {
+    return call.status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED &&
+           call.status.error_message().find("--max-waiting-calls") != std::string::npos;
+  };
+  // A pair waits without a thread, and GetHull on one or for one.
+  for (const bool is_pair : {true, false}) {
+    auto holder = HoldStore();
+    // Some are let in while others that were are not counted yet. Once one was refused, all are.
+    std::list<Call> calls(kSent);
+    for (Call& call : calls) ask(call, is_pair);
+    size_t ended = 0;
+    size_t others = 0;
+    const auto end_one = [&] {
+      const Call* const call = next();
+      ++ended;
+      others += !is_refused(*call);
+      return call;
+    };
+    end_one();
+    for (int i = 0; i < kMost && others == 0; ++i) {
+      Call& late = calls.emplace_back();
+      ask(late, is_pair);
+      while (end_one() != &late) {
+      }
+    }
+    EXPECT_EQ(others, 0);
+    // Those that waited are answered, and give way to others.
+    holder.reset();
+    while (ended < calls.size()) end_one();
+    EXPECT_GE(others, kMost);
+    const auto answered = std::ranges::count_if(calls, [](const Call& c) { return c.status.ok(); });
+    EXPECT_EQ(others, answered);
+    Call last;
+    ask(last, is_pair);
+    EXPECT_TRUE(next()->status.ok()) << last.status.error_message();
+  }
 }
 
 // Every call that reads takes it: a revision that nobody was told of, and another store, are told

@@ -11,8 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/harness/history_client.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/history_client.h"
+#include "tests/server/harness/history/hull_history.h"
+#include "tests/server/harness/history/made_up.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -22,19 +23,15 @@ using ::testing::HasSubstr;
 using Kind = Operation::Kind;
 using Outcome = Operation::Outcome;
 
-Operation Answered(Kind kind, uint64_t invoked, uint64_t returned, uint64_t revision) {
-  Operation operation;
-  operation.kind = kind;
-  operation.outcome = Outcome::kOk;
-  operation.invoked = invoked;
-  operation.returned = returned;
-  operation.store_revision = operation.revision = revision;
+// Of the incarnation that CreateAt makes.
+Operation AnsweredOf(Kind kind, uint64_t invoked, uint64_t returned, uint64_t revision) {
+  Operation operation = Answered(kind, invoked, returned, revision);
   operation.create_revision = 1;
   return operation;
 }
 
 Operation CreateAt(uint64_t invoked, uint64_t returned) {
-  Operation operation = Answered(Kind::kCreate, invoked, returned, 1);
+  Operation operation = AnsweredOf(Kind::kCreate, invoked, returned, 1);
   operation.created = true;
   return operation;
 }
@@ -42,7 +39,7 @@ Operation CreateAt(uint64_t invoked, uint64_t returned) {
 // One chunk of one point, which was new.
 Operation AppendAt(uint64_t invoked, uint64_t returned, uint64_t revision, int point,
                    uint64_t vertex_count, const std::string& writer = "w", uint64_t sequence = 1) {
-  Operation operation = Answered(Kind::kAppend, invoked, returned, revision);
+  Operation operation = AnsweredOf(Kind::kAppend, invoked, returned, revision);
   operation.incarnation = 1;
   operation.writer = writer;
   operation.sequence = sequence;
@@ -52,29 +49,13 @@ Operation AppendAt(uint64_t invoked, uint64_t returned, uint64_t revision, int p
   return operation;
 }
 
-// The hull of these points, once each, in the place of one that there was.
-Operation ReplaceAt(uint64_t invoked, uint64_t returned, uint64_t revision, PointSet points) {
-  Operation operation = Answered(Kind::kReplace, invoked, returned, revision);
-  operation.create_revision = revision;
-  operation.points = points;
-  operation.sent = operation.received = operation.outside = operation.vertex_count =
-      static_cast<uint64_t>(std::popcount(points));
-  return operation;
-}
-
-Operation Unanswered(Operation operation, uint64_t returned = UINT64_MAX) {
-  operation.outcome = Outcome::kUnknown;
-  operation.returned = returned;
-  return operation;
-}
-
 Operation Refused(Operation operation, Outcome outcome) {
   operation.outcome = outcome;
   return operation;
 }
 
 Operation MeshAt(uint64_t invoked, uint64_t returned, uint64_t revision, PointSet points) {
-  Operation operation = Answered(Kind::kMesh, invoked, returned, revision);
+  Operation operation = AnsweredOf(Kind::kMesh, invoked, returned, revision);
   operation.points = points;
   return operation;
 }
@@ -82,7 +63,7 @@ Operation MeshAt(uint64_t invoked, uint64_t returned, uint64_t revision, PointSe
 // A hull that took `points` points, each of them a vertex.
 Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t create_revision,
                 uint64_t points) {
-  Operation operation = Answered(Kind::kGet, invoked, returned, revision);
+  Operation operation = AnsweredOf(Kind::kGet, invoked, returned, revision);
   operation.create_revision = create_revision;
   operation.received = operation.outside = operation.vertex_count = points;
   return operation;
@@ -90,7 +71,7 @@ Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t
 
 Operation ProbeAt(uint64_t invoked, uint64_t returned, uint64_t revision, int point,
                   bool touching) {
-  Operation operation = Answered(Kind::kProbe, invoked, returned, revision);
+  Operation operation = AnsweredOf(Kind::kProbe, invoked, returned, revision);
   operation.probe = point;
   operation.touching = touching;
   return operation;
@@ -120,7 +101,7 @@ TEST(LinearizabilityCheck, AChangeWithoutAnAnswerMayOrMayNotHaveHappened) {
 TEST(LinearizabilityCheck, AConditionMayFailBecauseOfAChangeWithoutAnAnswer) {
   Operation lost = AppendAt(3, 4, 0, 5, 1);
   lost.outcome = Outcome::kUnknown;
-  Operation refused = Answered(Kind::kDelete, 5, 6, 0);
+  Operation refused = AnsweredOf(Kind::kDelete, 5, 6, 0);
   refused.outcome = Outcome::kAborted;
   refused.if_revision = 1;
   EXPECT_EQ(LinearizabilityFault({CreateAt(1, 2), lost, refused, ProbeAt(7, 8, 4, 5, true)}), "");
@@ -152,7 +133,7 @@ TEST(LinearizabilityCheck, RefusesAStaleRead) {
 
 TEST(LinearizabilityCheck, RefusesALostUpdate) {
   // Two acknowledged appends, and a hull with one of them.
-  Operation get = Answered(Kind::kGet, 10, 11, 3);
+  Operation get = AnsweredOf(Kind::kGet, 10, 11, 3);
   get.received = get.outside = get.vertex_count = 1;
   EXPECT_NE(LinearizabilityFault(
                 {CreateAt(1, 2), AppendAt(3, 6, 2, 5, 1, "v"), AppendAt(4, 7, 3, 6, 2, "w"), get}),
@@ -173,6 +154,39 @@ TEST(LinearizabilityCheck, RefusesARevisionThatFalls) {
   EXPECT_NE(LinearizabilityFault(
                 {CreateAt(1, 2), AppendAt(3, 4, 5, 5, 1), AppendAt(5, 6, 4, 6, 2, "w", 2)}),
             "");
+}
+
+// Chunks with points 5 and 6, sent at once, and acknowledged so: the first at tick `returned`, the
+// second at the next.
+TEST(LinearizabilityCheck, ChunksThatAreToldOfTogetherHappenedAndInOrder) {
+  Operation first = AppendAt(3, 20, 0, 5, 0);
+  first.is_untold = true;
+  Operation second = AppendAt(4, 21, 3, 6, 2, "w", 2);
+  second.is_told_with_others = true;
+  second.received = second.outside = 2;
+  const auto fault_of = [&](std::initializer_list<Operation> more) {
+    std::vector<Operation> operations = {CreateAt(1, 2), first, second};
+    operations.insert(operations.end(), more);
+    return LinearizabilityFault(operations);
+  };
+  EXPECT_EQ(fault_of({}), "");
+  EXPECT_EQ(fault_of({ProbeAt(5, 6, 2, 5, true), GetAt(7, 8, 3, 1, 2)}), "");
+  EXPECT_EQ(fault_of({ProbeAt(5, 6, 1, 5, false)}), "");
+  // Not one without the one before, nor one of them not at all.
+  EXPECT_NE(fault_of({MeshAt(5, 6, 2, 0x40)}), "");
+  EXPECT_NE(fault_of({ProbeAt(22, 23, 3, 5, false)}), "");
+  EXPECT_NE(fault_of({GetAt(22, 23, 2, 1, 1)}), "");
+  // Another writer's chunk in between is counted.
+  EXPECT_NE(fault_of({AppendAt(5, 6, 4, 7, 2, "v")}), "");
+  second.vertex_count = 3;
+  EXPECT_NE(fault_of({}), "");
+  EXPECT_EQ(fault_of({AppendAt(5, 6, 2, 7, 2, "v")}), "");
+  // The second may have been sent before, which the first was not.
+  second.vertex_count = 2;
+  second.sequence = 1;
+  EXPECT_EQ(fault_of({ProbeAt(7, 8, 3, 5, true)}), "");
+  second.sequence = 3;
+  EXPECT_NE(fault_of({}), "");
 }
 
 TEST(LinearizabilityCheck, RefusesAConditionThatDidNotHold) {
@@ -308,16 +322,14 @@ TEST(LinearizabilityCheck, AReplaceHappensOnlyWhereItsConditionHolds) {
 TEST(LinearizabilityCheck, RefusesAReplaceWithTheRevisionOfAnotherChange) {
   HullHistory history;
   history.Record("a", CreateAt(1, 2));
-  Operation replace = ReplaceAt(3, 4, 1, 0xc0);
-  replace.if_absent = replace.created = true;
-  history.Record("b", replace);
+  history.Record("b", ReplaceAt(3, 4, 1, 0xc0));
   EXPECT_THAT(HistoryFault(history), HasSubstr("revision 1 belongs to a change of a and to one"));
 }
 
 TEST(LinearizabilityCheck, RefusesRevisionsOfTheStoreThatFall) {
   HullHistory history;
   history.Record("a", CreateAt(1, 2));
-  Operation late = Answered(Kind::kProbe, 3, 4, 1);
+  Operation late = AnsweredOf(Kind::kProbe, 3, 4, 1);
   late.store_revision = 0;
   history.Record("a", late);
   EXPECT_THAT(HistoryFault(history), HasSubstr("the store told revision 0 at tick 3"));

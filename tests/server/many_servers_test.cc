@@ -19,7 +19,7 @@
 #include "client/appender.h"
 #include "client/client.h"
 #include "client/verify/answer_check.h"
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 #include "tests/server/harness/postgres/cutting_proxy.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
@@ -78,6 +78,35 @@ TEST_F(ManyServers, TheOthersGoOnWhenOneIsKilled) {
     Run({.seed = 1000 + seed}, {[&] { Replace(seed % kServers); }}, history);
     ExpectLinearizable(history, seed);
   });
+}
+
+// One store: whatever the freshness, all of an answer is of one revision, a page of a list too.
+TEST_F(ManyServers, BatchesStreamsAndListsAreOfOneRevisionOfTheStore) {
+  size_t batches = 0;
+  size_t whole = 0;
+  uint64_t runs = 0;
+  ForEachRun([&](uint64_t seed) {
+    Begin();
+    HullHistory history;
+    Run({.each = 60,
+         .seed = 9000 + seed,
+         .pairs = true,
+         .bodies = {"body/a", "body/b"},
+         .several = true,
+         .any_freshness = true},
+        {[&] { Replace(seed % kServers); }}, history);
+    ExpectLinearizable(history, seed);
+    ++runs;
+    for (const auto& [hull_id, operations] : history.operations()) {
+      for (const Operation& operation : operations) {
+        if (operation.kind != Operation::Kind::kBatch) continue;
+        ++batches;
+        whole += operation.others.size() >= 4;
+      }
+    }
+  });
+  EXPECT_GT(batches, 40 * runs);
+  EXPECT_GT(whole, 20 * runs);
 }
 
 TEST_F(ManyServers, OneThatStoodStillFindsWhatTheOthersDid) {

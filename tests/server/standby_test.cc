@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 #include "tests/server/harness/postgres/many_servers.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 

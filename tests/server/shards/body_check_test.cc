@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
+#include "tests/server/harness/history/made_up.h"
 
 namespace hulld::server {
 namespace {
@@ -19,25 +20,9 @@ using Operations = std::map<std::string, std::vector<Operation>>;
 
 constexpr int kPoint = 3;
 
-Operation Answered(Kind kind, uint64_t invoked, uint64_t returned, uint64_t revision) {
-  Operation operation;
-  operation.kind = kind;
-  operation.outcome = Outcome::kOk;
-  operation.invoked = invoked;
-  operation.returned = returned;
-  operation.store_revision = operation.create_revision = operation.revision = revision;
-  return operation;
-}
-
-// A hull of one point, kPoint or the next, in the place of the one before, or of none.
-Operation ReplaceAt(uint64_t invoked, uint64_t returned, uint64_t revision, bool has_point) {
-  Operation operation = Answered(Kind::kReplace, invoked, returned, revision);
-  operation.if_absent = true;
-  operation.created = revision == 1;
-  operation.points = PointSet{1} << (has_point ? kPoint : kPoint + 1);
-  operation.sent = operation.received = operation.outside = operation.vertex_count = 1;
-  return operation;
-}
+// The hull of one point: kPoint, or the next.
+constexpr PointSet kWith = PointSet{1} << kPoint;
+constexpr PointSet kWithout = kWith << 1;
 
 Operation PutAt(uint64_t invoked, uint64_t returned, uint64_t revision,
                 std::vector<std::string> pieces, uint64_t create_revision = 10) {
@@ -76,17 +61,11 @@ Operation Missing(Operation operation, const std::string& missing) {
   return operation;
 }
 
-Operation Unanswered(Operation operation) {
-  operation.outcome = Outcome::kUnknown;
-  operation.returned = UINT64_MAX;
-  return operation;
-}
-
 // a loses the point at ticks 21 to 22, and c is replaced at 31 to 32; the body has both.
 Operations With(const std::vector<Operation>& of_body) {
-  Operations operations = {{"a", {ReplaceAt(1, 2, 1, true), ReplaceAt(21, 22, 2, false)}},
+  Operations operations = {{"a", {ReplaceAt(1, 2, 1, kWith), ReplaceAt(21, 22, 2, kWithout)}},
                            {"b", {PutAt(5, 6, 10, {"a", "c"})}},
-                           {"c", {ReplaceAt(3, 4, 1, false), ReplaceAt(31, 32, 2, false)}}};
+                           {"c", {ReplaceAt(3, 4, 1, kWithout), ReplaceAt(31, 32, 2, kWithout)}}};
   // Three stores, as revisions begin anew.
   for (auto& [id, of_id] : operations) {
     for (Operation& operation : of_id) operation.store_id = id;
@@ -234,7 +213,7 @@ TEST(BodyCheck, ARevisionThatWasAskedForIsSeenInEachStore) {
 // Changes of one store take effect in the order of its revisions.
 TEST(BodyCheck, RefusesAnOrderAgainstTheRevisionsOfAStore) {
   Operations operations = With({});
-  operations["a"].push_back(ReplaceAt(41, 60, 5, true));
+  operations["a"].push_back(ReplaceAt(41, 60, 5, kWith));
   operations["b"].push_back(PutAt(41, 60, 20, {"a"}));
   // The body that was put later has been seen with the hull from before.
   Operation ask = AskAt(41, 60, 20, 2, 0, false);

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
+#include "tests/server/harness/history/made_up.h"
 
 namespace hulld::server {
 namespace {
@@ -15,36 +16,16 @@ using Kind = Operation::Kind;
 using Outcome = Operation::Outcome;
 using Operations = std::map<std::string, std::vector<Operation>>;
 
-// A hull of one point in the place of the one before, or of none.
-Operation ReplaceAt(uint64_t invoked, uint64_t returned, uint64_t revision) {
-  Operation operation;
-  operation.kind = Kind::kReplace;
-  operation.outcome = Outcome::kOk;
-  operation.invoked = invoked;
-  operation.returned = returned;
-  operation.if_absent = true;
-  operation.created = revision == 1;
-  operation.store_revision = operation.create_revision = operation.revision = revision;
-  operation.points = operation.sent = operation.received = 1;
-  operation.outside = operation.vertex_count = 1;
-  return operation;
-}
-
 Operation PairAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t other) {
-  Operation operation;
-  operation.kind = Kind::kPair;
-  operation.outcome = Outcome::kOk;
-  operation.invoked = invoked;
-  operation.returned = returned;
-  operation.store_revision = operation.create_revision = operation.revision = revision;
+  Operation operation = Answered(Kind::kPair, invoked, returned, revision);
   operation.others = {{"b", other, other, "", other}};
   return operation;
 }
 
 // a is replaced at ticks 21 to 22, and b at 31 to 32.
 Operations With(std::vector<Operation> pairs) {
-  Operations operations = {{"a", {ReplaceAt(1, 2, 1), ReplaceAt(21, 22, 2)}},
-                           {"b", {ReplaceAt(3, 4, 1), ReplaceAt(31, 32, 2)}}};
+  Operations operations = {{"a", {ReplaceAt(1, 2, 1, 1), ReplaceAt(21, 22, 2, 1)}},
+                           {"b", {ReplaceAt(3, 4, 1, 1), ReplaceAt(31, 32, 2, 1)}}};
   auto& of_a = operations["a"];
   of_a.insert(of_a.end(), pairs.begin(), pairs.end());
   return operations;

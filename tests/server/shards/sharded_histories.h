@@ -4,6 +4,7 @@
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -78,6 +79,7 @@ class ShardedHistories : public ManyServersTest {
             .hulls = {kHulls[0], kHulls[1]},
             .pairs = true,
             .bodies = {kBodies[0], kBodies[1]},
+            .several = true,
             .any_freshness = true};
   }
   static uint64_t NumberIn(const char* variable, uint64_t otherwise) {
@@ -102,17 +104,24 @@ class ShardedHistories : public ManyServersTest {
         puts_ += operation.kind == Operation::Kind::kPut;
         parts_ += operation.kind == Operation::Kind::kVersion || operation.is_part;
         pairs_ += operation.kind == Operation::Kind::kPair;
+        batches_ += operation.kind == Operation::Kind::kBatch;
+        at_once_ += operation.is_told_with_others;
+        const auto elsewhere =
+            static_cast<uint64_t>(std::ranges::count_if(operation.others, [&](const Seen& other) {
+              return !other.store_id.empty() && other.store_id != operation.store_id;
+            }));
+        if (operation.kind == Operation::Kind::kBatch) {
+          batches_over_two_shards_ += elsewhere > 0;
+        }
         if (operation.kind != Operation::Kind::kAsk || operation.is_part) continue;
         ++asked_;
-        for (const Seen& other : operation.others) {
-          over_two_shards_ += other.store_id != operation.store_id;
-        }
+        over_two_shards_ += elsewhere;
       }
     }
   }
   void ExpectAllKinds(uint64_t runs) {
-    for (const uint64_t count :
-         {from_the_past_, of_a_revision_, puts_, parts_, pairs_, asked_, over_two_shards_}) {
+    for (const uint64_t count : {from_the_past_, of_a_revision_, puts_, parts_, pairs_, asked_,
+                                 over_two_shards_, batches_, batches_over_two_shards_}) {
       EXPECT_GE(count, runs);
     }
     const auto record = [](const char* name, uint64_t count) {
@@ -126,6 +135,9 @@ class ShardedHistories : public ManyServersTest {
     record("pairs", pairs_);
     record("asked", asked_);
     record("over_two_shards", over_two_shards_);
+    record("batches", batches_);
+    record("batches_over_two_shards", batches_over_two_shards_);
+    record("at_once", at_once_);
   }
 
   std::string directory_;
@@ -139,6 +151,10 @@ class ShardedHistories : public ManyServersTest {
   uint64_t pairs_ = 0;
   uint64_t asked_ = 0;
   uint64_t over_two_shards_ = 0;
+  uint64_t batches_ = 0;
+  uint64_t batches_over_two_shards_ = 0;
+  // Acknowledgements of several chunks.
+  uint64_t at_once_ = 0;
 };
 
 }  // namespace hulld::server

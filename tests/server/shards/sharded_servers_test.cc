@@ -13,7 +13,7 @@
 
 #include "client/client.h"
 #include "server/shards/slots.h"
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 #include "tests/server/harness/postgres/many_servers.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 #include "tests/server/harness/test_server.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "hulld/v1/hull.grpc.pb.h"
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 
 namespace hulld::server {
@@ -126,8 +126,11 @@ void ManyServersTest::Call(size_t number, const Calls& calls, HullHistory& histo
     const std::string& hull = calls.hulls[call % 3 == 0 ? 0 : 1];
     const bool is_pair = calls.pairs && random() % 4 == 0;
     const bool is_body = !calls.bodies.empty() && random() % 3 == 0;
+    const bool is_several = calls.several && random() % 4 == 0;
     const bool is_answered =
-        is_body ? client.CallBodyAtRandom(calls.bodies[random() % calls.bodies.size()], calls.hulls)
+        is_several ? client.CallSeveralAtRandom(calls.hulls, calls.bodies)
+        : is_body
+            ? client.CallBodyAtRandom(calls.bodies[random() % calls.bodies.size()], calls.hulls)
         : is_pair ? client.Pair(calls.hulls[0], calls.hulls[1])
                   : client.CallAtRandom(hull);
     if (!is_answered) {
@@ -183,6 +186,10 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
       EXPECT_TRUE(last.GetBody(body)) << "server " << i << " does not answer, seed " << calls.seed;
       EXPECT_TRUE(last.Ask(body)) << "server " << i << " does not answer, seed " << calls.seed;
     }
+    if (calls.several) {
+      EXPECT_TRUE(last.ListHulls(calls.hulls) && last.Batch(calls.hulls, calls.bodies))
+          << "server " << i << " does not answer, seed " << calls.seed;
+    }
     for (const std::string& hull : calls.hulls) {
       EXPECT_TRUE(last.Get(hull)) << "server " << i << " does not answer, seed " << calls.seed;
       EXPECT_TRUE(last.Mesh(hull)) << "server " << i << " does not answer, seed " << calls.seed;
@@ -190,12 +197,12 @@ void ManyServersTest::Run(const Calls& calls, const std::vector<Fault>& faults,
   }
 }
 
-void ManyServersTest::ExpectNoAnswer(size_t server) {
+void ManyServersTest::ExpectNoAnswer(size_t server, const std::string& hull_id) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kWhile);
   v1::CreateHullRequest request;
   v1::CreateHullResponse response;
-  request.set_hull_id("unanswered");
+  request.set_hull_id(hull_id);
   const auto stub = v1::HullService::NewStub(Connect(server));
   EXPECT_FALSE(stub->CreateHull(&context, request, &response).ok());
 }

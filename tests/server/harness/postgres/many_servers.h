@@ -12,8 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include "tests/server/harness/history_client.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/history_client.h"
+#include "tests/server/harness/history/hull_history.h"
 #include "tests/server/harness/hulld_process.h"
 
 namespace hulld::server {
@@ -57,6 +57,9 @@ class ManyServersTest : public ::testing::Test {
     bool pairs = false;
     // Bodies of these hulls, which are put, deleted, read and asked about, too.
     std::vector<std::string> bodies = {};
+    // With pairs: also about all hulls and bodies at once, by batches, scenes, collision streams
+    // and lists.
+    bool several = false;
     // Reads are of any freshness.
     bool any_freshness = false;
   };
@@ -65,9 +68,9 @@ class ManyServersTest : public ::testing::Test {
   // when a server answers a question. The faults come one after the other, evenly spread over the
   // calls. At the end every server is asked about every hull.
   void Run(const Calls& calls, const std::vector<Fault>& faults, HullHistory& history);
-  // That a change is not answered for a while, as its database is out of reach. It is none of any
-  // history.
-  void ExpectNoAnswer(size_t server);
+  // That a change is not answered for a while, as its database is out of reach: the creation of a
+  // hull that is none of any history.
+  void ExpectNoAnswer(size_t server, const std::string& hull_id = "unanswered");
   // That the history is linearizable, and the seed and what the servers said if not.
   void ExpectLinearizable(const HullHistory& history, uint64_t seed);
 

@@ -1,9 +1,10 @@
-#include "tests/server/harness/hull_specification.h"
+#include "tests/server/harness/history/hull_specification.h"
 
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 #include <set>
 
 #include "core/base/check.h"
@@ -42,9 +43,10 @@ bool Agree(SpecifiedHull& state, uint64_t revision) {
   return true;
 }
 
-// A change that was answered with this revision, or, when lost, had a later one than before.
+// A change that was answered with this revision, or, when that was not told, had a later one than
+// before.
 bool Advance(SpecifiedHull& state, const Operation& operation, uint64_t revision) {
-  if (operation.outcome == Outcome::kUnknown) {
+  if (operation.outcome == Outcome::kUnknown || operation.is_untold) {
     state.revision_known = false;
     return true;
   }
@@ -116,15 +118,18 @@ bool StepCreateOrOpen(SpecifiedHull& state, const Operation& operation) {
 bool StepAppend(SpecifiedHull& state, const Operation& operation) {
   if (!state.exists || !AgreeOnIncarnation(state, operation.incarnation)) return false;
   const uint64_t last = state.LastSequence(operation.writer);
-  if (operation.outcome == Outcome::kOk && operation.already_applied) {
-    return operation.sequence <= last && Agree(state, operation.revision);
+  const bool is_applied_already = operation.is_untold || operation.is_told_with_others
+                                      ? operation.sequence <= last
+                                      : operation.already_applied;
+  if (operation.outcome == Outcome::kOk && is_applied_already) {
+    return operation.sequence <= last && (operation.is_untold || Agree(state, operation.revision));
   }
   if (operation.sequence != last + 1) return false;
   if (operation.outcome == Outcome::kAborted) return Mismatch(state, operation);
   if (!Match(state, operation)) return false;
   const PointSet added = operation.points & ~state.points;
   const uint64_t outside = static_cast<uint64_t>(std::popcount(added));
-  const bool lost = operation.outcome == Outcome::kUnknown;
+  const bool lost = operation.outcome == Outcome::kUnknown || operation.is_untold;
   if (!lost && operation.outcome != Outcome::kOk) return false;
   if (added != 0) {
     if (!Advance(state, operation, operation.revision)) return false;
@@ -138,9 +143,10 @@ bool StepAppend(SpecifiedHull& state, const Operation& operation) {
   state.duplicate += operation.sent - outside;
   state.writers[operation.writer] = operation.sequence;
   if (lost) return true;
+  if (operation.vertex_count != static_cast<uint64_t>(std::popcount(state.points))) return false;
+  if (operation.is_told_with_others) return true;
   return operation.received == operation.sent && operation.outside == outside &&
-         operation.duplicate == operation.sent - outside &&
-         operation.vertex_count == static_cast<uint64_t>(std::popcount(state.points));
+         operation.duplicate == operation.sent - outside;
 }
 
 // One change, in which the hull is never without the new points or with others.
@@ -266,6 +272,37 @@ bool StepAsk(SpecifiedHull& body, const Operation& operation, const FindSpecifie
          (HasPiece(body, operation.deciding) && Has(find(operation.deciding), operation.probe));
 }
 
+// The points of a hull, or of all pieces of a body; nullopt: a piece lacks its hull.
+std::optional<PointSet> PointsOf(const SpecifiedHull& state, const FindSpecified& find) {
+  PointSet points = state.points;
+  for (const std::string& piece : state.pieces) {
+    if (!find(piece).exists) return std::nullopt;
+    points |= find(piece).points;
+  }
+  return points;
+}
+
+bool StepSeen(const Seen& seen, const FindSpecified& find) {
+  SpecifiedHull& state = find(seen.hull_id);
+  if (seen.is_missing) return !state.exists;
+  if (!seen.missing_piece.empty()) {
+    return state.exists && HasPiece(state, seen.missing_piece) && !find(seen.missing_piece).exists;
+  }
+  if (seen.lacks_answer) return false;
+  if (!AgreeOnVersion(state, seen.create_revision, seen.revision)) return false;
+  const auto vertices = static_cast<uint64_t>(std::popcount(state.points));
+  if (seen.size && *seen.size != vertices + state.pieces.size()) return false;
+  if (seen.probed == 0) return true;
+  const std::optional<PointSet> points = PointsOf(state, find);
+  return points.has_value() && (*points & seen.probed) == seen.touched;
+}
+
+bool StepBatch(const Operation& operation, const FindSpecified& find) {
+  return operation.outcome == Outcome::kOk &&
+         std::all_of(operation.others.begin(), operation.others.end(),
+                     [&](const Seen& seen) { return StepSeen(seen, find); });
+}
+
 }  // namespace
 
 bool Step(SpecifiedHull& state, const Operation& operation) {
@@ -289,14 +326,21 @@ bool Step(SpecifiedHull& state, const Operation& operation) {
       return StepPut(state, operation);
     case Kind::kPair:
     case Kind::kAsk:
+    case Kind::kBatch:
       break;
   }
   HULLD_UNREACHABLE();
 }
 
 bool StepJoint(SpecifiedHull& hull, const Operation& operation, const FindSpecified& find) {
-  return operation.kind == Kind::kPair ? StepPair(hull, operation, find)
-                                       : StepAsk(hull, operation, find);
+  switch (operation.kind) {
+    case Kind::kPair:
+      return StepPair(hull, operation, find);
+    case Kind::kAsk:
+      return StepAsk(hull, operation, find);
+    default:
+      return StepBatch(operation, find);
+  }
 }
 
 bool IsRead(const Operation& operation) {
@@ -315,6 +359,7 @@ bool IsRead(const Operation& operation) {
     case Kind::kVersion:
     case Kind::kGetBody:
     case Kind::kAsk:
+    case Kind::kBatch:
       return true;
   }
   HULLD_UNREACHABLE();

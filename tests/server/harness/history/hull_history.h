@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
-#define HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_HISTORY_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_HISTORY_H_
 
 #include <atomic>
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace hulld::server {
 // them has exactly these as vertices.
 using PointSet = uint64_t;
 
-// What an answer about several says of a hull beside the first.
+// What an answer about several says of a hull beside the first; of a batch, of any.
 struct Seen {
   std::string hull_id;
   uint64_t create_revision = 0;
@@ -24,6 +24,19 @@ struct Seen {
   std::string store_id = {};
   uint64_t store_revision = 0;
   uint64_t at_least_revision = 0;
+
+  // Of a batch alone, about a hull or a body.
+  // There is none.
+  bool is_missing = false;
+  // The hull that a piece of it lacks; empty: none.
+  std::string missing_piece = {};
+  // It is there, and an answer about it is missing.
+  bool lacks_answer = false;
+  // Points of the cloud that were asked about, and those of them that it touches.
+  PointSet probed = 0;
+  PointSet touched = 0;
+  // How many vertices, or pieces, it has.
+  std::optional<uint64_t> size = {};
 };
 
 // One call on one hull or body, as its client saw it. Where an answer about several is not of one
@@ -42,7 +55,9 @@ struct Operation {
     kVersion,  // what an answer about several says of this hull, or body, alone
     kPut,      // of a body
     kGetBody,
-    kAsk,  // CheckCollision of a body with one point of the cloud
+    kAsk,    // CheckCollision of a body with one point of the cloud
+    kBatch,  // what a batch, a scene, an answer of a collision stream, or a page of a list, or its
+             // part of one store, says of each of `others`
   };
   enum class Outcome {
     kOk,
@@ -67,6 +82,10 @@ struct Operation {
   uint64_t sequence = 0;
   // Append: of the stream, as its opening said.
   uint64_t incarnation = 0;
+  // Append: acknowledged with chunks after it, so that nobody told what it did alone; and with
+  // chunks before it, so that counts, and whether it was applied already, are of all.
+  bool is_untold = false;
+  bool is_told_with_others = false;
   // Append, replace: how many points were sent; and which, without repetition.
   uint64_t sent = 0;
   PointSet points = 0;
@@ -95,7 +114,8 @@ struct Operation {
   uint64_t received = 0;
   uint64_t outside = 0;
   uint64_t duplicate = 0;
-  // Pair: the other hull. Ask: hulls of pieces.
+  // Pair: the other hull. Ask: hulls of pieces. Batch: all that it says; the operation is recorded
+  // under the first, and its own revisions are none.
   std::vector<Seen> others;
   // Ask: `pieces` names the hulls of all pieces, each once.
   bool tells_pieces = false;
@@ -151,7 +171,7 @@ std::string LinearizabilityFault(std::vector<Operation> operations);
 std::string JointLinearizabilityFault(
     const std::map<std::string, std::vector<Operation>>& operations);
 
-// The same for every hull, or for all together where pairs or bodies were asked about, and that
+// The same for every hull, or for all together where several were asked about at once, and that
 // revisions of the store, which all hulls share, never fall from one call to a later one, as far as
 // that may not be answered from the past, and that no two changes have the same; of each store by
 // itself.
@@ -159,4 +179,4 @@ std::string HistoryFault(const HullHistory& history);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_HARNESS_HULL_HISTORY_H_
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_HISTORY_H_

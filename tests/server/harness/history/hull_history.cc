@@ -1,4 +1,4 @@
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 
 #include <absl/strings/str_cat.h>
 #include <absl/strings/str_join.h>
@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "tests/server/harness/hull_specification.h"
+#include "tests/server/harness/history/hull_specification.h"
 
 namespace hulld::server {
 namespace {
@@ -24,7 +24,7 @@ bool IsOptional(const Operation& operation) { return operation.outcome == Outcom
 const char* Name(Kind kind) {
   constexpr const char* kNames[] = {"create", "open",     "append", "replace", "delete",
                                     "get",    "mesh",     "probe",  "pair",    "version",
-                                    "put",    "get body", "ask"};
+                                    "put",    "get body", "ask",    "batch"};
   return kNames[static_cast<int>(kind)];
 }
 
@@ -36,6 +36,11 @@ std::string Describe(const Operation& operation) {
                                   operation.revision, ", created at ", operation.create_revision);
   for (const Seen& other : operation.others) {
     absl::StrAppend(&text, ", with ", other.hull_id, " at revision ", other.revision);
+    if (other.is_missing) absl::StrAppend(&text, " (missing)");
+    if (!other.missing_piece.empty()) absl::StrAppend(&text, " (lacks ", other.missing_piece, ")");
+    if (other.lacks_answer) absl::StrAppend(&text, " (without an answer)");
+    if (other.probed == 0) continue;
+    absl::StrAppend(&text, " touching ", absl::Hex(other.touched), " of ", absl::Hex(other.probed));
   }
   if (!operation.pieces.empty()) {
     absl::StrAppend(&text, ", pieces ", absl::StrJoin(operation.pieces, " "));
@@ -60,7 +65,8 @@ std::string Describe(const Operation& operation) {
 
 // Whether it is of several hulls and bodies.
 bool IsJoint(const Operation& operation) {
-  return operation.kind == Kind::kPair || operation.kind == Kind::kAsk;
+  return operation.kind == Kind::kPair || operation.kind == Kind::kAsk ||
+         operation.kind == Kind::kBatch;
 }
 
 // From when on a call may have taken effect.
@@ -78,6 +84,8 @@ uint64_t ChangedAt(const Operation& operation) {
   if (operation.outcome != Outcome::kOk) return 0;
   switch (operation.kind) {
     case Kind::kAppend:
+      // Of several chunks that were told of together, any may have.
+      if (operation.is_untold || operation.is_told_with_others) return 0;
       return operation.already_applied || operation.outside == 0 ? 0 : operation.revision;
     case Kind::kDelete:
       return operation.store_revision;
@@ -104,6 +112,13 @@ std::string FreshnessFault(const Operation& operation) {
                         ": ", Describe(operation));
   }
   for (const Seen& other : operation.others) {
+    if (other.store_revision > 0 && other.revision > other.store_revision) {
+      return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
+                          other.hull_id, " tells of a later one: ", Describe(operation));
+    }
+    // Of what is missing one may not know the store.
+    const bool is_there = !other.is_missing && other.missing_piece.empty();
+    if (other.store_revision == 0 && !is_there) continue;
     if (other.store_revision >= other.at_least_revision) continue;
     return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
                         other.hull_id, " to one who wants at least ", other.at_least_revision, ": ",

@@ -1,26 +1,16 @@
-#include "tests/server/harness/history_client.h"
+#include "tests/server/harness/history/history_client.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
-#include "tests/server/harness/hull_specification.h"
+#include "tests/server/harness/history/answers.h"
+#include "tests/server/harness/history/hull_specification.h"
 
 namespace hulld::server {
 namespace {
 
 using Kind = Operation::Kind;
 using Outcome = Operation::Outcome;
-
-constexpr int kCloudSize = 48;
-// Far more than any of these calls takes: so that a defect ends as a failure and not as a hang.
-constexpr std::chrono::seconds kDeadline(60);
-
-std::unique_ptr<grpc::ClientContext> NewContext() {
-  auto context = std::make_unique<grpc::ClientContext>();
-  context->set_deadline(std::chrono::system_clock::now() + kDeadline);
-  return context;
-}
 
 Outcome OutcomeOf(const grpc::Status& status) {
   switch (status.error_code()) {
@@ -46,6 +36,15 @@ void TakeRecord(const v1::HullInfo& hull, Operation& operation) {
   operation.duplicate = hull.counts().duplicate();
 }
 
+void TakeAck(const v1::AppendAck& ack, Operation& operation) {
+  operation.already_applied = ack.outcome() == v1::APPEND_OUTCOME_ALREADY_APPLIED;
+  operation.revision = ack.hull_revision();
+  operation.vertex_count = ack.vertex_count();
+  operation.received = ack.counts().received();
+  operation.outside = ack.counts().outside();
+  operation.duplicate = ack.counts().duplicate();
+}
+
 // Which point of the cloud this is; -1 when none.
 int NumberOf(const double* xyz) {
   const Coordinates& cloud = HistoryCloud();
@@ -55,34 +54,9 @@ int NumberOf(const double* xyz) {
   return -1;
 }
 
-// Of the store with this ID, where there are several.
-uint64_t RevisionOf(const v1::ResponseHeader& header, const std::string& store_id) {
-  for (const v1::ShardRevision& shard : header.shards()) {
-    if (shard.store_id() == store_id) return shard.revision();
-  }
-  return header.revision();
-}
-
-void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen) {
-  seen.store_id = version.store_id();
-  seen.store_revision = RevisionOf(header, version.store_id());
-  seen.create_revision = version.create_revision();
-  seen.revision = version.revision();
-}
-
 // Whether an error is about this hull.
 bool IsAbout(const grpc::Status& status, const std::string& hull_id) {
   return status.error_message().find("hull \"" + hull_id + "\"") != std::string::npos;
-}
-
-// The hull that an error says a piece of a body lacks; empty: it is about another thing.
-std::string MissingPiece(const grpc::Status& status) {
-  const std::string& said = status.error_message();
-  const std::string before = "hull \"";
-  const size_t piece = said.find("\": piece ");
-  if (piece == std::string::npos) return "";
-  const size_t begin = said.find(before, piece) + before.size();
-  return said.substr(begin, said.find('"', begin) - begin);
 }
 
 }  // namespace
@@ -100,6 +74,7 @@ HistoryClient::HistoryClient(const std::shared_ptr<grpc::Channel>& channel, Hull
 
 void HistoryClient::Connect(const std::shared_ptr<grpc::Channel>& channel) {
   streams_.clear();
+  collision_stream_ = nullptr;
   hulls_ = v1::HullService::NewStub(channel);
   bodies_ = v1::BodyService::NewStub(channel);
   collisions_ = v1::CollisionService::NewStub(channel);
@@ -123,6 +98,7 @@ bool HistoryClient::ChangeAtRandom(const std::string& hull_id) {
   if (choice < 5) return Create(hull_id, Below(2) == 0);
   if (choice < 8) return Delete(hull_id, Below(2) == 0);
   if (choice < 14) return Replace(hull_id);
+  if (choice < 20) return AppendAtOnce(hull_id);
   return Append(hull_id);
 }
 
@@ -315,14 +291,57 @@ bool HistoryClient::Append(const std::string& hull_id) {
     return answered;
   }
   stream->next_sequence = operation.sequence + 1;
-  operation.already_applied = ack->outcome() == v1::APPEND_OUTCOME_ALREADY_APPLIED;
   TakeHeader(ack->header(), operation);
-  operation.revision = ack->hull_revision();
-  operation.vertex_count = ack->vertex_count();
-  operation.received = ack->counts().received();
-  operation.outside = ack->counts().outside();
-  operation.duplicate = ack->counts().duplicate();
+  TakeAck(*ack, operation);
   return End(hull_id, operation, grpc::Status::OK);
+}
+
+bool HistoryClient::AppendAtOnce(const std::string& hull_id) {
+  const auto open = streams_.find(hull_id);
+  bool answered = true;
+  Stream* stream = open != streams_.end() ? &open->second : OpenStream(hull_id, &answered);
+  if (stream == nullptr) return answered;
+
+  std::vector<Operation> sent;
+  for (int chunks = 2 + Below(3); chunks > 0; --chunks) {
+    Operation operation = Begin(Kind::kAppend);
+    operation.incarnation = stream->incarnation;
+    operation.sequence = stream->next_sequence++;
+    const Coordinates xyz = SomePoints(1 + Below(3), operation);
+    sent.push_back(operation);
+    stream->appender->Send(ChunkMessage(operation.sequence, xyz));
+  }
+  size_t next = 0;
+  while (next < sent.size()) {
+    const std::optional<v1::AppendAck> ack = stream->appender->ReadAck();
+    if (!ack.has_value()) {
+      const grpc::Status status = stream->appender->Finish();
+      streams_.erase(hull_id);
+      for (; next < sent.size(); ++next) answered = End(hull_id, sent[next], status);
+      return answered;
+    }
+    // One acknowledgement may be of several chunks.
+    const size_t first = next;
+    while (next < sent.size() && sent[next].sequence <= ack->sequence()) ++next;
+    if (next == first) {
+      ADD_FAILURE() << "sequence " << ack->sequence() << " of " << hull_id << " comes twice";
+      streams_.erase(hull_id);
+      return true;
+    }
+    for (size_t i = first; i + 1 < next; ++i) {
+      TakeHeader(ack->header(), sent[i]);
+      sent[i].is_untold = true;
+      sent[i].outcome = Outcome::kOk;
+      sent[i].returned = history_.Tick();
+      history_.Record(hull_id, sent[i]);
+    }
+    Operation& last = sent[next - 1];
+    TakeHeader(ack->header(), last);
+    TakeAck(*ack, last);
+    last.is_told_with_others = next - first > 1;
+    End(hull_id, last, grpc::Status::OK);
+  }
+  return true;
 }
 
 bool HistoryClient::Replace(const std::string& hull_id) {
@@ -362,18 +381,26 @@ bool HistoryClient::Replace(const std::string& hull_id) {
   return End(hull_id, operation, status);
 }
 
-bool HistoryClient::Delete(const std::string& hull_id, bool if_known_revision) {
+template <typename Response, typename Request, typename Call>
+bool HistoryClient::DeleteAs(const std::string& id, bool if_known_revision, Request request,
+                             const Call& call) {
   Operation operation = Begin(Kind::kDelete);
-  const auto known = revisions_.find(hull_id);
+  const auto known = revisions_.find(id);
   if (if_known_revision && known != revisions_.end()) operation.if_revision = known->second;
-  v1::DeleteHullRequest request;
-  v1::DeleteHullResponse response;
-  request.set_hull_id(hull_id);
   if (operation.if_revision) request.set_if_revision(*operation.if_revision);
-  const grpc::Status status = hulls_->DeleteHull(NewContext().get(), request, &response);
+  Response response;
+  const grpc::Status status = call(NewContext().get(), request, &response);
   TakeHeader(response.header(), operation);
   operation.revision = operation.store_revision;
-  return End(hull_id, operation, status);
+  return End(id, operation, status);
+}
+
+bool HistoryClient::Delete(const std::string& hull_id, bool if_known_revision) {
+  v1::DeleteHullRequest request;
+  request.set_hull_id(hull_id);
+  return DeleteAs<v1::DeleteHullResponse>(
+      hull_id, if_known_revision, request,
+      [this](auto... arguments) { return hulls_->DeleteHull(arguments...); });
 }
 
 bool HistoryClient::Get(const std::string& hull_id) {
@@ -487,17 +514,11 @@ bool HistoryClient::PutBody(const std::string& body_id, const std::vector<std::s
 }
 
 bool HistoryClient::DeleteBody(const std::string& body_id, bool if_known_revision) {
-  Operation operation = Begin(Kind::kDelete);
-  const auto known = revisions_.find(body_id);
-  if (if_known_revision && known != revisions_.end()) operation.if_revision = known->second;
   v1::DeleteBodyRequest request;
-  v1::DeleteBodyResponse response;
   request.set_body_id(body_id);
-  if (operation.if_revision) request.set_if_revision(*operation.if_revision);
-  const grpc::Status status = bodies_->DeleteBody(NewContext().get(), request, &response);
-  TakeHeader(response.header(), operation);
-  operation.revision = operation.store_revision;
-  return End(body_id, operation, status);
+  return DeleteAs<v1::DeleteBodyResponse>(
+      body_id, if_known_revision, request,
+      [this](auto... arguments) { return bodies_->DeleteBody(arguments...); });
 }
 
 bool HistoryClient::GetBody(const std::string& body_id) {
@@ -551,7 +572,7 @@ bool HistoryClient::Ask(const std::string& body_id) {
     take(response.piece_a().hull());
   }
   if (status.error_code() == grpc::StatusCode::NOT_FOUND) {
-    operation.missing = MissingPiece(status);
+    operation.missing = MissingPiece(status.error_message());
     if (!is_of_one_instant && !operation.missing.empty()) {
       const Seen seen{.hull_id = operation.missing,
                       .at_least_revision = LeastFor(operation.missing, request.freshness())};

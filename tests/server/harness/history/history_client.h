@@ -1,8 +1,9 @@
-#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
-#define HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_HISTORY_CLIENT_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_HISTORY_CLIENT_H_
 
 #include <grpcpp/grpcpp.h>
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <random>
@@ -13,7 +14,7 @@
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/freshness.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 #include "tests/server/harness/test_server.h"
 
 namespace hulld::server {
@@ -21,7 +22,8 @@ namespace hulld::server {
 // The hull of one point at the origin, which probes points of others. Not part of any history.
 inline constexpr const char* kProbeHull = "probe";
 
-// The cloud that histories are made of: 48 points, all extreme.
+// The cloud that histories are made of: so many points, all extreme.
+inline constexpr int kCloudSize = 48;
 const Coordinates& HistoryCloud();
 
 // A client that calls at random and records what it asked and was answered. For one thread.
@@ -51,8 +53,10 @@ class HistoryClient {
   bool ReadAtRandom(const std::string& hull_id);
 
   bool Create(const std::string& hull_id, bool if_absent);
-  // Opens a stream when none is open, and appends one chunk.
+  // Opens a stream when none is open, and appends one chunk, or some, the next before the one
+  // before is acknowledged.
   bool Append(const std::string& hull_id);
+  bool AppendAtOnce(const std::string& hull_id);
   // One to three blocks. Now and then the stream ends without the last, empty one, which must
   // change nothing, or is cancelled after it, which leaves open whether anything changed.
   bool Replace(const std::string& hull_id);
@@ -71,7 +75,25 @@ class HistoryClient {
   // Whether it touches a point of the cloud.
   bool Ask(const std::string& body_id);
 
+  // One call at random about all of these, each where it is. IDs of hulls have a prefix of their
+  // own, and so have those of bodies: the first segment. Requires TellStores.
+  bool CallSeveralAtRandom(const std::vector<std::string>& hulls,
+                           const std::vector<std::string>& bodies);
+  // Which points of some of the cloud each touches.
+  bool Batch(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
+  bool Scene(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
+  // The same by a collision stream, which is opened when none is open; else it looks the hulls up
+  // anew, and moves a point now and then.
+  bool AskStream(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
+  // In one page or in pages of one. Requires that no others have their prefix.
+  bool ListHulls(const std::vector<std::string>& hulls);
+  bool ListBodies(const std::vector<std::string>& bodies);
+
  private:
+  struct Asked;
+  struct Told;
+  struct CollisionStream;
+  struct Page;
   struct Stream {
     std::unique_ptr<Appender> appender;
     uint64_t incarnation = 0;
@@ -95,6 +117,24 @@ class HistoryClient {
   // What an answer about several says of this one, recorded by itself.
   bool EndPart(Operation::Kind kind, const Operation& whole, const Seen& seen,
                const grpc::Status& status);
+  // What an answer that came in now says of several. It is recorded as one operation where it is of
+  // one instant, else as one for each store.
+  void RecordSeveral(Operation operation, const v1::ResponseHeader& header, std::vector<Seen> seen,
+                     bool is_of_one_instant);
+  std::vector<Seen> SeenIn(const Asked& asked, const Told& told, const v1::Freshness& freshness,
+                           bool is_of_one_instant);
+  void RecordAsked(const Operation& operation, const Asked& asked, const Told& told,
+                   const v1::Freshness& freshness);
+  void TellStoreOf(const v1::ResponseHeader& header, Seen& seen) const;
+  // Opens one, or asks again; the request that it sends.
+  v1::StreamCollisionsRequest NextMessage(const std::vector<std::string>& hulls,
+                                          const std::vector<std::string>& bodies,
+                                          Operation& operation);
+  bool List(std::vector<std::string> ids,
+            const std::function<Page(const v1::Freshness&, int page_size,
+                                     const std::string& token)>& ask);
+  template <typename Response, typename Request, typename Call>
+  bool DeleteAs(const std::string& id, bool if_known_revision, Request request, const Call& call);
   // What an answer says of the store; of several, of the one with this ID.
   void TakeHeader(const v1::ResponseHeader& header, Operation& operation,
                   const std::string& store_id = "");
@@ -110,6 +150,7 @@ class HistoryClient {
   std::mt19937_64 random_;
   std::map<std::string, Stream> streams_;
   std::map<std::string, uint64_t> revisions_;
+  std::shared_ptr<CollisionStream> collision_stream_;
   bool any_freshness_ = false;
   bool tells_stores_ = false;
   // Of the last answer.
@@ -121,4 +162,4 @@ class HistoryClient {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_CLIENT_H_
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_HISTORY_CLIENT_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
-#define HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
+#ifndef HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_SPECIFICATION_H_
+#define HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_SPECIFICATION_H_
 
 #include <cstdint>
 #include <functional>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/server/harness/hull_history.h"
+#include "tests/server/harness/history/hull_history.h"
 
 namespace hulld::server {
 
@@ -42,7 +42,7 @@ struct SpecifiedHull {
 };
 
 // Whether the hull may answer an operation so; if it may, `hull` is what it is after that.
-// Not for a pair, nor for what is asked about a body.
+// Not for a pair or a batch, nor for what is asked about a body.
 bool Step(SpecifiedHull& hull, const Operation& operation);
 // The same for these; `find` has the others that the operation names, and those of the pieces of
 // the body, by ID.
@@ -53,4 +53,4 @@ bool IsRead(const Operation& operation);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_TESTS_SERVER_HARNESS_HULL_SPECIFICATION_H_
+#endif  // HULLD_TESTS_SERVER_HARNESS_HISTORY_HULL_SPECIFICATION_H_

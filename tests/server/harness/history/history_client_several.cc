@@ -1,0 +1,416 @@
+// What clients of histories ask about several hulls and bodies at once.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/server/harness/history/answers.h"
+#include "tests/server/harness/history/history_client.h"
+
+namespace hulld::server {
+namespace {
+
+using Kind = Operation::Kind;
+
+constexpr int kProbes = 4;
+// More than a list of the hulls of a history has.
+constexpr int kMostPages = 20;
+
+const double* PointAt(int point) { return HistoryCloud().data() + 3 * point; }
+
+// Whether the server was there to answer.
+bool IsAnswered(const grpc::Status& status) {
+  // Every revision that is asked for was told by an answer.
+  EXPECT_NE(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION) << status.error_message();
+  return status.error_code() != grpc::StatusCode::UNAVAILABLE;
+}
+
+}  // namespace
+
+// Hulls and bodies, each where it is, with kProbeHull at each of these points of the cloud.
+// Placements are the former, then the latter.
+struct HistoryClient::Asked {
+  static Asked Make(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies,
+                    std::mt19937_64& random) {
+    Asked asked;
+    asked.ids = hulls;
+    asked.ids.insert(asked.ids.end(), bodies.begin(), bodies.end());
+    asked.hulls = hulls.size();
+    for (int i = 0; i < kProbes; ++i) {
+      asked.points.push_back(static_cast<int>(random() % kCloudSize));
+    }
+    return asked;
+  }
+  template <typename Message>
+  void AddPlacements(Message& message) const {
+    for (const std::string& id : ids) *message.add_placements() = PlacementOf(id);
+    for (const int point : points) {
+      const double* at = PointAt(point);
+      *message.add_placements() = PlacementOf(kProbeHull, at[0], at[1], at[2]);
+    }
+  }
+  template <typename Message>
+  void AddPairs(Message& message) const {
+    for (uint32_t i = 0; i < ids.size(); ++i) {
+      for (uint32_t k = 0; k < points.size(); ++k) {
+        message.add_pairs(i);
+        message.add_pairs(static_cast<uint32_t>(ids.size()) + k);
+      }
+    }
+  }
+  size_t pairs() const { return ids.size() * points.size(); }
+  bool is_body(size_t i) const { return i >= hulls; }
+
+  // Those of hulls first.
+  std::vector<std::string> ids;
+  size_t hulls = 0;
+  std::vector<int> points;
+};
+
+// What was answered so far.
+struct HistoryClient::Told {
+  template <typename Message>
+  void TakeTable(const Message& message) {
+    if (message.has_header()) header = message.header();
+    hulls.insert(hulls.end(), message.hulls().begin(), message.hulls().end());
+    for (const v1::PlacementProblem& problem : message.placement_problems()) {
+      problems[problem.placement()] = problem;
+    }
+  }
+  void TakeRelation(size_t pair, v1::Relation relation) {
+    touching[pair] = std::nullopt;
+    if (relation != v1::RELATION_UNSPECIFIED) touching[pair] = relation == v1::RELATION_TOUCHING;
+  }
+
+  v1::ResponseHeader header;
+  std::vector<v1::HullVersion> hulls;
+  std::map<uint32_t, v1::PlacementProblem> problems;
+  // Of each pair; nullopt: it has no answer.
+  std::vector<std::optional<bool>> touching;
+};
+
+struct HistoryClient::CollisionStream {
+  std::unique_ptr<grpc::ClientContext> context;
+  std::unique_ptr<
+      grpc::ClientReaderWriter<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse>>
+      stream;
+  Asked asked;
+  Told told;
+  v1::Freshness freshness;
+  std::optional<uint64_t> max_staleness;
+};
+
+// Of a list.
+struct HistoryClient::Page {
+  grpc::Status status;
+  v1::ResponseHeader header;
+  // Without stores.
+  std::vector<Seen> rows;
+  std::string next_token;
+};
+
+bool HistoryClient::CallSeveralAtRandom(const std::vector<std::string>& hulls,
+                                        const std::vector<std::string>& bodies) {
+  const int choice = Below(12);
+  if (choice < 4) return Batch(hulls, bodies);
+  if (choice < 5) return Scene(hulls, bodies);
+  if (choice < 8) return AskStream(hulls, bodies);
+  return choice < 10 || bodies.empty() ? ListHulls(hulls) : ListBodies(bodies);
+}
+
+void HistoryClient::TellStoreOf(const v1::ResponseHeader& header, Seen& seen) const {
+  if (header.shards().empty()) {
+    seen.store_id = header.store_id();
+  } else if (const auto store = stores_.find(seen.hull_id); store != stores_.end()) {
+    seen.store_id = store->second;
+  } else {
+    return;
+  }
+  seen.store_revision = RevisionOf(header, seen.store_id);
+}
+
+std::vector<Seen> HistoryClient::SeenIn(const Asked& asked, const Told& told,
+                                        const v1::Freshness& freshness, bool is_of_one_instant) {
+  const bool tells_pieces = is_of_one_instant || told.header.shards().empty();
+  std::vector<Seen> all;
+  for (uint32_t i = 0; i < asked.ids.size(); ++i) {
+    Seen seen{.hull_id = asked.ids[i], .at_least_revision = LeastFor(asked.ids[i], freshness)};
+    const auto problem = told.problems.find(i);
+    if (problem != told.problems.end()) {
+      // What cannot be read at the moment says nothing.
+      if (problem->second.code() != static_cast<int>(grpc::StatusCode::NOT_FOUND)) continue;
+      seen.missing_piece = MissingPiece(problem->second.message());
+      seen.is_missing = seen.missing_piece.empty();
+      if (!seen.is_missing && !tells_pieces) continue;
+      TellStoreOf(told.header, seen);
+      all.push_back(seen);
+      continue;
+    }
+    if (i >= told.hulls.size()) {
+      ADD_FAILURE() << "an answer does not tell of placement " << i;
+      return {};
+    }
+    TakeVersion(told.hulls[i], told.header, seen);
+    for (size_t k = 0; k < asked.points.size(); ++k) {
+      const std::optional<bool> touching = told.touching[i * asked.points.size() + k];
+      seen.lacks_answer |= !touching.has_value();
+      // The hulls of pieces may be of another instant.
+      if (asked.is_body(i) && !tells_pieces) continue;
+      const PointSet point = PointSet{1} << asked.points[k];
+      seen.probed |= point;
+      if (touching.value_or(false)) seen.touched |= point;
+    }
+    all.push_back(seen);
+  }
+  return all;
+}
+
+void HistoryClient::RecordAsked(const Operation& operation, const Asked& asked, const Told& told,
+                                const v1::Freshness& freshness) {
+  const bool is_of_one_instant = operation.max_staleness == 0;
+  RecordSeveral(operation, told.header, SeenIn(asked, told, freshness, is_of_one_instant),
+                is_of_one_instant);
+}
+
+void HistoryClient::RecordSeveral(Operation operation, const v1::ResponseHeader& header,
+                                  std::vector<Seen> seen, bool is_of_one_instant) {
+  operation.outcome = Operation::Outcome::kOk;
+  operation.returned = history_.Tick();
+  // By store. What is of one instant is one part, under any.
+  std::map<std::string, std::vector<Seen>> parts;
+  const bool is_whole = is_of_one_instant || header.shards().empty();
+  for (Seen& each : seen) {
+    if (is_whole) {
+      parts[""].push_back(std::move(each));
+      continue;
+    }
+    // Of what is missing one may not know the store.
+    if (each.store_id.empty()) continue;
+    parts[each.store_id].push_back(std::move(each));
+  }
+  for (auto& [store_id, part] : parts) {
+    // The operation itself is of the store of the first.
+    const auto known =
+        std::ranges::find_if(part, [](const Seen& each) { return !each.store_id.empty(); });
+    if (known != part.end()) std::iter_swap(part.begin(), known);
+    const Seen& first = part.front();
+    TakeHeader(header, operation, first.store_id);
+    if (first.store_id.empty()) operation.store_revision = 0;
+    operation.at_least_revision = first.store_id.empty() ? 0 : first.at_least_revision;
+    for (const Seen& each : part) {
+      if (!each.store_id.empty()) stores_[each.hull_id] = each.store_id;
+    }
+    operation.others = part;
+    history_.Record(first.hull_id, operation);
+  }
+}
+
+bool HistoryClient::Batch(const std::vector<std::string>& hulls,
+                          const std::vector<std::string>& bodies) {
+  const Asked asked = Asked::Make(hulls, bodies, random_);
+  Operation operation = Begin(Kind::kBatch);
+  v1::BatchCheckCollisionsRequest request;
+  asked.AddPlacements(request);
+  asked.AddPairs(request);
+  ChooseFreshnessOfSeveral(hulls.front(), operation, *request.mutable_freshness());
+  const std::unique_ptr<grpc::ClientContext> context = NewContext();
+  const auto reader = collisions_->BatchCheckCollisions(context.get(), request);
+  Told told;
+  told.touching.resize(asked.pairs());
+  v1::BatchCheckCollisionsResponse message;
+  while (reader->Read(&message)) {
+    told.TakeTable(message);
+    for (int row = 0; row < message.columns().relations_size(); ++row) {
+      told.TakeRelation(message.first_pair() + row, message.columns().relations(row));
+    }
+  }
+  const grpc::Status status = reader->Finish();
+  if (!status.ok()) return IsAnswered(status);
+  RecordAsked(operation, asked, told, request.freshness());
+  return true;
+}
+
+bool HistoryClient::Scene(const std::vector<std::string>& hulls,
+                          const std::vector<std::string>& bodies) {
+  const Asked asked = Asked::Make(hulls, bodies, random_);
+  Operation operation = Begin(Kind::kBatch);
+  v1::FindCollisionsRequest request;
+  asked.AddPlacements(request);
+  for (int i = 0; i < request.placements_size(); ++i) {
+    request.add_groups(i < static_cast<int>(asked.ids.size()) ? 0 : 1);
+  }
+  request.set_ignore_same_group(true);
+  ChooseFreshnessOfSeveral(hulls.front(), operation, *request.mutable_freshness());
+  const std::unique_ptr<grpc::ClientContext> context = NewContext();
+  const auto reader = collisions_->FindCollisions(context.get(), request);
+  Told told;
+  // Those that are not told of do not touch.
+  told.touching.assign(asked.pairs(), false);
+  v1::FindCollisionsResponse message;
+  while (reader->Read(&message)) {
+    told.TakeTable(message);
+    for (int row = 0; row < message.columns().relations_size(); ++row) {
+      const size_t id = message.pairs(2 * row);
+      const size_t probe = message.pairs(2 * row + 1) - asked.ids.size();
+      told.TakeRelation(id * asked.points.size() + probe, message.columns().relations(row));
+    }
+  }
+  const grpc::Status status = reader->Finish();
+  if (!status.ok()) return IsAnswered(status);
+  RecordAsked(operation, asked, told, request.freshness());
+  return true;
+}
+
+v1::StreamCollisionsRequest HistoryClient::NextMessage(const std::vector<std::string>& hulls,
+                                                       const std::vector<std::string>& bodies,
+                                                       Operation& operation) {
+  v1::StreamCollisionsRequest request;
+  if (collision_stream_ == nullptr) {
+    collision_stream_ = std::make_shared<CollisionStream>();
+    CollisionStream& stream = *collision_stream_;
+    stream.asked = Asked::Make(hulls, bodies, random_);
+    stream.told.touching.resize(stream.asked.pairs());
+    ChooseFreshnessOfSeveral(hulls.front(), operation, stream.freshness);
+    stream.max_staleness = operation.max_staleness;
+    stream.asked.AddPlacements(*request.mutable_open());
+    stream.asked.AddPairs(*request.mutable_open());
+    *request.mutable_open()->mutable_freshness() = stream.freshness;
+    stream.context = NewContext();
+    stream.stream = collisions_->StreamCollisions(stream.context.get());
+    return request;
+  }
+  CollisionStream& stream = *collision_stream_;
+  v1::CollisionStreamUpdate& update = *request.mutable_update();
+  update.set_refresh_hulls(true);
+  if (Below(2) == 0) {
+    const auto probe = static_cast<size_t>(Below(kProbes));
+    stream.asked.points[probe] = Below(kCloudSize);
+    update.add_placements(static_cast<uint32_t>(stream.asked.ids.size() + probe));
+    const double* at = PointAt(stream.asked.points[probe]);
+    for (const double number : {1.0, 0.0, 0.0, 0.0, at[0], at[1], at[2]}) update.add_poses(number);
+    // Its pairs are answered again.
+    for (size_t i = 0; i < stream.asked.ids.size(); ++i) {
+      stream.told.touching[i * kProbes + probe] = std::nullopt;
+    }
+  }
+  operation.max_staleness = stream.max_staleness;
+  stream.told.hulls.clear();
+  stream.told.problems.clear();
+  return request;
+}
+
+bool HistoryClient::AskStream(const std::vector<std::string>& hulls,
+                              const std::vector<std::string>& bodies) {
+  Operation operation = Begin(Kind::kBatch);
+  const v1::StreamCollisionsRequest request = NextMessage(hulls, bodies, operation);
+  CollisionStream& stream = *collision_stream_;
+  stream.stream->Write(request);
+  v1::StreamCollisionsResponse message;
+  do {
+    if (!stream.stream->Read(&message)) {
+      const grpc::Status status = stream.stream->Finish();
+      collision_stream_ = nullptr;
+      return IsAnswered(status);
+    }
+    stream.told.TakeTable(message);
+    for (int row = 0; row < message.pairs_size(); ++row) {
+      stream.told.TakeRelation(message.pairs(row), message.columns().relations(row));
+    }
+  } while (!message.last());
+  RecordAsked(operation, stream.asked, stream.told, stream.freshness);
+  return true;
+}
+
+// A page tells of all IDs after those of the page before, up to its last; the last page, of all.
+bool HistoryClient::List(
+    std::vector<std::string> ids,
+    const std::function<Page(const v1::Freshness&, int page_size, const std::string& token)>& ask) {
+  std::ranges::sort(ids);
+  v1::Freshness freshness;
+  Operation chosen;
+  ChooseFreshness(ids.front(), chosen, freshness);
+  const int page_size = Below(2);
+  std::string token;
+  std::string after;
+  for (int pages = 0; pages < kMostPages; ++pages) {
+    Operation operation = Begin(Kind::kBatch);
+    operation.max_staleness = chosen.max_staleness;
+    const Page page = ask(freshness, page_size, token);
+    if (!page.status.ok()) return IsAnswered(page.status);
+    const bool is_last = page.next_token.empty();
+    std::vector<Seen> all;
+    auto row = page.rows.begin();
+    for (const std::string& id : ids) {
+      if (id <= after) continue;
+      if (!is_last && (page.rows.empty() || id > page.rows.back().hull_id)) break;
+      Seen seen{.hull_id = id};
+      if (row != page.rows.end() && row->hull_id == id) {
+        seen = *row++;
+      } else {
+        seen.is_missing = true;
+      }
+      seen.at_least_revision = LeastFor(id, freshness);
+      TellStoreOf(page.header, seen);
+      all.push_back(seen);
+    }
+    EXPECT_TRUE(row == page.rows.end())
+        << "a list after " << after << " tells of " << row->hull_id << ", which is not next";
+    RecordSeveral(operation, page.header, std::move(all), false);
+    if (is_last) return true;
+    token = page.next_token;
+    if (!page.rows.empty()) after = page.rows.back().hull_id;
+  }
+  ADD_FAILURE() << "a list comes to no end after " << after;
+  return true;
+}
+
+bool HistoryClient::ListHulls(const std::vector<std::string>& hulls) {
+  return List(hulls, [&](const v1::Freshness& freshness, int page_size, const std::string& token) {
+    v1::ListHullsRequest request;
+    v1::ListHullsResponse response;
+    request.set_prefix(hulls.front().substr(0, hulls.front().find('/') + 1));
+    request.set_page_size(static_cast<uint32_t>(page_size));
+    request.set_page_token(token);
+    *request.mutable_freshness() = freshness;
+    Page page;
+    page.status = hulls_->ListHulls(NewContext().get(), request, &response);
+    page.header = response.header();
+    page.next_token = response.next_page_token();
+    for (const v1::HullInfo& hull : response.hulls()) {
+      page.rows.push_back({.hull_id = hull.hull_id(),
+                           .create_revision = hull.create_revision(),
+                           .revision = hull.revision(),
+                           .size = hull.vertex_count()});
+    }
+    return page;
+  });
+}
+
+bool HistoryClient::ListBodies(const std::vector<std::string>& bodies) {
+  return List(bodies, [&](const v1::Freshness& freshness, int page_size, const std::string& token) {
+    v1::ListBodiesRequest request;
+    v1::ListBodiesResponse response;
+    request.set_prefix(bodies.front().substr(0, bodies.front().find('/') + 1));
+    request.set_page_size(static_cast<uint32_t>(page_size));
+    request.set_page_token(token);
+    *request.mutable_freshness() = freshness;
+    Page page;
+    page.status = bodies_->ListBodies(NewContext().get(), request, &response);
+    page.header = response.header();
+    page.next_token = response.next_page_token();
+    for (const v1::BodyInfo& body : response.bodies()) {
+      page.rows.push_back({.hull_id = body.body_id(),
+                           .create_revision = body.create_revision(),
+                           .revision = body.revision(),
+                           .size = body.piece_count()});
+    }
+    return page;
+  });
+}
+
+}  // namespace hulld::server
