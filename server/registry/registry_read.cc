@@ -220,7 +220,8 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
     if (prepare) SchedulePreparing(hull);
     known.view = HullView{hull->committed.record, hull->Serve()};
     known.bytes = hull->SharedBytes();
-    hull->NoteUse();
+    // One that was just loaded was noted then, and Serve counted the rest.
+    if (!is_loaded) hull->NoteUse();
     if (was_missing) {
       memory_.Evict(locked);
       hulls_.RestSome();

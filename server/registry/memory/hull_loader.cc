@@ -24,8 +24,11 @@ bool SpanSpace(std::span<const Vector> points) {
          });
 }
 
-// Points that a thread takes at once, the last hull apart: some 50 us.
+// Points that a thread takes at once, the last hull apart, and hulls, at most: some 50 us.
 constexpr uint64_t kPointsAtOnce = 1024;
+constexpr size_t kHullsAtOnce = 16;
+// A thread takes a small part of a job at once, so that all of them end together.
+constexpr size_t kLeastParts = 8;
 
 uint64_t PointCount(const StoredHull& stored) {
   return stored.layout.base_vertices + stored.layout.delta_vertices;
@@ -67,12 +70,16 @@ LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls)
   std::iota(order_.begin(), order_.end(), 0);
   // Those that were made one after the other are in one place of the store.
   std::ranges::sort(order_, {}, [&](uint32_t i) { return hulls_[i].record.create_revision; });
+  const size_t most = std::clamp<size_t>(order_.size() / kLeastParts, 1, kHullsAtOnce);
   uint64_t points = 0;
+  size_t begin = 0;
   for (uint32_t n = 0; n < order_.size(); ++n) {
     points += PointCount(hulls_[order_[n]]);
-    if (points < kPointsAtOnce && n + 1 < order_.size()) continue;
+    const size_t taken = n + 1 - begin;
+    if (points < kPointsAtOnce && taken < most && n + 1 < order_.size()) continue;
     ends_.push_back(n + 1);
     points = 0;
+    begin = n + 1;
   }
 }
 
@@ -89,9 +96,9 @@ std::shared_ptr<LoadJob> LoadJob::Start(Store& store, std::vector<StoredHull> hu
 // Until none is left to begin. Once should_stop, which may be empty, says so, none is loaded.
 void LoadJob::Work(const std::function<bool()>& should_stop) {
   for (size_t part = next_++; part < ends_.size(); part = next_++) {
-    if (Stopped(should_stop)) is_stopped_ = true;
     const uint32_t begin = part == 0 ? 0 : ends_[part - 1];
     if (!is_stopped_) LoadSome(std::span(order_).subspan(begin, ends_[part] - begin));
+    if (Stopped(should_stop)) is_stopped_ = true;
     const std::lock_guard lock(mutex_);
     if (++ended_ == ends_.size()) all_ended_.notify_all();
   }
