@@ -9,7 +9,9 @@
 
 namespace hulld::server {
 
-// Equal IDs have equal hashes, so they come together once sorted.
+// Equal IDs have equal hashes, so they come together once sorted. Hulls are numbered in the order
+// in which they are named first: those that are named one after the other were mostly made so, too,
+// so that a store has them in one place.
 void KnownHulls::Begin(std::span<const std::string> ids) {
   HULLD_CHECK(!has_begun_ || hull_of_.size() == ids.size());
   if (std::exchange(has_begun_, true)) return;
@@ -21,21 +23,27 @@ void KnownHulls::Begin(std::span<const std::string> ids) {
     const int compared = ids[a.second].compare(ids[b.second]);
     return compared != 0 ? compared < 0 : a.second < b.second;
   });
+  // At first, where each ID is named first.
   hull_of_.resize(ids.size());
   for (size_t n = 0; n < order.size(); ++n) {
     const auto [hash, i] = order[n];
     const bool is_new = n == 0 || order[n - 1].first != hash || ids[order[n - 1].second] != ids[i];
-    if (is_new) {
-      by_hash_.emplace_back(hash, static_cast<uint32_t>(hulls_.size()));
-      hulls_.emplace_back().first = i;
-    }
-    hull_of_[i] = static_cast<uint32_t>(hulls_.size() - 1);
+    hull_of_[i] = is_new ? i : hull_of_[order[n - 1].second];
+    if (is_new) by_hash_.emplace_back(hash, i);
   }
+  hulls_.reserve(by_hash_.size());
+  for (uint32_t i = 0; i < ids.size(); ++i) {
+    const bool is_first = hull_of_[i] == i;
+    if (is_first) hulls_.emplace_back().first = i;
+    hull_of_[i] = is_first ? static_cast<uint32_t>(hulls_.size() - 1) : hull_of_[hull_of_[i]];
+  }
+  for (auto& [hash, hull] : by_hash_) hull = hull_of_[hull];
   ForgetAll();
 }
 
+// The first is to come first.
 void KnownHulls::ForgetAll() {
-  for (uint32_t k = 0; k < hulls_.size(); ++k) MakeDue(k);
+  for (size_t k = hulls_.size(); k-- > 0;) MakeDue(static_cast<uint32_t>(k));
 }
 
 void KnownHulls::NoteChange(uint64_t hash) {

@@ -5,7 +5,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -13,9 +15,12 @@
 #include <utility>
 #include <vector>
 
+#include "server/registry/memory/hull_loader.h"
 #include "server/registry/registry_types.h"
 
 namespace hulld::server {
+
+struct RegisteredHull;
 
 // The last changes of what readers are given of hulls, in their order, each as a hash of the hull's
 // ID. Not thread-safe.
@@ -70,11 +75,23 @@ class KnownHulls {
     uint32_t first = 0;
     bool is_due = false;
     bool is_prepared = false;
-    // It was read from the store for this lookup, with others.
+    // It was read from the store for this lookup, with others; or it is among those that are.
     bool is_loaded = false;
+    bool is_ahead = false;
+    // What was found when that began; null where it must be looked for.
+    std::shared_ptr<RegisteredHull> found;
     // About what it holds of the hull.
     uint64_t bytes = 0;
     absl::StatusOr<HullView> view = absl::UnknownError("not looked up");
+  };
+
+  // Hulls that are read from the store before they are looked up.
+  struct Loading {
+    std::shared_ptr<LoadJob> job;
+    // Each hull of it, and its index here.
+    std::vector<std::shared_ptr<RegisteredHull>> found;
+    std::vector<uint32_t> hulls;
+    uint64_t points = 0;
   };
 
  public:
@@ -104,6 +121,10 @@ class KnownHulls {
   std::vector<std::pair<uint64_t, uint32_t>> by_hash_;
   // Those that must be looked up; the last one comes first.
   std::vector<uint32_t> due_;
+  // What is read from the store, in the order in which it is due; none between lookups.
+  std::deque<Loading> ahead_;
+  // Of due_, those from here on were looked through for what is to be read.
+  size_t ahead_end_ = 0;
   // Changes before this one were taken into account; none at first.
   std::optional<uint64_t> next_change_;
 };

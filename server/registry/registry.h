@@ -397,8 +397,14 @@ class Registry {
   absl::Status LookUp(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
                       uint32_t k, const std::function<bool()>& should_stop, const ReadPlan& plan,
                       bool may_wait);
-  void LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
+  absl::Status LookUpAll(Locked& locked, std::span<const std::string> ids, KnownHulls& known,
+                         const std::function<bool()>& should_stop, const ReadPlan& plan,
+                         bool may_wait);
+  void LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls, uint32_t k,
                 const std::function<bool()>& should_stop);
+  bool BeginLoading(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls);
+  void EndLoading(Locked& locked, KnownHulls& hulls, const std::function<bool()>& should_stop);
+  void EndAllLoading(Locked& locked, KnownHulls& hulls, const std::function<bool()>& should_stop);
   absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
   absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
                               const std::function<bool()>& should_stop);

@@ -87,6 +87,19 @@ absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
 absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> ids,
                                  KnownHulls& known, const std::function<bool()>& should_stop,
                                  const ReadPlan& plan, bool may_wait) {
+  absl::Status status = LookUpAll(locked, ids, known, should_stop, plan, may_wait);
+  // Nothing is left where that is OK, so that the mutex is held all the while.
+  if (!status.ok()) {
+    EndAllLoading(locked, known, [] { return true; });
+    const size_t first = std::min(known.ahead_end_, known.due_.size());
+    for (const uint32_t k : std::span(known.due_).subspan(first)) known.hulls_[k].found = nullptr;
+  }
+  return status;
+}
+
+absl::Status Registry::LookUpAll(Locked& locked, std::span<const std::string> ids,
+                                 KnownHulls& known, const std::function<bool()>& should_stop,
+                                 const ReadPlan& plan, bool may_wait) {
   if (!known.next_change_.has_value()) known.next_change_ = recent_changes_.end();
   while (true) {
     uint64_t& next = *known.next_change_;
@@ -105,6 +118,8 @@ absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> id
       due.is_due = false;
       known.due_.pop_back();
       ++known.lookups_;
+    } else if (!known.ahead_.empty()) {
+      EndAllLoading(locked, known, should_stop);
     } else {
       return absl::OkStatus();
     }
@@ -141,9 +156,14 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
   const std::string& id = ids[known.first];
   bool was_missing = false;
   while (true) {
-    std::optional<HullPointer> found = hulls_.Ask(id);
+    std::optional<HullPointer> found = std::exchange(known.found, nullptr);
+    if (*found == nullptr || (*found)->state.gone()) found = hulls_.Ask(id);
     if (!found.has_value() && !bodies_.contains(id)) {
       if (!may_wait) return WouldWait();
+      if (!hulls.ahead_.empty()) {
+        EndAllLoading(locked, hulls, should_stop);
+        continue;
+      }
       std::vector<const std::string*> wanted = {&id};
       const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
       for (const uint32_t due : std::span(hulls.due_).last(count)) {
@@ -171,8 +191,12 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
       if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
       if (!std::exchange(was_missing, true)) {
         ++cache_.misses;
-        LoadMany(locked, ids, hulls, should_stop);
+        LoadMany(locked, ids, hulls, k, should_stop);
         if (Stopped(should_stop)) return Cancelled();
+        continue;
+      }
+      if (!hulls.ahead_.empty()) {
+        EndAllLoading(locked, hulls, should_stop);
         continue;
       }
       const absl::Status loaded = LoadForReaders(locked, *hull, should_stop);
@@ -182,6 +206,10 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
       return absl::OkStatus();
     }
     if (prepare && plan.prepare_first && !std::exchange(known.is_prepared, true)) {
+      if (!hulls.ahead_.empty()) {
+        EndAllLoading(locked, hulls, should_stop);
+        if (!WantsPreparing(*hull, plan.expected_questions)) continue;
+      }
       Prepare(locked, *hull);
       if (Stopped(should_stop)) return Cancelled();
       continue;
@@ -192,7 +220,8 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
     if (prepare) SchedulePreparing(hull);
     known.view = HullView{hull->committed.record, hull->Serve()};
     known.bytes = hull->SharedBytes();
-    hull->NoteUse();
+    // One that was just loaded was noted then, and Serve counted the rest.
+    if (!is_loaded) hull->NoteUse();
     if (was_missing) {
       memory_.Evict(locked);
       hulls_.RestSome();
@@ -201,59 +230,95 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
   }
 }
 
-// Reads the points of the next hulls that are due, as far as they are missing and nobody else reads
-// them, from the store, by several threads at a time. Releases the mutex meanwhile. What cannot be
-// read, or was left behind by a writer, stays missing.
+// Reads the points of this hull, which is due, and of those that are due next from the store, as
+// far as they are missing and nobody else reads them, by several threads at a time. While these
+// hulls are looked up, others read the next. Who waits for others meanwhile ends all that first,
+// since others may wait for it. Releases the mutex. What cannot be read, or was left behind by a
+// writer, stays missing.
 void Registry::LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
-                        const std::function<bool()>& should_stop) {
+                        uint32_t k, const std::function<bool()>& should_stop) {
+  const bool& is_ahead = hulls.hulls_[k].is_ahead;
+  if (!is_ahead) hulls.ahead_end_ = hulls.due_.size();
+  while (hulls.ahead_.size() < 2 && BeginLoading(locked, ids, hulls)) continue;
+  while (is_ahead) EndLoading(locked, hulls, should_stop);
+}
+
+// Whether there are some that are worth it.
+bool Registry::BeginLoading(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls) {
   // At some 200 bytes a point, a twentieth of what all may hold: until each is looked up, nobody
   // asks whether readers hold too much.
-  const uint64_t most_points = std::min<uint64_t>(1 << 17, limits_.memory_limit / 4096);
-  std::vector<HullPointer> chosen;
-  std::vector<uint32_t> indices;
-  std::vector<StoredHull> stored;
-  uint64_t points = 0;
+  uint64_t most_points = std::min<uint64_t>(1 << 17, limits_.memory_limit / 4096);
+  // Two of them, so that more wait while the first are looked up.
+  const uint64_t enough_points = most_points / 2;
+  for (const KnownHulls::Loading& loading : hulls.ahead_) {
+    most_points -= std::min(most_points, loading.points);
+  }
   if (locked.lookups() > 0) {
     locked.Unlock();
     locked.Lock();
   }
-  // And the one of the caller.
-  const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
+  KnownHulls::Loading next;
+  std::vector<StoredHull> stored;
   // The last one that is due comes first.
-  for (size_t i = 1; i <= count; ++i) {
-    const uint32_t k = hulls.due_[hulls.due_.size() - i];
+  size_t& end = hulls.ahead_end_;
+  end = std::min(end, hulls.due_.size());
+  for (uint64_t looked_at = 1; end > 0 && looked_at < kMostLookupsPerHold; ++looked_at) {
+    const uint32_t k = hulls.due_[end - 1];
     locked.NoteLookup();
     const std::string& id = ids[hulls.hulls_[k].first];
-    if (!IsKnown(id)) continue;
-    const HullPointer hull = FindVisible(id);
+    const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
         hull->state.life() == HullState::Life::kEnding) {
+      --end;
       continue;
     }
     const VertexLayout& layout = hull->committed.layout;
-    points += layout.base_vertices + layout.delta_vertices;
-    if (points > most_points) break;
-    chosen.push_back(hull);
-    indices.push_back(k);
+    const uint64_t points = next.points + layout.base_vertices + layout.delta_vertices;
+    if (points > most_points || (points > enough_points && next.hulls.size() > 1)) break;
+    --end;
+    next.points = points;
+    next.found.push_back(hull);
+    next.hulls.push_back(k);
     stored.push_back(hull->committed);
   }
-  if (chosen.size() < 2) return;
-  for (const HullPointer& hull : chosen) hull->loading = true;
+  if (next.hulls.size() < 2) return false;
+  for (size_t i = 0; i < next.hulls.size(); ++i) {
+    next.found[i]->loading = true;
+    hulls.hulls_[next.hulls[i]].is_ahead = true;
+  }
+  next.job = LoadJob::Start(store_, std::move(stored), *loaders_);
+  hulls.ahead_.push_back(std::move(next));
+  return true;
+}
+
+// Waits for the first of those that are read.
+void Registry::EndLoading(Locked& locked, KnownHulls& hulls,
+                          const std::function<bool()>& should_stop) {
+  const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
+  hulls.ahead_.pop_front();
   locked.Unlock();
-  std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> loaded =
-      LoadLives(store_, stored, *loaders_, should_stop);
+  std::vector<LoadJob::Loaded> loaded = loading.job->Finish(should_stop);
   locked.Lock();
-  for (size_t i = 0; i < chosen.size(); ++i) {
-    RegisteredHull& hull = *chosen[i];
+  for (size_t i = 0; i < loading.hulls.size(); ++i) {
+    KnownHulls::Known& known = hulls.hulls_[loading.hulls[i]];
+    RegisteredHull& hull = *loading.found[i];
+    known.is_ahead = false;
     hull.loading = false;
     hull.changed.notify_all();
-    const bool is_current = hull.committed.record.revision == stored[i].record.revision;
+    const uint64_t revision = loading.job->hulls()[i].record.revision;
+    const bool is_current = hull.committed.record.revision == revision;
     if (!loaded[i].ok() || !is_current || hull.live != nullptr || hull.state.gone()) continue;
     hull.SetLive(*std::move(loaded[i]));
     ++cache_.loads;
     hull.NoteUse();
-    hulls.hulls_[indices[i]].is_loaded = true;
+    known.is_loaded = true;
+    known.found = loading.found[i];
   }
+}
+
+void Registry::EndAllLoading(Locked& locked, KnownHulls& hulls,
+                             const std::function<bool()>& should_stop) {
+  while (!hulls.ahead_.empty()) EndLoading(locked, hulls, should_stop);
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,

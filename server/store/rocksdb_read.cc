@@ -41,6 +41,24 @@ absl::StatusOr<std::optional<std::string>> RocksDbStore::Read(const std::string&
   return std::string(*value);
 }
 
+// Blocks are left out of the cache, where they would put each other out before they are used again.
+// What was found may be a part of the database, which must stay until it was visited.
+void RocksDbStore::FindValues(std::span<const std::string> keys,
+                              const std::function<void(size_t, std::string_view)>& visit) {
+  const std::shared_lock lock(db_mutex_);
+  if (db_ == nullptr || keys.empty()) return;
+  const std::vector<rocksdb::Slice> slices(keys.begin(), keys.end());
+  std::vector<rocksdb::PinnableSlice> values(keys.size());
+  std::vector<rocksdb::Status> statuses(keys.size());
+  rocksdb::ReadOptions options;
+  options.fill_cache = false;
+  db_->MultiGet(options, db_->DefaultColumnFamily(), keys.size(), slices.data(), values.data(),
+                statuses.data());
+  for (size_t i = 0; i < keys.size(); ++i) {
+    if (statuses[i].ok()) visit(i, View(values[i]));
+  }
+}
+
 absl::StatusOr<std::optional<uint64_t>> RocksDbStore::ReadNumber(const std::string& key) {
   const absl::StatusOr<std::optional<std::string>> value = Read(key);
   if (!value.ok()) return value.status();
@@ -104,6 +122,41 @@ absl::StatusOr<std::vector<Vector>> RocksDbStore::LoadVertices(const StoredHull&
   absl::Status status = LoadBase(hull, &assembly);
   if (status.ok()) status = LoadDeltas(hull, &assembly);
   return std::move(assembly).Finish(std::move(status));
+}
+
+// Most hulls are one value: a base of one part, or a single delta. Whatever is not so, or is not as
+// it should be, is read alone, which tells what is wrong.
+std::vector<absl::StatusOr<std::vector<Vector>>> RocksDbStore::LoadVerticesOfEach(
+    std::span<const StoredHull* const> hulls) {
+  std::vector<std::string> keys;
+  std::vector<size_t> hull_of;
+  for (size_t i = 0; i < hulls.size(); ++i) {
+    const HullRecord& record = hulls[i]->record;
+    const VertexLayout& layout = hulls[i]->layout;
+    const bool has_one_part = layout.base_vertices > 0 && layout.base_vertices <= kBasePartVertices;
+    if (has_one_part && layout.delta_count == 0) {
+      keys.push_back(BaseKey(record.create_revision, layout.base_revision, 0));
+      hull_of.push_back(i);
+    } else if (layout.base_vertices == 0 && layout.delta_count == 1) {
+      keys.push_back(DeltaKey(record.create_revision, record.revision));
+      hull_of.push_back(i);
+    }
+  }
+  std::vector<absl::StatusOr<std::vector<Vector>>> loaded(
+      hulls.size(), absl::NotFoundError("it is not one value"));
+  FindValues(keys, [&](size_t at, std::string_view sealed) {
+    const StoredHull& hull = *hulls[hull_of[at]];
+    const absl::StatusOr<std::string_view> value = Unseal(keys[at], sealed);
+    VertexAssembly assembly(hull);
+    absl::Status status = hull.layout.delta_count == 0
+                              ? assembly.AddBasePart(value)
+                              : assembly.AddDelta(hull.record.revision, value);
+    loaded[hull_of[at]] = std::move(assembly).Finish(std::move(status));
+  });
+  for (size_t i = 0; i < hulls.size(); ++i) {
+    if (!loaded[i].ok()) loaded[i] = LoadVertices(*hulls[i]);
+  }
+  return loaded;
 }
 
 absl::Status RocksDbStore::LoadBase(const StoredHull& hull, VertexAssembly* assembly) {

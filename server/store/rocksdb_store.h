@@ -67,6 +67,9 @@ class RocksDbStore : public Store {
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override;
+  // Asks for the first values of all at once, so that a block that holds several is read once.
+  std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
+      std::span<const StoredHull* const> hulls) override;
   absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                         const std::string& writer_id) override;
   absl::StatusOr<std::vector<WriterSequence>> LoadWriters(const StoredHull& hull) override;
@@ -112,6 +115,9 @@ class RocksDbStore : public Store {
   // The value of a key, without its checksum; nullopt: there is none. DATA_LOSS, UNAVAILABLE.
   absl::StatusOr<std::optional<std::string>> Read(const std::string& key);
   absl::StatusOr<std::optional<uint64_t>> ReadNumber(const std::string& key);
+  // Visits the sealed values of these keys, by index, as far as they are there and can be read.
+  void FindValues(std::span<const std::string> keys,
+                  const std::function<void(size_t, std::string_view)>& visit);
   absl::Status ScanRange(
       const std::string& begin, const std::string& end,
       const std::function<absl::Status(std::string_view, std::string_view)>& visit);

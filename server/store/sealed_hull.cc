@@ -37,19 +37,23 @@ VertexAssembly::VertexAssembly(const StoredHull& hull) : hull_(hull) {
 }
 
 absl::Status VertexAssembly::AddBasePart(const absl::StatusOr<std::string_view>& value) {
-  const std::string name = absl::StrCat("part ", next_part_++, " of its base: ");
-  if (!value.ok()) return Prefixed(name, value.status());
-  if (value->empty()) return absl::DataLossError(absl::StrCat(name, "it is empty"));
-  absl::Status status = Prefixed(name, AppendVertices(*value, &vertices_));
-  base_vertices_ = vertices_.size();
-  return status;
+  const uint32_t part = next_part_++;
+  absl::Status status = value.status();
+  if (value.ok()) {
+    status =
+        value->empty() ? absl::DataLossError("it is empty") : AppendVertices(*value, &vertices_);
+    base_vertices_ = vertices_.size();
+  }
+  if (status.ok()) return status;
+  return Prefixed(absl::StrCat("part ", part, " of its base: "), status);
 }
 
 absl::Status VertexAssembly::AddDelta(uint64_t revision,
                                       const absl::StatusOr<std::string_view>& value) {
   ++deltas_;
-  return Prefixed(absl::StrCat("its delta of revision ", revision, ": "),
-                  value.ok() ? AppendVertices(*value, &vertices_) : value.status());
+  const absl::Status status = value.ok() ? AppendVertices(*value, &vertices_) : value.status();
+  if (status.ok()) return status;
+  return Prefixed(absl::StrCat("its delta of revision ", revision, ": "), status);
 }
 
 absl::Status VertexAssembly::Check() const {

@@ -147,6 +147,14 @@ class Store {
   virtual absl::Status ForEachBody(const StoredBodyVisitor& visit) = 0;
   // Points whose hull `hull` is. DATA_LOSS naming the hull: something is missing or damaged.
   virtual absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) = 0;
+  // The same of each, in their order. Holds all that it read until it returns.
+  virtual std::vector<absl::StatusOr<std::vector<Vector>>> LoadVerticesOfEach(
+      std::span<const StoredHull* const> hulls) {
+    std::vector<absl::StatusOr<std::vector<Vector>>> loaded;
+    loaded.reserve(hulls.size());
+    for (const StoredHull* const hull : hulls) loaded.push_back(LoadVertices(*hull));
+    return loaded;
+  }
   // The writer's last committed sequence; 0 when there is none.
   virtual absl::StatusOr<uint64_t> LoadSequence(const HullRecord& hull,
                                                 const std::string& writer_id) = 0;

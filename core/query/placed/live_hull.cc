@@ -30,9 +30,10 @@ std::vector<Vector> PointsOf(const LiveParts& parts, uint64_t count) {
   return points;
 }
 
-// A tail with the first points of another from `begin` to `end`, and room for more.
+// A tail with the first points of another from `begin` to `end`, and room for more; null for none.
 std::shared_ptr<GrowthTail> CopyOf(const GrowthTail* tail, size_t begin, size_t end,
                                    const Vector& center) {
+  if (begin == end) return nullptr;
   const size_t capacity = std::max(kFirstTailCapacity, 2 * (end - begin));
   auto copy = std::make_shared<GrowthTail>(capacity, center);
   for (size_t i = begin; i < end; ++i) copy->Append(tail->point(i));
@@ -84,9 +85,8 @@ void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
   next.dimension_ = dimension;
   auto base = std::make_shared<const HullBase>(std::move(points), dimension);
   next.exponent_ = base->exponent();
-  auto tail = std::make_shared<GrowthTail>(kFirstTailCapacity, base->center());
-  next.parts_ = std::make_shared<const LiveParts>(
-      LiveParts{std::move(base), {}, next.count_, std::move(tail)});
+  next.parts_ =
+      std::make_shared<const LiveParts>(LiveParts{std::move(base), {}, next.count_, nullptr});
 }
 
 LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
@@ -112,10 +112,13 @@ LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
 // Nobody reads a tail beyond what a mark says.
 void LiveHull::AppendToTail(std::span<const Vector> points, Mark& next) {
   const size_t tail_count = next.count_ - next.parts_->covered;
-  HULLD_CHECK(next.parts_->tail->size() == tail_count);
-  if (tail_count + points.size() > next.parts_->tail->capacity()) {
+  const GrowthTail* const former = next.parts_->tail.get();
+  HULLD_CHECK((former == nullptr ? 0 : former->size()) == tail_count);
+  const size_t former_capacity = former == nullptr ? 0 : former->capacity();
+  if (tail_count + points.size() > former_capacity) {
     LiveParts parts = *next.parts_;
-    const size_t capacity = std::max(2 * parts.tail->capacity(), tail_count + points.size());
+    const size_t capacity =
+        std::max({kFirstTailCapacity, 2 * former_capacity, tail_count + points.size()});
     auto tail = std::make_shared<GrowthTail>(capacity, parts.base->center());
     for (size_t i = 0; i < tail_count; ++i) tail->Append(parts.tail->point(i));
     parts.tail = std::move(tail);
@@ -158,7 +161,8 @@ std::shared_ptr<const QueryHull> LiveHull::VersionAt(const Mark& mark) const {
   version->exponent_ = mark.exponent_;
   version->max_abs_ = std::max(mark.low_.cwiseAbs().maxCoeff(), mark.high_.cwiseAbs().maxCoeff());
   version->center_ = base.center();
-  version->radius_ = std::max(base.radius(), parts->tail->RadiusOf(tail_count));
+  version->radius_ = base.radius();
+  if (tail_count > 0) version->radius_ = std::max(base.radius(), parts->tail->RadiusOf(tail_count));
   size_t count = base.points().size() + tail_count;
   for (const auto& level : parts->levels) {
     version->radius_ = std::max(version->radius_, level->radius);
@@ -235,7 +239,7 @@ LiveParts LiveHull::Prepared(const LiveParts& before, const Mark& mark) {
   } else {
     std::vector<Vector> points;
     points.reserve(merged);
-    double radius = before.tail->RadiusOf(tail_count);
+    double radius = tail_count == 0 ? 0 : before.tail->RadiusOf(tail_count);
     for (size_t i = kept; i < after.levels.size(); ++i) {
       radius = std::max(radius, after.levels[i]->radius);
       const std::vector<Vector>& level = after.levels[i]->mapped.points;

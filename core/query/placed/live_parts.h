@@ -31,6 +31,7 @@ struct LiveParts {
   std::vector<std::shared_ptr<const PreparedLevel>> levels;
   // How many of the appended points base and levels stand for; the tail has those after.
   uint64_t covered = 0;
+  // Null as long as there are none.
   std::shared_ptr<GrowthTail> tail;
 };
 

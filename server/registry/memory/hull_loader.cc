@@ -4,14 +4,13 @@
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
-#include <atomic>
 #include <mutex>
+#include <numeric>
 #include <string>
 #include <utility>
 
 #include "core/numeric/orientation.h"
 #include "server/contract/stopped_call.h"
-#include "server/process/synchronization.h"
 #include "server/store/store_errors.h"
 
 namespace hulld::server {
@@ -25,11 +24,22 @@ bool SpanSpace(std::span<const Vector> points) {
          });
 }
 
-absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& stored) {
-  absl::StatusOr<std::vector<Vector>> points = store.LoadVertices(stored);
-  if (!points.ok()) return points;
+// Points that a thread takes at once, the last hull apart, and hulls, at most: some 50 us.
+constexpr uint64_t kPointsAtOnce = 1024;
+constexpr size_t kHullsAtOnce = 16;
+// A thread takes a small part of a job at once, so that all of them end together.
+constexpr size_t kLeastParts = 8;
+
+uint64_t PointCount(const StoredHull& stored) {
+  return stored.layout.base_vertices + stored.layout.delta_vertices;
+}
+
+// points: what the store says are those of the hull.
+absl::StatusOr<std::shared_ptr<LiveHull>> MakeLive(const StoredHull& stored,
+                                                   absl::StatusOr<std::vector<Vector>> points) {
+  if (!points.ok()) return points.status();
   const std::string& id = stored.record.hull_id;
-  const uint64_t expected = stored.layout.base_vertices + stored.layout.delta_vertices;
+  const uint64_t expected = PointCount(stored);
   if (points->size() != expected || expected < stored.record.vertex_count) {
     return DamagedHull(
         id, absl::StrCat("it has ", points->size(), " points of ", expected,
@@ -39,67 +49,76 @@ absl::StatusOr<std::vector<Vector>> LoadPoints(Store& store, const StoredHull& s
     return DamagedHull(id, "one of its points is not finite");
   }
   // A LiveHull relies on the dimension.
-  if (stored.record.dimension == 3 && SpanSpace(*points)) return points;
-  const absl::Status built = BuildHull(stored.record, *points, {}).status();
-  if (!built.ok()) return built;
-  return points;
+  if (stored.record.dimension != 3 || !SpanSpace(*points)) {
+    const absl::Status built = BuildHull(stored.record, *points, {}).status();
+    if (!built.ok()) return built;
+  }
+  return std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
 }
-
-// Hulls that several threads load: each takes the next one.
-class LoadJob {
- public:
-  LoadJob(Store& store, std::span<const StoredHull> stored)
-      : store_(store), stored_(stored.begin(), stored.end()), loaded_(stored.size(), Cancelled()) {}
-
-  size_t size() const { return stored_.size(); }
-
-  // Until none is left to begin. Once should_stop, which may be empty, says so, none is loaded.
-  void Work(const std::function<bool()>& should_stop) {
-    for (size_t i = next_++; i < size(); i = next_++) {
-      if (!is_stopped_) loaded_[i] = LoadLive(store_, stored_[i]);
-      if (Stopped(should_stop)) is_stopped_ = true;
-      const std::lock_guard lock(mutex_);
-      if (++ended_ == size()) all_ended_.notify_all();
-    }
-  }
-
-  // Waits for those that others began.
-  std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> Take() {
-    std::unique_lock lock(mutex_);
-    while (ended_ < size()) all_ended_.wait(lock);
-    return std::move(loaded_);
-  }
-
- private:
-  Store& store_;
-  const std::vector<StoredHull> stored_;
-  // Each is written by the thread that took it, and read once all have ended.
-  std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> loaded_;
-  std::atomic<size_t> next_ = 0;
-  std::atomic<bool> is_stopped_ = false;
-  Mutex mutex_;
-  ConditionVariable all_ended_;
-  size_t ended_ = 0;
-};
 
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<LiveHull>> LoadLive(Store& store, const StoredHull& stored) {
-  absl::StatusOr<std::vector<Vector>> points = LoadPoints(store, stored);
-  if (!points.ok()) return points.status();
-  return std::make_shared<LiveHull>(*std::move(points), stored.record.dimension);
+  return MakeLive(stored, store.LoadVertices(stored));
 }
 
-std::vector<absl::StatusOr<std::shared_ptr<LiveHull>>> LoadLives(
-    Store& store, std::span<const StoredHull> stored, WorkerPool& helpers,
-    const std::function<bool()>& should_stop) {
+LoadJob::LoadJob(Store& store, std::vector<StoredHull> hulls)
+    : store_(store),
+      hulls_(std::move(hulls)),
+      order_(hulls_.size()),
+      loaded_(hulls_.size(), Cancelled()) {
+  std::iota(order_.begin(), order_.end(), 0);
+  // Those that were made one after the other are in one place of the store.
+  std::ranges::sort(order_, {}, [&](uint32_t i) { return hulls_[i].record.create_revision; });
+  const size_t most = std::clamp<size_t>(order_.size() / kLeastParts, 1, kHullsAtOnce);
+  uint64_t points = 0;
+  size_t begin = 0;
+  for (uint32_t n = 0; n < order_.size(); ++n) {
+    points += PointCount(hulls_[order_[n]]);
+    const size_t taken = n + 1 - begin;
+    if (points < kPointsAtOnce && taken < most && n + 1 < order_.size()) continue;
+    ends_.push_back(n + 1);
+    points = 0;
+    begin = n + 1;
+  }
+}
+
+std::shared_ptr<LoadJob> LoadJob::Start(Store& store, std::vector<StoredHull> hulls,
+                                        WorkerPool& helpers) {
   // So many small hulls take longer than to wake a thread.
   constexpr size_t kWorthAThread = 8;
-  const auto job = std::make_shared<LoadJob>(store, stored);
-  const size_t shares = std::min<size_t>(helpers.threads(), stored.size() / kWorthAThread);
+  const auto job = std::make_shared<LoadJob>(store, std::move(hulls));
+  const size_t shares = std::min<size_t>(helpers.threads(), job->hulls_.size() / kWorthAThread);
   for (size_t i = 0; i < shares; ++i) helpers.Submit([job] { job->Work({}); });
-  job->Work(should_stop);
-  return job->Take();
+  return job;
+}
+
+// Until none is left to begin. Once should_stop, which may be empty, says so, none is loaded.
+void LoadJob::Work(const std::function<bool()>& should_stop) {
+  for (size_t part = next_++; part < ends_.size(); part = next_++) {
+    const uint32_t begin = part == 0 ? 0 : ends_[part - 1];
+    if (!is_stopped_) LoadSome(std::span(order_).subspan(begin, ends_[part] - begin));
+    if (Stopped(should_stop)) is_stopped_ = true;
+    const std::lock_guard lock(mutex_);
+    if (++ended_ == ends_.size()) all_ended_.notify_all();
+  }
+}
+
+void LoadJob::LoadSome(std::span<const uint32_t> some) {
+  std::vector<const StoredHull*> stored;
+  stored.reserve(some.size());
+  for (const uint32_t i : some) stored.push_back(&hulls_[i]);
+  std::vector<absl::StatusOr<std::vector<Vector>>> points = store_.LoadVerticesOfEach(stored);
+  for (size_t n = 0; n < some.size(); ++n) {
+    loaded_[some[n]] = MakeLive(*stored[n], std::move(points[n]));
+  }
+}
+
+std::vector<LoadJob::Loaded> LoadJob::Finish(const std::function<bool()>& should_stop) {
+  Work(should_stop);
+  std::unique_lock lock(mutex_);
+  while (ended_ < ends_.size()) all_ended_.wait(lock);
+  return std::move(loaded_);
 }
 
 absl::StatusOr<std::unique_ptr<HullBuilder>> BuildHull(const HullRecord& record,
