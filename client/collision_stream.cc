@@ -98,17 +98,21 @@ void CollisionStream::ReleaseHold() {
   RemoveHold();
 }
 
+// The thread that asks is woken once, when all that it waits for is there, and not under the mutex,
+// for which it would have to wait again.
 void CollisionStream::OnReadDone(bool ok) {
+  bool is_over = false;
   {
     const std::lock_guard lock(mutex_);
     if (ok) {
-      Append(incoming_, &answer_);
       answered_ = incoming_.last();
+      Append(incoming_, &answer_);
     } else {
       reads_ended_ = true;
     }
-    changed_.notify_all();
+    is_over = reads_ended_ || (answered_ && written_);
   }
+  if (is_over) changed_.notify_all();
   if (!ok) return;
   incoming_.Clear();
   StartRead(&incoming_);
@@ -116,9 +120,13 @@ void CollisionStream::OnReadDone(bool ok) {
 
 void CollisionStream::OnWriteDone(bool /*ok*/) {
   // After a failed write the reads end too and bring the reason.
-  const std::lock_guard lock(mutex_);
-  written_ = true;
-  changed_.notify_all();
+  bool is_over = false;
+  {
+    const std::lock_guard lock(mutex_);
+    written_ = true;
+    is_over = answered_;
+  }
+  if (is_over) changed_.notify_all();
 }
 
 void CollisionStream::OnDone(const grpc::Status& status) {

@@ -95,7 +95,7 @@ void LogStart(const Config& config, const Server& server) {
 // Serves until SIGTERM or SIGINT, then drains. Returns the exit status.
 int Run(const Config& config) {
   SetUpLog(config.log_level, config.log_format);
-  BoundArenas();
+  SetUpHeap();
   // Blocked before any thread exists, so that every thread inherits it and this one can wait.
   const sigset_t signals = HandledSignals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);

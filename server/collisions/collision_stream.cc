@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <span>
 #include <utility>
 
+#include "core/base/check.h"
+#include "core/query/collision.h"
 #include "server/collisions/placed/placed_answer.h"
 #include "server/collisions/placed/query_settings.h"
 #include "server/contract/status_map.h"
@@ -26,6 +29,13 @@ constexpr int kMostQuickPairs = 8;
 constexpr uint64_t kExpectedUpdates = 256;
 // An index among the pairs, as a varint.
 constexpr size_t kIndexBytes = 5;
+// A relation and a rung.
+constexpr size_t kRelationBytes = 2;
+// Decided pairs that are told between two looks at the clock, in some 20 us.
+constexpr size_t kToldPerLook = 4096;
+// Pairs for which another thread is asked to help: they take some 20 us at the least, and a thread
+// about as long to come. Observed: close pairs of UR5 links.
+constexpr size_t kPairsPerHelper = 192;
 
 }  // namespace
 
@@ -90,6 +100,7 @@ void CollisionStream::Handle() {
   table_.EncodeHeader(shards_, reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(asked_.size());
+  is_decided_ = false;
   AnswerSlice();
 }
 
@@ -161,8 +172,9 @@ absl::Status CollisionStream::HandleOpen() {
 // Counts what the stream is to hold against --memory-limit, before it is held. RESOURCE_EXHAUSTED:
 // there is no room for it.
 absl::Status CollisionStream::ChargeFor(size_t pairs) {
-  // A pair among the pairs of two placements, and among those that are asked about.
-  constexpr size_t kPerPair = sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char);
+  // A pair among the pairs of two placements, and among those that are asked about and decided.
+  constexpr size_t kPerPair =
+      sizeof(PairState) + 3 * sizeof(uint32_t) + sizeof(char) + sizeof(Decided);
   charge_.Set(table_.MemoryBytes() + (table_.size() + 1) * sizeof(size_t) + pairs * kPerPair);
   return shards_.CheckMemory(MemoryUse::kReading);
 }
@@ -238,6 +250,85 @@ void CollisionStream::AddAnswer(uint32_t index) {
   reply_bytes_ += AddPlacedAnswer(table_, pair.a, pair.b, answer, wanted_, columns);
 }
 
+// Decides the pairs that are asked about with the help of other threads, as far as these come in
+// time: helpers take slices, in the turns of this call, so they wait where others have to.
+void CollisionStream::DecideTogether() {
+  decided_.resize(asked_.size());
+  if (asked_.empty()) return TellDecided();
+  unclaimed_.Begin(static_cast<uint32_t>(asked_.size()));
+  const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
+  // Those of a step before that did not have their turn yet will do.
+  for (size_t helpers = helpers_waiting_.load(); helpers < wished; ++helpers) {
+    ++helpers_waiting_;
+    RunOn(lane_, [this] {
+      --helpers_waiting_;
+      TakePart();
+    });
+  }
+  TakePart();
+}
+
+// Decides blocks of pairs until none is left, or it is the turn of others. By any thread, several
+// at a time; whoever comes last goes on. Nothing of this stream may be touched after the last block
+// was given back, or when there was none.
+void CollisionStream::TakePart() {
+  const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
+  while (true) {
+    const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerLook);
+    if (block.empty()) return;
+    // What is left is given back undecided, so that somebody comes last.
+    if (!call().ShouldStop()) {
+      for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
+    }
+    if (unclaimed_.GiveBack(block)) return TellDecided();
+    if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { TakePart(); });
+  }
+}
+
+void CollisionStream::Decide(uint32_t i) {
+  PairState& pair = pairs_[asked_[i]];
+  v1::Relation relation = v1::RELATION_UNSPECIFIED;
+  Rung rung = Rung::kBounds;
+  if (table_.is_answerable(pair.a) && table_.is_answerable(pair.b)) {
+    const std::span<const PlacedHull> placed = table_.placed();
+    const absl::StatusOr<Answer> answer =
+        CheckCollision(placed[pair.a], placed[pair.b], options_, &pair.cache);
+    // Nothing else can happen to the relation of valid hulls at valid poses.
+    HULLD_CHECK(answer.ok() || absl::IsCancelled(answer.status()));
+    if (!answer.ok()) return;
+    relation = EncodeRelation(answer->relation);
+    rung = answer->rung;
+  }
+  const bool is_changed = std::exchange(pair.relation, relation) != relation;
+  decided_[i] = {static_cast<uint8_t>(relation), rung, is_changed};
+}
+
+// Tells what was decided: as much as fits a message, or until it is the turn of others.
+void CollisionStream::TellDecided() {
+  const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
+  is_decided_ = true;
+  v1::AnswerColumns* const columns = reply().mutable_columns();
+  while (next_asked_ < asked_.size() && reply_bytes_ < FullMessageBytes(wanted_)) {
+    if (next_asked_ % kToldPerLook == 0) {
+      if (call().ShouldStop()) break;
+      if (std::chrono::steady_clock::now() >= end) {
+        return RunOn(lane_, [this] { TellDecided(); });
+      }
+    }
+    const auto [number, rung, is_changed] = decided_[next_asked_];
+    const uint32_t index = asked_[next_asked_++];
+    const auto relation = static_cast<v1::Relation>(number);
+    const bool is_answered = relation != v1::RELATION_UNSPECIFIED;
+    if (is_answered) rungs_.Add(rung);
+    if (only_changes_ && messages_ > 0 && !is_changed) continue;
+    reply().add_pairs(index);
+    columns->add_relations(relation);
+    columns->add_rungs(is_answered ? EncodeRung(rung) : v1::RUNG_UNSPECIFIED);
+    reply_bytes_ += kIndexBytes + kRelationBytes;
+  }
+  SendAnswered();
+}
+
 void CollisionStream::SendPart(bool last) {
   reply().set_update(messages_);
   reply().set_last(last);
@@ -251,6 +342,7 @@ void CollisionStream::AnswerSlice() {
     if (next_row_ < table_.table_rows()) return SendPart(false);
     reply_bytes_ = reply().ByteSizeLong();
   }
+  if (IsPlain()) return is_decided_ ? TellDecided() : DecideTogether();
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   const size_t pairs_per_look = table_.has_bodies() ? 1 : kPairsPerLook;
   while (next_asked_ < asked_.size()) {
@@ -262,6 +354,10 @@ void CollisionStream::AnswerSlice() {
       return RunOn(lane_, [this] { AnswerSlice(); });
     }
   }
+  SendAnswered();
+}
+
+void CollisionStream::SendAnswered() {
   call().metrics().CountPairs(std::exchange(rungs_, {}));
   if (call().ShouldStop()) return FinishCall(call().StopStatus());
   if (next_asked_ == asked_.size()) call().EndMessage();

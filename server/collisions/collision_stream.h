@@ -4,6 +4,7 @@
 #include <absl/status/status.h>
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/pulled_stream.h"
+#include "server/collisions/claimed_range.h"
 #include "server/collisions/placed/placement_table.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
@@ -25,7 +27,8 @@ namespace hulld::server {
 // next, so that a fast client fills gRPC's window and not our memory. A message that takes no time
 // is answered where it arrives, one that resolves hulls on a reader thread, and others on the pool.
 // Long answers are computed in slices, between which other calls get their turn, and sent in
-// pieces.
+// pieces. Where the relation of hulls is all that is wanted, other threads of the pool help with a
+// step: they take slices, so they wait where others have to.
 class CollisionStream
     : public ReadingStream<PulledStream<BidiReactor, v1::StreamCollisionsResponse>,
                            v1::StreamCollisionsRequest> {
@@ -44,6 +47,15 @@ class CollisionStream
     v1::Relation relation = v1::RELATION_UNSPECIFIED;
   };
 
+  // What was found of a pair.
+  struct Decided {
+    // As a v1::Relation; unspecified where a placement has a problem, which is told elsewhere.
+    uint8_t relation = 0;
+    Rung rung = Rung::kBounds;
+    // Whether it was answered otherwise before.
+    bool is_changed = false;
+  };
+
   CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
                   WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
       : ReadingStream(context, admission, Rpc::kStreamCollisions),
@@ -60,6 +72,8 @@ class CollisionStream
   void OnSent() override;
 
   bool IsQuick() const;
+  // Whether every pair is one of hulls, and the relation is all that is wanted.
+  bool IsPlain() const { return options_.WantsRelationOnly() && !table_.has_bodies(); }
   void Handle();
   absl::Status HandleMessage();
   absl::Status HandleOpen();
@@ -69,7 +83,12 @@ class CollisionStream
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
+  void DecideTogether();
+  void TakePart();
+  void Decide(uint32_t i);
+  void TellDecided();
   void AnswerSlice();
+  void SendAnswered();
   void SendPart(bool last);
 
   Shards& shards_;
@@ -104,6 +123,14 @@ class CollisionStream
   std::vector<char> is_asked_;
   size_t next_asked_ = 0;
   RungCounts rungs_;
+
+  // A plain answer is decided as a whole, by several threads, and then told.
+  bool is_decided_ = false;
+  // Parallel to asked_, and which of them no thread has begun with.
+  std::vector<Decided> decided_;
+  ClaimedRange unclaimed_;
+  // Slices of helpers that wait for their turn.
+  std::atomic<size_t> helpers_waiting_ = 0;
 };
 
 }  // namespace hulld::server

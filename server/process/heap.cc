@@ -13,6 +13,11 @@ namespace {
 
 // Bytes that malloc may keep. A choice: ordinary work leaves less behind.
 constexpr size_t kWorthIt = 64 << 20;
+// Blocks from this size on are mapped, and unmapped, by themselves. A choice: above the lists of a
+// message of some MiB, which double as they grow.
+constexpr int kMappedBytes = 8 << 20;
+// What an arena may keep free at its end. A choice: what a call with a message of some MiB takes.
+constexpr int kKeptBytes = 32 << 20;
 
 // Memory of this process that is resident and no file's; 0 where the system does not tell.
 size_t AnonymousBytes() {
@@ -29,7 +34,11 @@ size_t AnonymousBytes() {
 
 }  // namespace
 
-void BoundArenas() { mallopt(M_ARENA_MAX, DefaultThreads()); }
+void SetUpHeap() {
+  mallopt(M_ARENA_MAX, DefaultThreads());
+  mallopt(M_MMAP_THRESHOLD, kMappedBytes);
+  mallopt(M_TRIM_THRESHOLD, kKeptBytes);
+}
 
 bool GiveBackFreeMemory() {
   const struct mallinfo2 heap = mallinfo2();

@@ -3,10 +3,13 @@
 
 namespace hulld::server {
 
-// Bounds the arenas of malloc by the number of cores. Messages are allocated on one thread and
-// freed on another, and what one arena keeps for itself is lost to the others. Call it before the
-// first thread starts.
-void BoundArenas();
+// Sets up malloc for messages. Its arenas are bounded by the number of cores: messages are
+// allocated on one thread and freed on another, and what one arena keeps for itself is lost to the
+// others. And what a message of some MiB took is kept for the next: malloc gave it back to the
+// system each time, which cost more than all else about such a message (observed: 16384 pairs of
+// packed placements, 2 MB, in 1.0 ms instead of 1.5 to 1.9, and 300 page faults fewer). Call it
+// before the first thread starts.
+void SetUpHeap();
 
 // Gives free memory back to the system when malloc keeps more than 64 MiB of it, as after a peak of
 // messages: malloc itself gives back only what lies at the end of an arena. Returns whether it did.

@@ -18,6 +18,7 @@
 #include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "server/call/transport.h"
+#include "server/process/heap.h"
 #include "server/process/random_id.h"
 #include "server/settings/config.h"
 
@@ -221,6 +222,7 @@ class CollisionFloor : public v1::CollisionService::CallbackService {
 };
 
 int Main(const std::string& address) {
+  server::SetUpHeap();
   HullFloor hulls;
   CollisionFloor collisions;
   grpc::ServerBuilder builder;

@@ -403,6 +403,50 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
+// So many that threads share them.
+TEST_F(StreamCollisionsCall, OnlyChangesOfManyPairsAreThoseThatABatchFinds) {
+  Put("cube", Cube());
+  Put("ball", Sphere(60));
+  v1::BatchCheckCollisionsRequest batch;
+  std::vector<v1::Placement> placements;
+  std::vector<uint32_t> pairs;
+  constexpr uint32_t kPlacements = 60;
+  for (uint32_t i = 0; i < kPlacements; ++i) {
+    placements.push_back(PlacementOf(i % 2 == 0 ? "cube" : "ball", 0.1 * i));
+    for (uint32_t j = 0; j < i; ++j) pairs.insert(pairs.end(), {j, i});
+  }
+  batch.mutable_pairs()->Assign(pairs.begin(), pairs.end());
+  batch.mutable_placements()->Assign(placements.begin(), placements.end());
+  std::vector<int> before = BatchRelations(batch);
+  v1::StreamCollisionsRequest open = Open(placements, pairs);
+  open.mutable_open()->set_only_changes(true);
+  Stream stream(*collisions_);
+  EXPECT_EQ(stream.Ask(open).pairs_size(), pairs.size() / 2);
+  for (int step = 1; step <= 5; ++step) {
+    std::vector<std::pair<uint32_t, PoseNumbers>> moves;
+    for (uint32_t i = 0; i < kPlacements; ++i) {
+      const double x = 0.1 * i + 0.05 * step * (i % 5);
+      placements[i].mutable_pose()->mutable_translation()->set_x(x);
+      moves.push_back({i, {1, 0, 0, 0, x, 0, 0}});
+    }
+    batch.mutable_placements()->Assign(placements.begin(), placements.end());
+    const std::vector<int> now = BatchRelations(batch);
+    std::vector<uint32_t> changed;
+    for (uint32_t i = 0; i < now.size(); ++i) {
+      if (now[i] != before[i]) changed.push_back(i);
+    }
+    const auto answer = stream.Ask(Move(moves));
+    EXPECT_THAT(answer.pairs(), ::testing::ElementsAreArray(changed));
+    EXPECT_GT(changed.size(), 20U);
+    EXPECT_LT(changed.size(), 1000U);
+    for (int i = 0; i < answer.pairs_size(); ++i) {
+      EXPECT_EQ(answer.columns().relations(i), now[answer.pairs(i)]);
+    }
+    before = now;
+  }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
 TEST_F(StreamCollisionsCall, ClientsThatWriteAheadAreAnsweredInOrder) {
   Put("cube", Cube());
   Stream stream(*collisions_);
