@@ -122,18 +122,18 @@ Server::Server(const Config& config, std::unique_ptr<Guard> guard, Stores stores
     : guard_(std::move(guard)),
       admission_(config.limits, metrics_),
       stores_(std::move(stores.stores)),
-      writers_(PoolThreads(), metrics_.AddPool("writers")),
-      shards_(Pointers(stores_), stores.shard_of_slot, config.limits, writers_,
+      writers_(stores_.size(), PoolThreads(), metrics_.AddPool("writers")),
+      shards_(Pointers(stores_), stores.shard_of_slot, config.limits, writers_.all(),
               metrics_.AddPool("preparers"), metrics_.AddPool("loaders")),
-      readers_(PoolThreads(), metrics_.AddPool("readers")),
-      long_readers_(PoolThreads(), metrics_.AddPool("long_readers")),
+      readers_(stores_.size(), PoolThreads(), metrics_.AddPool("readers")),
+      long_readers_(stores_.size(), PoolThreads(), metrics_.AddPool("long_readers")),
       pool_(AnswerThreads(config), metrics_.AddPool("single_calls"), metrics_.AddPool("slices")),
       executor_(pool_.threads(), metrics_.AddPool("executor")),
       hull_service_(shards_, admission_, writers_, readers_, long_readers_),
       body_service_(shards_, admission_, readers_),
       collision_service_(shards_, admission_, readers_, long_readers_, pool_, executor_),
       status_service_(shards_, admission_),
-      maintenance_service_(*stores_.front(), shards_, admission_, long_readers_),
+      maintenance_service_(*stores_.front(), shards_, admission_, long_readers_.of_several()),
       reflection_service_(admission_, AllServices()) {
   admission_.SetAuthenticator(guard_->authenticator());
   admission_.SetBacklog([this](Rpc rpc) {

@@ -23,8 +23,8 @@
 #include "server/process/metrics.h"
 #include "server/process/metrics_endpoint.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/settings/config.h"
+#include "server/shards/shard_pools.h"
 #include "server/shards/shards.h"
 #include "server/store/store.h"
 
@@ -95,12 +95,12 @@ class Server {
   // Calls leave their ticket last of all, hence before what they use.
   Admission admission_;
   std::vector<std::unique_ptr<Store>> stores_;
-  // Chunks and replacements, and what may wait for the store. Three pools, so that readers never
-  // wait for writers, nor those of microseconds for those of seconds.
-  WorkerPool writers_;
+  // Chunks and replacements, and what may wait for the store. Three kinds of pools, so that readers
+  // never wait for writers, nor those of microseconds for those of seconds.
+  ShardPools writers_;
   Shards shards_;
-  WorkerPool readers_;
-  WorkerPool long_readers_;
+  ShardPools readers_;
+  ShardPools long_readers_;
   // Answers.
   TaskPool pool_;
   Executor executor_;

@@ -86,7 +86,7 @@ grpc::ServerUnaryReactor* BodyService::PutBody(grpc::CallbackServerContext* cont
                                                grpc::ByteBuffer* response) {
   return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
                         [this](PutCall* call) {
-                          readers_.Submit([this, call] { Put(call); }, call->call().client());
+                          readers_.of_several().Submit([this, call] { Put(call); }, call->call().client());
                         });
 }
 
@@ -95,7 +95,7 @@ grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* cont
                                                grpc::ByteBuffer* response) {
   return GetCall::Start(
       *context, admission_, Rpc::kGetBody, {request, response}, [this](GetCall* call) {
-        call->EndOn(readers_,
+        call->EndOn(readers_.of(shards_.shard_of(call->request().body_id())),
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });
 }
@@ -106,7 +106,7 @@ grpc::ServerUnaryReactor* BodyService::ListBodies(grpc::CallbackServerContext* c
   return ListCall::Start(
       *context, admission_, Rpc::kListBodies, {request, response}, [this](ListCall* call) {
         EndFresh(
-            shards_, readers_, call,
+            shards_, readers_.of_several(), call,
             [this, call](std::chrono::nanoseconds staleness) {
               return List(call->request(), call->call(), staleness, &call->response());
             },

@@ -10,7 +10,7 @@
 #include "server/call/admission.h"
 #include "server/call/call.h"
 #include "server/call/unary_call.h"
-#include "server/process/worker_pool.h"
+#include "server/shards/shard_pools.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
@@ -25,7 +25,7 @@ using BodyServiceOfBytes =
 // are answered where they arrive; those with pieces, of which there may be many, on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
-  BodyService(Shards& shards, Admission& admission, WorkerPool& readers)
+  BodyService(Shards& shards, Admission& admission, ShardPools& readers)
       : shards_(shards), admission_(admission), readers_(readers) {}
 
   grpc::ServerUnaryReactor* PutBody(grpc::CallbackServerContext* context,
@@ -57,7 +57,7 @@ class BodyService : public BodyServiceOfBytes {
 
   Shards& shards_;
   Admission& admission_;
-  WorkerPool& readers_;
+  ShardPools& readers_;
 };
 
 }  // namespace hulld::server

@@ -301,10 +301,17 @@ void CollisionService::Check(CheckCall* call) {
   if (!asks && wait->Withdraw()) AnswerLater(std::move(*waiting), lookup, call);
 }
 
+// The pieces of a body may be in other shards than the body.
+WorkerPool& CollisionService::ReadersOf(const v1::CheckCollisionRequest& request) {
+  const size_t shard = shards_.shard_of(request.a().hull_id());
+  const bool is_one = shard == shards_.shard_of(request.b().hull_id()) && !shards_.has_bodies();
+  return is_one ? readers_.of(shard) : readers_.of_several();
+}
+
 // Waits for the store, or for canonical snapshots or boxes of pieces to be made.
 void CollisionService::AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call) {
   const ClientId client = call->call().client();
-  readers_.Submit(
+  ReadersOf(call->request()).Submit(
       [this, call, lookup, query = std::move(query)]() mutable {
         AnswerPair(
             std::move(query),
@@ -383,21 +390,21 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
                                                      const grpc::ByteBuffer* request) {
-  return BatchStream::Start(*context, admission_, shards_, long_readers_, pool_, executor_,
+  return BatchStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_, executor_,
                             *request);
 }
 
 BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, shards_, readers_, long_readers_, pool_);
+  return CollisionStream::Start(*context, admission_, shards_, readers_.of_several(), long_readers_.of_several(), pool_);
 }
 
 WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request) {
-  return SceneStream::Start(*context, admission_, shards_, long_readers_, pool_, *request);
+  return SceneStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_, *request);
 }
 
 BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
-  return CollisionWatch::Start(*context, admission_, shards_, readers_, long_readers_, pool_);
+  return CollisionWatch::Start(*context, admission_, shards_, readers_.of_several(), long_readers_.of_several(), pool_);
 }
 
 }  // namespace hulld::server

@@ -12,8 +12,8 @@
 #include "server/call/unary_call.h"
 #include "server/process/executor.h"
 #include "server/process/task_pool.h"
-#include "server/process/worker_pool.h"
 #include "server/shards/body_resolution.h"
+#include "server/shards/shard_pools.h"
 #include "server/shards/shards.h"
 #include "server/shards/waiting_calls.h"
 
@@ -36,8 +36,8 @@ using CollisionServiceOfBytes = v1::CollisionService::WithRawCallbackMethod_Chec
 // whose loop over axes is worth a team of threads go to the executor.
 class CollisionService : public CollisionServiceOfBytes {
  public:
-  CollisionService(Shards& shards, Admission& admission, WorkerPool& readers,
-                   WorkerPool& long_readers, TaskPool& pool, Executor& executor)
+  CollisionService(Shards& shards, Admission& admission, ShardPools& readers,
+                   ShardPools& long_readers, TaskPool& pool, Executor& executor)
       : shards_(shards),
         admission_(admission),
         readers_(readers),
@@ -63,6 +63,7 @@ class CollisionService : public CollisionServiceOfBytes {
   struct PairQuery;
 
   void Check(CheckCall* call);
+  WorkerPool& ReadersOf(const v1::CheckCollisionRequest& request);
   void AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call);
   void AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved, CheckCall* call);
   void AnswerBodies(const PairQuery& query, ShardsResolved resolved, CheckCall* call);
@@ -75,8 +76,8 @@ class CollisionService : public CollisionServiceOfBytes {
 
   Shards& shards_;
   Admission& admission_;
-  WorkerPool& readers_;
-  WorkerPool& long_readers_;
+  ShardPools& readers_;
+  ShardPools& long_readers_;
   TaskPool& pool_;
   Executor& executor_;
   WaitingCalls waiting_;

@@ -51,7 +51,8 @@ grpc::ServerUnaryReactor* HullService::GetHull(grpc::CallbackServerContext* cont
   return GetCall::Start(
       *context, admission_, Rpc::kGetHull, {request, response}, [this](GetCall* call) {
         // An audit takes as long as the hull is large.
-        call->EndOn(call->request().audit() ? long_readers_ : readers_,
+        ShardPools& readers = call->request().audit() ? long_readers_ : readers_;
+        call->EndOn(readers.of(shards_.shard_of(call->request().hull_id())),
                     [this, call] { return Get(call->request(), call->call(), &call->response()); });
       });
 }
@@ -67,7 +68,7 @@ grpc::ServerUnaryReactor* HullService::ListHulls(grpc::CallbackServerContext* co
   return ListCall::Start(
       *context, admission_, Rpc::kListHulls, {request, response}, [this](ListCall* call) {
         EndFresh(
-            shards_, readers_, call,
+            shards_, readers_.of_several(), call,
             [this, call](std::chrono::nanoseconds staleness) {
               return List(call->request(), call->call(), staleness, &call->response());
             },
@@ -84,7 +85,7 @@ grpc::ServerUnaryReactor* HullService::DeleteHull(grpc::CallbackServerContext* c
 
 WriteReactor* HullService::WatchHulls(grpc::CallbackServerContext* context,
                                       const grpc::ByteBuffer* request) {
-  return WatchStream::Start(*context, admission_, shards_, readers_, *request);
+  return WatchStream::Start(*context, admission_, shards_, readers_.of_several(), *request);
 }
 
 void HullService::Create(CreateCall* call) {

@@ -10,7 +10,7 @@
 #include "server/call/call.h"
 #include "server/call/call_stream.h"
 #include "server/call/unary_call.h"
-#include "server/process/worker_pool.h"
+#include "server/shards/shard_pools.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
@@ -34,8 +34,8 @@ using HullServiceOfBytes = v1::HullService::WithRawCallbackMethod_CreateHull<
 // `readers`.
 class HullService : public HullServiceOfBytes {
  public:
-  HullService(Shards& shards, Admission& admission, WorkerPool& writers, WorkerPool& readers,
-              WorkerPool& long_readers)
+  HullService(Shards& shards, Admission& admission, ShardPools& writers, ShardPools& readers,
+              ShardPools& long_readers)
       : shards_(shards),
         admission_(admission),
         writers_(writers),
@@ -78,9 +78,9 @@ class HullService : public HullServiceOfBytes {
 
   Shards& shards_;
   Admission& admission_;
-  WorkerPool& writers_;
-  WorkerPool& readers_;
-  WorkerPool& long_readers_;
+  ShardPools& writers_;
+  ShardPools& readers_;
+  ShardPools& long_readers_;
 };
 
 }  // namespace hulld::server

@@ -21,14 +21,14 @@ constexpr int kIndicesPerMessage = Config::kReplyMessageBytes / 5;
 }  // namespace
 
 WriteReactor* MeshStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                Shards& shards, WorkerPool& readers,
+                                Shards& shards, ShardPools& readers,
                                 const grpc::ByteBuffer& request) {
   return Launch(
       std::shared_ptr<MeshStream>(new MeshStream(context, admission, shards, readers, request)));
 }
 
 void MeshStream::Open() {
-  RunOn(readers_, [this] {
+  RunOn(readers_.of(shards_.shard_of(request().hull_id())), [this] {
     const absl::Status made = MakeHeader();
     if (call().ShouldStop()) return FinishCall(call().StopStatus());
     if (!made.ok()) return FinishCall(made);

@@ -10,7 +10,7 @@
 
 #include "hulld/v1/hull.pb.h"
 #include "server/call/pulled_stream.h"
-#include "server/process/worker_pool.h"
+#include "server/shards/shard_pools.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
@@ -20,11 +20,11 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
                                         v1::GetHullMeshRequest> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, WorkerPool& readers, const grpc::ByteBuffer& request);
+                             Shards& shards, ShardPools& readers, const grpc::ByteBuffer& request);
 
  private:
   MeshStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-             WorkerPool& readers, const grpc::ByteBuffer& request)
+             ShardPools& readers, const grpc::ByteBuffer& request)
       : RequestStream(request, context, admission, Rpc::kGetHullMesh),
         shards_(shards),
         readers_(readers) {}
@@ -40,7 +40,7 @@ class MeshStream : public RequestStream<PulledStream<WriteReactor, v1::GetHullMe
   void FillFacets(v1::MeshFacets* message);
 
   Shards& shards_;
-  WorkerPool& readers_;
+  ShardPools& readers_;
   // What is sent: the hull itself, or what stands for it.
   std::shared_ptr<const Hull> mesh_;
   size_t next_vertex_ = 0;

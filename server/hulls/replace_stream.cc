@@ -13,7 +13,7 @@
 namespace hulld::server {
 
 ReadReactor* ReplaceStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                  Shards& shards, WorkerPool& writers, grpc::ByteBuffer* response) {
+                                  Shards& shards, ShardPools& writers, grpc::ByteBuffer* response) {
   return Launch(std::shared_ptr<ReplaceStream>(
       new ReplaceStream(context, admission, shards, writers, response)));
 }
@@ -23,7 +23,7 @@ void ReplaceStream::OnNoMessage(const absl::Status& why) {
   if (!why.ok()) return FinishCall(why);
   const bool opened = replacement_.builder != nullptr;
   // Only the empty block tells a client that has said all from one that is gone.
-  if (opened && complete_) return RunOn(writers_, [this] { Commit(); });
+  if (opened && complete_) return RunOn(writers(), [this] { Commit(); });
   FinishCall(absl::InvalidArgumentError(
       opened ? "the stream ended without an empty block of points, which says that nothing is "
                "missing; the hull is as it was"
@@ -35,7 +35,7 @@ void ReplaceStream::OnMessage() {
   ++messages_;
   if (absl::Status s = HandleMessage(); !s.ok()) return FinishCall(s);
   if (!request().has_points() || complete_) return Read();
-  RunOn(writers_, [this, arrival = std::chrono::steady_clock::now()] {
+  RunOn(writers(), [this, arrival = std::chrono::steady_clock::now()] {
     const absl::Status built = Build();
     if (!built.ok()) return FinishCall(OrStopped(built));
     call().EndMessage(arrival);

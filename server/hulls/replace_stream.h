@@ -11,6 +11,7 @@
 #include "hulld/v1/hull.pb.h"
 #include "server/call/call_stream.h"
 #include "server/process/worker_pool.h"
+#include "server/shards/shard_pools.h"
 #include "server/shards/shards.h"
 
 namespace hulld::server {
@@ -20,13 +21,13 @@ namespace hulld::server {
 // or the building of what was read, so the state needs no mutex.
 class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceHullRequest> {
  public:
-  // response: as gRPC holds it until the call ends.
+  // writers: the threads that build. response: as gRPC holds it until the call ends.
   static ReadReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                            Shards& shards, WorkerPool& writers, grpc::ByteBuffer* response);
+                            Shards& shards, ShardPools& writers, grpc::ByteBuffer* response);
 
  private:
   ReplaceStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                WorkerPool& writers, grpc::ByteBuffer* response)
+                ShardPools& writers, grpc::ByteBuffer* response)
       : ReadingStream(context, admission, Rpc::kReplaceHull),
         shards_(shards),
         writers_(writers),
@@ -41,9 +42,11 @@ class ReplaceStream : public ReadingStream<CallStream<ReadReactor>, v1::ReplaceH
   absl::Status HandleOpen(const v1::ReplaceOpen& open);
   absl::Status Build();
   void Commit();
+  // Once the hull is named.
+  WorkerPool& writers() { return writers_.of(shards_.shard_of(replacement_.hull_id)); }
 
   Shards& shards_;
-  WorkerPool& writers_;
+  ShardPools& writers_;
   grpc::ByteBuffer* const response_;
   // Covers the builder until the registry has it.
   MemoryCharge charge_;

@@ -59,18 +59,20 @@ struct PartOfList {
 
 Shards::Shards(Store& store, const Limits& limits, WorkerPool& writers,
                std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
-    : Shards(std::array<Store*, 1>{&store}, ShardOfSlot{}, limits, writers, preparers, loaders) {}
+    : Shards(std::array<Store*, 1>{&store}, ShardOfSlot{}, limits,
+             std::array<WorkerPool*, 1>{&writers}, preparers, loaders) {}
 
 Shards::Shards(std::span<Store* const> stores, const ShardOfSlot& shard_of_slot,
-               const Limits& limits, WorkerPool& writers, std::optional<PoolMetrics> preparers,
-               std::optional<PoolMetrics> loaders)
+               const Limits& limits, std::span<WorkerPool* const> writers,
+               std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
     : limits_(limits), shard_of_slot_(shard_of_slot) {
-  HULLD_CHECK(!stores.empty());
+  HULLD_CHECK(!stores.empty() && writers.size() >= stores.size());
   for (const uint16_t shard : shard_of_slot_) HULLD_CHECK(shard < stores.size());
   const Limits each = LimitsOfShard(limits, stores.size());
-  for (Store* const store : stores) {
-    store_ids_.push_back(store->id());
-    registries_.push_back(std::make_unique<Registry>(*store, each, writers, preparers, loaders));
+  for (size_t i = 0; i < stores.size(); ++i) {
+    store_ids_.push_back(stores[i]->id());
+    registries_.push_back(
+        std::make_unique<Registry>(*stores[i], each, *writers[i], preparers, loaders));
   }
   limits_.memory_limit = registries_.front()->limits().memory_limit * registries_.size();
   if (registries_.size() == 1) return;

@@ -46,10 +46,11 @@ class Shards {
   Shards(Store& store, const Limits& limits, WorkerPool& writers,
          std::optional<PoolMetrics> preparers = std::nullopt,
          std::optional<PoolMetrics> loaders = std::nullopt);
-  // Each store has the same share of --memory-limit; --max-hulls holds over all. The rest is as in
-  // Registry. Requires a shard of `stores` for each slot.
+  // Each store has the same share of --memory-limit; --max-hulls holds over all. writers: of each
+  // store; may be one for all. The rest is as in Registry. Requires a shard of `stores` for each
+  // slot, and writers for each store.
   Shards(std::span<Store* const> stores, const ShardOfSlot& shard_of_slot, const Limits& limits,
-         WorkerPool& writers, std::optional<PoolMetrics> preparers = std::nullopt,
+         std::span<WorkerPool* const> writers, std::optional<PoolMetrics> preparers = std::nullopt,
          std::optional<PoolMetrics> loaders = std::nullopt);
   Shards(const Shards&) = delete;
   Shards& operator=(const Shards&) = delete;

@@ -41,7 +41,8 @@ class Server {
     for (size_t slot = 0; slot < kSlots; ++slot) {
       shard_of_slot[slot] = static_cast<uint16_t>(slot % 2);
     }
-    shards_ = std::make_unique<Shards>(stores, shard_of_slot, Limits(), writers_);
+    const std::vector<WorkerPool*> writers(stores.size(), &writers_);
+    shards_ = std::make_unique<Shards>(stores, shard_of_slot, Limits(), writers);
     EXPECT_TRUE(shards_->Load().ok());
   }
 

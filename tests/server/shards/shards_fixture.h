@@ -37,7 +37,8 @@ class ShardsTest : public ::testing::Test {
     for (size_t slot = 0; slot < kSlots; ++slot) {
       shard_of_slot[slot] = static_cast<uint16_t>(slot % kShards);
     }
-    shards_ = std::make_unique<Shards>(stores, shard_of_slot, limits, writers_);
+    const std::vector<WorkerPool*> writers(stores.size(), &writers_);
+    shards_ = std::make_unique<Shards>(stores, shard_of_slot, limits, writers);
     EXPECT_TRUE(shards_->Load().ok());
   }
 

@@ -1,0 +1,133 @@
+// A server over two databases of which one does not answer: calls that need it wait, and those
+// about hulls of the other one do not wait for them.
+#include <absl/strings/str_cat.h>
+#include <gtest/gtest.h>
+#include <libpq-fe.h>
+
+#include <atomic>
+#include <fstream>
+#include <list>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "client/client.h"
+#include "hulld/v1/hull.grpc.pb.h"
+#include "tests/server/harness/postgres/postgres_cluster.h"
+#include "tests/server/shards/sharded_histories.h"
+
+namespace hulld::server {
+namespace {
+
+// More than a pool has threads.
+constexpr size_t kWaiting = 16;
+
+class SilentDatabase : public ShardedHistories {
+ protected:
+  void SetUp() override {
+    ShardedHistories::SetUp();
+    if (IsSkipped()) return;
+    PostgresCluster& cluster = PostgresCluster::Shared();
+    for (std::string& database : databases_) database = cluster.MakeDatabase();
+    const std::string path = directory_ + "/silent.shards";
+    std::ofstream(path) << "0-511 " << cluster.WriteConninfo(databases_[0]) << "\n512-1023 "
+                        << cluster.WriteConninfo(databases_[1]) << "\n";
+    Begin({path});
+  }
+
+  // Who looks into this table of the second database waits until Release.
+  void Hold(const char* table) {
+    holder_.reset(PQconnectdb(PostgresCluster::Shared().Conninfo(databases_[1]).c_str()));
+    const std::string lock = absl::StrCat("BEGIN; LOCK TABLE ", table, " IN ACCESS EXCLUSIVE MODE");
+    PQclear(PQexec(holder_.get(), lock.c_str()));
+    ASSERT_EQ(PQtransactionStatus(holder_.get()), PQTRANS_INTRANS) << PQerrorMessage(holder_.get());
+  }
+  void Release() { holder_.reset(); }
+
+ private:
+  std::string databases_[kShards];
+  std::unique_ptr<PGconn, decltype(&PQfinish)> holder_{nullptr, PQfinish};
+};
+
+TEST_F(SilentDatabase, DoesNotHoldUpReadsOfAnother) {
+  constexpr size_t kOthers = 200;
+  Hold("hulld.store");
+  const auto hulls = v1::HullService::NewStub(Connect(0));
+  struct Call {
+    grpc::ClientContext context;
+    v1::GetHullResponse response;
+    grpc::Status status;
+  };
+  grpc::CompletionQueue queue;
+  const auto ask = [&](Call& call, const char* hull_id) {
+    v1::GetHullRequest request;
+    request.set_hull_id(hull_id);
+    hulls->AsyncGetHull(&call.context, request, &queue)
+        ->Finish(&call.response, &call.status, &call);
+  };
+  const auto next = [&] {
+    void* tag = nullptr;
+    bool ok = false;
+    EXPECT_TRUE(queue.Next(&tag, &ok));
+    return static_cast<Call*>(tag);
+  };
+  std::vector<Call> waiting(kWaiting);
+  for (Call& call : waiting) ask(call, kHulls[1]);
+  // Long before the last of them the server has all that wait.
+  std::list<Call> others;
+  size_t ended = 0;
+  const Call* last = nullptr;
+  do {
+    ask(others.emplace_back(), kHulls[0]);
+    last = next();
+    ++ended;
+  } while (last == &others.back() && others.size() < kOthers);
+  EXPECT_EQ(last, &others.back()) << "after " << others.size() << " calls";
+  Release();
+  for (; ended < waiting.size() + others.size(); ++ended) next();
+  for (const Call& call : others) {
+    EXPECT_EQ(call.status.error_code(), grpc::StatusCode::NOT_FOUND) << call.status.error_message();
+  }
+}
+
+// What was appended under a writer's name before is read when its stream opens.
+TEST_F(SilentDatabase, DoesNotHoldUpChangesOfAnother) {
+  constexpr size_t kOthers = 50;
+  ClientOptions server;
+  server.server = address(0);
+  const auto append = [&](const char* hull_id, size_t writer) -> absl::Status {
+    AppendOptions options;
+    options.create_if_absent = true;
+    options.writer_id = absl::StrCat("writer-", writer);
+    const auto stream = Client(server).OpenAppend(hull_id, options);
+    if (!stream.ok()) return stream.status();
+    v1::PointBlock points;
+    for (int i = 0; i < 3; ++i) points.add_xyz(static_cast<double>(writer));
+    const absl::Status appended = (*stream)->Append(points);
+    return appended.ok() ? (*stream)->Finish() : appended;
+  };
+  for (const char* hull_id : kHulls) {
+    const absl::Status status = append(hull_id, 0);
+    ASSERT_TRUE(status.ok()) << status;
+  }
+  Hold("hulld.writers");
+  std::atomic<size_t> ended = 0;
+  std::vector<std::thread> waiting;
+  for (size_t i = 1; i <= kWaiting; ++i) {
+    waiting.emplace_back([&, i] {
+      append(kHulls[1], i).IgnoreError();
+      ++ended;
+    });
+  }
+  for (size_t i = 1; i <= kOthers && !HasFailure(); ++i) {
+    const absl::Status status = append(kHulls[0], i);
+    EXPECT_TRUE(status.ok()) << status;
+  }
+  EXPECT_EQ(ended, 0);
+  Release();
+  for (std::thread& thread : waiting) thread.join();
+}
+
+}  // namespace
+}  // namespace hulld::server
