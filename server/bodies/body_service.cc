@@ -84,10 +84,10 @@ std::optional<uint64_t> IfRevision(const Request& request) {
 grpc::ServerUnaryReactor* BodyService::PutBody(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request,
                                                grpc::ByteBuffer* response) {
-  return PutCall::Start(*context, admission_, Rpc::kPutBody, {request, response},
-                        [this](PutCall* call) {
-                          readers_.of_several().Submit([this, call] { Put(call); }, call->call().client());
-                        });
+  return PutCall::Start(
+      *context, admission_, Rpc::kPutBody, {request, response}, [this](PutCall* call) {
+        readers_.of_several().Submit([this, call] { Put(call); }, call->call().client());
+      });
 }
 
 grpc::ServerUnaryReactor* BodyService::GetBody(grpc::CallbackServerContext* context,

@@ -311,14 +311,15 @@ WorkerPool& CollisionService::ReadersOf(const v1::CheckCollisionRequest& request
 // Waits for the store, or for canonical snapshots or boxes of pieces to be made.
 void CollisionService::AnswerLater(PairQuery query, const PlacedLookup& lookup, CheckCall* call) {
   const ClientId client = call->call().client();
-  ReadersOf(call->request()).Submit(
-      [this, call, lookup, query = std::move(query)]() mutable {
-        AnswerPair(
-            std::move(query),
-            ResolvePlaced(shards_, HullIds(call->request()), lookup, query.options.should_stop),
-            call);
-      },
-      client);
+  ReadersOf(call->request())
+      .Submit(
+          [this, call, lookup, query = std::move(query)]() mutable {
+            AnswerPair(
+                std::move(query),
+                ResolvePlaced(shards_, HullIds(call->request()), lookup, query.options.should_stop),
+                call);
+          },
+          client);
 }
 
 void CollisionService::AnswerPair(PairQuery query, absl::StatusOr<ShardsResolved> resolved,
@@ -390,21 +391,24 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
                                                      const grpc::ByteBuffer* request) {
-  return BatchStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_, executor_,
-                            *request);
+  return BatchStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_,
+                            executor_, *request);
 }
 
 BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
-  return CollisionStream::Start(*context, admission_, shards_, readers_.of_several(), long_readers_.of_several(), pool_);
+  return CollisionStream::Start(*context, admission_, shards_, readers_.of_several(),
+                                long_readers_.of_several(), pool_);
 }
 
 WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request) {
-  return SceneStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_, *request);
+  return SceneStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_,
+                            *request);
 }
 
 BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {
-  return CollisionWatch::Start(*context, admission_, shards_, readers_.of_several(), long_readers_.of_several(), pool_);
+  return CollisionWatch::Start(*context, admission_, shards_, readers_.of_several(),
+                               long_readers_.of_several(), pool_);
 }
 
 }  // namespace hulld::server
