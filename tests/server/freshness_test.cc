@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
-#include <libpq-fe.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -75,13 +74,9 @@ class FreshReads : public ::testing::Test {
     return ack.has_value() ? ack->header() : v1::ResponseHeader();
   }
 
-  // Nobody reads the row of the store until this session ends.
-  std::unique_ptr<PGconn, decltype(&PQfinish)> HoldStore() const {
-    std::unique_ptr<PGconn, decltype(&PQfinish)> holder(
-        PQconnectdb(PostgresCluster::Shared().Conninfo(database_).c_str()), PQfinish);
-    PQclear(PQexec(holder.get(), "BEGIN; LOCK TABLE hulld.store IN ACCESS EXCLUSIVE MODE"));
-    EXPECT_EQ(PQtransactionStatus(holder.get()), PQTRANS_INTRANS) << PQerrorMessage(holder.get());
-    return holder;
+  // Nobody reads the row of the store as long as this is there.
+  std::shared_ptr<void> HoldStore() const {
+    return PostgresCluster::Shared().HoldTable(database_, "hulld.store");
   }
 
   bool Knows(size_t server, const std::string& hull_id) const {

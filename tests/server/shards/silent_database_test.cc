@@ -2,7 +2,6 @@
 // about hulls of the other one do not wait for them.
 #include <absl/strings/str_cat.h>
 #include <gtest/gtest.h>
-#include <libpq-fe.h>
 
 #include <atomic>
 #include <fstream>
@@ -36,23 +35,18 @@ class SilentDatabase : public ShardedHistories {
     Begin({path});
   }
 
-  // Who looks into this table of the second database waits until Release.
-  void Hold(const char* table) {
-    holder_.reset(PQconnectdb(PostgresCluster::Shared().Conninfo(databases_[1]).c_str()));
-    const std::string lock = absl::StrCat("BEGIN; LOCK TABLE ", table, " IN ACCESS EXCLUSIVE MODE");
-    PQclear(PQexec(holder_.get(), lock.c_str()));
-    ASSERT_EQ(PQtransactionStatus(holder_.get()), PQTRANS_INTRANS) << PQerrorMessage(holder_.get());
+  // Who looks into this table of the second database waits as long as this is there.
+  std::shared_ptr<void> Hold(const std::string& table) const {
+    return PostgresCluster::Shared().HoldTable(databases_[1], table);
   }
-  void Release() { holder_.reset(); }
 
  private:
   std::string databases_[kShards];
-  std::unique_ptr<PGconn, decltype(&PQfinish)> holder_{nullptr, PQfinish};
 };
 
 TEST_F(SilentDatabase, DoesNotHoldUpReadsOfAnother) {
   constexpr size_t kOthers = 200;
-  Hold("hulld.store");
+  std::shared_ptr<void> held = Hold("hulld.store");
   const auto hulls = v1::HullService::NewStub(Connect(0));
   struct Call {
     grpc::ClientContext context;
@@ -84,7 +78,7 @@ TEST_F(SilentDatabase, DoesNotHoldUpReadsOfAnother) {
     ++ended;
   } while (last == &others.back() && others.size() < kOthers);
   EXPECT_EQ(last, &others.back()) << "after " << others.size() << " calls";
-  Release();
+  held.reset();
   for (; ended < waiting.size() + others.size(); ++ended) next();
   for (const Call& call : others) {
     EXPECT_EQ(call.status.error_code(), grpc::StatusCode::NOT_FOUND) << call.status.error_message();
@@ -111,7 +105,7 @@ TEST_F(SilentDatabase, DoesNotHoldUpChangesOfAnother) {
     const absl::Status status = append(hull_id, 0);
     ASSERT_TRUE(status.ok()) << status;
   }
-  Hold("hulld.writers");
+  std::shared_ptr<void> held = Hold("hulld.writers");
   std::atomic<size_t> ended = 0;
   std::vector<std::thread> waiting;
   for (size_t i = 1; i <= kWaiting; ++i) {
@@ -125,7 +119,7 @@ TEST_F(SilentDatabase, DoesNotHoldUpChangesOfAnother) {
     EXPECT_TRUE(status.ok()) << status;
   }
   EXPECT_EQ(ended, 0);
-  Release();
+  held.reset();
   for (std::thread& thread : waiting) thread.join();
 }
 

@@ -92,6 +92,32 @@ TEST_P(StoreDamage, ADamagedDeltaIsReportedByHullAndNeverServed) {
   ExpectOnlyBIsDamaged();
 }
 
+// Hulls that are read together, of which one is damaged: the others are served.
+TEST_P(StoreDamage, ADamagedDeltaAmongManyIsReportedByHull) {
+  constexpr size_t kHulls = 40;
+  constexpr size_t kDamaged = 17;
+  Start();
+  std::vector<std::string> ids;
+  for (size_t i = 0; i < kHulls; ++i) {
+    ids.push_back(absl::StrCat("h", i));
+    ASSERT_TRUE(hulls_->Put(ids.back(), CubeCorners()).ok());
+  }
+  const HullRecord record = hulls_->View(ids[kDamaged])->record;
+  Flip(DeltaKey(record.create_revision, record.revision));
+  Start();
+  const absl::StatusOr<Resolved> resolved = hulls_->registry().Resolve(ids, {});
+  ASSERT_TRUE(resolved.ok()) << resolved.status();
+  for (size_t i = 0; i < kHulls; ++i) {
+    const absl::StatusOr<HullView>& hull = resolved->hulls[i];
+    EXPECT_EQ(absl::IsDataLoss(hull.status()), i == kDamaged) << hull.status();
+    if (hull.ok()) {
+      EXPECT_EQ(hull->record.vertex_count, 8);
+    }
+  }
+  EXPECT_THAT(std::string(resolved->hulls[kDamaged].status().message()),
+              HasSubstr(absl::StrCat("hull \"", ids[kDamaged], "\"")));
+}
+
 TEST_P(StoreDamage, ADamagedRecordIsReportedByHullAndListed) {
   FillThree();
   Flip(HullKey("b"));

@@ -270,6 +270,15 @@ std::string PostgresCluster::MakeDatabase(const std::string& tablespace) {
   return name;
 }
 
+std::shared_ptr<void> PostgresCluster::HoldTable(const std::string& database,
+                                                 const std::string& table) const {
+  const std::shared_ptr<PGconn> session(PQconnectdb(Conninfo(database).c_str()), PQfinish);
+  const std::string lock = absl::StrCat("BEGIN; LOCK TABLE ", table, " IN ACCESS EXCLUSIVE MODE");
+  PQclear(PQexec(session.get(), lock.c_str()));
+  if (PQtransactionStatus(session.get()) != PQTRANS_INTRANS) Fail(PQerrorMessage(session.get()));
+  return session;
+}
+
 std::string PostgresCluster::Conninfo(const std::string& database, const std::string& host) const {
   return absl::StrCat("host=", host.empty() ? directory_ : host, " dbname=", database,
                       " user=hulld password=", kPassword);

@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -49,6 +50,9 @@ class PostgresCluster {
 
   // Runs statements as a superuser; the first column of the rows of the last.
   std::vector<std::string> Ask(const std::string& database, const std::string& sql) const;
+
+  // Locks a table, which has to be there: until what is returned ends, who looks into it waits.
+  std::shared_ptr<void> HoldTable(const std::string& database, const std::string& table) const;
 
   // Waits until it answers.
   void Start();
