@@ -391,20 +391,20 @@ class Registry {
                    const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
   void Revert(Locked& locked, RegisteredHull& hull);
 
-  absl::Status LookUpDue(Locked& locked, std::span<const std::string> ids, KnownHulls& known,
-                         const std::function<bool()>& should_stop, const ReadPlan& plan,
-                         bool may_wait);
-  absl::Status LookUp(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
-                      uint32_t k, const std::function<bool()>& should_stop, const ReadPlan& plan,
-                      bool may_wait);
-  absl::Status LookUpAll(Locked& locked, std::span<const std::string> ids, KnownHulls& known,
-                         const std::function<bool()>& should_stop, const ReadPlan& plan,
-                         bool may_wait);
-  void LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls, uint32_t k,
-                const std::function<bool()>& should_stop);
-  bool BeginLoading(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls);
-  void EndLoading(Locked& locked, KnownHulls& hulls, const std::function<bool()>& should_stop);
-  void EndAllLoading(Locked& locked, KnownHulls& hulls, const std::function<bool()>& should_stop);
+  struct HullsRead;
+  absl::Status LookUpDue(Locked& locked, const HullsRead& read);
+  absl::Status LookUpAll(Locked& locked, const HullsRead& read);
+  absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
+  absl::StatusOr<bool> AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
+  absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
+                                   RegisteredHull& hull, bool& was_missing);
+  absl::Status PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull);
+  void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
+                bool was_missing);
+  void LoadMany(Locked& locked, const HullsRead& read, uint32_t k);
+  bool BeginLoading(Locked& locked, const HullsRead& read);
+  void EndLoading(Locked& locked, const HullsRead& read);
+  void EndAllLoading(Locked& locked, const HullsRead& read);
   absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
   absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
                               const std::function<bool()>& should_stop);

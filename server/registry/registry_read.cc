@@ -32,6 +32,16 @@ absl::Status WouldWait() { return absl::UnavailableError("it would have to wait"
 
 }  // namespace
 
+// A read of several hulls.
+struct Registry::HullsRead {
+  std::span<const std::string> ids;
+  KnownHulls& known;
+  const std::function<bool()>& should_stop;
+  const ReadPlan& plan;
+  // Whether it may release the mutex to read from the store, and to prepare.
+  bool may_wait = true;
+};
+
 // Where what is here is as fresh as this: how stale it may be. Otherwise a question to the store
 // decides. A read that is content, but would soon not be, has that asked for those to come, so that
 // none of them waits.
@@ -84,22 +94,21 @@ absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
 // to an end, since a commit takes longer than a lookup. Releases the mutex also to read from the
 // store and to prepare; where it may not, UNAVAILABLE says that it would have to. CANCELLED:
 // should_stop said so.
-absl::Status Registry::LookUpDue(Locked& locked, std::span<const std::string> ids,
-                                 KnownHulls& known, const std::function<bool()>& should_stop,
-                                 const ReadPlan& plan, bool may_wait) {
-  absl::Status status = LookUpAll(locked, ids, known, should_stop, plan, may_wait);
+absl::Status Registry::LookUpDue(Locked& locked, const HullsRead& read) {
+  absl::Status status = LookUpAll(locked, read);
   // Nothing is left where that is OK, so that the mutex is held all the while.
   if (!status.ok()) {
-    EndAllLoading(locked, known, [] { return true; });
+    KnownHulls& known = read.known;
+    const std::function<bool()> stop = [] { return true; };
+    EndAllLoading(locked, {read.ids, known, stop, read.plan});
     const size_t first = std::min(known.ahead_end_, known.due_.size());
     for (const uint32_t k : std::span(known.due_).subspan(first)) known.hulls_[k].found = nullptr;
   }
   return status;
 }
 
-absl::Status Registry::LookUpAll(Locked& locked, std::span<const std::string> ids,
-                                 KnownHulls& known, const std::function<bool()>& should_stop,
-                                 const ReadPlan& plan, bool may_wait) {
+absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
+  KnownHulls& known = read.known;
   if (!known.next_change_.has_value()) known.next_change_ = recent_changes_.end();
   while (true) {
     uint64_t& next = *known.next_change_;
@@ -112,21 +121,20 @@ absl::Status Registry::LookUpAll(Locked& locked, std::span<const std::string> id
       known.NoteChange(recent_changes_.at(next++));
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
-      const absl::Status status =
-          LookUp(locked, ids, known, known.due_.back(), should_stop, plan, may_wait);
+      const absl::Status status = LookUp(locked, read, known.due_.back());
       if (!status.ok()) return status;
       due.is_due = false;
       known.due_.pop_back();
       ++known.lookups_;
     } else if (!known.ahead_.empty()) {
-      EndAllLoading(locked, known, should_stop);
+      EndAllLoading(locked, read);
     } else {
       return absl::OkStatus();
     }
     locked.NoteLookup();
     if (locked.lookups() < kMostLookupsPerHold) continue;
     locked.Unlock();
-    const bool stopped = Stopped(should_stop);
+    const bool stopped = Stopped(read.should_stop);
     locked.Lock();
     if (stopped) return Cancelled();
     if (absl::Status s = CheckReaders(locked, known); !s.ok()) return s;
@@ -149,31 +157,18 @@ absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
 }
 
 // What readers are given of one hull now, or why there is nothing.
-absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
-                              uint32_t k, const std::function<bool()>& should_stop,
-                              const ReadPlan& plan, bool may_wait) {
-  KnownHulls::Known& known = hulls.hulls_[k];
-  const std::string& id = ids[known.first];
+absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k) {
+  KnownHulls::Known& known = read.known.hulls_[k];
+  const std::string& id = read.ids[known.first];
+  const ReadPlan& plan = read.plan;
   bool was_missing = false;
   while (true) {
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
     if (*found == nullptr || (*found)->state.gone()) found = hulls_.Ask(id);
     if (!found.has_value() && !bodies_.contains(id)) {
-      if (!may_wait) return WouldWait();
-      if (!hulls.ahead_.empty()) {
-        EndAllLoading(locked, hulls, should_stop);
-        continue;
-      }
-      std::vector<const std::string*> wanted = {&id};
-      const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
-      for (const uint32_t due : std::span(hulls.due_).last(count)) {
-        if (due != k) wanted.push_back(&ids[hulls.hulls_[due].first]);
-      }
-      const absl::Status read = AwaitKnown(locked, wanted, should_stop);
-      if (Stopped(should_stop)) return Cancelled();
-      if (read.ok()) continue;
-      known.view = read;
-      return absl::OkStatus();
+      const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
+      if (!is_over.ok() || *is_over) return is_over.status();
+      continue;
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
@@ -184,49 +179,93 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
       known.view = hull->state.damage();
       return absl::OkStatus();
     }
-    const bool is_missing = !hull->IsReady();
-    const bool prepare = !is_missing && WantsPreparing(*hull, plan.expected_questions);
-    if (!may_wait && (is_missing || (prepare && plan.prepare_first))) return WouldWait();
-    if (is_missing) {
-      if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
-      if (!std::exchange(was_missing, true)) {
-        ++cache_.misses;
-        LoadMany(locked, ids, hulls, k, should_stop);
-        if (Stopped(should_stop)) return Cancelled();
-        continue;
-      }
-      if (!hulls.ahead_.empty()) {
-        EndAllLoading(locked, hulls, should_stop);
-        continue;
-      }
-      const absl::Status loaded = LoadForReaders(locked, *hull, should_stop);
-      if (Stopped(should_stop) || absl::IsCancelled(loaded)) return Cancelled();
-      if (loaded.ok() || hull->state.gone()) continue;
-      known.view = loaded;
-      return absl::OkStatus();
-    }
-    if (prepare && plan.prepare_first && !std::exchange(known.is_prepared, true)) {
-      if (!hulls.ahead_.empty()) {
-        EndAllLoading(locked, hulls, should_stop);
-        if (!WantsPreparing(*hull, plan.expected_questions)) continue;
-      }
-      Prepare(locked, *hull);
-      if (Stopped(should_stop)) return Cancelled();
+    if (!hull->IsReady()) {
+      const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
+      if (!is_over.ok() || *is_over) return is_over.status();
       continue;
     }
-    const bool is_loaded = std::exchange(known.is_loaded, false);
-    if (!was_missing) ++(is_loaded ? cache_.misses : cache_.hits);
-    was_missing |= is_loaded;
-    if (prepare) SchedulePreparing(hull);
-    known.view = HullView{hull->committed.record, hull->Serve()};
-    known.bytes = hull->SharedBytes();
-    // One that was just loaded was noted then, and Serve counted the rest.
-    if (!is_loaded) hull->NoteUse();
-    if (was_missing) {
-      memory_.Evict(locked);
-      hulls_.RestSome();
+    const bool prepare = WantsPreparing(*hull, plan.expected_questions);
+    if (prepare && plan.prepare_first) {
+      if (!read.may_wait) return WouldWait();
+      if (!std::exchange(known.is_prepared, true)) {
+        if (absl::Status s = PrepareFirst(locked, read, *hull); !s.ok()) return s;
+        continue;
+      }
     }
+    if (prepare) SchedulePreparing(hull);
+    NoteView(locked, hull, read.known, k, was_missing);
     return absl::OkStatus();
+  }
+}
+
+// Finds out from the store whether there is this hull, and some of those that are due next. False:
+// look again; true: it could not be found out, which is noted. Releases the mutex.
+absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
+  if (!read.may_wait) return WouldWait();
+  KnownHulls& hulls = read.known;
+  if (!hulls.ahead_.empty()) {
+    EndAllLoading(locked, read);
+    return false;
+  }
+  std::vector<const std::string*> wanted = {&read.ids[hulls.hulls_[k].first]};
+  const size_t count = std::min<size_t>(hulls.due_.size(), kMostLookupsPerHold - 1);
+  for (const uint32_t due : std::span(hulls.due_).last(count)) {
+    if (due != k) wanted.push_back(&read.ids[hulls.hulls_[due].first]);
+  }
+  const absl::Status asked = AwaitKnown(locked, wanted, read.should_stop);
+  if (Stopped(read.should_stop)) return Cancelled();
+  if (asked.ok()) return false;
+  hulls.hulls_[k].view = asked;
+  return true;
+}
+
+// Reads the points of this hull, and at first of those that are due next as well. False: look
+// again; true: they cannot be read, which is noted. Releases the mutex.
+absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
+                                           RegisteredHull& hull, bool& was_missing) {
+  if (!read.may_wait) return WouldWait();
+  KnownHulls& hulls = read.known;
+  if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
+  if (!std::exchange(was_missing, true)) {
+    ++cache_.misses;
+    LoadMany(locked, read, k);
+    if (Stopped(read.should_stop)) return Cancelled();
+    return false;
+  }
+  if (!hulls.ahead_.empty()) {
+    EndAllLoading(locked, read);
+    return false;
+  }
+  const absl::Status loaded = LoadForReaders(locked, hull, read.should_stop);
+  if (Stopped(read.should_stop) || absl::IsCancelled(loaded)) return Cancelled();
+  if (loaded.ok() || hull.state.gone()) return false;
+  hulls.hulls_[k].view = loaded;
+  return true;
+}
+
+// Prepares what questions look through, before the first of them. Releases the mutex.
+absl::Status Registry::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
+  if (!read.known.ahead_.empty()) {
+    EndAllLoading(locked, read);
+    if (!WantsPreparing(hull, read.plan.expected_questions)) return absl::OkStatus();
+  }
+  Prepare(locked, hull);
+  return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
+}
+
+// Notes what readers are given of a hull that is ready. was_missing: its points were read for that.
+void Registry::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
+                        bool was_missing) {
+  KnownHulls::Known& known = hulls.hulls_[k];
+  const bool was_loaded = std::exchange(known.is_loaded, false);
+  if (!was_missing) ++(was_loaded ? cache_.misses : cache_.hits);
+  known.view = HullView{hull->committed.record, hull->Serve()};
+  known.bytes = hull->SharedBytes();
+  // One that was just loaded was noted then, and Serve counted the rest.
+  if (!was_loaded) hull->NoteUse();
+  if (was_missing || was_loaded) {
+    memory_.Evict(locked);
+    hulls_.RestSome();
   }
 }
 
@@ -235,16 +274,17 @@ absl::Status Registry::LookUp(Locked& locked, std::span<const std::string> ids, 
 // hulls are looked up, others read the next. Who waits for others meanwhile ends all that first,
 // since others may wait for it. Releases the mutex. What cannot be read, or was left behind by a
 // writer, stays missing.
-void Registry::LoadMany(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls,
-                        uint32_t k, const std::function<bool()>& should_stop) {
+void Registry::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
+  KnownHulls& hulls = read.known;
   const bool& is_ahead = hulls.hulls_[k].is_ahead;
   if (!is_ahead) hulls.ahead_end_ = hulls.due_.size();
-  while (hulls.ahead_.size() < 2 && BeginLoading(locked, ids, hulls)) continue;
-  while (is_ahead) EndLoading(locked, hulls, should_stop);
+  while (hulls.ahead_.size() < 2 && BeginLoading(locked, read)) continue;
+  while (is_ahead) EndLoading(locked, read);
 }
 
 // Whether there are some that are worth it.
-bool Registry::BeginLoading(Locked& locked, std::span<const std::string> ids, KnownHulls& hulls) {
+bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
+  KnownHulls& hulls = read.known;
   // At some 200 bytes a point, a twentieth of what all may hold: until each is looked up, nobody
   // asks whether readers hold too much.
   uint64_t most_points = std::min<uint64_t>(1 << 17, limits_.memory_limit / 4096);
@@ -265,7 +305,7 @@ bool Registry::BeginLoading(Locked& locked, std::span<const std::string> ids, Kn
   for (uint64_t looked_at = 1; end > 0 && looked_at < kMostLookupsPerHold; ++looked_at) {
     const uint32_t k = hulls.due_[end - 1];
     locked.NoteLookup();
-    const std::string& id = ids[hulls.hulls_[k].first];
+    const std::string& id = read.ids[hulls.hulls_[k].first];
     const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
         hull->state.life() == HullState::Life::kEnding) {
@@ -292,12 +332,12 @@ bool Registry::BeginLoading(Locked& locked, std::span<const std::string> ids, Kn
 }
 
 // Waits for the first of those that are read.
-void Registry::EndLoading(Locked& locked, KnownHulls& hulls,
-                          const std::function<bool()>& should_stop) {
+void Registry::EndLoading(Locked& locked, const HullsRead& read) {
+  KnownHulls& hulls = read.known;
   const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
   hulls.ahead_.pop_front();
   locked.Unlock();
-  std::vector<LoadJob::Loaded> loaded = loading.job->Finish(should_stop);
+  std::vector<LoadJob::Loaded> loaded = loading.job->Finish(read.should_stop);
   locked.Lock();
   for (size_t i = 0; i < loading.hulls.size(); ++i) {
     KnownHulls::Known& known = hulls.hulls_[loading.hulls[i]];
@@ -316,9 +356,8 @@ void Registry::EndLoading(Locked& locked, KnownHulls& hulls,
   }
 }
 
-void Registry::EndAllLoading(Locked& locked, KnownHulls& hulls,
-                             const std::function<bool()>& should_stop) {
-  while (!hulls.ahead_.empty()) EndLoading(locked, hulls, should_stop);
+void Registry::EndAllLoading(Locked& locked, const HullsRead& read) {
+  while (!read.known.ahead_.empty()) EndLoading(locked, read);
 }
 
 absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
@@ -339,7 +378,7 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
     const auto staleness = AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
     resolved.staleness = *staleness;
-    const absl::Status status = LookUpDue(locked, ids, known, should_stop, plan, true);
+    const absl::Status status = LookUpDue(locked, {ids, known, should_stop, plan});
     if (!status.ok()) return status;
     resolved.store_revision = revision_;
     memory_.Evict(locked);
@@ -352,13 +391,15 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
                                              const ReadPlan& plan) {
   KnownHulls known;
   known.Begin(ids);
+  const std::function<bool()> should_stop;
   Resolved resolved;
   {
     Locked locked(mutex_);
     const auto staleness = TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.staleness = *staleness;
-    if (!LookUpDue(locked, ids, known, {}, plan, false).ok()) return std::nullopt;
+    const HullsRead read = {ids, known, should_stop, plan, false};
+    if (!LookUpDue(locked, read).ok()) return std::nullopt;
     resolved.store_revision = revision_;
   }
   resolved.hulls = known.Views(ids);
