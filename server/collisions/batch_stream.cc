@@ -33,17 +33,17 @@ void Append(const v1::BatchCheckCollisionsResponse& next,
 }  // namespace
 
 WriteReactor* BatchStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Shards& shards, WorkerPool& readers, TaskPool& pool,
-                                 Executor& executor, const grpc::ByteBuffer& request) {
+                                 Shards& shards, const PieceThreads& threads, Executor& executor,
+                                 const grpc::ByteBuffer& request) {
   return Launch(std::shared_ptr<BatchStream>(
-      new BatchStream(context, admission, shards, readers, pool, executor, request)));
+      new BatchStream(context, admission, shards, threads, executor, request)));
 }
 
 BatchStream::BatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                         WorkerPool& readers, TaskPool& pool, Executor& executor,
+                         const PieceThreads& threads, Executor& executor,
                          const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, shards,
-                    {readers, pool}, {kFirstPairs, kMostPairs}),
+    : PiecedReplies(request, context, admission, Rpc::kBatchCheckCollisions, shards, threads,
+                    {kFirstPairs, kMostPairs}),
       team_threads_(executor.threads()),
       team_lane_(executor.opener()) {}
 

@@ -36,16 +36,17 @@ class BatchStream : public PiecedReplies<v1::BatchCheckCollisionsRequest,
                                          v1::BatchCheckCollisionsResponse, PairsPiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, WorkerPool& readers, TaskPool& pool,
-                             Executor& executor, const grpc::ByteBuffer& request);
+                             Shards& shards, const PieceThreads& threads, Executor& executor,
+                             const grpc::ByteBuffer& request);
 
  private:
   BatchStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-              WorkerPool& readers, TaskPool& pool, Executor& executor,
-              const grpc::ByteBuffer& request);
+              const PieceThreads& threads, Executor& executor, const grpc::ByteBuffer& request);
 
   bool IsShort() const override;
   absl::Status Validate() override;
+  std::span<const std::string> HullIds() const override { return table_.hull_ids(); }
+  const ShardsFreshness& freshness() const override { return freshness_; }
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
   absl::Status Advance(PairsPiece& piece, Clock::time_point end) override;

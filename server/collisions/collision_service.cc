@@ -285,20 +285,19 @@ void CollisionService::Check(CheckCall* call) {
   if (ready.has_value()) return AnswerPair(*std::move(query), *std::move(ready), call);
   // Where others commit to the store, it is asked, and no thread waits for what it answers.
   const auto waiting = std::make_shared<PairQuery>(*std::move(query));
-  const auto wait = waiting_.Add(
-      waiting->options.should_stop, [this, call, lookup, waiting](const absl::Status& status) {
-        if (!status.ok()) return call->End(status);
-        if (waiting_.count() >= kMostAnsweredInTurn) {
-          return AnswerLater(std::move(*waiting), lookup, call);
-        }
-        std::optional<ShardsResolved> found =
-            TryResolvePlaced(shards_, HullIds(call->request()), lookup);
-        if (found.has_value()) return AnswerPair(std::move(*waiting), *std::move(found), call);
-        AnswerLater(std::move(*waiting), lookup, call);
-      });
-  const bool asks = shards_.StartFresh(HullIds(request), *freshness,
-                                       [wait](const absl::Status& status) { wait->Tell(status); });
-  if (!asks && wait->Withdraw()) AnswerLater(std::move(*waiting), lookup, call);
+  const auto answer = [this, call, lookup, waiting](const absl::Status& status) {
+    if (!status.ok()) return call->End(status);
+    if (waiting_.count() >= kMostAnsweredInTurn) {
+      return AnswerLater(std::move(*waiting), lookup, call);
+    }
+    std::optional<ShardsResolved> found =
+        TryResolvePlaced(shards_, HullIds(call->request()), lookup);
+    if (found.has_value()) return AnswerPair(std::move(*waiting), *std::move(found), call);
+    AnswerLater(std::move(*waiting), lookup, call);
+  };
+  const bool awaits = waiting_.AwaitFresh(shards_, HullIds(request), *freshness,
+                                          waiting->options.should_stop, answer);
+  if (!awaits) AnswerLater(std::move(*waiting), lookup, call);
 }
 
 // The pieces of a body may be in other shards than the body.
@@ -391,19 +390,19 @@ void CollisionService::SubmitPiece(std::shared_ptr<TextbookQuery> query, CheckCa
 
 WriteReactor* CollisionService::BatchCheckCollisions(grpc::CallbackServerContext* context,
                                                      const grpc::ByteBuffer* request) {
-  return BatchStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_,
-                            executor_, *request);
+  return BatchStream::Start(*context, admission_, shards_,
+                            {long_readers_.of_several(), pool_, waiting_}, executor_, *request);
 }
 
 BidiReactor* CollisionService::StreamCollisions(grpc::CallbackServerContext* context) {
   return CollisionStream::Start(*context, admission_, shards_, readers_.of_several(),
-                                long_readers_.of_several(), pool_);
+                                long_readers_.of_several(), pool_, waiting_);
 }
 
 WriteReactor* CollisionService::FindCollisions(grpc::CallbackServerContext* context,
                                                const grpc::ByteBuffer* request) {
-  return SceneStream::Start(*context, admission_, shards_, long_readers_.of_several(), pool_,
-                            *request);
+  return SceneStream::Start(*context, admission_, shards_,
+                            {long_readers_.of_several(), pool_, waiting_}, *request);
 }
 
 BidiReactor* CollisionService::WatchCollisions(grpc::CallbackServerContext* context) {

@@ -41,9 +41,9 @@ constexpr size_t kPairsPerHelper = 192;
 
 BidiReactor* CollisionStream::Start(grpc::CallbackServerContext& context, Admission& admission,
                                     Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
-                                    TaskPool& pool) {
+                                    TaskPool& pool, WaitingCalls& waiting) {
   return Launch(std::shared_ptr<CollisionStream>(
-      new CollisionStream(context, admission, shards, readers, long_readers, pool)));
+      new CollisionStream(context, admission, shards, readers, long_readers, pool, waiting)));
 }
 
 void CollisionStream::OnMessage() {
@@ -92,7 +92,23 @@ bool CollisionStream::IsQuick() const {
 void CollisionStream::Handle() {
   asked_.clear();
   next_asked_ = 0;
+  refresh_.reset();
   const absl::Status status = HandleMessage();
+  if (!status.ok() || !refresh_.has_value()) return AnswerMessage(status);
+  // No thread waits while stores are asked: one that does not answer would hold all of them.
+  WorkerPool& threads = messages_ == 0 ? long_readers_ : readers_;
+  const bool awaits = waiting_.AwaitFresh(
+      shards_, table_.hull_ids(), refresh_->freshness, [this] { return call().ShouldStop(); },
+      [this, &threads, self = shared_from_this()](const absl::Status& fresh) {
+        RunOn(threads, [this, fresh] { AnswerMessage(OfMessage(fresh)); });
+      });
+  if (!awaits) AnswerMessage(absl::OkStatus());
+}
+
+// Looks the hulls up, if the message has them looked up, and answers it. status: of what came
+// before.
+void CollisionStream::AnswerMessage(absl::Status status) {
+  if (status.ok() && refresh_.has_value()) status = OfMessage(Refresh(*refresh_));
   if (!status.ok()) return FinishCall(OrStopped(status));
   request().Clear();
   std::sort(asked_.begin(), asked_.end());
@@ -102,6 +118,12 @@ void CollisionStream::Handle() {
   call().AddPairs(asked_.size());
   is_decided_ = false;
   AnswerSlice();
+}
+
+// What came of an update, as the client is told.
+absl::Status CollisionStream::OfMessage(const absl::Status& status) const {
+  if (messages_ == 0) return status;
+  return Prefixed(absl::StrCat("update ", messages_, ": "), status);
 }
 
 absl::Status CollisionStream::HandleMessage() {
@@ -115,7 +137,7 @@ absl::Status CollisionStream::HandleMessage() {
     case v1::StreamCollisionsRequest::kUpdate:
       if (!open_) return absl::InvalidArgumentError("the first message must be open, not update");
       ++messages_;
-      return Prefixed(absl::StrCat("update ", messages_, ": "), HandleUpdate(request().update()));
+      return OfMessage(HandleUpdate(request().update()));
     case v1::StreamCollisionsRequest::MESSAGE_NOT_SET:
       break;
   }
@@ -166,7 +188,8 @@ absl::Status CollisionStream::HandleOpen() {
   for (size_t i = 0; i < pairs_.size(); ++i) AskAbout(static_cast<uint32_t>(i));
   // It is worth the wait: the hulls are used until the client refreshes them.
   const uint64_t pairs_per_hull = 2 * pairs_.size() / std::max<size_t>(1, table_.hull_count());
-  return Refresh({kExpectedUpdates * pairs_per_hull, true});
+  refresh_ = {kExpectedUpdates * pairs_per_hull, true, freshness_};
+  return absl::OkStatus();
 }
 
 // Counts what the stream is to hold against --memory-limit, before it is held. RESOURCE_EXHAUSTED:
@@ -184,7 +207,8 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   const absl::StatusOr<Moves> moves = ReadMoves(update.placements(), update.poses(), table_.size());
   if (!moves.ok()) return moves.status();
   if (update.refresh_hulls()) {
-    if (absl::Status s = Refresh({}); !s.ok()) return s;
+    refresh_ = ShardsPlan{.freshness = freshness_};
+    refresh_->freshness.began = call().message_arrival();
   }
   for (const auto& [placement, pose] : *moves) {
     table_.Move(placement, pose);
@@ -193,9 +217,7 @@ absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& upda
   return absl::OkStatus();
 }
 
-absl::Status CollisionStream::Refresh(ShardsPlan plan) {
-  plan.freshness = freshness_;
-  plan.freshness.began = call().message_arrival();
+absl::Status CollisionStream::Refresh(const ShardsPlan& plan) {
   if (absl::Status s = table_.Refresh(shards_, options_, plan); !s.ok()) return s;
   if (table_.has_bodies()) {
     if (absl::Status s = ChargeFor(pairs_.size()); !s.ok()) return s;

@@ -20,6 +20,7 @@
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/shards/shards.h"
+#include "server/shards/waiting_calls.h"
 
 namespace hulld::server {
 
@@ -35,7 +36,7 @@ class CollisionStream
  public:
   static BidiReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
                             Shards& shards, WorkerPool& readers, WorkerPool& long_readers,
-                            TaskPool& pool);
+                            TaskPool& pool, WaitingCalls& waiting);
 
  private:
   // What is kept of a pair from one answer to the next.
@@ -57,13 +58,15 @@ class CollisionStream
   };
 
   CollisionStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                  WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool)
+                  WorkerPool& readers, WorkerPool& long_readers, TaskPool& pool,
+                  WaitingCalls& waiting)
       : ReadingStream(context, admission, Rpc::kStreamCollisions),
         shards_(shards),
         readers_(readers),
         long_readers_(long_readers),
         pool_(pool),
         lane_(pool),
+        waiting_(waiting),
         charge_(shards.memory(), MemoryUse::kReading) {}
 
   void Open() override { Read(); }
@@ -76,10 +79,12 @@ class CollisionStream
   bool IsPlain() const { return options_.WantsRelationOnly() && !table_.has_bodies(); }
   void Handle();
   absl::Status HandleMessage();
+  absl::Status OfMessage(const absl::Status& status) const;
   absl::Status HandleOpen();
   absl::Status ChargeFor(size_t pairs);
   absl::Status HandleUpdate(const v1::CollisionStreamUpdate& update);
-  absl::Status Refresh(ShardsPlan plan);
+  absl::Status Refresh(const ShardsPlan& plan);
+  void AnswerMessage(absl::Status status);
   void AskAbout(uint32_t pair);
   void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
@@ -97,6 +102,7 @@ class CollisionStream
   TaskPool& pool_;
   // The slices of long answers.
   TaskPool::Lane lane_;
+  WaitingCalls& waiting_;
   // Covers placements and pairs.
   MemoryCharge charge_;
 
@@ -108,6 +114,8 @@ class CollisionStream
   bool open_ = false;
   bool only_changes_ = false;
   ShardsFreshness freshness_;
+  // How the current message has the hulls looked up, if it does.
+  std::optional<ShardsPlan> refresh_;
   v1::Wanted wanted_;
   QueryOptions options_;
   PlacementTable table_;

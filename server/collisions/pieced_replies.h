@@ -12,6 +12,8 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -22,6 +24,7 @@
 #include "server/process/worker_pool.h"
 #include "server/settings/config.h"
 #include "server/shards/shards.h"
+#include "server/shards/waiting_calls.h"
 
 namespace hulld::server {
 
@@ -56,6 +59,15 @@ struct Piece {
   }
 };
 
+// Where a call is prepared and computed.
+struct PieceThreads {
+  // For what may wait.
+  WorkerPool& readers;
+  TaskPool& pool;
+  // Where it waits, without a thread, until what is here is fresh.
+  WaitingCalls& waiting;
+};
+
 // A stream whose answers are computed in pieces by all threads of a pool and sent in order. A piece
 // is worked on by one slice at a time, each of about TaskPool::kSliceTime, so that other calls get
 // their turn. A bounded number of pieces is under way, and each holds a bounded number of bytes;
@@ -84,12 +96,6 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   static constexpr size_t kSmallReplyBytes = 32 << 10;
   static constexpr std::chrono::milliseconds kMostWait{2};
 
-  // Where the call is prepared and computed.
-  struct Threads {
-    // For what may wait.
-    WorkerPool& readers;
-    TaskPool& pool;
-  };
   // How pieces grow.
   struct Shape {
     uint64_t first_units;
@@ -97,12 +103,13 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   };
 
   PiecedReplies(const grpc::ByteBuffer& request, grpc::CallbackServerContext& context,
-                Admission& admission, Rpc rpc, Shards& shards, const Threads& threads,
+                Admission& admission, Rpc rpc, Shards& shards, const PieceThreads& threads,
                 const Shape& shape)
       : Base(request, context, admission, rpc),
         shards_(shards),
         readers_(threads.readers),
         lane_(threads.pool),
+        waiting_(threads.waiting),
         most_pieces_(2 * static_cast<size_t>(threads.pool.threads())),
         most_units_(shape.most_units),
         charge_(shards.memory(), MemoryUse::kReading),
@@ -112,6 +119,9 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   virtual bool IsShort() const = 0;
   // The call is prepared step by step, without the mutex, on one thread at a time.
   virtual absl::Status Validate() = 0;
+  // What the call names, and how fresh that is to be. Requires that it is valid.
+  virtual std::span<const std::string> HullIds() const = 0;
+  virtual const ShardsFreshness& freshness() const = 0;
   // Whether the hulls were resolved: false when that may wait and `may_wait` is not set.
   virtual absl::StatusOr<bool> ResolveHulls(bool may_wait) = 0;
   virtual absl::Status Prepare() { return absl::OkStatus(); }
@@ -201,7 +211,21 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   // A short call whose hulls are ready need not wait for another thread.
   void Open() final {
     if (IsShort()) return this->RunOn(lane_, [this] { OpenWith(Validate(), false); });
-    this->RunOn(readers_, [this] { OpenWith(Validate(), true); });
+    this->RunOn(readers_, [this] {
+      absl::Status status = Validate();
+      if (status.ok()) status = Charge();
+      if (!status.ok() || !AwaitsFresh()) OpenWith(status, true);
+    });
+  }
+
+  // Whether it waits for a store, to be opened when that has answered. No thread waits meanwhile:
+  // a store that does not answer would hold all of them, also from calls that name nothing of it.
+  bool AwaitsFresh() {
+    const auto should_stop = [this] { return this->call().ShouldStop(); };
+    const auto open = [this, self = this->shared_from_this()](const absl::Status& status) {
+      this->RunOn(readers_, [this, status] { OpenWith(status, true); });
+    };
+    return waiting_.AwaitFresh(shards_, HullIds(), freshness(), should_stop, open);
   }
 
   void OpenWith(absl::Status status, bool may_wait) {
@@ -210,6 +234,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
       const absl::StatusOr<bool> resolved = ResolveHulls(may_wait);
       if (resolved.ok() && !*resolved) {
         HULLD_CHECK(!may_wait);
+        if (AwaitsFresh()) return;
         return this->RunOn(readers_, [this] { OpenWith(absl::OkStatus(), true); });
       }
       status = resolved.status();
@@ -302,6 +327,7 @@ class PiecedReplies : public RequestStream<QueuedStream<WriteReactor, Reply>, Re
   Shards& shards_;
   WorkerPool& readers_;
   TaskPool::Lane lane_;
+  WaitingCalls& waiting_;
   const size_t most_pieces_;
   const uint64_t most_units_;
 

@@ -54,15 +54,15 @@ void AddTo(v1::SceneTotals* sums, const v1::SceneTotals& totals) {
 }  // namespace
 
 WriteReactor* SceneStream::Start(grpc::CallbackServerContext& context, Admission& admission,
-                                 Shards& shards, WorkerPool& readers, TaskPool& pool,
+                                 Shards& shards, const PieceThreads& threads,
                                  const grpc::ByteBuffer& request) {
-  return Launch(std::shared_ptr<SceneStream>(
-      new SceneStream(context, admission, shards, readers, pool, request)));
+  return Launch(
+      std::shared_ptr<SceneStream>(new SceneStream(context, admission, shards, threads, request)));
 }
 
 SceneStream::SceneStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-                         WorkerPool& readers, TaskPool& pool, const grpc::ByteBuffer& request)
-    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, shards, {readers, pool},
+                         const PieceThreads& threads, const grpc::ByteBuffer& request)
+    : PiecedReplies(request, context, admission, Rpc::kFindCollisions, shards, threads,
                     {kFirstPlacements, kMostPlacements}) {}
 
 bool SceneStream::IsShort() const {

@@ -39,15 +39,17 @@ class SceneStream
     : public PiecedReplies<v1::FindCollisionsRequest, v1::FindCollisionsResponse, ScenePiece> {
  public:
   static WriteReactor* Start(grpc::CallbackServerContext& context, Admission& admission,
-                             Shards& shards, WorkerPool& readers, TaskPool& pool,
+                             Shards& shards, const PieceThreads& threads,
                              const grpc::ByteBuffer& request);
 
  private:
   SceneStream(grpc::CallbackServerContext& context, Admission& admission, Shards& shards,
-              WorkerPool& readers, TaskPool& pool, const grpc::ByteBuffer& request);
+              const PieceThreads& threads, const grpc::ByteBuffer& request);
 
   bool IsShort() const override;
   absl::Status Validate() override;
+  std::span<const std::string> HullIds() const override { return table_.hull_ids(); }
+  const ShardsFreshness& freshness() const override { return freshness_; }
   absl::StatusOr<bool> ResolveHulls(bool may_wait) override;
   absl::Status Prepare() override;
   absl::Status Advance(ScenePiece& piece, Clock::time_point end) override;

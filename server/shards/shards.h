@@ -89,7 +89,8 @@ class Shards {
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const ShardsFreshness& freshness,
                                                       const std::function<bool()>& should_stop);
   std::optional<std::chrono::nanoseconds> TryFresh(const ShardsFreshness& freshness);
-  // As Registry::StartFresh for a call that names these, if they are in one shard; false otherwise.
+  // As Registry::StartFresh for a call that names these, of all their shards at once; `done` is
+  // called once, perhaps on this thread, with the first that failed.
   bool StartFresh(std::span<const std::string> ids, const ShardsFreshness& freshness,
                   std::function<void(const absl::Status&)> done);
   // In the byte order of the IDs, across shards.

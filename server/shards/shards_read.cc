@@ -19,6 +19,7 @@
 #include <absl/status/status.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <utility>
 
@@ -41,6 +42,26 @@ struct Answers {
   Mutex mutex;
   ConditionVariable changed;
   size_t due = 0;
+  absl::Status status;
+};
+
+// The same where nobody waits for them.
+struct Asked {
+  explicit Asked(std::function<void(const absl::Status&)> to_tell) : done(std::move(to_tell)) {}
+
+  void Tell(const absl::Status& answer) {
+    {
+      const std::lock_guard lock(mutex);
+      status.Update(answer);
+    }
+    // The last one sees what all have left.
+    if (--due == 0) done(status);
+  }
+
+  const std::function<void(const absl::Status&)> done;
+  // One of them is who asks.
+  std::atomic<size_t> due = 1;
+  Mutex mutex;
   absl::Status status;
 };
 
@@ -119,11 +140,22 @@ std::optional<std::chrono::nanoseconds> Shards::TryFresh(const ShardsFreshness& 
 
 bool Shards::StartFresh(std::span<const std::string> ids, const ShardsFreshness& freshness,
                         std::function<void(const absl::Status&)> done) {
-  const size_t shard = ids.empty() ? 0 : shard_of(ids.front());
-  for (const std::string& id : ids) {
-    if (shard_of(id) != shard) return false;
+  if (size() == 1) return at(0).StartFresh(freshness.Of(0), std::move(done));
+  std::vector<bool> is_named(size());
+  for (const std::string& id : ids) is_named[shard_of(id)] = true;
+  if (ids.empty()) is_named[0] = true;
+  const auto asked = std::make_shared<Asked>(std::move(done));
+  bool asks = false;
+  for (size_t shard = 0; shard < size(); ++shard) {
+    if (!is_named[shard]) continue;
+    ++asked->due;
+    const bool asks_it = at(shard).StartFresh(freshness.Of(shard),
+                                              [asked](const absl::Status& s) { asked->Tell(s); });
+    if (!asks_it) --asked->due;
+    asks |= asks_it;
   }
-  return at(shard).StartFresh(freshness.Of(shard), std::move(done));
+  if (asks) asked->Tell(absl::OkStatus());
+  return asks;
 }
 
 // Finds out which shards the call concerns; once. A call that names nothing concerns the first.

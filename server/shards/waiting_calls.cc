@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/contract/stopped_call.h"
+#include "server/shards/shards.h"
 
 namespace hulld::server {
 
@@ -54,6 +55,17 @@ std::shared_ptr<WaitingCalls::Wait> WaitingCalls::Add(
   // Otherwise it looks by itself.
   if (was_empty) changed_.notify_one();
   return wait;
+}
+
+bool WaitingCalls::AwaitFresh(Shards& shards, std::span<const std::string> ids,
+                              const ShardsFreshness& freshness, std::function<bool()> should_stop,
+                              std::function<void(const absl::Status&)> done) {
+  if (!shards.any_store().is_shared()) return false;
+  const std::shared_ptr<Wait> wait = Add(std::move(should_stop), std::move(done));
+  const bool asks =
+      shards.StartFresh(ids, freshness, [wait](const absl::Status& status) { wait->Tell(status); });
+  // Where it is over by now, it was cancelled, and told so.
+  return asks || !wait->Withdraw();
 }
 
 void WaitingCalls::Run() {

@@ -8,12 +8,17 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "server/process/synchronization.h"
+#include "server/shards/shard_types.h"
 
 namespace hulld::server {
+
+class Shards;
 
 // Calls that wait for the store without a thread each. One thread for all of them ends those that
 // nobody waits for any more; it sleeps while there are none. Thread-safe.
@@ -55,6 +60,13 @@ class WaitingCalls {
   // should_stop says so. Cost: some 100 ns.
   std::shared_ptr<Wait> Add(std::function<bool()> should_stop,
                             std::function<void(const absl::Status&)> done);
+
+  // For a call that names these: has the stores asked that hold nothing here that is as fresh as
+  // this, and calls `done` as above when all have answered. False, and nothing, where there are
+  // none. Cost: as Shards::StartFresh.
+  bool AwaitFresh(Shards& shards, std::span<const std::string> ids,
+                  const ShardsFreshness& freshness, std::function<bool()> should_stop,
+                  std::function<void(const absl::Status&)> done);
 
   // Those that are not over.
   size_t count() const { return count_.load(std::memory_order_relaxed); }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <fstream>
 #include <list>
 #include <memory>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "hulld/v1/collision.grpc.pb.h"
 #include "hulld/v1/hull.grpc.pb.h"
 #include "tests/server/harness/postgres/postgres_cluster.h"
 #include "tests/server/shards/sharded_histories.h"
@@ -83,6 +85,77 @@ TEST_F(SilentDatabase, DoesNotHoldUpReadsOfAnother) {
   for (const Call& call : others) {
     EXPECT_EQ(call.status.error_code(), grpc::StatusCode::NOT_FOUND) << call.status.error_message();
   }
+}
+
+// Batches, scenes and streams, which share threads with those about hulls of several databases.
+TEST_F(SilentDatabase, DoesNotHoldUpQueriesOfAnother) {
+  constexpr size_t kOthers = 20;
+  // Of each kind; with one more, a client has as many as it may.
+  constexpr size_t kQueries = 7;
+  // Where they are held up, the test is to end.
+  constexpr std::chrono::seconds kPatience{60};
+  std::shared_ptr<void> held = Hold("hulld.store");
+  const auto collisions = v1::CollisionService::NewStub(Connect(0));
+  const auto fill = [](auto* request, const char* hull_id) {
+    for (int i = 0; i < 2; ++i) request->add_placements()->set_hull_id(hull_id);
+  };
+  const auto ask_batch = [&](const char* hull_id) {
+    v1::BatchCheckCollisionsRequest request;
+    fill(&request, hull_id);
+    request.add_pairs(0);
+    request.add_pairs(1);
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kPatience);
+    const auto stream = collisions->BatchCheckCollisions(&context, request);
+    v1::BatchCheckCollisionsResponse response;
+    while (stream->Read(&response)) continue;
+    return stream->Finish();
+  };
+  const auto find = [&](const char* hull_id) {
+    v1::FindCollisionsRequest request;
+    fill(&request, hull_id);
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kPatience);
+    const auto stream = collisions->FindCollisions(&context, request);
+    v1::FindCollisionsResponse response;
+    while (stream->Read(&response)) continue;
+    return stream->Finish();
+  };
+  const auto follow = [&](const char* hull_id) {
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kPatience);
+    const auto stream = collisions->StreamCollisions(&context);
+    v1::StreamCollisionsRequest request;
+    fill(request.mutable_open(), hull_id);
+    v1::StreamCollisionsResponse response;
+    stream->Write(request);
+    const bool is_open = stream->Read(&response);
+    request.mutable_update()->set_refresh_hulls(true);
+    if (is_open && stream->Write(request)) stream->Read(&response);
+    stream->WritesDone();
+    return stream->Finish();
+  };
+  std::atomic<size_t> ended = 0;
+  std::vector<std::thread> waiting;
+  const auto wait = [&](const auto& ask) {
+    for (size_t i = 0; i < kQueries; ++i) {
+      waiting.emplace_back([&, ask] {
+        ask(kHulls[1]);
+        ++ended;
+      });
+    }
+  };
+  wait(ask_batch);
+  wait(find);
+  wait(follow);
+  for (size_t i = 0; i < kOthers && !HasFailure(); ++i) {
+    for (const grpc::Status& status : {ask_batch(kHulls[0]), find(kHulls[0]), follow(kHulls[0])}) {
+      EXPECT_TRUE(status.ok()) << status.error_message();
+    }
+    EXPECT_EQ(ended, 0);
+  }
+  held.reset();
+  for (std::thread& thread : waiting) thread.join();
 }
 
 // What was appended under a writer's name before is read when its stream opens.
