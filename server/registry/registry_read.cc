@@ -180,6 +180,12 @@ absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k)
       return absl::OkStatus();
     }
     if (!hull->IsReady()) {
+      // It was looked up, prepared, and dropped since. To read it again, and prepare it again, may
+      // drop another one of the same read, and so on for ever.
+      if (known.view.ok() && known.view->record == hull->committed.record) {
+        ++cache_.hits;
+        return absl::OkStatus();
+      }
       const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
       if (!is_over.ok() || *is_over) return is_over.status();
       continue;

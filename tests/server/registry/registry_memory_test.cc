@@ -104,6 +104,36 @@ TEST_F(RegistryMemory, ACanonicalSnapshotCountsAndIsDropped) {
   EXPECT_EQ(registry.Cache().bytes, registry.Cache().limit_bytes);
 }
 
+// Where two hulls have no room together, a reader of both would read one after the other for ever:
+// each is prepared while the other is read, and so looked up again.
+TEST_F(RegistryMemory, WhatAReaderHoldsIsNotReadAgainOnceItWasPreparedAndDropped) {
+  Start();
+  ASSERT_TRUE(hulls_->Put("h", SpherePoints(2000)).ok());
+  Start();
+  Registry& registry = hulls_->registry();
+  const std::vector<std::string> ids = {"h"};
+  const ReadPlan plan = {.expected_questions = 1'000'000};
+  KnownHulls known;
+  const absl::StatusOr<Resolved> first = registry.Refresh(ids, known, {}, plan);
+  ASSERT_TRUE(first.ok() && first->hulls[0].ok());
+  const auto is_prepared = [&] { return hulls_->View("h")->served != first->hulls[0]->served; };
+  for (int i = 0; i < 100'000 && !is_prepared(); ++i) std::this_thread::yield();
+  ASSERT_TRUE(is_prepared());
+  {
+    const MemoryCharge charge(registry.memory(), MemoryUse::kReading, registry.Cache().limit_bytes);
+    EXPECT_TRUE(registry.CheckMemory(MemoryUse::kWriting).ok());
+  }
+  ASSERT_FALSE(registry.TryResolve(ids).has_value());
+  const uint64_t loads = registry.Cache().loads;
+  const absl::StatusOr<Resolved> second = registry.Refresh(ids, known, {}, plan);
+  ASSERT_TRUE(second.ok() && second->hulls[0].ok());
+  EXPECT_EQ(registry.Cache().loads, loads);
+  EXPECT_EQ(second->hulls[0]->served, first->hulls[0]->served);
+  // A change is read.
+  ASSERT_TRUE(hulls_->Put("h", {{2, 0, 0}}).ok());
+  EXPECT_EQ(registry.Refresh(ids, known, {}, plan)->hulls[0]->served->high().x(), 2);
+}
+
 TEST_F(RegistryMemory, TheHullNotUsedForLongestIsDropped) {
   Limits limits;
   limits.memory_limit = 3 << 20;
