@@ -399,6 +399,7 @@ class Registry {
   absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
                                    RegisteredHull& hull, bool& was_missing);
   absl::Status PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull);
+  static bool IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull);
   void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
                 bool was_missing);
   void LoadMany(Locked& locked, const HullsRead& read, uint32_t k);

@@ -182,7 +182,7 @@ absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k)
     if (!hull->IsReady()) {
       // It was looked up, prepared, and dropped since. To read it again, and prepare it again, may
       // drop another one of the same read, and so on for ever.
-      if (known.view.ok() && known.view->record == hull->committed.record) {
+      if (IsHeld(known, *hull)) {
         ++cache_.hits;
         return absl::OkStatus();
       }
@@ -259,6 +259,11 @@ absl::Status Registry::PrepareFirst(Locked& locked, const HullsRead& read, Regis
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
+// Whether a reader holds what is committed of a hull.
+bool Registry::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
+  return known.view.ok() && known.view->record == hull.committed.record;
+}
+
 // Notes what readers are given of a hull that is ready. was_missing: its points were read for that.
 void Registry::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
                         bool was_missing) {
@@ -311,10 +316,11 @@ bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
   for (uint64_t looked_at = 1; end > 0 && looked_at < kMostLookupsPerHold; ++looked_at) {
     const uint32_t k = hulls.due_[end - 1];
     locked.NoteLookup();
-    const std::string& id = read.ids[hulls.hulls_[k].first];
+    const KnownHulls::Known& known = hulls.hulls_[k];
+    const std::string& id = read.ids[known.first];
     const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
-        hull->state.life() == HullState::Life::kEnding) {
+        hull->state.life() == HullState::Life::kEnding || IsHeld(known, *hull)) {
       --end;
       continue;
     }
