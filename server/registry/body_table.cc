@@ -7,13 +7,13 @@
 namespace hulld::server {
 
 uint64_t BodyTable::BytesOf(const Entry& entry) {
-  return kBytesOfEntry + (entry.body == nullptr ? 0 : entry.body->stored()->MemoryBytes());
+  return kBytesOfEntry + (entry.body_ == nullptr ? 0 : entry.body_->stored()->MemoryBytes());
 }
 
 BodyTable::Entry* BodyTable::Find(const std::string& id) {
   const auto found = entries_.find(id);
   if (found == entries_.end()) return nullptr;
-  used_.splice(used_.begin(), used_, found->second.place);
+  used_.splice(used_.begin(), used_, found->second.place_);
   return &found->second;
 }
 
@@ -22,7 +22,7 @@ BodyTable::Entry& BodyTable::Add(const std::string& id) {
   Entry& entry = place->second;
   if (is_new) {
     used_.push_front(&place->first);
-    entry.place = used_.begin();
+    entry.place_ = used_.begin();
     bytes_ += BytesOf(entry);
   }
   return entry;
@@ -32,7 +32,7 @@ void BodyTable::Set(Locked& locked, const std::string& id, std::shared_ptr<const
   Entry* const entry = Find(id);
   HULLD_CHECK(entry != nullptr);
   bytes_ -= BytesOf(*entry);
-  locked.Discard(std::exchange(entry->body, std::move(body)));
+  locked.Discard(std::exchange(entry->body_, std::move(body)));
   bytes_ += BytesOf(*entry);
 }
 
@@ -40,8 +40,8 @@ void BodyTable::Erase(Locked& locked, const std::string& id) {
   const auto found = entries_.find(id);
   HULLD_CHECK(found != entries_.end() && !found->second.in_flight && found->second.waiting.empty());
   bytes_ -= BytesOf(found->second);
-  used_.erase(found->second.place);
-  locked.Discard(std::move(found->second.body));
+  used_.erase(found->second.place_);
+  locked.Discard(std::move(found->second.body_));
   entries_.erase(found);
 }
 

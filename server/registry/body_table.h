@@ -29,9 +29,9 @@ class BodyTable {
   // What is known of an ID that is, or is about to be, a body's.
   struct Entry {
     // Null until the first is committed.
-    const std::shared_ptr<const Body>& committed() const { return body; }
+    const std::shared_ptr<const Body>& committed() const { return body_; }
     // Whether nothing would be lost with it but what the store finds again.
-    bool IsUnused() const { return !in_flight && waiting.empty() && body.use_count() == 1; }
+    bool IsUnused() const { return !in_flight && waiting.empty() && body_.use_count() == 1; }
 
     // A change of it is submitted and neither committed nor refused; others wait for that.
     bool in_flight = false;
@@ -40,9 +40,9 @@ class BodyTable {
    private:
     friend class BodyTable;
 
-    std::shared_ptr<const Body> body;
+    std::shared_ptr<const Body> body_;
     // In used_.
-    std::list<const std::string*>::iterator place;
+    std::list<const std::string*>::iterator place_;
   };
   using Entries = std::map<std::string, Entry>;
 

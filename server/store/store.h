@@ -231,11 +231,11 @@ class Store {
   // where that is not known.
   virtual bool ReleaseOthers() { return true; }
   // `others` is called, on any thread, soon after other servers committed: a reason to Follow.
-  virtual void OnOthers(std::function<void()> others) { (void)others; }
+  virtual void OnOthers(std::function<void()> /*others*/) {}
 
   // `ended` is called, on any thread, once nothing can be committed or read here any more because
   // another server took the store over; at once if that is so already. The process is to end then.
-  virtual void OnEnded(std::function<void()> ended) { (void)ended; }
+  virtual void OnEnded(std::function<void()> /*ended*/) {}
 
   // Whether the next change is to bring a new base instead of a delta of `new_vertices`: once the
   // deltas outgrew the base, so that all bases together are as large as all deltas, a few times at

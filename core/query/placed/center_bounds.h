@@ -132,16 +132,16 @@ class CenterBounds {
 class CenterBounds::Place {
  private:
   friend class CenterBounds;
-  double largest = 0;     // component of n
-  uint32_t axis = 0;      // of that component
-  bool negative = false;  // its sign
+  double largest_ = 0;     // component of n
+  uint32_t axis_ = 0;      // of that component
+  bool negative_ = false;  // its sign
   // The other components over the largest, in cells.
-  double across_s = 0;
-  double across_t = 0;
-  double s = 0;  // from low[0] to high[0]
-  double t = 0;  // from low[0] to low[1]
-  const Corner* low = nullptr;
-  const Corner* high = nullptr;
+  double across_s_ = 0;
+  double across_t_ = 0;
+  double s_ = 0;  // from low_[0] to high_[0]
+  double t_ = 0;  // from low_[0] to low_[1]
+  const Corner* low_ = nullptr;
+  const Corner* high_ = nullptr;
 };
 
 inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
@@ -151,41 +151,41 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   // A direction turned into a hull's frame is at most sqrt(3) times longer or shorter.
   HULLD_DCHECK(IsFilterDirection(2 * on_cube.largest()) ||
                IsFilterDirection(on_cube.largest() / 2));
-  place.largest = on_cube.largest();
-  const double factor = half_ / place.largest;
-  place.axis = on_cube.axis();
-  place.negative = on_cube.negative();
-  place.across_s = on_cube.first() * factor;
-  place.across_t = on_cube.second() * factor;
-  const double u = place.across_s + half_;
-  const double v = place.across_t + half_;
+  place.largest_ = on_cube.largest();
+  const double factor = half_ / place.largest_;
+  place.axis_ = on_cube.axis();
+  place.negative_ = on_cube.negative();
+  place.across_s_ = on_cube.first() * factor;
+  place.across_t_ = on_cube.second() * factor;
+  const double u = place.across_s_ + half_;
+  const double v = place.across_t_ + half_;
   const uint32_t last = side_ - 1;
   const uint32_t i = std::min(static_cast<uint32_t>(static_cast<int32_t>(u)), last);
   const uint32_t j = std::min(static_cast<uint32_t>(static_cast<int32_t>(v)), last);
   const uint32_t row = side_ + 1;
-  const uint32_t face = CubeFace(place.axis, place.negative);
+  const uint32_t face = CubeFace(place.axis_, place.negative_);
   NeedCell(face, i, j);
-  place.low = making_->corners.data() + CubeCell(face, row, i, j);
-  place.high = place.low + row;
+  place.low_ = making_->corners.data() + CubeCell(face, row, i, j);
+  place.high_ = place.low_ + row;
   // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
-  place.s = std::clamp(u - i, 0.0, 1.0);
-  place.t = std::clamp(v - j, 0.0, 1.0);
+  place.s_ = std::clamp(u - i, 0.0, 1.0);
+  place.t_ = std::clamp(v - j, 0.0, 1.0);
   return place;
 }
 
 inline CenterBounds::Bounds CenterBounds::At(const Place& place) const {
-  if (place.low == nullptr) return {};
-  const double s = place.s;
-  const double t = place.t;
+  if (place.low_ == nullptr) return {};
+  const double s = place.s_;
+  const double t = place.t_;
   const auto mean = [&](float a, float b, float c, float d) {
     return (1 - s) * ((1 - t) * a + t * b) + s * ((1 - t) * c + t * d);
   };
-  const Corner* const low = place.low;
-  const Corner* const high = place.high;
-  return {
-      mean(low[0].support, low[1].support, high[0].support, high[1].support) *
-          (place.largest * unit_),
-      mean(low[0].gauge, low[1].gauge, high[0].gauge, high[1].gauge) * (place.largest * per_unit_)};
+  const Corner* const low = place.low_;
+  const Corner* const high = place.high_;
+  return {mean(low[0].support, low[1].support, high[0].support, high[1].support) *
+              (place.largest_ * unit_),
+          mean(low[0].gauge, low[1].gauge, high[0].gauge, high[1].gauge) *
+              (place.largest_ * per_unit_)};
 }
 
 inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
@@ -196,20 +196,20 @@ inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
 // the others over it.
 inline PlainVector CenterBounds::NormalAt(const Place& place) const {
   if (coarse() || !(largest_gauge() < kInfinity)) return {0, 0, 0};
-  const double corner = place.low[0].gauge;
-  const double along_low = place.low[1].gauge - corner;
-  const double along_high = double{place.high[1].gauge} - place.high[0].gauge;
+  const double corner = place.low_[0].gauge;
+  const double along_low = place.low_[1].gauge - corner;
+  const double along_high = double{place.high_[1].gauge} - place.high_[0].gauge;
   const double twist = along_high - along_low;
-  const double slope_s = place.high[0].gauge - corner + place.t * twist;
-  const double slope_t = along_low + place.s * twist;
-  const double value = corner + place.t * along_low + place.s * slope_s;
-  const double slope = value - (place.across_s * slope_s + place.across_t * slope_t);
+  const double slope_s = place.high_[0].gauge - corner + place.t_ * twist;
+  const double slope_t = along_low + place.s_ * twist;
+  const double value = corner + place.t_ * along_low + place.s_ * slope_s;
+  const double slope = value - (place.across_s_ * slope_s + place.across_t_ * slope_t);
   // After the component along the axis come the next two, the first after the last.
   double normal[5];
-  normal[place.axis] = place.negative ? -slope : slope;
-  normal[place.axis + 1] = half_ * slope_s;
-  normal[place.axis + 2] = half_ * slope_t;
-  return {place.axis == 0 ? normal[0] : normal[3], place.axis == 2 ? normal[4] : normal[1],
+  normal[place.axis_] = place.negative_ ? -slope : slope;
+  normal[place.axis_ + 1] = half_ * slope_s;
+  normal[place.axis_ + 2] = half_ * slope_t;
+  return {place.axis_ == 0 ? normal[0] : normal[3], place.axis_ == 2 ? normal[4] : normal[1],
           normal[2]};
 }
 
