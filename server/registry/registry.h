@@ -468,6 +468,9 @@ class Registry {
                                            size_t page_size,
                                            const std::function<bool()>& should_stop);
   HullChange DescribeFound(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
+  static void LetOthersPass(Locked& locked);
+  bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
+  bool IsBehind(const FoundRecords& found) const;
   void ReadPresent(Locked& locked, ChangeWatch& watch);
   absl::Status TakePresentFound(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
 

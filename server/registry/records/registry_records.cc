@@ -150,7 +150,7 @@ void Registry::ReadRecords(Locked& locked, const Readings& readings) {
 void Registry::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
                            FoundTaker take) {
   if (found.ok() && found->revision < asked_at) found = WentBack(found->revision, asked_at);
-  if (!found.ok() || found->revision <= revision_) return take(locked, found);
+  if (!found.ok() || !IsBehind(*found)) return take(locked, found);
   // After this round of the committer, what the store held is known here.
   const auto kept = std::make_shared<const FoundRecords>(*std::move(found));
   committer_.Follow(
@@ -212,6 +212,34 @@ void Registry::EndReadingOf(const std::string& id) {
   }
 }
 
+// Before a lookup of many: others have the mutex after some of them.
+void Registry::LetOthersPass(Locked& locked) {
+  if (locked.lookups() == kMostLookupsPerHold) {
+    locked.Unlock();
+    locked.Lock();
+  }
+  locked.NoteLookup();
+}
+
+// Whether the store held more of this hull than is known here, under the same revision: points that
+// changed no vertex take none.
+bool Registry::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const {
+  if (!stored.ok()) return false;
+  const auto known = hulls_.entries().find(id);
+  const bool is_same =
+      known != hulls_.entries().end() && known->second.revision() == stored->record.revision;
+  if (!is_same) return false;
+  return known->second.Describe(id).record.counts.received < stored->record.counts.received;
+}
+
+// Whether what was found is of a later moment than what is known here: committed, perhaps by
+// others, and not taken over yet. Who tells it would be followed by one who tells what is here.
+bool Registry::IsBehind(const FoundRecords& found) const {
+  if (found.revision > revision_) return true;
+  return std::ranges::any_of(
+      found.hulls, [this](const auto& hull) { return IsBehind(hull.first, hull.second); });
+}
+
 // What the store lists, once it is of no later moment than what is known here.
 absl::StatusOr<FoundRecords> Registry::ListFound(const std::string& prefix,
                                                  const std::string& after, size_t page_size,
@@ -226,7 +254,12 @@ absl::StatusOr<FoundRecords> Registry::ListFound(const std::string& prefix,
   if (!found.ok()) return found;
   if (found->revision < asked_at) return WentBack(found->revision, asked_at);
   Locked locked(mutex_);
-  if (found->revision <= revision_) return found;
+  bool is_behind = found->revision > revision_;
+  for (auto hull = found->hulls.begin(); !is_behind && hull != found->hulls.end(); ++hull) {
+    LetOthersPass(locked);
+    is_behind = IsBehind(hull->first, hull->second);
+  }
+  if (!is_behind) return found;
   if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
   if (found->revision > revision_) return IsAhead(found->revision, revision_);
   return found;
@@ -259,11 +292,7 @@ absl::StatusOr<HullPage> Registry::ListFoundHulls(const std::string& prefix,
   page.more = found->more;
   Locked locked(mutex_);
   for (const auto& [id, stored] : found->hulls) {
-    if (locked.lookups() == kMostLookupsPerHold) {
-      locked.Unlock();
-      locked.Lock();
-    }
-    locked.NoteLookup();
+    LetOthersPass(locked);
     HullChange hull = DescribeFound(id, stored);
     page.hulls.push_back({std::move(hull.record), hull.damaged});
   }
