@@ -15,6 +15,8 @@ namespace {
 constexpr uint32_t kLeafVertices = 8;
 // Edges of a vertex that are climbed along.
 constexpr size_t kMostNeighbours = 64;
+// Vertices climbed to, so that no way round a long edge of small facets is walked to its end.
+constexpr int kMostClimbs = 256;
 // Support points for one distance. Each makes the bound less, so it holds after any number.
 constexpr int kMostSupportPoints = 32;
 // A bound that is this near to the distance, relatively, is not worth another one.
@@ -74,7 +76,7 @@ void SupportFunction::Build(uint32_t first, uint32_t end) {
 uint32_t SupportFunction::FarthestAlong(const Vector& direction, uint32_t start) const {
   uint32_t best = start;
   double most = points_[best].dot(direction);
-  for (;;) {
+  for (int climbs = 0; climbs < kMostClimbs; ++climbs) {
     const uint32_t at = best;
     const std::span<const uint32_t> neighbours = NeighboursOf(at);
     if (neighbours.size() > kMostNeighbours) break;
