@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "core/base/stop_poll.h"
@@ -25,9 +24,8 @@ namespace hulld {
 class InsideSearch {
  public:
   // max_error: the caller's length unit; 0: none to reach. most: vertices, at least dimension + 1
-  // and at most the hull's. All given must outlive this. should_stop: what the poll asks.
-  InsideSearch(const Hull& hull, double max_error, size_t most,
-               const std::function<bool()>& should_stop, StopPoll& poll);
+  // and at most the hull's. All given must outlive this.
+  InsideSearch(const Hull& hull, double max_error, size_t most, StopPoll& poll);
 
   // After the poll said stop, nothing holds. Cost: that of farthest first, some times over.
   void Run();
@@ -41,7 +39,6 @@ class InsideSearch {
   const Hull& hull_;
   const double max_error_;
   const size_t most_;
-  const std::function<bool()>& should_stop_;
   StopPoll& poll_;
   const UnitScale scale_;
   InsideOrder order_;

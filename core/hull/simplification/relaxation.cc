@@ -15,13 +15,8 @@ constexpr size_t kVerticesPerFlat = 10;
 
 }  // namespace
 
-Relaxation::Relaxation(const Hull& hull, std::span<const Vector> unit_points,
-                       const std::function<bool()>& should_stop, StopPoll& poll)
-    : hull_(hull),
-      unit_points_(unit_points),
-      should_stop_(should_stop),
-      poll_(poll),
-      support_(hull, unit_points) {}
+Relaxation::Relaxation(const Hull& hull, std::span<const Vector> unit_points, StopPoll& poll)
+    : hull_(hull), unit_points_(unit_points), poll_(poll), support_(hull, unit_points) {}
 
 std::optional<std::vector<uint32_t>> Relaxation::Move(std::span<const uint32_t> chosen) {
   return Move(chosen, false);
@@ -35,7 +30,7 @@ std::optional<std::vector<uint32_t>> Relaxation::Move(std::span<const uint32_t> 
                                                       bool leave_out) {
   // In this order they are those of the inside hull.
   const std::vector<uint32_t> places = Ascending(chosen);
-  const std::optional<Hull> inside = HullOfSubset(hull_, places, should_stop_);
+  const std::optional<Hull> inside = HullOfSubset(hull_, places, poll_);
   if (!inside || inside->dimension() < 3) return std::nullopt;
   std::vector<Vector> points;
   points.reserve(places.size());

@@ -2,7 +2,6 @@
 #define HULLD_CORE_HULL_SIMPLIFICATION_RELAXATION_H_
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -27,9 +26,7 @@ namespace hulld {
 class Relaxation {
  public:
   // unit_points: the hull's vertices at unit scale. All given must outlive this. Cost: O(V log V).
-  // should_stop: what the poll asks.
-  Relaxation(const Hull& hull, std::span<const Vector> unit_points,
-             const std::function<bool()>& should_stop, StopPoll& poll);
+  Relaxation(const Hull& hull, std::span<const Vector> unit_points, StopPoll& poll);
 
   // Moves each of the chosen vertices once; they may meet, so that fewer come back, ascending.
   // Nothing where the chosen lie in a plane, or the poll said stop. Cost: a hull of the chosen and
@@ -47,7 +44,6 @@ class Relaxation {
 
   const Hull& hull_;
   const std::span<const Vector> unit_points_;
-  const std::function<bool()>& should_stop_;
   StopPoll& poll_;
   const SupportFunction support_;
 };

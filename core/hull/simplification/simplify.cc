@@ -104,7 +104,7 @@ class OutsideSearch {
   std::optional<Hull> Inside(size_t count) {
     const std::vector<uint32_t> first = order_.First(count);
     if (poll_.stopped()) return std::nullopt;
-    return HullOfSubset(hull_, first, target_.should_stop);
+    return HullOfSubset(hull_, first, poll_);
   }
   bool TryPushing(size_t inside_vertices) {
     const std::optional<Hull> inside = Inside(inside_vertices);
@@ -175,10 +175,10 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
   const size_t most = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
   if (all <= least || (target.max_error == 0 && all == most)) return SimplifiedHull{hull, 0};
   StopPoll poll(target.should_stop);
-  InsideSearch search(hull, target.max_error, most, target.should_stop, poll);
+  InsideSearch search(hull, target.max_error, most, poll);
   search.Run();
   if (poll.stopped()) return Stopped();
-  std::optional<Hull> inside = HullOfSubset(hull, search.best().vertices, target.should_stop);
+  std::optional<Hull> inside = HullOfSubset(hull, search.best().vertices, poll);
   if (!inside) return Stopped();
   return SimplifiedHull{*std::move(inside), search.best().error};
 }

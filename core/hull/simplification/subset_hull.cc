@@ -11,7 +11,8 @@
 namespace hulld {
 
 std::optional<Hull> HullOfSubset(const Hull& full, std::span<const uint32_t> chosen,
-                                 const std::function<bool()>& should_stop) {
+                                 StopPoll& poll) {
+  const auto should_stop = [&poll] { return poll.Poll(); };
   std::vector<Vector> points;
   points.reserve(chosen.size());
   for (const uint32_t i : chosen) points.push_back(full.vertices()[i]);

@@ -2,11 +2,11 @@
 #define HULLD_CORE_HULL_SIMPLIFICATION_SUBSET_HULL_H_
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/hull/hull.h"
 #include "core/numeric/vector.h"
 
@@ -20,10 +20,10 @@ struct VertexChoice {
   double error = 0;
 };
 
-// The hull of some of a hull's vertices; nothing when should_stop, which may be empty, said so. All
-// of them are vertices of it, as each is extreme among all.
+// The hull of some of a hull's vertices; nothing when the poll said stop. All of them are vertices
+// of it, as each is extreme among all.
 std::optional<Hull> HullOfSubset(const Hull& full, std::span<const uint32_t> chosen,
-                                 const std::function<bool()>& should_stop);
+                                 StopPoll& poll);
 
 // Twice the area of a facet times its unit normal; rounded. Newell's sum, which many corners do not
 // spoil.
