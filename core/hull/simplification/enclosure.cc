@@ -47,7 +47,7 @@ Enclosure::Enclosure(const Hull& full, const UnitScale& scale,
       should_stop_(should_stop),
       poll_(poll),
       vertices_(scale.ToUnit(full.vertices())),
-      support_(full, vertices_) {}
+      support_(full, vertices_, poll) {}
 
 // Where the inside hull's vertices are among those of the full hull; both are sorted.
 std::vector<uint32_t> Enclosure::PlacesOf(const Hull& inside) const {

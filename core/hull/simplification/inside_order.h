@@ -33,6 +33,9 @@ class InsideOrder {
   double ErrorAt(size_t count);
   // The first `count`, by index.
   std::vector<uint32_t> First(size_t count);
+  // True where the signs of determinants mostly are certain in floating point, of a solid; not at
+  // extreme scales.
+  bool IsMeasurable() const { return solid_ && solid_->IsMeasurable(); }
   // The hull's vertices at unit scale.
   std::span<const Vector> unit_points() const { return unit_points_; }
 

@@ -37,11 +37,14 @@ void InsideSearch::Run() {
   if (poll_.stopped() || hull_.dimension() < 3) return;
   // With the fewest vertices, or none left out, there is nothing to gain.
   if (Reaches(best_) && (count == order_.least() || count == hull_.vertices().size())) return;
+  // An attempt looks for the triangles of all vertices, which is slow by integers.
+  if (!order_.IsMeasurable()) return;
   Improve();
 }
 
 void InsideSearch::Improve() {
   Relaxation relaxation(hull_, order_.unit_points(), poll_);
+  if (poll_.stopped()) return;
   std::vector<uint32_t> chosen =
       order_.First(std::max(order_.least(), best_.vertices.size() * 4 / 5));
   const size_t most_moves = kMovesPerVertex * (hull_.vertices().size() + 1024);

@@ -16,7 +16,7 @@ constexpr size_t kVerticesPerFlat = 10;
 }  // namespace
 
 Relaxation::Relaxation(const Hull& hull, std::span<const Vector> unit_points, StopPoll& poll)
-    : hull_(hull), unit_points_(unit_points), poll_(poll), support_(hull, unit_points) {}
+    : hull_(hull), unit_points_(unit_points), poll_(poll), support_(hull, unit_points, poll) {}
 
 std::optional<std::vector<uint32_t>> Relaxation::Move(std::span<const uint32_t> chosen) {
   return Move(chosen, false);

@@ -43,6 +43,8 @@ class VertexSubset {
   // Indices, in the order chosen.
   const std::vector<uint32_t>& chosen() const { return chosen_; }
   bool is_complete() const { return chosen_.size() == points_.size(); }
+  // See Surface.
+  bool IsMeasurable() const { return surface_->IsMeasurable(); }
   // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: of n choices of V
   // vertices O((V + n) log n) for round shapes.
   void ChooseNext(StopPoll& poll);
