@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/base/check.h"
+#include "core/hull/simplification/subset_hull.h"
 
 namespace hulld {
 namespace {
@@ -26,16 +27,6 @@ constexpr double kLeastCosine = 0.05;
 // Vertices of the full hull that are checked at once; before, so many spread over all of them: most
 // that fail, fail early.
 constexpr size_t kVerticesPerCheck = 1024;
-
-// Twice the area times the unit normal; rounded. Newell's sum, which many corners do not spoil.
-Vector AreaNormal(std::span<const Vector> points, std::span<const uint32_t> loop) {
-  Vector sum = Vector::Zero();
-  const Vector& a = points[loop[0]];
-  for (size_t i = 1; i + 1 < loop.size(); ++i) {
-    sum += (points[loop[i]] - a).cross(points[loop[i + 1]] - a);
-  }
-  return sum;
-}
 
 Vector MeanOf(std::span<const Vector> points) {
   Vector mean = Vector::Zero();
@@ -56,7 +47,7 @@ Enclosure::Enclosure(const Hull& full, const UnitScale& scale,
       should_stop_(should_stop),
       poll_(poll),
       vertices_(scale.ToUnit(full.vertices())),
-      support_(full, vertices_) {}
+      support_(full, vertices_, poll) {}
 
 // Where the inside hull's vertices are among those of the full hull; both are sorted.
 std::vector<uint32_t> Enclosure::PlacesOf(const Hull& inside) const {

@@ -1,11 +1,8 @@
 #include "core/hull/simplification/inside_order.h"
 
-#include <absl/status/statusor.h>
-
-#include <utility>
+#include <cstddef>
 
 #include "core/base/check.h"
-#include "core/hull/growth/hull_builder.h"
 
 namespace hulld {
 
@@ -52,17 +49,10 @@ double InsideOrder::ErrorAt(size_t count) {
   return poll_.stopped() ? 0 : errors_[count - least_];
 }
 
-std::optional<Hull> InsideOrder::HullOf(size_t count, const std::function<bool()>& should_stop) {
+std::vector<uint32_t> InsideOrder::First(size_t count) {
   ExtendTo(count);
-  if (poll_.stopped()) return std::nullopt;
-  std::vector<Vector> points;
-  for (size_t i = 0; i < count; ++i) points.push_back(hull_.vertices()[chosen()[i]]);
-  HullBuilder builder;
-  if (!builder.Add(points, {.should_stop = should_stop}).ok()) return std::nullopt;
-  absl::StatusOr<Hull> hull = builder.Snapshot(should_stop);
-  if (!hull.ok()) return std::nullopt;
-  HULLD_CHECK(hull->vertices().size() == count);
-  return *std::move(hull);
+  if (poll_.stopped()) return {};
+  return {chosen().begin(), chosen().begin() + static_cast<ptrdiff_t>(count)};
 }
 
 }  // namespace hulld

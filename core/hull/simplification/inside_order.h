@@ -2,8 +2,9 @@
 #define HULLD_CORE_HULL_SIMPLIFICATION_INSIDE_ORDER_H_
 
 #include <cstddef>
-#include <functional>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/base/stop_poll.h"
@@ -30,8 +31,13 @@ class InsideOrder {
   // Proven: no point of the hull is farther than this from the hull of the first `count` vertices.
   // The caller's length unit. Requires least() <= count <= the hull's vertices.
   double ErrorAt(size_t count);
-  // The hull of the first `count`; nothing when should_stop, which may be empty, said so.
-  std::optional<Hull> HullOf(size_t count, const std::function<bool()>& should_stop);
+  // The first `count`, by index.
+  std::vector<uint32_t> First(size_t count);
+  // True where the signs of determinants mostly are certain in floating point, of a solid; not at
+  // extreme scales.
+  bool IsMeasurable() const { return solid_ && solid_->IsMeasurable(); }
+  // The hull's vertices at unit scale.
+  std::span<const Vector> unit_points() const { return unit_points_; }
 
  private:
   const std::vector<uint32_t>& chosen() const {

@@ -5,14 +5,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/hull/simplification/enclosure.h"
 #include "core/hull/simplification/inside_order.h"
+#include "core/hull/simplification/inside_search.h"
+#include "core/hull/simplification/subset_hull.h"
 #include "core/hull/simplification/unit_scale.h"
 
 namespace hulld {
@@ -97,7 +101,11 @@ class OutsideSearch {
     return best_ && Reaches(*best_) ? best_->hull.vertices().size() : most_;
   }
 
-  std::optional<Hull> Inside(size_t count) { return order_.HullOf(count, target_.should_stop); }
+  std::optional<Hull> Inside(size_t count) {
+    const std::vector<uint32_t> first = order_.First(count);
+    if (poll_.stopped()) return std::nullopt;
+    return HullOfSubset(hull_, first, poll_);
+  }
   bool TryPushing(size_t inside_vertices) {
     const std::optional<Hull> inside = Inside(inside_vertices);
     return inside && Consider(enclosure_.ByPushing(*inside));
@@ -167,14 +175,12 @@ absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTa
   const size_t most = target.max_vertices == 0 ? all : std::min(all, target.max_vertices);
   if (all <= least || (target.max_error == 0 && all == most)) return SimplifiedHull{hull, 0};
   StopPoll poll(target.should_stop);
-  InsideOrder order(hull, UnitScale(hull.max_abs_coordinate()), poll);
+  InsideSearch search(hull, target.max_error, most, poll);
+  search.Run();
   if (poll.stopped()) return Stopped();
-  // Nothing but all vertices has no error.
-  const size_t count = order.CountFor(target.max_error, most);
-  const double error = order.ErrorAt(count);
-  std::optional<Hull> inside = order.HullOf(count, target.should_stop);
+  std::optional<Hull> inside = HullOfSubset(hull, search.best().vertices, poll);
   if (!inside) return Stopped();
-  return SimplifiedHull{*std::move(inside), error};
+  return SimplifiedHull{*std::move(inside), search.best().error};
 }
 
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target) {

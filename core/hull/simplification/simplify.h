@@ -32,14 +32,17 @@ struct SimplifiedHull {
   double error = 0;
 };
 
-// A hull inside the given one, its vertices a subset of the given one's, chosen farthest first.
+// A hull inside the given one, its vertices a subset of the given one's, chosen farthest first and
+// then, for a solid, spread more evenly.
 //
-// With max_vertices alone: that many vertices, or all. With max_error: the choice ends as soon as
-// the error is within it, or at max_vertices. Errors: INVALID_ARGUMENT: no limit, a max_error that
-// is negative, infinite or NaN, or fewer vertices than the dimension needs to be kept (dimension +
-// 1). CANCELLED. Cost: of n choices of V vertices O((V + n) log n) for round shapes. For smooth
-// bodies the vertices for an error are within a constant of the fewest that any method can do with
-// (Kamenev 1992); for a sphere 1.7 times (observed: SimplifyQuality).
+// With max_vertices alone: that many vertices, or all. With max_error: few vertices for an error
+// within it, or as many as max_vertices lets be. Guaranteed: never more vertices for an error, nor
+// a larger error for max_vertices, than choosing farthest first. For smooth bodies that alone needs
+// vertices within a constant of the fewest that any method can do with (Kamenev 1992); on spheres
+// this needs less than 1.5 times the fewest (observed: SimplifyQuality). Errors: INVALID_ARGUMENT:
+// no limit, a max_error that is negative, infinite or NaN, or fewer vertices than the dimension
+// needs to be kept (dimension + 1). CANCELLED. Cost: of n choices of V vertices O((V + n) log n)
+// for round shapes; some three times that of choosing farthest first.
 absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTarget& target);
 
 // A hull that encloses the given one, exactly for the doubles returned: the vertices of inside

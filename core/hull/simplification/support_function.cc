@@ -13,8 +13,12 @@ namespace hulld {
 namespace {
 
 constexpr uint32_t kLeafVertices = 8;
+// Vertices that are put on two sides in about as long as a step of a poll may take.
+constexpr uint32_t kVerticesPerStep = 256;
 // Edges of a vertex that are climbed along.
 constexpr size_t kMostNeighbours = 64;
+// Vertices climbed to, so that no way round a long edge of small facets is walked to its end.
+constexpr int kMostClimbs = 256;
 // Support points for one distance. Each makes the bound less, so it holds after any number.
 constexpr int kMostSupportPoints = 32;
 // A bound that is this near to the distance, relatively, is not worth another one.
@@ -28,17 +32,18 @@ double ReachOf(const Vector& low, const Vector& high, const Vector& direction) {
 
 }  // namespace
 
-SupportFunction::SupportFunction(const Hull& hull, std::span<const Vector> points)
+SupportFunction::SupportFunction(const Hull& hull, std::span<const Vector> points, StopPoll& poll)
     : points_(points), order_(points.size()) {
   HULLD_CHECK(!points.empty() && points.size() == hull.vertices().size());
-  Link(hull);
+  Link(hull, poll);
   std::iota(order_.begin(), order_.end(), 0u);
-  Build(0, static_cast<uint32_t>(order_.size()));
+  Build(0, static_cast<uint32_t>(order_.size()), poll);
 }
 
-void SupportFunction::Link(const Hull& hull) {
+void SupportFunction::Link(const Hull& hull, StopPoll& poll) {
   starts_.assign(points_.size() + 1, 0);
   for (const Edge& edge : hull.edges()) {
+    if (poll.Step()) return;
     ++starts_[edge.tail];
     ++starts_[edge.head];
   }
@@ -46,12 +51,14 @@ void SupportFunction::Link(const Hull& hull) {
   for (uint32_t& start : starts_) start = end += start;
   neighbours_.resize(2 * hull.edges().size());
   for (const Edge& edge : hull.edges()) {
+    if (poll.Step()) return;
     neighbours_[--starts_[edge.tail]] = edge.head;
     neighbours_[--starts_[edge.head]] = edge.tail;
   }
 }
 
-void SupportFunction::Build(uint32_t first, uint32_t end) {
+void SupportFunction::Build(uint32_t first, uint32_t end, StopPoll& poll) {
+  if (poll.Step(1 + (end - first) / kVerticesPerStep)) return;
   const size_t node = nodes_.size();
   Vector low = points_[order_[first]];
   Vector high = low;
@@ -66,15 +73,15 @@ void SupportFunction::Build(uint32_t first, uint32_t end) {
   const uint32_t middle = first + (end - first) / 2;
   std::nth_element(order_.begin() + first, order_.begin() + middle, order_.begin() + end,
                    [&](uint32_t a, uint32_t b) { return points_[a][axis] < points_[b][axis]; });
-  Build(first, middle);
+  Build(first, middle, poll);
   nodes_[node].second_half = static_cast<uint32_t>(nodes_.size());
-  Build(middle, end);
+  Build(middle, end, poll);
 }
 
 uint32_t SupportFunction::FarthestAlong(const Vector& direction, uint32_t start) const {
   uint32_t best = start;
   double most = points_[best].dot(direction);
-  for (;;) {
+  for (int climbs = 0; climbs < kMostClimbs; ++climbs) {
     const uint32_t at = best;
     const std::span<const uint32_t> neighbours = NeighboursOf(at);
     if (neighbours.size() > kMostNeighbours) break;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/stop_poll.h"
 #include "core/hull/hull.h"
 #include "core/numeric/vector.h"
 
@@ -19,9 +20,9 @@ namespace hulld {
 // far.
 class SupportFunction {
  public:
-  // points: the hull's vertices at unit scale, which must outlive this. Requires a vertex. Cost:
-  // O(V log V).
-  SupportFunction(const Hull& hull, std::span<const Vector> points);
+  // points: the hull's vertices at unit scale, which must outlive this. Requires a vertex. After
+  // the poll said stop, nothing holds but that this may be destroyed. Cost: O(V log V).
+  SupportFunction(const Hull& hull, std::span<const Vector> points, StopPoll& poll);
 
   // The index of the vertex farthest along the direction. Any start is right; a near one is fast.
   uint32_t FarthestAlong(const Vector& direction, uint32_t start) const;
@@ -46,8 +47,8 @@ class SupportFunction {
   std::span<const uint32_t> NeighboursOf(uint32_t vertex) const {
     return std::span(neighbours_).subspan(starts_[vertex], starts_[vertex + 1] - starts_[vertex]);
   }
-  void Link(const Hull& hull);
-  void Build(uint32_t first, uint32_t end);
+  void Link(const Hull& hull, StopPoll& poll);
+  void Build(uint32_t first, uint32_t end, StopPoll& poll);
   void Search(uint32_t at, const Vector& direction, uint32_t& best, double& most) const;
 
   std::span<const Vector> points_;

@@ -1,8 +1,12 @@
 #include "core/hull/simplification/vertex_subset.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <numeric>
+#include <random>
 #include <utility>
 
 #include "core/base/check.h"
@@ -14,14 +18,17 @@ namespace {
 
 // Steps from triangle to triangle in search of a nearer one; the next search goes on from there.
 constexpr int kMostSteps = 64;
+// Steps of walks for each point, on average, beyond which a shape does not suit them.
+constexpr uint64_t kMostWalkPerPoint = 64;
 
-// The number below `count`, other than `excluded`, for which `measure` is largest.
+// The candidate, other than those excluded, for which `measure` is largest.
 template <size_t n, typename Measure>
-uint32_t Farthest(size_t count, const std::array<uint32_t, n>& excluded, StopPoll& poll,
-                  Measure&& measure) {
-  uint32_t best = 0;
+uint32_t Farthest(std::span<const uint32_t> candidates, const std::array<uint32_t, n>& excluded,
+                  StopPoll& poll, Measure&& measure) {
+  uint32_t best = candidates[0];
   double most = -1;
-  for (uint32_t i = 0; i < count && !poll.Step(); ++i) {
+  for (const uint32_t i : candidates) {
+    if (poll.Step()) break;
     bool is_excluded = false;
     for (const uint32_t other : excluded) is_excluded |= i == other;
     if (is_excluded) continue;
@@ -35,47 +42,119 @@ uint32_t Farthest(size_t count, const std::array<uint32_t, n>& excluded, StopPol
 
 }  // namespace
 
-VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points,
-                           StopPoll& poll)
+VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points)
     : points_(points), unit_points_(unit_points) {
   HULLD_CHECK(points.size() >= 4 && points.size() == unit_points.size());
   next_.resize(points.size(), kNone);
   distance_.resize(points.size(), 0);
-  Start(poll);
 }
 
-// Four points that span the set about as well as any. Three vertices are never on one line; that
-// the fourth is not in their plane is decided exactly.
-void VertexSubset::Start(StopPoll& poll) {
-  const std::span<const Vector> u = unit_points_;
-  const size_t n = points_.size();
-  const uint32_t a = 0;
-  const uint32_t b =
-      Farthest<1>(n, {a}, poll, [&](uint32_t i) { return (u[i] - u[a]).stableNorm(); });
-  const Vector ab = (u[b] - u[a]).stableNormalized();
-  const uint32_t c =
-      Farthest<2>(n, {a, b}, poll, [&](uint32_t i) { return ab.cross(u[i] - u[a]).stableNorm(); });
-  const Vector normal = ab.cross((u[c] - u[a]).stableNormalized()).stableNormalized();
-  uint32_t d = Farthest<3>(n, {a, b, c}, poll,
-                           [&](uint32_t i) { return std::abs(normal.dot(u[i] - u[a])); });
+VertexSubset::VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points,
+                           StopPoll& poll)
+    : VertexSubset(points, unit_points) {
+  std::vector<uint32_t> everyone(points.size());
+  std::iota(everyone.begin(), everyone.end(), 0u);
+  const bool is_solid = StartWithCornersOf(everyone, poll);
   if (poll.stopped()) return;
+  HULLD_CHECK(is_solid);
+  const std::vector<TriangleId> all = MakeCells();
+  for (const uint32_t i : everyone) {
+    if (poll.Step()) return;
+    if (std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end()) Assign(i, all);
+  }
+  EnqueueChanged();
+}
+
+std::optional<VertexSubset> VertexSubset::StartingWith(std::span<const uint32_t> start,
+                                                       std::span<const Vector> points,
+                                                       std::span<const Vector> unit_points,
+                                                       StopPoll& poll) {
+  VertexSubset subset(points, unit_points);
+  if (start.size() < 4 || !subset.StartWithCornersOf(start, poll)) return std::nullopt;
+  if (!subset.ChooseRestOf(start, poll) || !subset.AssignRest(poll)) return std::nullopt;
+  return subset;
+}
+
+// Four of the candidates that span them about as well as any. Three vertices are never on one line;
+// that the fourth is not in their plane is decided exactly. False where all are in a plane, or the
+// poll said stop.
+bool VertexSubset::StartWithCornersOf(std::span<const uint32_t> candidates, StopPoll& poll) {
+  const std::span<const Vector> u = unit_points_;
+  const uint32_t a = candidates[0];
+  const uint32_t b =
+      Farthest<1>(candidates, {a}, poll, [&](uint32_t i) { return (u[i] - u[a]).stableNorm(); });
+  const Vector ab = (u[b] - u[a]).stableNormalized();
+  const uint32_t c = Farthest<2>(candidates, {a, b}, poll,
+                                 [&](uint32_t i) { return ab.cross(u[i] - u[a]).stableNorm(); });
+  const Vector normal = ab.cross((u[c] - u[a]).stableNormalized()).stableNormalized();
+  uint32_t d = Farthest<3>(candidates, {a, b, c}, poll,
+                           [&](uint32_t i) { return std::abs(normal.dot(u[i] - u[a])); });
+  if (poll.stopped()) return false;
   const auto is_apart = [&](uint32_t i) {
     return Orient3d(points_[a], points_[b], points_[c], points_[i]) != 0;
   };
-  for (uint32_t i = 0; !is_apart(d) && i < n; ++i) d = i;
-  HULLD_CHECK(is_apart(d));
-
+  if (!is_apart(d)) {
+    const auto apart = std::find_if(candidates.begin(), candidates.end(), is_apart);
+    if (apart == candidates.end()) return false;
+    d = *apart;
+  }
   chosen_ = {a, b, c, d};
   for (const uint32_t i : chosen_) vertices_.Add(points_[i]);
   const std::array<VertexId, 3> base = {0, 1, 2};
   surface_.emplace(vertices_, base, 3);
+  return true;
+}
+
+// Adds them to the surface, while no list is kept. In an order like a random one, as sorted points
+// may see all that came before. False where walks are long, or the poll said stop.
+bool VertexSubset::ChooseRestOf(std::span<const uint32_t> start, StopPoll& poll) {
+  if (surface_->directions() == nullptr) return false;
+  std::vector<uint32_t> order;
+  std::copy_if(start.begin(), start.end(), std::back_inserter(order), [this](uint32_t i) {
+    return std::find(chosen_.begin(), chosen_.end(), i) == chosen_.end();
+  });
+  // Not std::shuffle, which differs from library to library.
+  std::mt19937 random;
+  for (size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random() % k]);
+  for (const uint32_t i : order) {
+    if (poll.Step(1 + surface_->TakeSteps())) return false;
+    surface_->Insert(vertices_, points_[i]);
+    chosen_.push_back(i);
+    // A vertex of the whole is one of the hull of any, and stays one.
+    HULLD_CHECK(vertices_.size() == chosen_.size());
+    if (IsSlow()) return false;
+  }
+  return true;
+}
+
+// Gives each vertex that is not chosen to a triangle. False where walks are long, or the poll said
+// stop.
+bool VertexSubset::AssignRest(StopPoll& poll) {
+  MakeCells();
+  std::vector<bool> is_chosen(points_.size(), false);
+  for (const uint32_t i : chosen_) is_chosen[i] = true;
+  for (uint32_t i = 0; i < points_.size(); ++i) {
+    if (poll.Step()) return false;
+    if (is_chosen[i]) continue;
+    const std::optional<Surface::Location> location = surface_->Locate(vertices_, points_[i]);
+    if (!location || IsSlow()) return false;
+    HULLD_CHECK(location->side == Surface::Side::kOutside);
+    Assign(i, {&location->triangle, 1});
+  }
+  EnqueueChanged();
+  return true;
+}
+
+// True where walks on the surface are so long that together they may be quadratic.
+bool VertexSubset::IsSlow() const {
+  return surface_->work() > kMostWalkPerPoint * (points_.size() + 1024);
+}
+
+std::vector<TriangleId> VertexSubset::MakeCells() {
   std::vector<TriangleId> all;
   surface_->ForEachTriangle([&](TriangleId id, const SurfaceTriangle&) { all.push_back(id); });
   for (const TriangleId id : all) MakeCell(id);
-  for (uint32_t i = 0; i < n && !poll.Step(); ++i) {
-    if (i != a && i != b && i != c && i != d) Assign(i, all);
-  }
-  EnqueueChanged();
+  return all;
 }
 
 void VertexSubset::ChooseNext(StopPoll& poll) {

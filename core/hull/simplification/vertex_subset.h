@@ -32,10 +32,19 @@ class VertexSubset {
   // outlive this. Starts with four. After the poll said stop, here or in ChooseNext, nothing holds
   // but that this may be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
+  // The same, but it starts with the vertices given, each once. Nothing where these lie in a plane,
+  // where no double is found inside their hull, where walks on it are longer than round shapes
+  // need, and after the poll said stop. Cost: O(points) walks.
+  static std::optional<VertexSubset> StartingWith(std::span<const uint32_t> start,
+                                                  std::span<const Vector> points,
+                                                  std::span<const Vector> unit_points,
+                                                  StopPoll& poll);
 
   // Indices, in the order chosen.
   const std::vector<uint32_t>& chosen() const { return chosen_; }
   bool is_complete() const { return chosen_.size() == points_.size(); }
+  // See Surface.
+  bool IsMeasurable() const { return surface_->IsMeasurable(); }
   // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: of n choices of V
   // vertices O((V + n) log n) for round shapes.
   void ChooseNext(StopPoll& poll);
@@ -68,7 +77,12 @@ class VertexSubset {
     }
   };
 
-  void Start(StopPoll& poll);
+  VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points);
+  bool StartWithCornersOf(std::span<const uint32_t> candidates, StopPoll& poll);
+  bool ChooseRestOf(std::span<const uint32_t> start, StopPoll& poll);
+  bool AssignRest(StopPoll& poll);
+  std::vector<TriangleId> MakeCells();
+  bool IsSlow() const;
   void MakeCell(TriangleId id);
   double HeightOver(TriangleId id, uint32_t point) const {
     return cells_[id].normal.dot(unit_points_[point] - cells_[id].corner);
