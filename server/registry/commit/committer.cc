@@ -140,7 +140,11 @@ void Committer::CommitAndFollow(Round round) {
   if (round.batch.empty()) {
     // Who waits to know all that the store holds must not wait for the next change to find out
     // what became of the last.
-    if (!store_.is_shared() && Statistics().failing) followed = store_.Recover();
+    if (!store_.is_shared() && Statistics().failing) {
+      followed = store_.Recover();
+      const std::lock_guard lock(mutex_);
+      statistics_.failing = !followed.ok();
+    }
     if (followed.ok()) followed = store_.Follow();
   }
   Settle(round, status, followed, asked);
@@ -152,7 +156,11 @@ void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
   if (holds.empty()) return;
   const SteadyClock::time_point asked = SteadyClock::now();
   absl::Status status;
-  if (Statistics().failing) status = store_.Recover();
+  if (Statistics().failing) {
+    status = store_.Recover();
+    const std::lock_guard lock(mutex_);
+    statistics_.failing = !status.ok();
+  }
   if (status.ok()) status = store_.HoldOthers();
   Round nothing_else;
   Settle(nothing_else, absl::OkStatus(), status, asked);

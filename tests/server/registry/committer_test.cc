@@ -253,6 +253,23 @@ TEST_F(CommitterTest, WhatACompletionSubmitsIsNotRefusedWithItsBatch) {
   EXPECT_FALSE(committer_.Statistics().failing);
 }
 
+TEST_F(CommitterTest, AStoreThatRecoveredForWhoFollowsFailsNoMore) {
+  GatedStore::Gate gate;
+  store_.Close(gate);
+  gate.outcome.set_value(absl::UnavailableError("no disk"));
+  Submit(1).wait();
+  EXPECT_TRUE(committer_.Statistics().failing);
+  std::promise<absl::Status> told;
+  {
+    const Locked locked(order_);
+    committer_.Follow(locked, [&](Locked&, const absl::Status& status) { told.set_value(status); });
+  }
+  EXPECT_TRUE(told.get_future().get().ok());
+  EXPECT_FALSE(committer_.Statistics().failing);
+  Submit(2).wait();
+  EXPECT_EQ(store_.recoveries(), 1);
+}
+
 TEST_F(CommitterTest, TheStoreRecoversBeforeTheNextBatch) {
   GatedStore::Gate gate;
   store_.Close(gate);
