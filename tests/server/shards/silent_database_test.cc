@@ -90,8 +90,8 @@ TEST_F(SilentDatabase, DoesNotHoldUpReadsOfAnother) {
 // Batches, scenes and streams, which share threads with those about hulls of several databases.
 TEST_F(SilentDatabase, DoesNotHoldUpQueriesOfAnother) {
   constexpr size_t kOthers = 20;
-  // Of each kind; with one more, a client has as many as it may.
-  constexpr size_t kQueries = 7;
+  // Of each kind: more than a pool has threads, and half of what one client may have.
+  constexpr size_t kQueries = 4;
   // Where they are held up, the test is to end.
   constexpr std::chrono::seconds kPatience{60};
   std::shared_ptr<void> held = Hold("hulld.store");
