@@ -139,16 +139,17 @@ TEST(WorkerPool, ClientsTakeTurnsHoweverMuchEachAsksFor) {
 }
 
 TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
-  TaskPool pool(2);
-  TaskPool::Lane lane(pool);
+  // Before the pool: a task may look at them until it has ended.
   std::promise<void> first;
   std::promise<void> second;
+  std::promise<void> done;
+  TaskPool pool(2);
+  TaskPool::Lane lane(pool);
   // Each waits for the other.
   lane.Submit([&] {
     first.set_value();
     second.get_future().wait();
   });
-  std::promise<void> done;
   lane.Submit([&] {
     first.get_future().wait();
     second.set_value();
@@ -158,10 +159,10 @@ TEST(TaskPool, SlicesOfOneLaneRunOnAllThreads) {
 }
 
 TEST(TaskPool, SlicesWaitNoLongerThanSingleCallsArrive) {
-  TaskPool pool(2);
-  TaskPool::Lane lane(pool);
   std::promise<void> both;
   std::atomic<int> running = 0;
+  TaskPool pool(2);
+  TaskPool::Lane lane(pool);
   pool.NoteSingleCall();
   const std::shared_future<void> ready = both.get_future();
   for (int i = 0; i < 2; ++i) {
