@@ -313,10 +313,9 @@ void CollisionService::AnswerLater(PairQuery query, const PlacedLookup& lookup, 
   ReadersOf(call->request())
       .Submit(
           [this, call, lookup, query = std::move(query)]() mutable {
-            AnswerPair(
-                std::move(query),
-                ResolvePlaced(shards_, HullIds(call->request()), lookup, query.options.should_stop),
-                call);
+            absl::StatusOr<ShardsResolved> resolved =
+                ResolvePlaced(shards_, HullIds(call->request()), lookup, query.options.should_stop);
+            AnswerPair(std::move(query), std::move(resolved), call);
           },
           client);
 }
