@@ -42,7 +42,7 @@ struct SimplifiedHull {
 // this needs less than 1.5 times the fewest (observed: SimplifyQuality). Errors: INVALID_ARGUMENT:
 // no limit, a max_error that is negative, infinite or NaN, or fewer vertices than the dimension
 // needs to be kept (dimension + 1). CANCELLED. Cost: of n choices of V vertices O((V + n) log n)
-// for round shapes; two to five times that of choosing farthest first (observed).
+// for round shapes; two to six times that of choosing farthest first (observed).
 absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTarget& target);
 
 // A hull that encloses the given one, exactly for the doubles returned: the vertices of inside

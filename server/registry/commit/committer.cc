@@ -140,14 +140,19 @@ void Committer::CommitAndFollow(Round round) {
   if (round.batch.empty()) {
     // Who waits to know all that the store holds must not wait for the next change to find out
     // what became of the last.
-    if (!store_.is_shared() && Statistics().failing) {
-      followed = store_.Recover();
-      const std::lock_guard lock(mutex_);
-      statistics_.failing = !followed.ok();
-    }
+    if (!store_.is_shared()) followed = RecoverIfFailing();
     if (followed.ok()) followed = store_.Follow();
   }
   Settle(round, status, followed, asked);
+}
+
+// For who does not commit next: what is committed next tells for itself whether it fails.
+absl::Status Committer::RecoverIfFailing() {
+  if (!Statistics().failing) return absl::OkStatus();
+  absl::Status status = store_.Recover();
+  const std::lock_guard lock(mutex_);
+  statistics_.failing = !status.ok();
+  return status;
 }
 
 // One time for all who want one by now.
@@ -155,12 +160,7 @@ void Committer::HoldFor(std::vector<std::shared_ptr<CommitHold>> holds) {
   std::erase_if(holds, [](const auto& hold) { return !hold->is_wanted(); });
   if (holds.empty()) return;
   const SteadyClock::time_point asked = SteadyClock::now();
-  absl::Status status;
-  if (Statistics().failing) {
-    status = store_.Recover();
-    const std::lock_guard lock(mutex_);
-    statistics_.failing = !status.ok();
-  }
+  absl::Status status = RecoverIfFailing();
   if (status.ok()) status = store_.HoldOthers();
   Round nothing_else;
   Settle(nothing_else, absl::OkStatus(), status, asked);

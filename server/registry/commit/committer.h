@@ -133,6 +133,7 @@ class Committer {
   void AskNow();
   void CommitAndFollow(Round round);
   void HoldFor(std::vector<std::shared_ptr<CommitHold>> holds);
+  absl::Status RecoverIfFailing();
   absl::Status Write(std::vector<Pending>& batch);
   OtherChanges TakeOthers(const absl::Status& status);
   void Settle(Round& round, const absl::Status& status, const absl::Status& followed,

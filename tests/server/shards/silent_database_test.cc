@@ -99,6 +99,10 @@ TEST_F(SilentDatabase, DoesNotHoldUpQueriesOfAnother) {
   const auto fill = [](auto* request, const char* hull_id) {
     for (int i = 0; i < 2; ++i) request->add_placements()->set_hull_id(hull_id);
   };
+  const auto read_all = [](auto& stream, auto response) {
+    while (stream.Read(&response)) continue;
+    return stream.Finish();
+  };
   const auto ask_batch = [&](const char* hull_id) {
     v1::BatchCheckCollisionsRequest request;
     fill(&request, hull_id);
@@ -106,20 +110,15 @@ TEST_F(SilentDatabase, DoesNotHoldUpQueriesOfAnother) {
     request.add_pairs(1);
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kPatience);
-    const auto stream = collisions->BatchCheckCollisions(&context, request);
-    v1::BatchCheckCollisionsResponse response;
-    while (stream->Read(&response)) continue;
-    return stream->Finish();
+    return read_all(*collisions->BatchCheckCollisions(&context, request),
+                    v1::BatchCheckCollisionsResponse());
   };
   const auto find = [&](const char* hull_id) {
     v1::FindCollisionsRequest request;
     fill(&request, hull_id);
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kPatience);
-    const auto stream = collisions->FindCollisions(&context, request);
-    v1::FindCollisionsResponse response;
-    while (stream->Read(&response)) continue;
-    return stream->Finish();
+    return read_all(*collisions->FindCollisions(&context, request), v1::FindCollisionsResponse());
   };
   const auto follow = [&](const char* hull_id) {
     grpc::ClientContext context;
