@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <span>
+#include <thread>
 #include <utility>
 
 #include "core/base/check.h"
@@ -91,6 +92,7 @@ bool CollisionStream::IsQuick() const {
 
 void CollisionStream::Handle() {
   asked_.clear();
+  moved_.clear();
   next_asked_ = 0;
   refresh_.reset();
   const absl::Status status = HandleMessage();
@@ -111,12 +113,17 @@ void CollisionStream::AnswerMessage(absl::Status status) {
   if (status.ok() && refresh_.has_value()) status = OfMessage(Refresh(*refresh_));
   if (!status.ok()) return FinishCall(OrStopped(status));
   request().Clear();
-  std::sort(asked_.begin(), asked_.end());
+  if (!std::is_sorted(asked_.begin(), asked_.end())) std::sort(asked_.begin(), asked_.end());
   for (const uint32_t pair : asked_) is_asked_[pair] = false;
   table_.EncodeHeader(shards_, reply().mutable_header());
   reply_bytes_ = reply().ByteSizeLong();
   call().AddPairs(asked_.size());
   is_decided_ = false;
+  // A few, or where one thread answers, by this one.
+  if (!IsPlain() || moved_.size() < kPairsPerHelper) {
+    for (const uint32_t placement : moved_) table_.PlaceAgain(placement);
+    moved_.clear();
+  }
   AnswerSlice();
 }
 
@@ -204,15 +211,19 @@ absl::Status CollisionStream::ChargeFor(size_t pairs) {
 
 // Checks all of the update before it applies any.
 absl::Status CollisionStream::HandleUpdate(const v1::CollisionStreamUpdate& update) {
-  const absl::StatusOr<Moves> moves = ReadMoves(update.placements(), update.poses(), table_.size());
-  if (!moves.ok()) return moves.status();
+  if (absl::Status s = ValidateMoves(update.placements(), update.poses(), table_.size()); !s.ok()) {
+    return s;
+  }
+  for (int i = 0; i < update.placements_size(); ++i) {
+    table_.SetPose(update.placements(i), ReadPose(update.poses(), static_cast<size_t>(i)));
+    AskAboutPairsOf(update.placements(i));
+  }
   if (update.refresh_hulls()) {
+    // That places all.
     refresh_ = ShardsPlan{.freshness = freshness_};
     refresh_->freshness.began = call().message_arrival();
-  }
-  for (const auto& [placement, pose] : *moves) {
-    table_.Move(placement, pose);
-    AskAboutPairsOf(placement);
+  } else {
+    moved_.assign(update.placements().begin(), update.placements().end());
   }
   return absl::OkStatus();
 }
@@ -272,12 +283,17 @@ void CollisionStream::AddAnswer(uint32_t index) {
   reply_bytes_ += AddPlacedAnswer(table_, pair.a, pair.b, answer, wanted_, columns);
 }
 
-// Decides the pairs that are asked about with the help of other threads, as far as these come in
-// time: helpers take slices, in the turns of this call, so they wait where others have to.
+// Places what moved, and then decides the pairs that are asked about, with the help of other
+// threads, as far as these come in time: helpers take slices, in the turns of this call, so they
+// wait where others have to.
 void CollisionStream::DecideTogether() {
   decided_.resize(asked_.size());
-  if (asked_.empty()) return TellDecided();
-  unclaimed_.Begin(static_cast<uint32_t>(asked_.size()));
+  is_placing_ = !moved_.empty();
+  if (is_placing_) {
+    unclaimed_.Begin(static_cast<uint32_t>(moved_.size()));
+  } else if (!BeginDeciding()) {
+    return TellDecided();
+  }
   const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
   // Those of a step before that did not have their turn yet will do.
   for (size_t helpers = helpers_waiting_.load(); helpers < wished; ++helpers) {
@@ -290,19 +306,43 @@ void CollisionStream::DecideTogether() {
   TakePart();
 }
 
-// Decides blocks of pairs until none is left, or it is the turn of others. By any thread, several
-// at a time; whoever comes last goes on. Nothing of this stream may be touched after the last block
-// was given back, or when there was none.
+// Requires that all is placed. False when there is nothing to decide.
+bool CollisionStream::BeginDeciding() {
+  is_placing_ = false;
+  if (asked_.empty()) return false;
+  unclaimed_.Begin(static_cast<uint32_t>(asked_.size()));
+  return true;
+}
+
+// The next block. While others still place the last placements, the pairs are worth a short wait:
+// another thread would have to be woken for them.
+ClaimedRange::Block CollisionStream::Claim() {
+  constexpr int kMostYields = 64;
+  ClaimedRange::Block block = unclaimed_.Claim(kPairsPerLook);
+  for (int i = 0; block.empty() && is_placing_ && i < kMostYields; ++i) {
+    std::this_thread::yield();
+    block = unclaimed_.Claim(kPairsPerLook);
+  }
+  return block;
+}
+
+// Works on blocks until none is left, or it is the turn of others. By any thread, several at a
+// time; whoever comes last goes on. Nothing of this stream may be touched after the last block was
+// given back, or when there was none.
 void CollisionStream::TakePart() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {
-    const ClaimedRange::Block block = unclaimed_.Claim(kPairsPerLook);
+    const ClaimedRange::Block block = Claim();
     if (block.empty()) return;
-    // What is left is given back undecided, so that somebody comes last.
+    // What is begun next waits until this block is given back.
+    const bool is_placing = is_placing_;
+    // What is left is given back as it is, so that somebody comes last.
     if (!call().ShouldStop()) {
-      for (uint32_t i = block.begin; i < block.end; ++i) Decide(i);
+      for (uint32_t i = block.begin; i < block.end; ++i) {
+        is_placing ? table_.PlaceAgain(moved_[i]) : Decide(i);
+      }
     }
-    if (unclaimed_.GiveBack(block)) return TellDecided();
+    if (unclaimed_.GiveBack(block) && !(is_placing && BeginDeciding())) return TellDecided();
     if (std::chrono::steady_clock::now() >= end) return RunOn(lane_, [this] { TakePart(); });
   }
 }

@@ -89,6 +89,8 @@ class CollisionStream
   void AskAboutPairsOf(size_t placement);
   void AddAnswer(uint32_t index);
   void DecideTogether();
+  bool BeginDeciding();
+  ClaimedRange::Block Claim();
   void TakePart();
   void Decide(uint32_t i);
   void TellDecided();
@@ -132,11 +134,16 @@ class CollisionStream
   size_t next_asked_ = 0;
   RungCounts rungs_;
 
+  // The placements that the current message moved and that are not placed yet.
+  std::vector<uint32_t> moved_;
+
   // A plain answer is decided as a whole, by several threads, and then told.
   bool is_decided_ = false;
-  // Parallel to asked_, and which of them no thread has begun with.
+  // Parallel to asked_.
   std::vector<Decided> decided_;
+  // Of moved_ while they are placed, and then of asked_: what no thread has begun with.
   ClaimedRange unclaimed_;
+  std::atomic<bool> is_placing_ = false;
   // Slices of helpers that wait for their turn.
   std::atomic<size_t> helpers_waiting_ = 0;
 };

@@ -141,12 +141,6 @@ absl::StatusOr<Pose> DecodePose(const v1::Pose& message) {
   return pose;
 }
 
-absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i) {
-  const Pose pose = ReadPose(poses, static_cast<size_t>(i));
-  if (absl::Status s = ValidatePose(pose); !s.ok()) return s;
-  return pose;
-}
-
 absl::StatusOr<ShardsFreshness> DecodeFreshness(const v1::Freshness& message,
                                                 std::span<const std::string> store_ids,
                                                 SteadyClock::time_point began) {

@@ -38,9 +38,7 @@ Pose ReadPose(const v1::Pose& message);
 
 // Poses in a row have seven numbers each: quaternion w x y z and translation x y z.
 inline constexpr int kPoseNumbers = 7;
-// The i-th of such poses. INVALID_ARGUMENT as DecodePose.
-absl::StatusOr<Pose> DecodePoseAt(const google::protobuf::RepeatedField<double>& poses, int i);
-// The same without a check (ValidatePose). Cost: 2 ns.
+// The i-th of such poses, without a check (ValidatePose). Cost: 2 ns.
 inline Pose ReadPose(const google::protobuf::RepeatedField<double>& poses, size_t i) {
   const double* const numbers = poses.data() + kPoseNumbers * i;
   return {{numbers[0], numbers[1], numbers[2], numbers[3]},

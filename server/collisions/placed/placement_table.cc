@@ -234,6 +234,7 @@ absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& opt
   if (!resolved.ok()) return resolved.status();
   std::fill(changed_.begin(), changed_.end(), false);
   std::fill(query_hull_changed_.begin(), query_hull_changed_.end(), false);
+  is_all_answerable_ = false;
   for (size_t n = 0; n < hulls.size(); ++n) {
     const size_t k = hulls[n];
     // The one before ends only when nothing is placed of it any more.
@@ -241,13 +242,12 @@ absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& opt
     const QueryHull& query_hull = QueryHullOf(hulls_[k], options.WantsCanonical());
     changed_[k] = !IsSame(before, hulls_[k]);
     query_hull_changed_[k] = std::exchange(query_hulls_[k], &query_hull) != &query_hull;
+    if (has_bodies()) TakeBody(k);
     for (const uint32_t i : placements_of(k)) PlaceAgain(i);
-    if (!has_bodies()) continue;
-    TakeBody(k);
-    for (const uint32_t i : placements_of(k)) bodies_[i] = PlaceBody(i);
   }
   if (!has_bodies()) TakeBodies();
   as_of_ = resolved->as_of;
+  NoteProblems();
   return absl::OkStatus();
 }
 
@@ -279,6 +279,7 @@ void PlacementTable::Take(const Shards& shards, ShardsResolved resolved,
   query_hulls_ = std::move(query_hulls);
   shards_ = &shards;
   as_of_ = resolved.as_of;
+  NoteProblems();
   placed_.clear();
   if (!places_on_demand_) {
     placed_.reserve(size());
@@ -287,6 +288,12 @@ void PlacementTable::Take(const Shards& shards, ShardsResolved resolved,
   TakeBodies();
   hulls_of_pieces_.clear();
   if (options.want_certificate) TakeHullsOfPieces();
+}
+
+void PlacementTable::NoteProblems() {
+  is_all_answerable_ =
+      malformed_.empty() && std::ranges::all_of(hulls_, [](const auto& hull) { return hull.ok(); });
+  told_placements_ = is_packed_ && is_all_answerable_ ? 0 : size();
 }
 
 // Where there are bodies, hulls are asked about as bodies of one piece.
@@ -353,10 +360,6 @@ PlacedHull PlacementTable::Place(size_t i) const {
   return PlacedHull(*query_hulls_[hull_of_[i]], PoseAt(i));
 }
 
-void PlacementTable::PlaceAgain(size_t i) {
-  if (!places_on_demand_) placed_[i] = Place(i);
-}
-
 const absl::Status& PlacementTable::problem(size_t i) const {
   return IsMalformed(i) ? malformed_.at(i) : hulls_[hull_of_[i]].status();
 }
@@ -368,10 +371,19 @@ bool PlacementTable::query_hull_changed(size_t i) const {
 }
 
 void PlacementTable::Move(size_t i, const Pose& X_WH) {
+  SetPose(i, X_WH);
+  PlaceAgain(i);
+}
+
+void PlacementTable::SetPose(size_t i, const Pose& X_WH) {
   if (!HasHull(i)) return;
   WritePose(X_WH, i, &poses_);
   malformed_.erase(i);
-  PlaceAgain(i);
+}
+
+void PlacementTable::PlaceAgain(size_t i) {
+  if (!HasHull(i)) return;
+  if (!places_on_demand_) placed_[i] = Place(i);
   if (has_bodies()) bodies_[i] = PlaceBody(i);
 }
 
@@ -380,10 +392,11 @@ void PlacementTable::EncodeHeader(const Shards& shards, v1::ResponseHeader* head
 }
 
 size_t PlacementTable::EncodeRows(size_t first, const RowFields& to) const {
-  const size_t placements = named_.size() + size();
+  const size_t placements = named_.size() + told_placements_;
+  const size_t rows = table_rows();
   size_t bytes = 0;
   size_t row = first;
-  for (; row < table_rows() && bytes < Config::kReplyMessageBytes; ++row) {
+  for (; row < rows && bytes < Config::kReplyMessageBytes; ++row) {
     bytes += kEntryBytes;
     if (row < placements) {
       bytes += EncodePlacement(row, to);
@@ -427,9 +440,8 @@ void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) cons
   message->set_reason(ReasonOf(status));
 }
 
-absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
-                                const google::protobuf::RepeatedField<double>& poses,
-                                size_t count) {
+absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
+                           const google::protobuf::RepeatedField<double>& poses, size_t count) {
   const int moved = placements.size();
   if (poses.size() != kPoseNumbers * moved) {
     return absl::InvalidArgumentError(absl::StrCat("poses holds ", poses.size(), " numbers for ",
@@ -438,8 +450,6 @@ absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>&
                                                    "y z"));
   }
   std::vector<char> named(count);
-  Moves moves;
-  moves.reserve(moved);
   for (int i = 0; i < moved; ++i) {
     const uint32_t placement = placements[i];
     if (placement >= count) {
@@ -452,11 +462,10 @@ absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>&
           absl::StrCat("placements[", i, "] is ", placement, ", which is named twice"));
     }
     named[placement] = true;
-    const absl::StatusOr<Pose> pose = DecodePoseAt(poses, i);
-    if (!pose.ok()) return Prefixed(absl::StrCat("poses[", i, "]."), pose.status());
-    moves.emplace_back(placement, *pose);
+    const Pose pose = ReadPose(poses, i);
+    if (!IsValidPose(pose)) return Prefixed(absl::StrCat("poses[", i, "]."), ValidatePose(pose));
   }
-  return moves;
+  return absl::OkStatus();
 }
 
 std::string ThereArePlacements(size_t count) {

@@ -89,7 +89,9 @@ class PlacementTable {
     const auto pieces = bodies_[i].body().pieces();
     return piece < pieces.size() ? *pieces[piece].hull : HullAt(i);
   }
-  bool is_answerable(size_t i) const { return !IsMalformed(i) && hulls_[hull_of_[i]].ok(); }
+  bool is_answerable(size_t i) const {
+    return is_all_answerable_ || (!IsMalformed(i) && hulls_[hull_of_[i]].ok());
+  }
   // Why not, else OK. Requires that the hulls were resolved.
   const absl::Status& problem(size_t i) const;
   // Whether the last Resolve gave this placement another hull, or took it, or gave it one; of a
@@ -105,8 +107,11 @@ class PlacementTable {
   absl::Status ResolveSome(Shards& shards, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
-  // Requires a valid pose, which is checked where the hull is placed.
+  // Requires a valid pose.
   void Move(size_t i, const Pose& X_WH);
+  // The same in two steps. Several threads at a time may place different placements again.
+  void SetPose(size_t i, const Pose& X_WH);
+  void PlaceAgain(size_t i);
 
   // The hulls; each once, but one that packed placements name several times.
   std::span<const std::string> hull_ids() const { return ids_; }
@@ -136,7 +141,7 @@ class PlacementTable {
     return EncodeRows(first, {message->mutable_hulls(), message->mutable_placement_problems(),
                               message->mutable_piece_hulls()});
   }
-  size_t table_rows() const { return named_.size() + size() + hulls_of_pieces_.size(); }
+  size_t table_rows() const { return named_.size() + told_placements_ + hulls_of_pieces_.size(); }
   void EncodeHull(size_t k, v1::HullVersion* version) const;
   // Requires that the placement is not answerable.
   void EncodeProblem(size_t i, v1::PlacementProblem* message) const;
@@ -167,12 +172,12 @@ class PlacementTable {
   void TakeBodies();
   void TakeBody(size_t k);
   void TakeHullsOfPieces();
+  void NoteProblems();
   size_t EncodeRows(size_t first, const RowFields& to) const;
   size_t EncodePlacement(size_t row, const RowFields& to) const;
   size_t BodyBytes() const;
   PlacedBody PlaceBody(size_t i) const;
   PlacedHull Place(size_t i) const;
-  void PlaceAgain(size_t i);
 
   // Of each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
   // not the caller's; and its pose, as packed placements have it.
@@ -199,6 +204,11 @@ class PlacementTable {
   // Of the last Resolve.
   const Shards* shards_ = nullptr;
   ShardsAsOf as_of_;
+  // Whether no placement had a problem when the hulls were last resolved; most often so.
+  bool is_all_answerable_ = false;
+  // How many placements the table of hulls tells of, from the first: of packed ones, which have no
+  // row but for a problem, none where none has one.
+  size_t told_placements_ = 0;
   bool places_on_demand_ = false;
   // Empty where they are placed on demand.
   std::vector<PlacedHull> placed_;
@@ -214,14 +224,11 @@ class PlacementTable {
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
 
-// Placements that move, each with its new pose.
-using Moves = std::vector<std::pair<uint32_t, Pose>>;
-
-// Reads an update of a stream with so many placements, poses as seven numbers each.
-// INVALID_ARGUMENT: numbers that do not fit the placements, an index out of range or named twice, a
-// malformed pose.
-absl::StatusOr<Moves> ReadMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
-                                const google::protobuf::RepeatedField<double>& poses, size_t count);
+// Checks an update of a stream with `count` placements: of each of `placements` the new pose, as
+// ReadPose reads it. INVALID_ARGUMENT: numbers that do not fit the placements, an index out of
+// range or named twice, a malformed pose.
+absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,
+                           const google::protobuf::RepeatedField<double>& poses, size_t count);
 
 // How errors say how many placements there are: packed or not, so that no field is named that the
 // caller did not send.

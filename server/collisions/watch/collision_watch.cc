@@ -261,14 +261,14 @@ void CollisionWatch::TellOfPieces(size_t hull) {
 }
 
 absl::Status CollisionWatch::HandleUpdate(const v1::CollisionWatchUpdate& update) {
-  const absl::StatusOr<Moves> moves = ReadMoves(update.placements(), update.poses(), table_.size());
-  if (!moves.ok()) return moves.status();
-  std::vector<uint32_t> changed;
-  changed.reserve(moves->size());
-  for (const auto& [placement, pose] : *moves) {
+  if (absl::Status s = ValidateMoves(update.placements(), update.poses(), table_.size()); !s.ok()) {
+    return s;
+  }
+  const std::vector<uint32_t> changed(update.placements().begin(), update.placements().end());
+  for (size_t i = 0; i < changed.size(); ++i) {
+    const uint32_t placement = changed[i];
     const absl::Status before = table_.problem(placement);
-    table_.Move(placement, pose);
-    changed.push_back(placement);
+    table_.Move(placement, ReadPose(update.poses(), i));
     // It may lack a hull, too.
     const absl::Status& now = table_.problem(placement);
     if (!now.ok() && now != before) problems_to_tell_.push_back(placement);

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -370,10 +371,12 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
   v1::BatchCheckCollisionsRequest batch;
   std::vector<v1::Placement> placements;
   std::vector<uint32_t> pairs;
-  constexpr uint32_t kPlacements = 100;
+  // So many that threads share the placing of those that move, and then their pairs.
+  constexpr uint32_t kPlacements = 250;
+  constexpr uint32_t kPairsEach = 40;
   for (uint32_t i = 0; i < kPlacements; ++i) {
     placements.push_back(PlacementOf(ids[i % ids.size()], 0.1 * i));
-    for (uint32_t j = 0; j < i; ++j) pairs.insert(pairs.end(), {j, i});
+    for (uint32_t j = i - std::min(i, kPairsEach); j < i; ++j) pairs.insert(pairs.end(), {j, i});
   }
   batch.mutable_pairs()->Assign(pairs.begin(), pairs.end());
   Stream stream(*collisions_);
@@ -400,6 +403,30 @@ TEST_F(StreamCollisionsCall, ManyPairsAreAnsweredAsInABatch) {
     EXPECT_GT(relations[v1::RELATION_SEPARATED], 1000);
     EXPECT_GT(relations[v1::RELATION_OVERLAPPING], 300);
   }
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+TEST_F(StreamCollisionsCall, ManyPlacementsThatMoveMayHaveFewPairsOrNone) {
+  Put("cube", Cube());
+  constexpr uint32_t kPlacements = 250;
+  std::vector<v1::Placement> placements;
+  for (uint32_t i = 0; i < kPlacements; ++i) placements.push_back(PlacementOf("cube", 10.0 * i));
+  Stream stream(*collisions_);
+  EXPECT_EQ(stream.Ask(Open(placements, {0, kPlacements - 1})).pairs_size(), 1);
+  const auto move_from = [&](uint32_t first, double x) {
+    std::vector<std::pair<uint32_t, PoseNumbers>> moves;
+    for (uint32_t i = first; i < kPlacements; ++i) moves.push_back({i, {1, 0, 0, 0, x, 0, 0}});
+    return stream.Ask(Move(moves));
+  };
+  const auto together = move_from(0, 1);
+  ASSERT_EQ(together.pairs_size(), 1);
+  EXPECT_EQ(together.columns().relations(0), v1::RELATION_OVERLAPPING);
+  std::vector<std::pair<uint32_t, PoseNumbers>> others;
+  for (uint32_t i = 1; i + 1 < kPlacements; ++i) others.push_back({i, {1, 0, 0, 0, -30, 0, 0}});
+  EXPECT_EQ(stream.Ask(Move(others)).pairs_size(), 0);
+  const auto apart = move_from(1, 20);
+  ASSERT_EQ(apart.pairs_size(), 1);
+  EXPECT_EQ(apart.columns().relations(0), v1::RELATION_SEPARATED);
   EXPECT_TRUE(stream.Finish().ok());
 }
 
