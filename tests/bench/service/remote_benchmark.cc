@@ -129,14 +129,17 @@ void Run(const RemoteWorkload& workload, const std::vector<RemoteSubject*>& subj
          Report& report) {
   std::vector<Rounds> rounds(subjects.size());
   Rounds in_process;
+  Rounds placing;
   // The first round warms up.
   for (int round = 0; round <= count; ++round) {
     if (round == 1) {
       rounds.assign(subjects.size(), {});
       in_process = {};
+      placing = {};
     }
     for (size_t i = 0; i < subjects.size(); ++i) Measure(*subjects[i], workload, rounds[i]);
     if (workload.run_in_process) in_process.samples.push_back(workload.run_in_process());
+    if (workload.run_placing) placing.samples.push_back(workload.run_placing());
   }
   const Rounds* core = in_process.samples.empty() ? nullptr : &in_process;
   const std::string& transport = subjects[0]->transport();
@@ -146,6 +149,9 @@ void Run(const RemoteWorkload& workload, const std::vector<RemoteSubject*>& subj
   }
   if (core != nullptr) {
     report.Write(workload, transport, "in process", in_process, nullptr, nullptr);
+  }
+  if (!placing.samples.empty()) {
+    report.Write(workload, transport, "placing", placing, nullptr, core);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <map>
 #include <memory>
+#include <span>
 #include <thread>
 #include <tuple>
 
@@ -104,8 +105,31 @@ const QuerySet& Ur5Questions(Regime regime, size_t count) {
   return found->second;
 }
 
+// Hulls, and where they are.
+struct Placements {
+  std::vector<const QueryHull*> hulls;
+  std::vector<Pose> poses;
+
+  void Add(const QueryHull& hull, const Pose& pose) {
+    hulls.push_back(&hull);
+    poses.push_back(pose);
+  }
+};
+
+// Places all anew, as a program does whose hulls moved, by all threads. Requires as many in
+// `placed`, whose memory is used again.
+void PlaceAll(const Placements& placements, std::vector<PlacedHull>& placed) {
+#pragma omp parallel for schedule(static) num_threads(kThreads)
+  for (size_t i = 0; i < placed.size(); ++i) {
+    absl::StatusOr<PlacedHull> made = PlacedHull::Make(*placements.hulls[i], placements.poses[i]);
+    CheckOk(made.status(), "a pose");
+    placed[i] = *std::move(made);
+  }
+}
+
 // Pairs of placements, for core and for the wire.
 struct Batch {
+  Placements placements;
   std::vector<PlacedHull> placed;
   std::vector<PlacedPair> pairs;
   v1::BatchCheckCollisionsRequest request;
@@ -120,9 +144,11 @@ std::shared_ptr<Batch> MakeBatch(Regime regime, size_t distinct, size_t count,
   batch->placed.insert(batch->placed.end(), set.b.begin(), set.b.end());
   for (const QuerySet::Query& query : set.queries) {
     AddPlacement(form, query.hull_a, query.X_WA, &batch->request);
+    batch->placements.Add(set.query_hulls[query.hull_a], query.X_WA);
   }
   for (const QuerySet::Query& query : set.queries) {
     AddPlacement(form, query.hull_b, query.X_WB, &batch->request);
+    batch->placements.Add(set.query_hulls[query.hull_b], query.X_WB);
   }
   for (size_t i = 0; i < count; ++i) {
     const auto a = static_cast<uint32_t>(i % distinct);
@@ -151,6 +177,14 @@ Sample AnswerBatch(RemoteSubject& subject, const Batch& batch, double seconds) {
 Sample AnswerBatchInProcess(const Batch& batch, double seconds) {
   return Repeat(1, seconds, static_cast<double>(batch.pairs.size()), [&](int, size_t) {
     CheckOk(CheckCollisions(batch.placed, batch.pairs, {}, kThreads).back().status(), "a batch");
+  });
+}
+
+Sample PlaceAndAnswerBatch(const Batch& batch, double seconds) {
+  std::vector<PlacedHull> placed = batch.placed;
+  return Repeat(1, seconds, static_cast<double>(batch.pairs.size()), [&](int, size_t) {
+    PlaceAll(batch.placements, placed);
+    CheckOk(CheckCollisions(placed, batch.pairs, {}, kThreads).back().status(), "a batch");
   });
 }
 
@@ -227,6 +261,7 @@ Sample FollowMotionInProcess(const Motion& motion, double seconds) {
 }
 
 struct Scene {
+  Placements placements;
   std::vector<PlacedHull> placed;
   v1::FindCollisionsRequest request;
   size_t found = 0;
@@ -247,6 +282,7 @@ std::shared_ptr<Scene> MakeScene(size_t count, Form form) {
     pose.q = random.Rotation();
     for (int k = 0; k < 3; ++k) pose.t[k] = random.Between(-half, half);
     AddPlacement(form, hull, pose, &scene->request);
+    scene->placements.Add(hulls.query_hulls[hull], pose);
     scene->placed.push_back(*PlacedHull::Make(hulls.query_hulls[hull], pose));
   }
   SceneOptions options;
@@ -268,6 +304,12 @@ Sample SearchScene(RemoteSubject& subject, const Scene& scene, double seconds) {
     CheckOk(reader->Finish(), "a scene");
     if (found != scene.found) CheckOk(absl::InternalError("wrong number"), "a scene");
   });
+}
+
+void SearchInProcess(std::span<const PlacedHull> placed) {
+  SceneOptions options;
+  options.threads = kThreads;
+  CheckOk(FindCollisions(placed, options, [](auto) {}).status(), "a scene");
 }
 
 }  // namespace
@@ -306,10 +348,15 @@ std::vector<RemoteWorkload> MakeBatchWorkloads(double seconds) {
   constexpr size_t kOwnPairs = size_t{1} << 14;
   std::vector<RemoteWorkload> workloads;
   const auto add = [&](const std::string& name, const std::shared_ptr<Batch>& batch) {
-    workloads.push_back(
-        {name, "pairs",
-         [=](RemoteSubject& subject) { return AnswerBatch(subject, *batch, seconds); },
-         [=] { return AnswerBatchInProcess(*batch, seconds); }});
+    RemoteWorkload workload = {
+        name, "pairs",
+        [=](RemoteSubject& subject) { return AnswerBatch(subject, *batch, seconds); },
+        [=] { return AnswerBatchInProcess(*batch, seconds); }};
+    // Each pair has placements of its own.
+    if (batch->pairs.size() * 2 == batch->placed.size()) {
+      workload.run_placing = [=] { return PlaceAndAnswerBatch(*batch, seconds); };
+    }
+    workloads.push_back(std::move(workload));
   };
   add("batch ur5 close", MakeBatch(Regime::kClose, 128, kPairs));
   add("batch ur5 deep", MakeBatch(Regime::kDeep, 128, kPairs));
@@ -341,10 +388,13 @@ std::vector<RemoteWorkload> MakeSceneWorkloads(double seconds) {
         {"scene " + std::to_string(count) + " ur5 links" + suffix, "calls",
          [=](RemoteSubject& subject) { return SearchScene(subject, *scene, seconds); },
          [=] {
+           return Repeat(1, seconds, 1, [&](int, size_t) { SearchInProcess(scene->placed); });
+         },
+         [=] {
+           std::vector<PlacedHull> placed = scene->placed;
            return Repeat(1, seconds, 1, [&](int, size_t) {
-             SceneOptions options;
-             options.threads = kThreads;
-             CheckOk(FindCollisions(scene->placed, options, [](auto) {}).status(), "a scene");
+             PlaceAll(scene->placements, placed);
+             SearchInProcess(placed);
            });
          }});
   }

@@ -56,7 +56,10 @@ struct RemoteWorkload {
   // Measures one round.
   std::function<Sample(RemoteSubject&)> run;
   // The same work by core in this process; may be empty.
-  std::function<Sample()> run_in_process;
+  std::function<Sample()> run_in_process = nullptr;
+  // The same with hulls that are placed each time, at the poses that the request holds; empty where
+  // run_in_process does that, or nothing needs to be placed anew.
+  std::function<Sample()> run_placing = nullptr;
 };
 
 // The workloads; hulls are created on hulld when first needed. `seconds`: of one round of those
