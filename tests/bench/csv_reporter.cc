@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <map>
 #include <thread>
 
 namespace hulld::bench {
@@ -61,13 +62,17 @@ bool IsFinal(const benchmark::BenchmarkReporter::Run& run) {
 }  // namespace
 
 std::string CpuName() {
+  // The first processor's. Where a machine is virtual its name may leave the generation out.
+  std::map<std::string, std::string> values;
   std::ifstream in("/proc/cpuinfo");
-  std::string name = "unknown CPU";
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("model name")) {
-      name = line.substr(line.find(':') + 2);
-      break;
-    }
+  for (std::string line; std::getline(in, line) && !line.empty();) {
+    const size_t colon = line.find(':');
+    const size_t name_end = line.find_last_not_of(" \t", colon - 1);
+    if (colon + 2 < line.size()) values[line.substr(0, name_end + 1)] = line.substr(colon + 2);
+  }
+  std::string name = values.contains("model name") ? values["model name"] : "unknown CPU";
+  if (values.contains("cpu family")) {
+    name += " family " + values["cpu family"] + " model " + values["model"];
   }
   return name.append(" (")
       .append(std::to_string(std::thread::hardware_concurrency()))

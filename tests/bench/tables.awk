@@ -37,10 +37,35 @@ function unreadable(path) {
   exit 1
 }
 
-# Names the file below the table (measured), once.
-function cite(file,   link) {
+# Names the file below the table (measured), once, and where it was measured.
+function cite(file,   link, origin) {
   link = "[`" file ".csv`](" results file ".csv)"
-  if (index(files, link) == 0) files = files (files == "" ? "" : ", ") link
+  if (index(files, link) > 0) return
+  files = files (files == "" ? "" : ", ") link
+  origin = origin_of(file)
+  if (origin == "") origin = usual_origin()
+  if (index(origins, origin) == 0) origins = origins (origins == "" ? "" : ", and ") origin
+}
+
+# The processor and the compiler that the first row of a file names; empty where it names none.
+function origin_of(file,   command, line, names, fields, count, i, cpu, compiler) {
+  command = "head -2 results/" file ".csv"
+  if ((command | getline line) > 0) count = split_row(line, names)
+  if ((command | getline line) > 0) split_row(line, fields)
+  close(command)
+  for (i = 1; i <= count; i++) {
+    if (names[i] == "cpu") cpu = fields[i]
+    if (names[i] == "compiler") compiler = fields[i]
+  }
+  sub(/\(virtual; /, "(", cpu)
+  return cpu == "" ? "" : "a virtual " cpu ", " compiler
+}
+
+# Of rows that name none: as that of the hulls, but for the generation, which may be another.
+function usual_origin(   origin) {
+  origin = origin_of("hull_build_" machine)
+  sub(/ family [0-9]+ model [0-9]+/, "", origin)
+  return origin
 }
 
 # Splits at commas that are not within quotes.
@@ -65,15 +90,7 @@ function head(text,   part, count, i) {
 }
 
 # Where the rows above come from.
-function measured(   path, line, fields) {
-  path = "results/hull_build_" machine ".csv"
-  close(path)
-  getline line < path
-  getline line < path
-  split_row(line, fields)
-  sub(/\(virtual; /, "(", fields[8])
-  printf "\n*Measured on a virtual %s, %s; rows in %s.*\n", fields[8], fields[7], files
-}
+function measured() { printf "\n*Measured on %s; rows in %s.*\n", origins, files }
 
 # Nanoseconds, or "-".
 function short(value) {
