@@ -157,7 +157,7 @@ absl::Status MoveIntoPlace(const fs::path& staging, const fs::path& directory) {
     if (part == kDatabaseName && !SyncPath(directory.string())) return CannotWrite(directory);
     fs::rename(staging / part, directory / part, error);
     if (error) {
-      const absl::Status status = absl::UnavailableError(
+      absl::Status status = absl::UnavailableError(
           absl::StrCat("cannot make ", (directory / part).string(), ": ", error.message()));
       for (const fs::path& moved : parts) {
         if (moved == part) break;

@@ -116,7 +116,7 @@ HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
-Client::Client(ClientOptions options) : Client(options, Connect(options)) {}
+Client::Client(const ClientOptions& options) : Client(options, Connect(options)) {}
 
 Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
     : options_(std::move(options)),
@@ -242,17 +242,17 @@ absl::StatusOr<HullMesh> Client::GetHullMesh(const std::string& hull_id) const {
 }
 
 absl::StatusOr<HullMesh> Client::GetHullMesh(
-    const v1::GetHullMeshRequest& given,
+    const v1::GetHullMeshRequest& request,
     const std::function<void(const HullMesh&)>& on_part) const {
   v1::GetHullMeshRequest copy;
-  const v1::GetHullMeshRequest& request = WithFreshness(given, &copy);
+  const v1::GetHullMeshRequest& fresh = WithFreshness(request, &copy);
   const Deadline deadline = NextDeadline();
   HullMesh mesh;
   absl::Status status = CallWithRetries(options_.retry, deadline, [&] {
     mesh = HullMesh();
     grpc::ClientContext context;
     context.set_deadline(options_.retry.ForCall(deadline));
-    const auto reader = hulls_->GetHullMesh(&context, request);
+    const auto reader = hulls_->GetHullMesh(&context, fresh);
     absl::Status part_status;
     v1::GetHullMeshResponse part;
     while (part_status.ok() && reader->Read(&part)) {
@@ -361,23 +361,23 @@ absl::Status Client::Receive(const Start& start,
   return receiver_status.ok() ? status : receiver_status;
 }
 
-absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& given,
+absl::Status Client::BatchCheckCollisions(const v1::BatchCheckCollisionsRequest& request,
                                           const BatchReceiver& receive) const {
   v1::BatchCheckCollisionsRequest copy;
-  const v1::BatchCheckCollisionsRequest& request = WithFreshness(given, &copy);
+  const v1::BatchCheckCollisionsRequest& fresh = WithFreshness(request, &copy);
   return Receive<v1::BatchCheckCollisionsResponse>(
       [&](grpc::ClientContext* context) {
-        return collisions_->BatchCheckCollisions(context, request);
+        return collisions_->BatchCheckCollisions(context, fresh);
       },
       receive);
 }
 
-absl::Status Client::FindCollisions(const v1::FindCollisionsRequest& given,
+absl::Status Client::FindCollisions(const v1::FindCollisionsRequest& request,
                                     const SceneReceiver& receive) const {
   v1::FindCollisionsRequest copy;
-  const v1::FindCollisionsRequest& request = WithFreshness(given, &copy);
+  const v1::FindCollisionsRequest& fresh = WithFreshness(request, &copy);
   return Receive<v1::FindCollisionsResponse>(
-      [&](grpc::ClientContext* context) { return collisions_->FindCollisions(context, request); },
+      [&](grpc::ClientContext* context) { return collisions_->FindCollisions(context, fresh); },
       receive);
 }
 

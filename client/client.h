@@ -68,7 +68,7 @@ struct HullMesh {
 // work.
 class Client {
  public:
-  explicit Client(ClientOptions options = {});
+  explicit Client(const ClientOptions& options = {});
   // Over a given channel, such as one within the process.
   Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel);
 

@@ -89,13 +89,13 @@ absl::Status ValidateSecurity(const ConnectionSecurity& security, const std::str
 
 std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
                                            const ConnectionSecurity& security,
-                                           const grpc::ChannelArguments& given) {
-  grpc::ChannelArguments arguments = given;
-  if (NamesSeveral(server)) arguments.SetServiceConfigJSON(kSpreadCalls);
+                                           const grpc::ChannelArguments& arguments) {
+  grpc::ChannelArguments chosen = arguments;
+  if (NamesSeveral(server)) chosen.SetServiceConfigJSON(kSpreadCalls);
   std::shared_ptr<grpc::ChannelCredentials> credentials;
   if (security.tls) {
     credentials = grpc::SslCredentials({security.authorities, security.key, security.certificate});
-    if (!security.server_name.empty()) arguments.SetSslTargetNameOverride(security.server_name);
+    if (!security.server_name.empty()) chosen.SetSslTargetNameOverride(security.server_name);
   } else {
     credentials = grpc::InsecureChannelCredentials();
   }
@@ -103,8 +103,8 @@ std::shared_ptr<grpc::Channel> OpenChannel(const std::string& server,
   if (IsToken(security.token) && MaySendToken(security, server)) {
     interceptors.push_back(std::make_unique<TokenSenderFactory>(security.token));
   }
-  return grpc::experimental::CreateCustomChannelWithInterceptors(
-      TargetName(server), credentials, arguments, std::move(interceptors));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(TargetName(server), credentials,
+                                                                 chosen, std::move(interceptors));
 }
 
 absl::StatusOr<std::string> ReadTokenFile(const std::string& path) {

@@ -115,7 +115,7 @@ absl::Status VisitMeshes(const aiScene& scene, const MeshVisitor& visit) {
     }
     // Pushed in reverse, so that the order is the file's.
     for (unsigned i = node->mNumChildren; i > 0; --i) {
-      pending.push_back({node->mChildren[i - 1], X_WN});
+      pending.emplace_back(node->mChildren[i - 1], X_WN);
     }
   }
   return absl::OkStatus();

@@ -83,6 +83,7 @@ std::vector<MeshPart> Distribute(const TriangleMesh& mesh, const std::vector<uin
                                  const std::vector<std::string>& names) {
   constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
   std::vector<MeshPart> parts;
+  parts.reserve(names.size());
   for (const std::string& name : names) parts.push_back({name, {}});
   std::vector<std::vector<uint32_t>> triangles_of(parts.size());
   for (uint32_t i = 0; i < mesh.triangles.size(); ++i) triangles_of[part_of[i]].push_back(i);
@@ -154,7 +155,7 @@ absl::Status ReadObjParts(ByteSource* source, std::vector<MeshPart>* parts) {
   std::map<std::string, uint32_t> number;
   std::string object;
   std::string group;
-  const absl::Status read = WalkObj(
+  absl::Status read = WalkObj(
       source, &mesh,
       [&](const std::vector<uint32_t>& corners) {
         const std::string name =

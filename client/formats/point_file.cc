@@ -73,12 +73,12 @@ absl::Status ReadAny(const ReadRequest& request, PointCollector* points) {
 }  // namespace
 
 const std::vector<std::string>& PointFormatNames() {
-  static const auto* const names = [] {
+  static const auto* const kNames = [] {
     auto* all = new std::vector<std::string>;
     for (const FormatName& entry : kFormatNames) all->push_back(entry.name);
     return all;
   }();
-  return *names;
+  return *kNames;
 }
 
 absl::StatusOr<PointFormat> PointFormatFromName(const std::string& name) {
