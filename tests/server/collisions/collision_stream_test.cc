@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <thread>
 
@@ -427,6 +429,75 @@ TEST_F(StreamCollisionsCall, ManyPlacementsThatMoveMayHaveFewPairsOrNone) {
   const auto apart = move_from(1, 20);
   ASSERT_EQ(apart.pairs_size(), 1);
   EXPECT_EQ(apart.columns().relations(0), v1::RELATION_SEPARATED);
+  EXPECT_TRUE(stream.Finish().ok());
+}
+
+// Steps of any size, of which some have the hulls looked up: those of many placements are placed
+// and decided by several threads.
+TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
+  Put("cube", Cube());
+  Put("ball", Sphere(60));
+  const char* const seed = std::getenv("HULLD_TEST_SEED");
+  std::mt19937 random(seed == nullptr ? 0 : std::atoi(seed));
+  const auto below = [&](uint32_t count) {
+    return std::uniform_int_distribution<uint32_t>(0, count - 1)(random);
+  };
+  constexpr uint32_t kPlacements = 400;
+  constexpr int kSteps = 60;
+  const char* const ids[] = {"cube", "ball", "late"};
+  std::vector<v1::Placement> placements;
+  for (uint32_t i = 0; i < kPlacements; ++i) {
+    placements.push_back(PlacementOf(ids[below(3)], 0.02 * below(1000)));
+    if (below(20) == 0) placements[i].mutable_pose()->mutable_translation()->set_x(NAN);
+  }
+  std::vector<uint32_t> pairs;
+  for (int i = 0; i < 3000; ++i)
+    pairs.insert(pairs.end(), {below(kPlacements), below(kPlacements)});
+  Stream stream(*collisions_);
+  auto answer = stream.Ask(Open(placements, pairs));
+  std::vector<char> is_asked(pairs.size() / 2, true);
+  for (int step = 0; step <= kSteps; ++step) {
+    v1::BatchCheckCollisionsRequest batch;
+    batch.mutable_placements()->Assign(placements.begin(), placements.end());
+    std::vector<uint32_t> asked;
+    for (uint32_t i = 0; i < is_asked.size(); ++i) {
+      if (!is_asked[i]) continue;
+      asked.push_back(i);
+      batch.add_pairs(pairs[2 * i]);
+      batch.add_pairs(pairs[2 * i + 1]);
+    }
+    ASSERT_THAT(answer.pairs(), ::testing::ElementsAreArray(asked)) << "step " << step;
+    ASSERT_THAT(answer.columns().relations(), ::testing::ElementsAreArray(BatchRelations(batch)))
+        << "step " << step;
+    is_asked.assign(is_asked.size(), false);
+    const auto ask_about = [&](auto holds) {
+      for (uint32_t i = 0; i < is_asked.size(); ++i) {
+        if (holds(pairs[2 * i]) || holds(pairs[2 * i + 1])) is_asked[i] = true;
+      }
+    };
+    std::vector<uint32_t> order(kPlacements);
+    std::iota(order.begin(), order.end(), 0);
+    std::shuffle(order.begin(), order.end(), random);
+    order.resize(below(3) == 0 ? kPlacements : below(1 << below(9)) % kPlacements);
+    std::vector<std::pair<uint32_t, PoseNumbers>> moves;
+    for (const uint32_t i : order) {
+      const double x = 0.02 * below(1000);
+      *placements[i].mutable_pose() = PlacementOf("", x).pose();
+      moves.push_back({i, {1, 0, 0, 0, x, 0, 0}});
+    }
+    std::vector<char> moved(kPlacements, false);
+    for (const uint32_t i : order) moved[i] = true;
+    ask_about([&](uint32_t i) { return moved[i] != 0; });
+    v1::StreamCollisionsRequest request = Move(moves);
+    if (step == kSteps / 2) {
+      Put("late", Cube());
+      request.mutable_update()->set_refresh_hulls(true);
+      ask_about([&](uint32_t i) { return placements[i].hull_id() == "late"; });
+    } else if (below(8) == 0) {
+      request.mutable_update()->set_refresh_hulls(true);
+    }
+    answer = stream.Ask(request);
+  }
   EXPECT_TRUE(stream.Finish().ok());
 }
 
