@@ -116,7 +116,7 @@ HealthStatus DecodeHealth(const grpc::ByteBuffer& buffer) {
 
 }  // namespace
 
-Client::Client(const ClientOptions& options) : Client(options, Connect(options)) {}
+Client::Client(ClientOptions options) : Client(options, Connect(options)) {}
 
 Client::Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel)
     : options_(std::move(options)),

@@ -68,7 +68,7 @@ struct HullMesh {
 // work.
 class Client {
  public:
-  explicit Client(const ClientOptions& options = {});
+  explicit Client(ClientOptions options = {});
   // Over a given channel, such as one within the process.
   Client(ClientOptions options, std::shared_ptr<grpc::Channel> channel);
 

@@ -28,9 +28,9 @@ bool IsRequestId(const std::string& text) {
 }
 
 std::string NextRequestId() {
-  static const std::string process = RandomId().substr(0, kRandomCharacters);
+  static const std::string kProcess = RandomId().substr(0, kRandomCharacters);
   static std::atomic<uint64_t> last = 0;
-  return absl::StrCat(process, "-", last.fetch_add(1, std::memory_order_relaxed) + 1);
+  return absl::StrCat(kProcess, "-", last.fetch_add(1, std::memory_order_relaxed) + 1);
 }
 
 }  // namespace hulld::server

@@ -13,7 +13,7 @@ bool IsHexadecimal(std::string_view text) {
 }
 
 bool IsId(std::string_view text) {
-  return IsHexadecimal(text) && text.find_first_not_of('0') != text.npos;
+  return IsHexadecimal(text) && text.find_first_not_of('0') != std::string_view::npos;
 }
 
 }  // namespace

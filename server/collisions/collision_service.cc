@@ -69,9 +69,9 @@ absl::Status FirstProblem(const absl::StatusOr<ShardsResolved>& resolved) {
 
 // What stands for a hull where no pair of pieces decided.
 const QueryHull& NoHull() {
-  static const Hull nothing;
-  static const QueryHull no_hull(nothing);
-  return no_hull;
+  static const Hull kNothing;
+  static const QueryHull kNoHull(kNothing);
+  return kNoHull;
 }
 
 void EncodeVersions(const Shards& shards, const ShardsAsOf& as_of, const HullView& a,

@@ -84,9 +84,9 @@ class JsonFormatter : public spdlog::formatter {
 
 // Both budgets live as long as the process: libraries log while it ends, too.
 LineBudget& BudgetOf(const char* library) {
-  static auto* const grpc = new LineBudget(kLibraryLines, std::chrono::minutes(1));
-  static auto* const protobuf = new LineBudget(kLibraryLines, std::chrono::minutes(1));
-  return library[0] == 'g' ? *grpc : *protobuf;
+  static auto* const kGrpc = new LineBudget(kLibraryLines, std::chrono::minutes(1));
+  static auto* const kProtobuf = new LineBudget(kLibraryLines, std::chrono::minutes(1));
+  return library[0] == 'g' ? *kGrpc : *kProtobuf;
 }
 
 void LogForLibrary(const char* library, spdlog::level::level_enum level, const std::string& text) {

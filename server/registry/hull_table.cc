@@ -21,7 +21,7 @@ HullRecord HullTable::RestingHull::RecordWith(const std::string& id) const {
   record.hull_id = id;
   record.create_revision = create_revision;
   record.revision = revision;
-  record.dimension = dimension;
+  record.dimension = static_cast<int>(dimension);
   record.vertex_count = vertex_count;
   record.counts = counts;
   return record;

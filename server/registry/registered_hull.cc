@@ -214,14 +214,14 @@ void RegisteredHull::DropUnused(Locked& locked) {
 }
 
 const std::shared_ptr<const ServedHull>& EmptyServedHull() {
-  static const auto* const served = [] {
+  static const auto* const kServed = [] {
     const auto canonical = std::make_shared<CanonicalHull>(Hull());
     const LiveHull::Mark nothing;
     return new std::shared_ptr<const ServedHull>(std::make_shared<const ServedHull>(
         std::shared_ptr<const QueryHull>(canonical, &canonical->query_hull()), nothing.low(),
         nothing.high(), canonical));
   }();
-  return *served;
+  return *kServed;
 }
 
 std::string QuotedHull(const std::string& id) { return absl::StrCat("hull \"", id, "\""); }

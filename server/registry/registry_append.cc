@@ -476,6 +476,7 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk
   const uint64_t sequence = pending.chunk.sequence;
   if (store_.is_shared()) {
     kept = std::make_shared<PendingChunk>(std::move(pending));
+    // NOLINTNEXTLINE(bugprone-use-after-move): it is the caller's again
     pending.on_built = std::exchange(kept->on_built, nullptr);
   }
   const auto finish = [=, this, mark = built.mark, counts = built.counts](

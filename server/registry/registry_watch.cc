@@ -42,7 +42,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
   WatchPiece piece;
   piece.anew = std::exchange(watch.anew, false);
   piece.revision = watch.after_revision;
-  const bool tells_bodies = feed_.TargetOf(watch).bodies;
+  const bool tells_bodies = ChangeFeed::TargetOf(watch).bodies;
   const auto is_there = [this, tells_bodies](const std::string& id) {
     if (bodies_.contains(id)) return tells_bodies && FindBody(id) != nullptr;
     return hulls_.Knows(id) ? hulls_.IsVisible(id) : feed_.BeganAnew(id, tells_bodies);
@@ -69,7 +69,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
 void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   // What changed before the first step need not be told twice.
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
-  const WatchTarget& target = feed_.TargetOf(watch);
+  const WatchTarget& target = ChangeFeed::TargetOf(watch);
   const std::string& prefix = target.ids.empty() ? target.prefix : target.ids.front();
   const auto is_watched = [&](const std::string& id) {
     return target.ids.empty() ? id.starts_with(prefix) : id == prefix;

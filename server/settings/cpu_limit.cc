@@ -62,8 +62,8 @@ CpuLimit ReadCpuLimit(const fs::path& root) {
 }
 
 int DefaultThreads() {
-  static const int threads = ReadCpuLimit().threads();
-  return threads;
+  static const int kThreads = ReadCpuLimit().threads();
+  return kThreads;
 }
 
 }  // namespace hulld::server

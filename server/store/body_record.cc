@@ -69,7 +69,7 @@ constexpr size_t kPieceBytes = sizeof(uint32_t) + 7 * sizeof(double);
 
 size_t StoredBody::MemoryBytes() const {
   size_t bytes = sizeof(*this) + pieces.capacity() * sizeof(StoredPiece);
-  for (const std::string& id : hull_ids) bytes += sizeof(id) + id.capacity();
+  for (const std::string& id : hull_ids) bytes += sizeof(std::string) + id.capacity();
   return bytes;
 }
 

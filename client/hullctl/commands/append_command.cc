@@ -108,8 +108,9 @@ class FileAppender {
     AppendOptions options;
     options.writer_id = arguments_.writer;
     auto opened = client_.OpenAppend(arguments_.hull_id, options);
-    if (opened.ok()) appender_ = *std::move(opened);
-    return opened.status();
+    if (!opened.ok()) return opened.status();
+    appender_ = *std::move(opened);
+    return absl::OkStatus();
   }
 
   const AppendArguments& arguments_;

@@ -33,12 +33,12 @@ struct LoadArguments {
 };
 
 const std::map<std::string, LoadMode>& ModeNames() {
-  static const auto* const names =
+  static const auto* const kNames =
       new std::map<std::string, LoadMode>{{"check", LoadMode::kCheck},
                                           {"batch", LoadMode::kBatch},
                                           {"append", LoadMode::kAppend},
                                           {"mixed", LoadMode::kMixed}};
-  return *names;
+  return *kNames;
 }
 
 // What an item of a request is.

@@ -34,6 +34,7 @@ absl::StatusOr<bool> IsMeant(const Invocation& run, const DeleteArguments& argum
                              const std::vector<Doomed>& doomed) {
   if (arguments.yes || (doomed.size() == 1 && !arguments.has_prefix)) return true;
   std::vector<std::string> ids;
+  ids.reserve(doomed.size());
   for (const Doomed& hull : doomed) ids.push_back(hull.hull_id);
   return ConfirmDeletion(run, ids, "hull", "hulls");
 }

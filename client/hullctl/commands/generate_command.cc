@@ -21,11 +21,11 @@ struct GenerateArguments {
 };
 
 const std::map<std::string, Shape>& ShapeNames() {
-  static const auto* const names = new std::map<std::string, Shape>{{"ball", Shape::kBall},
-                                                                    {"sphere", Shape::kSphere},
-                                                                    {"cube", Shape::kCube},
-                                                                    {"lattice", Shape::kLattice}};
-  return *names;
+  static const auto* const kNames = new std::map<std::string, Shape>{{"ball", Shape::kBall},
+                                                                     {"sphere", Shape::kSphere},
+                                                                     {"cube", Shape::kCube},
+                                                                     {"lattice", Shape::kLattice}};
+  return *kNames;
 }
 
 // True when every coordinate that can come is finite.

@@ -22,13 +22,13 @@ struct ListArguments {
 // What a list is sorted by: the largest first, but IDs ascend.
 using SortKey = std::function<uint64_t(const v1::HullInfo&)>;
 const std::map<std::string, SortKey>& SortKeys() {
-  static const auto* const keys = new std::map<std::string, SortKey>{
+  static const auto* const kKeys = new std::map<std::string, SortKey>{
       {"id", nullptr},
       {"vertices", [](const v1::HullInfo& hull) { return hull.vertex_count(); }},
       {"points", [](const v1::HullInfo& hull) { return hull.counts().received(); }},
       {"revision", [](const v1::HullInfo& hull) { return hull.revision(); }},
       {"created", [](const v1::HullInfo& hull) { return hull.create_revision(); }}};
-  return *keys;
+  return *kKeys;
 }
 
 void Sort(const ListArguments& arguments, v1::ListHullsResponse* response) {

@@ -163,6 +163,7 @@ std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> plane
   std::sort(dual.begin(), dual.end(),
             [&](const Corner& a, const Corner& b) { return less(a.point, b.point); });
   std::vector<Vector> points;
+  points.reserve(dual.size());
   for (const Corner& d : dual) points.push_back(d.point);
   HullBuilder builder;
   if (!builder.Add(points, {.should_stop = should_stop_}).ok()) return {};

@@ -15,9 +15,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The rotation of a pose, as placed hulls compute it.
 Eigen::Matrix3d RotationOf(const Pose& pose) {
-  static const Hull nothing;
-  static const QueryHull no_hull(nothing);
-  return PlacedHull(no_hull, pose).R_WH();
+  static const Hull kNothing;
+  static const QueryHull kNoHull(kNothing);
+  return PlacedHull(kNoHull, pose).R_WH();
 }
 
 }  // namespace

@@ -234,7 +234,7 @@ absl::StatusOr<Answer> SceneSearch::AskWith(uint32_t a, uint32_t b, const QueryO
   if (!IsBody(a) && !IsBody(b)) return CheckCollision(placements_[a], placements_[b], options);
   absl::StatusOr<BodyAnswer> found = CheckBodies(options_->bodies[a], options_->bodies[b], options);
   if (!found.ok()) return found.status();
-  if (of_body != nullptr) *of_body = PiecesAnswer(*std::move(found));
+  if (of_body != nullptr) *of_body = std::move(static_cast<PiecesAnswer&>(*found));
   return std::move(found->answer);
 }
 

@@ -24,15 +24,15 @@ constexpr size_t kEntryBytes = 4;
 
 // Stands in for the hull of placements that cannot be answered for.
 const QueryHull& NoHull() {
-  static const Hull empty;
-  static const QueryHull no_hull(empty);
-  return no_hull;
+  static const Hull kEmpty;
+  static const QueryHull kNoQueryHull(kEmpty);
+  return kNoQueryHull;
 }
 
 // Stands in for the body of such placements.
 const QueryBody& NoBody() {
-  static const QueryBody no_body(NoHull());
-  return no_body;
+  static const QueryBody kNoBody(NoHull());
+  return kNoBody;
 }
 
 bool IsSame(const HullView& a, const HullView& b) {

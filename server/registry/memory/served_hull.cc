@@ -54,10 +54,11 @@ absl::Status CanonicalHull::Make(const QueryHull& version, const HullRecord& rec
   absl::StatusOr<Hull> made = MakeSnapshot(version, record, should_stop);
   lock.lock();
   making_ = false;
-  if (made.ok()) Keep(*std::move(made));
+  const absl::Status status = made.status();
+  if (status.ok()) Keep(*std::move(made));
   lock.unlock();
   changed_.notify_all();
-  return made.status();
+  return status;
 }
 
 const QueryHull& CanonicalHull::query_hull() {

@@ -319,7 +319,7 @@ HullChange Registry::DescribeFound(const std::string& id,
 void Registry::ReadPresent(Locked& locked, ChangeWatch& watch) {
   // What changed before the first step need not be told twice.
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
-  const WatchTarget& target = feed_.TargetOf(watch);
+  const WatchTarget& target = ChangeFeed::TargetOf(watch);
   watch.is_reading = true;
   loaders_->Submit(
       [this, kept = watch.shared_from_this(), reading = ++watch.readings, asked_at = revision_,

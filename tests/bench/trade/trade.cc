@@ -41,8 +41,8 @@ class Measurement {
   bool too_slow() const { return too_slow_; }
   double nanoseconds() const { return 1e9 * Median(seconds_) / static_cast<double>(range_.count); }
 
-  // Question by question, so that it can be given up. Then once more, to see how long it takes: some
-  // methods make what they need when they are first asked.
+  // Question by question, so that it can be given up. Then once more, to see how long it takes:
+  // some methods make what they need when they are first asked.
   void RunFirst(double max_seconds) {
     const double start = ThreadSeconds();
     for (size_t i = 0; i < range_.count && !too_slow_; ++i) {
