@@ -204,12 +204,12 @@ function relation(   s, p, r, key, text, n) {
   head("| vertices | hulld | FCL, libccd | FCL, own | libccd MPR | libccd GJK | Bullet | SAT, plain double |")
   split("sphere:8,sphere:64,sphere:512,sphere:10000,ur5", sets, ",")
   n = split("hulld,FCL libccd,FCL indep,libccd MPR,libccd GJK,Bullet,SAT double", peers, ",")
-  split("far,close,gap,deep", regimes, ",")
+  split("far,close,gap,graze,deep", regimes, ",")
   for (s = 1; s <= 5; s++) {
     printf "| %s |", set_name(sets[s])
     for (p = 1; p <= n; p++) {
       text = ""
-      for (r = 1; r <= 4; r++) {
+      for (r = 1; r <= 5; r++) {
         key = sets[s] " " regimes[r] SUBSEP peers[p]
         text = text (r > 1 ? " / " : "") short(cell[key, "ns"])
         if (cell[key, "wrong"] > 0) text = text " (" cell[key, "wrong"] " wrong)"
@@ -232,12 +232,15 @@ function touching(   s, p, n, key) {
     printf "| %s |", set_name(sets[s])
     for (p = 1; p <= n; p++) {
       key = sets[s] " contact" SUBSEP peers[p]
-      printf " %s (%s) |", short(cell[key, "ns"]), cell[key, "wrong"]
+      printf " %s (%s) |", short(cell[key, "ns"]), share(cell[key, "wrong"], cell[key, "questions"])
     }
     print ""
   }
   measured()
 }
+
+# Percent of all, or "0".
+function share(part, all) { return part == 0 ? "0" : sprintf("%.2g %%", 100 * part / all) }
 
 function lengths(question,   s, p, n, m, key) {
   read_rows("query_" question "_" machine)
@@ -439,7 +442,8 @@ function pair(what, set,   peers, n, i, best) {
     if (best == "" || cell[set, peers[i], "ns"] + 0 < cell[set, best, "ns"] + 0) best = peers[i]
   }
   compare(what, cell[set, "hulld", "ns"], named(best), cell[set, best, "ns"],
-          cell[set, "hulld", "wrong"] " / " cell[set, best, "wrong"])
+          share(cell[set, "hulld", "wrong"], cell[set, "hulld", "questions"]) " / " \
+          share(cell[set, best, "wrong"], cell[set, best, "questions"]))
 }
 # One point and one question of a growing hull.
 function grown(vertices,   fields, step) {

@@ -54,8 +54,9 @@ class ClimbingHull {
   }
 
  private:
-  // Where FCL begins to climb.
-  static constexpr size_t kScanLimit = 32;
+  // FCL begins to climb at 32 vertices. Observed, libccd, questions that were not asked before: a
+  // scan of 64 takes 0.66 to 0.96 of the time of climbing, one of 72 to 220 1.2 to 2 times as long.
+  static constexpr size_t kScanLimit = 64;
 
   const Vector3& Scan(const Vector3& n) const {
     size_t best = 0;

@@ -20,7 +20,7 @@ programs=build/release/bin
 # Threads that wait leave the core to those that work, also where other programs run.
 export OMP_WAIT_POLICY=passive
 
-cmake --preset release -DHULLD_BUILD_BENCH=ON >/dev/null
+cmake --preset release -DHULLD_BUILD_BENCH=ON -DHULLD_BENCH_NATIVE=ON >/dev/null
 cmake --build --preset release --target query_benchmark live_benchmark query_accuracy hulld-bench
 
 for suite in "${suites[@]}"; do
