@@ -173,10 +173,9 @@ absl::StatusOr<ShardsResolved> RefreshPlaced(Shards& shards, std::span<const std
   absl::StatusOr<ShardsResolved> hulls;
   bool have_changed = true;
   while (have_changed) {
-    // NOLINTNEXTLINE(bugprone-use-after-move): have_changed tells that they were looked for again
     if (!bodies.ok()) return bodies.status();
     have_changed = false;
-    known.SetBodies(ids, *std::move(bodies));
+    known.SetBodies(ids, std::exchange(*bodies, {}));
     const auto holds = [&] {
       bodies = BodiesAmong(shards, ids, should_stop);
       have_changed = !bodies.ok() || !known.AreBodies(*bodies);

@@ -188,6 +188,7 @@ TEST_F(StreamCollisionsCall, EveryStepEqualsASingleCheck) {
   Put("square", {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0});
   const std::vector<std::string> ids = {"cube", "ball", "square", "ball"};
   std::vector<v1::Placement> placements;
+  placements.reserve(ids.size());
   for (const std::string& id : ids) placements.push_back(PlacementOf(id, 1.5 * placements.size()));
   Stream stream(*collisions_);
   auto answer = stream.Ask(Open(placements, {0, 1, 1, 2, 2, 3, 3, 0, 0, 2}));
