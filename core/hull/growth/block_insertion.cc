@@ -22,7 +22,7 @@ constexpr size_t kRun = 8;
 // The map of directions (see Surface::MeasureBefore) that a sample is looked up in, and the one
 // that follows where the first leaves many times as many points as the surface has triangles, as it
 // does where points lie along large facets.
-constexpr double kMapFineness = 2.8;
+constexpr double kMapFineness = 2.4;
 constexpr double kWalksPerPoint = 0.2;
 constexpr size_t kManyPerTriangle = 32;
 constexpr double kFineMapFineness = 5.6;

@@ -26,7 +26,7 @@ void ConflictLists::Take(std::span<const Vector> points) {
   Reserve(BlocksFor(points.size()));
   const List all = {static_cast<uint32_t>(end_), static_cast<uint32_t>(points.size())};
   end_ += BlocksFor(points.size());
-  if (!points.empty()) blocks_[end_ - 1].Clear();
+  if (!points.empty()) blocks_[end_ - 1].Fill(PointInside());
   for (size_t i = 0; i < points.size(); ++i) {
     blocks_[all.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, points[i]);
   }
@@ -105,7 +105,7 @@ void ConflictLists::InsertFrom(TriangleId id) {
     if (list.count > 0) sources_.push_back(std::exchange(list, {}));
   }
   const std::span<const TriangleId> targets = surface_.JoinToBoundary(vertices_, apex);
-  if (lists_.size() < surface_.id_bound()) lists_.resize(surface_.id_bound());
+  if (lists_.size() < surface_.id_bound()) lists_.resize(2 * surface_.id_bound());
   if (!sources_.empty()) Distribute(targets);
 }
 
@@ -114,9 +114,10 @@ Vector ConflictLists::RemoveFarthest(TriangleId id) {
   List& list = lists_[id];
   HULLD_CHECK(list.count > 0);
   const size_t i = FarthestAlong(BlocksOf(list), list.count, surface_.triangle(id).normal);
+  const size_t last = list.count - 1;
   const Vector farthest = PointOf(list, i);
-  const Vector last = PointOf(list, list.count - 1);
-  blocks_[list.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, last);
+  Set(list, i, PointOf(list, last));
+  Set(list, last, PointInside());
   --list.count;
   --waiting_;
   return farthest;
@@ -127,17 +128,17 @@ void ConflictLists::Distribute(std::span<const TriangleId> targets) {
   size_t points = 0;
   for (const List& source : sources_) points += source.count;
   moved_ += points;
-  waiting_ -= points;
   // One block beyond the lists takes the points that are inside.
   Reserve(BlocksFor(points) + targets.size() + 1);
+  source_blocks_.clear();
+  for (const List& source : sources_) {
+    for (const PointBlock& block : BlocksOf(source)) source_blocks_.push_back(&block);
+  }
   Match(targets);
   counts_.assign(targets.size() + 1, 0);
-  const int64_t* matches = matches_.data();
-  for (const List& source : sources_) {
-    for (size_t i = 0; i < source.count; ++i) ++counts_[static_cast<size_t>(matches[i] + 1)];
-    matches += BlocksFor(source.count) * PointBlock::kSize;
-  }
-  waiting_ += points - counts_[0];
+  const size_t lanes = source_blocks_.size() * PointBlock::kSize;
+  for (size_t i = 0; i < lanes; ++i) ++counts_[static_cast<size_t>(matches_[i] + 1)];
+  waiting_ = waiting_ - points + (lanes - counts_[0]);
   AllocateLists(targets);
   Scatter();
 }
@@ -152,19 +153,19 @@ void ConflictLists::Match(std::span<const TriangleId> targets) {
                        t.offset,
                        static_cast<double>(t.slope) * size});
   }
-  size_t blocks = 0;
-  for (const List& source : sources_) blocks += BlocksFor(source.count);
-  if (matches_.size() < blocks * PointBlock::kSize) matches_.resize(2 * blocks * PointBlock::kSize);
-  int64_t* matches = matches_.data();
+  const size_t lanes = source_blocks_.size() * PointBlock::kSize;
+  matches_.MakeRoom(lanes, 0);
+  if (!MatchPlanes({source_blocks_.data(), source_blocks_.size()}, planes_, matches_.data())) {
+    return;
+  }
+  int64_t* match = matches_.data();
   for (const List& source : sources_) {
-    const std::span<const PointBlock> of_source = BlocksOf(source);
-    if (MatchPlanes(of_source, planes_, matches)) {
-      for (size_t i = 0; i < source.count; ++i) {
-        if (matches[i] != kUncertain) continue;
-        matches[i] = poll_.Step() ? kBelowAll : MatchExactly(PointOf(source, i), targets);
-      }
+    const size_t room = BlocksFor(source.count) * PointBlock::kSize;
+    for (size_t i = 0; i < room; ++i, ++match) {
+      if (*match != kUncertain) continue;
+      const bool is_filling = i >= source.count;
+      *match = is_filling || poll_.Step() ? kBelowAll : MatchExactly(PointOf(source, i), targets);
     }
-    matches += of_source.size() * PointBlock::kSize;
   }
 }
 
@@ -172,14 +173,16 @@ void ConflictLists::Match(std::span<const TriangleId> targets) {
 // is inside goes to a place that never advances.
 void ConflictLists::Scatter() {
   const int64_t* matches = matches_.data();
-  for (const List& source : sources_) {
-    for (size_t i = 0; i < source.count; ++i) {
+  size_t* const cursors = cursors_.data();
+  PointBlock* const blocks = blocks_.get();
+  for (const PointBlock* const block : source_blocks_) {
+    for (size_t i = 0; i < PointBlock::kSize; ++i) {
       const auto match = static_cast<size_t>(matches[i] + 1);
-      const size_t at = cursors_[match];
-      cursors_[match] += match != 0;
-      blocks_[at / PointBlock::kSize].Set(at % PointBlock::kSize, PointOf(source, i));
+      const size_t at = cursors[match];
+      cursors[match] += match != 0;
+      blocks[at / PointBlock::kSize].Set(at % PointBlock::kSize, block->point(i));
     }
-    matches += BlocksFor(source.count) * PointBlock::kSize;
+    matches += PointBlock::kSize;
   }
 }
 
@@ -201,24 +204,24 @@ int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const Triangl
 // cursors_[0] to a block beyond all lists. Requires that Reserve has made room.
 void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
   cursors_.resize(targets.size() + 1);
-  const size_t queued_before = queue_.size();
-  queue_.resize(queued_before + targets.size());
-  TriangleId* queued = queue_.data() + queued_before;
+  queue_.MakeRoom(queue_.size() + targets.size(), queue_.size());
+  TriangleId* queued = queue_.end();
+  const Vector inside = PointInside();
   for (size_t k = 0; k < targets.size(); ++k) {
     const uint32_t count = counts_[k + 1];
     const size_t blocks = BlocksFor(count);
     cursors_[k + 1] = end_ * PointBlock::kSize;
     // Whether a target gets points cannot be foreseen, so nothing branches on it: an empty list
-    // clears a block that is free.
-    HULLD_CHECK(end_ + blocks < capacity_);
+    // fills a block that is free.
+    HULLD_DCHECK(end_ + blocks < capacity_);
     lists_[targets[k]] = {static_cast<uint32_t>(end_), count};
     *queued = targets[k];
     queued += count > 0;
     // The last may be partly filled.
-    blocks_[end_ + std::max(blocks, size_t{1}) - 1].Clear();
+    blocks_[end_ + std::max(blocks, size_t{1}) - 1].Fill(inside);
     end_ += blocks;
   }
-  queue_.resize(static_cast<size_t>(queued - queue_.data()));
+  queue_.SetSize(static_cast<size_t>(queued - queue_.data()));
   HULLD_CHECK(end_ < capacity_);
   cursors_[0] = end_ * PointBlock::kSize;
 }
@@ -229,7 +232,8 @@ void ConflictLists::Reserve(size_t blocks) {
   size_t kept = 0;
   for (const List& list : lists_) kept += BlocksFor(list.count);
   for (const List& list : sources_) kept += BlocksFor(list.count);
-  capacity_ = 2 * (kept + blocks);
+  // The more room, the rarer all blocks are moved; most of it is never touched.
+  capacity_ = 4 * (kept + blocks);
   // Lists hold the numbers of blocks in 32 bits.
   HULLD_CHECK(capacity_ <= UINT32_MAX);
   auto packed = std::make_unique_for_overwrite<PointBlock[]>(capacity_);

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/scratch_list.h"
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/point_blocks.h"
 #include "core/hull/growth/surface.h"
@@ -34,6 +35,7 @@ class ConflictLists {
 
   // The poll's steps are single insertions or exact tests. After it said stop, InsertAll says so,
   // and some points that are waiting may be lost.
+  // Requires that an interior point is known.
   ConflictLists(Surface& surface, VertexTable& vertices, StopPoll& poll)
       : surface_(surface), vertices_(vertices), poll_(poll) {}
 
@@ -49,7 +51,8 @@ class ConflictLists {
   std::vector<Vector> TakeRest();
 
  private:
-  // A range of blocks_, the last of which may be partly filled.
+  // A range of blocks_. What the last one has room for beyond the list's points is filled with a
+  // point inside, which sees nothing.
   struct List {
     uint32_t first_block = 0;
     uint32_t count = 0;
@@ -60,6 +63,9 @@ class ConflictLists {
   }
   Vector PointOf(const List& list, size_t i) const {
     return blocks_[list.first_block + i / PointBlock::kSize].point(i % PointBlock::kSize);
+  }
+  void Set(const List& list, size_t i, const Vector& p) {
+    blocks_[list.first_block + i / PointBlock::kSize].Set(i % PointBlock::kSize, p);
   }
   bool IsMostlyOutside(size_t insertions);
   void CountTaken(std::span<const Vector> points);
@@ -72,6 +78,8 @@ class ConflictLists {
   void Scatter();
   void Reserve(size_t blocks);
 
+  const Vector& PointInside() const { return surface_.directions()->center(); }
+
   Surface& surface_;
   VertexTable& vertices_;
   StopPoll& poll_;
@@ -82,7 +90,7 @@ class ConflictLists {
   // By triangle.
   std::vector<List> lists_;
   // Triangles that have had a list, in the order in which they are looked at.
-  std::vector<TriangleId> queue_;
+  ScratchList<TriangleId> queue_;
   size_t next_in_queue_ = 0;
   // How many points are in lists, how many were taken in all, and how often one was moved.
   size_t waiting_ = 0;
@@ -93,11 +101,12 @@ class ConflictLists {
   // Largest absolute coordinate of a point.
   double size_ = 0;
 
-  // Of one distribution: the lists to empty, the targets' planes, what MatchPlanes says, and, by
-  // match + 1, how many points there are and where the next one goes.
+  // Of one distribution: the lists to empty, their blocks, the targets' planes, what MatchPlanes
+  // says, and, by match + 1, how many points there are and where the next one goes.
   std::vector<List> sources_;
+  ScratchList<const PointBlock*> source_blocks_;
   std::vector<PlaneWithBound> planes_;
-  std::vector<int64_t> matches_;
+  ScratchList<int64_t> matches_;
   std::vector<uint32_t> counts_;
   std::vector<size_t> cursors_;
 };

@@ -11,11 +11,12 @@ using Lanes = double __attribute__((vector_size(32)));
 using Mask = int64_t __attribute__((vector_size(32)));
 
 // One body for both instruction sets. Not contracted to FMA, so both round alike.
-__attribute__((always_inline)) inline bool MatchPlanesBody(std::span<const PointBlock> blocks,
-                                                           std::span<const PlaneWithBound> planes,
-                                                           int64_t* matches) {
+__attribute__((always_inline)) inline bool MatchPlanesBody(
+    std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
+    int64_t* matches) {
   Mask are_uncertain = {0, 0, 0, 0};
-  for (const PointBlock& block : blocks) {
+  for (const PointBlock* const at : blocks) {
+    const PointBlock& block = *at;
     Lanes x;
     Lanes y;
     Lanes z;
@@ -45,22 +46,58 @@ __attribute__((always_inline)) inline bool MatchPlanesBody(std::span<const Point
 }
 static_assert(kUncertain == kBelowAll - 1);
 
-bool MatchPlanesBaseline(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
-                         int64_t* matches) {
+bool MatchPlanesBaseline(std::span<const PointBlock* const> blocks,
+                         std::span<const PlaneWithBound> planes, int64_t* matches) {
   return MatchPlanesBody(blocks, planes, matches);
 }
 
 #ifdef HULLD_HAS_AVX2_PATH
-__attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock> blocks,
+__attribute__((target("avx2"))) bool MatchPlanesAvx2(std::span<const PointBlock* const> blocks,
                                                      std::span<const PlaneWithBound> planes,
                                                      int64_t* matches) {
   return MatchPlanesBody(blocks, planes, matches);
 }
 #endif
 
+// Lane by lane, and then the best of the lanes, the first one of equals.
+__attribute__((always_inline)) inline size_t FarthestAlongBody(std::span<const PointBlock> blocks,
+                                                               size_t count,
+                                                               const Vector& direction) {
+  Lanes most = {-INFINITY, -INFINITY, -INFINITY, -INFINITY};
+  Mask farthest = {0, 1, 2, 3};
+  Mask index = {0, 1, 2, 3};
+  const auto end = static_cast<int64_t>(count);
+  for (const PointBlock& block : blocks) {
+    Lanes x;
+    Lanes y;
+    Lanes z;
+    __builtin_memcpy(&x, block.x, sizeof(x));
+    __builtin_memcpy(&y, block.y, sizeof(y));
+    __builtin_memcpy(&z, block.z, sizeof(z));
+    const Lanes value = direction.x() * x + direction.y() * y + direction.z() * z;
+    const Mask is_better = (value > most) & (index < end);
+    most = is_better ? value : most;
+    farthest = is_better ? index : farthest;
+    index += static_cast<int64_t>(PointBlock::kSize);
+  }
+  size_t best = 0;
+  for (size_t lane = 1; lane < PointBlock::kSize; ++lane) {
+    const bool is_earlier = most[lane] == most[best] && farthest[lane] < farthest[best];
+    if (most[lane] > most[best] || is_earlier) best = lane;
+  }
+  return static_cast<size_t>(farthest[best]);
+}
+
+#ifdef HULLD_HAS_AVX2_PATH
+__attribute__((target("avx2"))) size_t FarthestAlongAvx2(std::span<const PointBlock> blocks,
+                                                         size_t count, const Vector& direction) {
+  return FarthestAlongBody(blocks, count, direction);
+}
+#endif
+
 }  // namespace
 
-bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
+bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
                  int64_t* matches) {
 #ifdef HULLD_HAS_AVX2_PATH
   if (CurrentSimdPath() == SimdPath::kAvx2) return MatchPlanesAvx2(blocks, planes, matches);
@@ -70,19 +107,10 @@ bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBo
 
 size_t FarthestAlong(std::span<const PointBlock> blocks, size_t count, const Vector& direction) {
   HULLD_CHECK(count > 0 && BlocksFor(count) <= blocks.size());
-  size_t farthest = 0;
-  double most = -INFINITY;
-  for (size_t i = 0; i < count; ++i) {
-    const PointBlock& block = blocks[i / PointBlock::kSize];
-    const size_t k = i % PointBlock::kSize;
-    const double value =
-        direction.x() * block.x[k] + direction.y() * block.y[k] + direction.z() * block.z[k];
-    if (value > most) {
-      most = value;
-      farthest = i;
-    }
-  }
-  return farthest;
+#ifdef HULLD_HAS_AVX2_PATH
+  if (CurrentSimdPath() == SimdPath::kAvx2) return FarthestAlongAvx2(blocks, count, direction);
+#endif
+  return FarthestAlongBody(blocks, count, direction);
 }
 
 }  // namespace hulld

@@ -9,9 +9,7 @@
 
 namespace hulld {
 
-// Points in fours, each coordinate together, for testing four at a time against planes. The last
-// block of a list may hold points that do not count; they are tested as well, so they must be
-// initialized.
+// Points in fours, each coordinate together, for testing four at a time against planes.
 struct PointBlock {
   static constexpr size_t kSize = 4;
 
@@ -25,10 +23,10 @@ struct PointBlock {
     y[i] = p.y();
     z[i] = p.z();
   }
-  // Component by component: as one object, compilers clear it by a string instruction, which takes
+  // Component by component: as one object, compilers copy it by a string instruction, which takes
   // longer to start than all of this.
-  void Clear() {
-    for (size_t i = 0; i < kSize; ++i) Set(i, Vector::Zero());
+  void Fill(const Vector& p) {
+    for (size_t i = 0; i < kSize; ++i) Set(i, p);
   }
 };
 
@@ -57,7 +55,7 @@ inline constexpr int64_t kUncertain = -2;
 // For each point of the blocks, the index of a plane that it is certainly above, the one with the
 // largest normal . p - offset, else kBelowAll or kUncertain. matches: 4 per block. True when some
 // are uncertain. The same bits with AVX2 and without.
-bool MatchPlanes(std::span<const PointBlock> blocks, std::span<const PlaneWithBound> planes,
+bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
                  int64_t* matches);
 
 // The index of the point, of the first `count`, with the largest component along the direction.

@@ -27,6 +27,21 @@ Vector WithUnitSize(const Vector& v) {
   return v.unaryExpr([exponent](double component) { return std::ldexp(component, -exponent); });
 }
 
+// The normal, the offset and the slope.
+inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const Vector& c) {
+  Vector e = b - a;
+  Vector f = c - a;
+  double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
+  if (!(slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope)) {
+    e = WithUnitSize(e);
+    f = WithUnitSize(f);
+    slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
+  }
+  t.normal = Cross(e, f);
+  t.offset = t.normal.dot(a);
+  t.slope = static_cast<float>(slope * (1 + 0x1p-20));
+}
+
 }  // namespace
 
 Surface::Surface(const VertexTable& vertices, std::span<const VertexId> polygon, VertexId apex) {
@@ -83,7 +98,7 @@ std::span<const TriangleId> Surface::RemoveVisible(VertexTable& vertices, const 
   if (!CollectCertainRegion(seen, point, size)) CollectRegion(vertices, seen, point, size);
   for (uint32_t k = 0; k < horizon_.size(); ++k) place_of_vertex_.Mutable(horizon_[k].tail) = k;
   RemoveVertices(vertices);
-  return region_;
+  return {region_.data(), region_.size()};
 }
 
 std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const Vector& point) {
@@ -97,7 +112,7 @@ std::span<const TriangleId> Surface::JoinToBoundary(VertexTable& vertices, const
   if (directions_) {
     extent_ = std::max(extent_, LargestComponent(point - directions_->center()));
   }
-  const std::span<const TriangleId> created = std::span(region_).first(horizon_.size());
+  const std::span<const TriangleId> created(region_.data(), horizon_.size());
   DcheckStar(*this, vertices, created, apex);
   return created;
 }
@@ -172,11 +187,6 @@ void Surface::KeepDirections() {
   before_->directions = std::move(directions_);
 }
 
-double Surface::SizeWith(const VertexTable& vertices, const Vector& point) const {
-  const double size = vertices.max_abs_coordinate() + LargestComponent(point);
-  return size >= kPlaneMinCoordinate && size <= kPlaneMaxCoordinate ? size : INFINITY;
-}
-
 int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
                          const Vector& point) const {
   const auto& [a, b, c] = t.corners;
@@ -186,18 +196,8 @@ int Surface::ExactSideOf(const VertexTable& vertices, const SurfaceTriangle& t,
 void Surface::SetTriangle(const VertexTable& vertices, TriangleId id, VertexId a, VertexId b,
                           VertexId c) {
   SurfaceTriangle& t = triangles_.Mutable(id);
-  Vector e = vertices[b] - vertices[a];
-  Vector f = vertices[c] - vertices[a];
-  double slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
-  if (!(slope >= kPlaneMinSlope && slope <= kPlaneMaxSlope)) {
-    e = WithUnitSize(e);
-    f = WithUnitSize(f);
-    slope = kPlaneErrorFactor * LargestComponent(e) * LargestComponent(f);
-  }
+  SetPlane(t, vertices[a], vertices[b], vertices[c]);
   t.corners = {a, b, c};
-  t.normal = Cross(e, f);
-  t.offset = t.normal.dot(vertices[a]);
-  t.slope = static_cast<float>(slope * (1 + 0x1p-20));
   t.mark = 0;
   t.flat = 0;
 }
@@ -263,7 +263,8 @@ uint32_t Surface::NextMark() {
 template <typename Classify>
 void Surface::Traverse(TriangleId first, Classify&& classify) {
   const uint32_t mark = NextMark();
-  region_.assign(1, first);
+  region_.clear();
+  region_.push_back(first);
   horizon_.clear();
   triangles_.Mutable(first).mark = mark;
   visits_.clear();
@@ -301,41 +302,46 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
 // each neighbour is written to both lists, and one of them then counts it.
 bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
   const uint32_t mark = NextMark();
+  // Local, as what is stored below may be them for all that the compiler knows.
+  const double x = point.x();
+  const double y = point.y();
+  const double z = point.z();
   size_t seen = 1;
   size_t edges = 0;
-  // Room for what one triangle adds.
-  const auto make_room = [](auto& list, size_t used) {
-    if (list.size() < used + 3) list.resize(used + 8);
-  };
-  make_room(region_, seen);
+  region_.MakeRoom(4, 0);
   region_[0] = first;
   triangles_.Mutable(first).mark = mark;
   for (size_t k = 0; k < seen; ++k) {
-    make_room(region_, seen);
-    make_room(horizon_, edges);
-    const TriangleId id = region_[k];
+    // For what one triangle adds.
+    region_.MakeRoom(seen + 3, seen);
+    horizon_.MakeRoom(edges + 3, edges);
+    TriangleId* const region = region_.data();
+    HorizonEdge* const horizon = horizon_.data();
+    const TriangleId id = region[k];
     const SurfaceTriangle& t = triangles_[id];
-    bool is_certain = true;
+    uint32_t is_certain = 1;
     for (uint32_t i = 0; i < 3; ++i) {
       const TriangleId next = t.neighbours[i];
       // All of them change in the end.
       SurfaceTriangle& other = triangles_.Mutable(next);
-      const double value = other.normal.dot(point) - other.offset;
+      const double* const normal = other.normal.data();
+      const double value = ((normal[0] * x + normal[1] * y) + normal[2] * z) - other.offset;
       const double bound = static_cast<double>(other.slope) * size;
-      const bool is_seen = value > bound;
-      is_certain &= is_seen | (value < -bound);
-      region_[seen] = next;
-      seen += static_cast<size_t>(is_seen & (other.mark != mark));
-      other.mark = is_seen ? mark : other.mark;
-      const auto back = static_cast<uint16_t>((other.neighbours[1] == id) +
-                                              2 * static_cast<int>(other.neighbours[2] == id));
-      horizon_[edges] = {t.corners[i], t.corners[NextEdge(i)], next, back, false};
-      edges += static_cast<size_t>(!is_seen);
+      const uint32_t is_seen = value > bound;
+      is_certain &= is_seen | static_cast<uint32_t>(value < -bound);
+      const uint32_t mark_before = other.mark;
+      region[seen] = next;
+      seen += is_seen & static_cast<uint32_t>(mark_before != mark);
+      other.mark = is_seen != 0 ? mark : mark_before;
+      const auto back = static_cast<uint16_t>(static_cast<uint32_t>(other.neighbours[1] == id) +
+                                              2 * static_cast<uint32_t>(other.neighbours[2] == id));
+      horizon[edges] = {t.corners[i], t.corners[NextEdge(i)], next, back, false};
+      edges += is_seen ^ 1;
     }
-    if (!is_certain) return false;
+    if (is_certain == 0) return false;
   }
-  region_.resize(seen);
-  horizon_.resize(edges);
+  region_.SetSize(seen);
+  horizon_.SetSize(edges);
   return true;
 }
 
@@ -393,12 +399,15 @@ bool Surface::IsFlatAround(const VertexTable& vertices, const HorizonEdge& befor
 // Removes the vertices that only triangles of the region have: those not on the horizon. By Euler's
 // formula for a disk there are (triangles - edges of the boundary + 2) / 2 of them, mostly none.
 void Surface::RemoveVertices(VertexTable& vertices) {
-  if (region_.size() + 2 == horizon_.size()) return;
+  size_t left = (region_.size() + 2 - horizon_.size()) / 2;
   for (const TriangleId id : region_) {
+    if (left == 0) return;
     for (const VertexId v : triangles_[id].corners) {
       const uint32_t place = place_of_vertex_[v];
       if (place < horizon_.size() && horizon_[place].tail == v) continue;
-      if (vertices.IsAlive(v)) vertices.Remove(v);
+      if (!vertices.IsAlive(v)) continue;
+      vertices.Remove(v);
+      --left;
     }
   }
 }
@@ -408,25 +417,34 @@ void Surface::JoinHorizon(const VertexTable& vertices, VertexId apex) {
   const size_t old_count = region_.size();
   const size_t new_count = horizon_.size();
   while (region_.size() < new_count) region_.push_back(NewId());
+  const TriangleId* const region = region_.data();
+  const Vector top = vertices[apex];
   for (size_t k = 0; k < new_count; ++k) {
-    const HorizonEdge& edge = horizon_[k];
-    const TriangleId id = region_[k];
-    SetTriangle(vertices, id, edge.tail, edge.head, apex);
+    const HorizonEdge edge = horizon_[k];
+    const TriangleId id = region[k];
+    const TriangleId after = region[place_of_vertex_[edge.head]];
     SurfaceTriangle& t = triangles_.Mutable(id);
-    const TriangleId after = region_[place_of_vertex_[edge.head]];
+    SetPlane(t, vertices[edge.tail], vertices[edge.head], top);
+    t.corners = {edge.tail, edge.head, apex};
+    t.neighbours[0] = edge.beyond;
     t.neighbours[1] = after;
+    t.mark = 0;
+    t.flat = edge.is_flat;
     triangles_.Mutable(after).neighbours[2] = id;
-    Link(id, 0, edge.beyond, edge.edge_beyond, edge.is_flat);
+    SurfaceTriangle& beyond = triangles_.Mutable(edge.beyond);
+    beyond.neighbours[edge.edge_beyond] = id;
+    beyond.flat = (beyond.flat & ~(1u << edge.edge_beyond)) | static_cast<uint32_t>(edge.is_flat)
+                                                                  << edge.edge_beyond;
   }
   for (size_t k = new_count; k < old_count; ++k) {
-    SurfaceTriangle& t = triangles_.Mutable(region_[k]);
+    SurfaceTriangle& t = triangles_.Mutable(region[k]);
     t.corners[0] = kDead;
-    t.neighbours[0] = region_[0];
-    free_.push_back(region_[k]);
+    t.neighbours[0] = region[0];
+    free_.push_back(region[k]);
   }
   steps_ += 1 + (old_count + new_count) / kTrianglesPerStep;
   alive_ = alive_ - old_count + new_count;
-  last_ = region_[0];
+  last_ = region[0];
 }
 
 }  // namespace hulld

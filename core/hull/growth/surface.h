@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/check.h"
+#include "core/base/scratch_list.h"
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/chunked_vector.h"
 #include "core/hull/growth/direction_map.h"
@@ -95,8 +96,11 @@ class Surface {
   std::optional<Location> Locate(const VertexTable& vertices, const Vector& point) {
     HULLD_CHECK(directions_.has_value());
     const size_t cell = directions_->PlaceOf(point).cell;
-    const std::optional<Location> location =
-        Walk(vertices, point, SizeWith(vertices, point), Alive(directions_->hint(cell)), work_);
+    const double size = SizeWith(vertices, point);
+    const TriangleId start = Alive(directions_->hint(cell));
+    ++work_;
+    std::optional<Location> location = SeenNear(start, point, size);
+    if (!location) location = Walk(vertices, point, size, start, work_);
     if (location) directions_->SetHint(cell, location->triangle);
     return location;
   }
@@ -187,7 +191,10 @@ class Surface {
   // IDs of triangles lie below this.
   size_t id_bound() const { return triangles_.size(); }
   // What a plane's slope is relative to; infinite where the bound would not hold.
-  double SizeWith(const VertexTable& vertices, const Vector& point) const;
+  double SizeWith(const VertexTable& vertices, const Vector& point) const {
+    const double size = vertices.max_abs_coordinate() + LargestComponent(point);
+    return size >= kPlaneMinCoordinate && size <= kPlaneMaxCoordinate ? size : INFINITY;
+  }
   // Triangles that are alive, and IDs that wait to be used again.
   size_t triangle_count() const { return alive_; }
   size_t free_count() const { return free_.size(); }
@@ -255,6 +262,26 @@ class Surface {
   TriangleId NewId();
   void Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat);
 
+  // Of a triangle and those beyond its edges, the one that the point is farthest outside, where
+  // doubles are certain that it is. Faster than the steps of a walk that it saves.
+  std::optional<Location> SeenNear(TriangleId id, const Vector& point, double size) const {
+    const SurfaceTriangle& t = triangles_[id];
+    TriangleId best = id;
+    double most = HeightAbove(t, point, size);
+    for (const TriangleId next : t.neighbours) {
+      const double height = HeightAbove(triangles_[next], point, size);
+      best = height > most ? next : best;
+      most = std::max(most, height);
+    }
+    if (!(most > 0)) return std::nullopt;
+    return Location{Side::kOutside, best};
+  }
+  // The point's height above the triangle's plane, times the length of its normal, where that is
+  // certainly above zero; else zero.
+  static double HeightAbove(const SurfaceTriangle& t, const Vector& point, double size) {
+    const double height = t.normal.dot(point) - t.offset;
+    return height > static_cast<double>(t.slope) * size ? height : 0;
+  }
   std::optional<Location> Walk(const VertexTable& vertices, const Vector& point, double size,
                                TriangleId start, uint64_t& steps) const;
   Ray RayTo(const Vector& point) const;
@@ -335,9 +362,9 @@ class Surface {
 
   // What one insertion works with: the triangles that the point sees or whose planes hold it, their
   // boundary, and the stack of the traversal.
-  std::vector<TriangleId> region_;
-  std::vector<HorizonEdge> horizon_;
-  std::vector<Visit> visits_;
+  ScratchList<TriangleId> region_;
+  ScratchList<HorizonEdge> horizon_;
+  ScratchList<Visit> visits_;
   // The triangles that go though the point does not see them.
   std::vector<TriangleId> flat_stars_;
   // The number of the traversal.
