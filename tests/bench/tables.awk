@@ -212,7 +212,7 @@ function relation(   s, p, r, key, text, n) {
       for (r = 1; r <= 5; r++) {
         key = sets[s] " " regimes[r] SUBSEP peers[p]
         text = text (r > 1 ? " / " : "") short(cell[key, "ns"])
-        if (cell[key, "wrong"] > 0) text = text " (" cell[key, "wrong"] " wrong)"
+        if (cell[key, "wrong"] > 0) text = text " (" share(cell[key, "wrong"], cell[key, "questions"]) " wrong)"
       }
       printf " %s |", p == 1 ? "**" text "**" : text
     }

@@ -4,8 +4,9 @@
 //
 // For each number of vertices (64 to 1000000, in tens from 1000 on, where none is given): starts a
 // hulld of its own on a durable store and asks single questions about a hull of so many vertices
-// and a probe near it: at rest; right after each acknowledged chunk of one outside point; while
-// another connection streams such chunks at full rate; about another hull meanwhile, which tells
+// and a probe near it: at rest; right after each acknowledged chunk of one outside point; about
+// another hull then, which tells what the append costs any call that follows it; while another
+// connection streams such chunks at full rate; about another hull meanwhile, which tells
 // what the machine's load alone costs; and as the first question after a restart. One row of CSV
 // per case: the questions' percentiles, their ratios to those at rest, and the writer's rate, which
 // the row "writer alone" has without any reader. The cases take turns, so that drifts of the
@@ -143,6 +144,7 @@ void Measure(const std::string& program, int vertices) {
                                             "10000000",   "--log-level", "info"};
   Row rest = {"at rest"};
   Row after = {"after an append"};
+  Row after_other = {"another hull after an append"};
   Row beside = {"beside a writer"};
   Row other = {"another hull beside a writer"};
   Row alone = {"writer alone"};
@@ -164,6 +166,7 @@ void Measure(const std::string& program, int vertices) {
         GrowingWriter writer(ConnectAlone(server.address()), kHull, "after" + number);
         const auto append = [&] { writer.SendAndReceive(); };
         MeasureTurn(*stub, kHull, append, &after);
+        MeasureTurn(*stub, kResting, append, &after_other);
       }
       const StreamingWriter writer(server.address(), "beside" + number);
       Count(
@@ -183,7 +186,7 @@ void Measure(const std::string& program, int vertices) {
     Require(v1::HullService::NewStub(channel)->ListHulls(&context, {}, &page), "ListHulls");
     cold.times.push_back(Ask(*v1::CollisionService::NewStub(channel), kHull, 0));
   }
-  for (Row* row : {&rest, &after, &beside, &other, &alone, &cold})
+  for (Row* row : {&rest, &after, &after_other, &beside, &other, &alone, &cold})
     Print(vertices, row, &rest.times);
   std::filesystem::remove_all(directory);
 }
