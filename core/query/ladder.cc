@@ -25,7 +25,8 @@ bool SpheresSeparate(const FloatPair& pair, const PlainVector& n) {
 // n separates them, or that the segment between the centres is covered by their insides.
 std::optional<Relation> CompareOnCenterLine(const FloatPair& pair, const PlainVector& n,
                                             const FloatPair::CenterView& view) {
-  // Where one is unknown, no comparison holds.
+  if (!view.known()) return std::nullopt;
+  // Where one is not a number, no comparison holds.
   const CenterBounds::Bounds a = view.bounds_a();
   const CenterBounds::Bounds b = view.bounds_b();
   const double error = kCenterSupportFactor * LargestComponent(n) * pair.size();

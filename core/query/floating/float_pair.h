@@ -140,6 +140,8 @@ class FloatPair {
 
 class FloatPair::CenterView {
  public:
+  // Whether both hulls have bounds there.
+  bool known() const { return place_a_.known() && place_b_.known(); }
   CenterBounds::Bounds bounds_a() const { return pair_->a_->query_hull().BoundsAt(place_a_, n_a_); }
   CenterBounds::Bounds bounds_b() const { return pair_->b_->query_hull().BoundsAt(place_b_, n_b_); }
   // About the direction from A's surface to B's, where the line of the centres crosses them; zero

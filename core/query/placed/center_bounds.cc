@@ -292,7 +292,7 @@ class Lookout {
 }  // namespace
 
 CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const Vector& center,
-                           double max_abs, const SupportMap& support) {
+                           double max_abs, const SupportMap& support, Making making) {
   if (dimension < 3) return;
   double radius = 0;
   for (const Vector& v : points) radius = std::max(radius, (v - center).cwiseAbs().maxCoeff());
@@ -304,49 +304,53 @@ CenterBounds::CenterBounds(std::span<const Vector> points, int dimension, const 
   half_ = 0.5 * side_;
   unit_ = std::ldexp(1.0, std::ilogb(radius));
   per_unit_ = 1 / unit_;
-  making_ = std::make_unique<Making>();
-  making_->points = points;
-  making_->center = center;
-  making_->radius = radius;
-  making_->max_abs = max_abs;
-  making_->support = &support;
+  map_ = std::make_unique<Map>();
+  map_->points = points;
+  map_->center = center;
+  map_->radius = radius;
+  map_->max_abs = max_abs;
+  map_->support = &support;
+  if (making == Making::kAtFirstLook) {
+    for (std::atomic<uint64_t>& cells : map_->awaited)
+      cells.store(~uint64_t{0}, std::memory_order_relaxed);
+  }
 }
 
 void CenterBounds::MakeCell(uint32_t face, uint32_t i, uint32_t j) const {
-  const std::lock_guard lock(making_->mutex);
-  if (making_->corners.empty()) Begin();
+  const std::lock_guard lock(map_->mutex);
+  if (map_->corners.empty()) Begin();
   const uint32_t row = side_ + 1;
   const auto first = static_cast<uint32_t>(CubeCell(face, row, i, j));
   for (const uint32_t corner : {first, first + 1, first + row, first + row + 1}) {
     MakeSupport(corner);
-    if (making_->largest_gauge < kInfinity) MakeGauge(corner);
+    if (map_->largest_gauge < kInfinity) MakeGauge(corner);
   }
-  making_->cells[face].fetch_or(uint64_t{1} << (i * side_ + j), std::memory_order_release);
+  map_->cells[face].fetch_or(uint64_t{1} << (i * side_ + j), std::memory_order_release);
 }
 
 // Makes room for the corners and finds the largest gauge: that of the cube's eight own corners, as
 // the gauge is convex on each face. It stays unknown unless the centre is certain to be inside.
 void CenterBounds::Begin() const {
-  making_->corners.resize(corner_count(), {kUnknown, kUnknown});
-  making_->per_width = PerWidth(*making_->support);
-  Lookout lookout(making_->points, making_->center, *making_->support, making_->per_width);
+  map_->corners.resize(corner_count(), {kUnknown, kUnknown});
+  map_->per_width = PerWidth(*map_->support);
+  Lookout lookout(map_->points, map_->center, *map_->support, map_->per_width);
   if (!lookout.IsInside()) return;
   double least = kInfinity;
   for (uint32_t octant = 0; octant < 8; ++octant) {
     const auto sign = [octant](uint32_t axis) { return (octant >> axis & 1) == 0 ? 1.0 : -1.0; };
     least = std::min(least, lookout.Reach(Vector(sign(0), sign(1), sign(2))));
     // Only a centre that is surrounded is strictly inside, up to rounding.
-    if (!(least > 0 && least >= kCenterLeastRadius * making_->max_abs)) return;
+    if (!(least > 0 && least >= kCenterLeastRadius * map_->max_abs)) return;
   }
-  making_->largest_gauge = (1 + kCenterMargin) / least;
+  map_->largest_gauge = (1 + kCenterMargin) / least;
 }
 
 void CenterBounds::MakeSupport(uint32_t corner) const {
-  std::vector<Corner>& corners = making_->corners;
+  std::vector<Corner>& corners = map_->corners;
   const auto& [n, twin] = Corners(side_)[corner];
   if (std::isnan(corners[twin].support)) {
-    const double margin = kCenterMargin * making_->radius;
-    const double reach = making_->support->Farthest(n).value - n.dot(making_->center);
+    const double margin = kCenterMargin * map_->radius;
+    const double reach = map_->support->Farthest(n).value - n.dot(map_->center);
     corners[twin].support = RoundedUp((reach + margin) * per_unit_);
   }
   // A twin that is made already may be read by others.
@@ -355,7 +359,7 @@ void CenterBounds::MakeSupport(uint32_t corner) const {
 
 // Requires a largest gauge that is known.
 float CenterBounds::MakeGauge(uint32_t corner) const {
-  std::vector<Corner>& corners = making_->corners;
+  std::vector<Corner>& corners = map_->corners;
   float& gauge = corners[corner].gauge;
   if (!std::isnan(gauge)) return gauge;
   const uint32_t row = side_ + 1;
@@ -366,10 +370,10 @@ float CenterBounds::MakeGauge(uint32_t corner) const {
   }
   const auto& [d, twin] = Corners(side_)[corner];
   if (!std::isnan(corners[twin].gauge)) return gauge = corners[twin].gauge;
-  Lookout lookout(making_->points, making_->center, *making_->support, making_->per_width);
+  Lookout lookout(map_->points, map_->center, *map_->support, map_->per_width);
   const double t = lookout.Reach(d);
   // Infinite where nothing was found.
-  gauge = RoundedUp(std::min((1 + kCenterMargin) / t, making_->largest_gauge) * unit_);
+  gauge = RoundedUp(std::min((1 + kCenterMargin) / t, map_->largest_gauge) * unit_);
   return corners[twin].gauge = gauge;
 }
 

@@ -32,22 +32,28 @@ namespace hulld {
 // cell, and the same mean of their values bounds its own. Where the hull is round, what is lost
 // shrinks with the square of a cell's width.
 //
-// A cell is made when a direction first leads into it: most hulls are looked at from few sides.
-// What it holds does not depend on when it is made. Readable by any thread.
+// A cell is made when a direction leads into it, for the first or the second time: most hulls are
+// looked at from few sides. What it holds does not depend on when it is made. Readable by any
+// thread.
 class CenterBounds {
  public:
+  // When a cell is made. At the first look, so that answers do not depend on what was asked before,
+  // or at the second, so that a hull that is asked about a few times costs less: a cell costs as
+  // much as several questions. Until then the bounds are unknown there.
+  enum class Making { kAtFirstLook, kAtSecondLook };
+
   // None: every bound is unknown.
   CenterBounds() = default;
   // Of the hull of some points about a centre. None for one that is flat (`dimension` below 3). The
   // gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
   // largest absolute coordinate. The points and the support map must outlive the bounds and stay in
-  // place. Cost: O(V) comparisons; of the first direction some 100 support points more, and of the
-  // first in each of 24 or 384 cells some 25.
+  // place. Cost: O(V) comparisons; of the first cell that is made some 100 support points more, and
+  // of each of 24 or 384 cells some 25.
   CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
-               const SupportMap& support);
+               const SupportMap& support, Making making);
   CenterBounds(const Hull& hull, const SupportMap& support)
       : CenterBounds(hull.vertices(), hull.dimension(), hull.center(), hull.max_abs_coordinate(),
-                     support) {}
+                     support, Making::kAtFirstLook) {}
 
   // Not a number where unknown.
   struct Bounds {
@@ -56,7 +62,7 @@ class CenterBounds {
   };
   // The place of a direction among the corners; no place when there are none.
   class Place;
-  // Requires n in the range of FloatPair's directions (IsFilterDirection).
+  // Requires n in the range of FloatPair's directions (IsFilterDirection). Looks at n's cell.
   Place PlaceOf(const PlainVector& n) const;
   // Upper bounds of h(n) and g(n) for the n of a place, but for errors of the hull's coordinates
   // and of n (see kCenterSupportFactor and kCenterGaugeFactor in core/numeric/error_bounds.h).
@@ -68,13 +74,13 @@ class CenterBounds {
   // Whether there are few corners or none. Then the bounds say little except about what is deep
   // inside, and the normals say nothing.
   bool coarse() const { return side_ < kLeastFineSide; }
-  // At least g(d) for all d with components of at most 1; infinite where unknown, as it is before
-  // the first direction.
-  double largest_gauge() const { return making_ == nullptr ? kInfinity : making_->largest_gauge; }
+  // At least g(d) for all d with components of at most 1; infinite where unknown. Requires that
+  // this thread had a known place.
+  double largest_gauge() const { return map_->largest_gauge; }
 
   // With all cells. Bytes.
   size_t MemoryBytes() const {
-    return making_ == nullptr ? 0 : sizeof(Making) + corner_count() * sizeof(Corner);
+    return map_ == nullptr ? 0 : sizeof(Map) + corner_count() * sizeof(Corner);
   }
 
  private:
@@ -90,7 +96,7 @@ class CenterBounds {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
   // What cells are made from, and those that are made.
-  struct Making {
+  struct Map {
     std::span<const Vector> points;
     Vector center;
     double radius;
@@ -100,6 +106,8 @@ class CenterBounds {
     // By face, a bit for each cell, by rows: whether its corners are made. Whoever sees a bit may
     // read these corners, and the largest gauge.
     std::array<std::atomic<uint64_t>, 6> cells = {};
+    // Likewise: whether the next look makes it.
+    std::array<std::atomic<uint64_t>, 6> awaited = {};
     // Held by whoever makes a cell.
     std::mutex mutex;
     // (side + 1)^2 for each of the six faces; none before the first cell is made.
@@ -110,10 +118,14 @@ class CenterBounds {
   };
 
   size_t corner_count() const { return size_t{6} * (side_ + 1) * (side_ + 1); }
-  void NeedCell(uint32_t face, uint32_t i, uint32_t j) const {
-    const uint64_t made = making_->cells[face].load(std::memory_order_acquire);
-    if ((made >> (i * side_ + j) & 1) == 0) [[unlikely]]
-      MakeCell(face, i, j);
+  // Whether the cell is made: before, or by this look.
+  bool LookAtCell(uint32_t face, uint32_t i, uint32_t j) const {
+    const uint64_t bit = uint64_t{1} << (i * side_ + j);
+    if ((map_->cells[face].load(std::memory_order_acquire) & bit) != 0) [[likely]]
+      return true;
+    if ((map_->awaited[face].fetch_or(bit, std::memory_order_relaxed) & bit) == 0) return false;
+    MakeCell(face, i, j);
+    return true;
   }
   void MakeCell(uint32_t face, uint32_t i, uint32_t j) const;
   void Begin() const;
@@ -121,7 +133,8 @@ class CenterBounds {
   float MakeGauge(uint32_t corner) const;
   float MeanGauge(uint32_t corner, uint32_t down, uint32_t right) const;
 
-  std::unique_ptr<Making> making_;
+  // Null where there are no bounds.
+  std::unique_ptr<Map> map_;
   uint32_t side_ = 0;
   double half_ = 0;
   // A power of two near the hull's radius.
@@ -130,6 +143,10 @@ class CenterBounds {
 };
 
 class CenterBounds::Place {
+ public:
+  // Whether there are bounds there.
+  bool known() const { return low_ != nullptr; }
+
  private:
   friend class CenterBounds;
   double largest_ = 0;     // component of n
@@ -146,7 +163,7 @@ class CenterBounds::Place {
 
 inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   Place place;
-  if (making_ == nullptr) return place;
+  if (map_ == nullptr) return place;
   const OnCube on_cube(n.x, n.y, n.z);
   // A direction turned into a hull's frame is at most sqrt(3) times longer or shorter.
   HULLD_DCHECK(IsFilterDirection(2 * on_cube.largest()) ||
@@ -164,8 +181,8 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
   const uint32_t j = std::min(static_cast<uint32_t>(static_cast<int32_t>(v)), last);
   const uint32_t row = side_ + 1;
   const uint32_t face = CubeFace(place.axis_, place.negative_);
-  NeedCell(face, i, j);
-  place.low_ = making_->corners.data() + CubeCell(face, row, i, j);
+  if (!LookAtCell(face, i, j)) return place;
+  place.low_ = map_->corners.data() + CubeCell(face, row, i, j);
   place.high_ = place.low_ + row;
   // Weights are not negative: u and v may exceed side_ by rounding, or be below 0.
   place.s_ = std::clamp(u - i, 0.0, 1.0);
@@ -174,7 +191,7 @@ inline CenterBounds::Place CenterBounds::PlaceOf(const PlainVector& n) const {
 }
 
 inline CenterBounds::Bounds CenterBounds::At(const Place& place) const {
-  if (place.low_ == nullptr) return {};
+  if (!place.known()) return {};
   const double s = place.s_;
   const double t = place.t_;
   const auto mean = [&](float a, float b, float c, float d) {
@@ -195,7 +212,7 @@ inline CenterBounds::Bounds CenterBounds::Along(const PlainVector& n) const {
 // The gradient of the gauge per unit, which on a face is the largest component times a function of
 // the others over it.
 inline PlainVector CenterBounds::NormalAt(const Place& place) const {
-  if (coarse() || !(largest_gauge() < kInfinity)) return {0, 0, 0};
+  if (!place.known() || coarse() || !(largest_gauge() < kInfinity)) return {0, 0, 0};
   const double corner = place.low_[0].gauge;
   const double along_low = place.low_[1].gauge - corner;
   const double along_high = double{place.high_[1].gauge} - place.high_[0].gauge;

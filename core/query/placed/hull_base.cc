@@ -27,7 +27,7 @@ HullBase::HullBase(const Hull& hull) : points_(hull.vertices()), prepared_(true)
   HULLD_DCHECK(center_ == hull.center() && max_abs_ == hull.max_abs_coordinate());
   Span(hull.dimension());
   support_ = SupportMap(points_);
-  center_bounds_ = CenterBounds(points_, hull.dimension(), center_, max_abs_, support_);
+  center_bounds_ = CenterBounds(hull, support_);
 }
 
 HullBase::HullBase(MappedPoints mapped, int dimension)
@@ -38,7 +38,8 @@ HullBase::HullBase(MappedPoints mapped, int dimension)
   HULLD_CHECK(!own_.empty());
   Measure();
   Span(dimension);
-  center_bounds_ = CenterBounds(points_, dimension, center_, max_abs_, support_);
+  center_bounds_ = CenterBounds(points_, dimension, center_, max_abs_, support_,
+                                CenterBounds::Making::kAtSecondLook);
 }
 
 HullBase::HullBase(std::vector<Vector> points, int dimension)

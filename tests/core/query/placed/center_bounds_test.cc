@@ -153,6 +153,29 @@ TEST(CenterBounds, CellsAreTheSameInWhateverOrderTheyAreMade) {
   }
 }
 
+TEST(CenterBounds, OneLookMayMakeNothingAndTheSecondTheSame) {
+  Random random(TestSeed(908));
+  for (const auto& [name, hull] : Solids(random)) {
+    const SupportMap support(hull);
+    const CenterBounds at_first(hull, support);
+    const CenterBounds at_second(hull.vertices(), hull.dimension(), hull.center(),
+                                 hull.max_abs_coordinate(), support,
+                                 CenterBounds::Making::kAtSecondLook);
+    int unknown = 0;
+    for (const Vector& n : Directions(random)) {
+      const CenterBounds::Bounds expected = at_first.Along(n);
+      if (!at_second.PlaceOf(n).known()) ++unknown;
+      const CenterBounds::Bounds found = at_second.Along(n);
+      const auto bits = [](double x) { return std::bit_cast<uint64_t>(x); };
+      ASSERT_EQ(bits(found.support), bits(expected.support)) << name;
+      ASSERT_EQ(bits(found.gauge), bits(expected.gauge)) << name;
+    }
+    // The least number of cells.
+    EXPECT_GE(unknown, 24) << name;
+    EXPECT_EQ(at_second.largest_gauge(), at_first.largest_gauge()) << name;
+  }
+}
+
 TEST(CenterBounds, FlatHullsHaveNone) {
   for (const std::vector<Vector>& points : {std::vector<Vector>{Vector(1, 2, 3)},
                                             {Vector(0, 0, 0), Vector(1, 1, 0)},
