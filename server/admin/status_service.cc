@@ -51,6 +51,7 @@ void StatusService::Fill(const Caller& caller, v1::GetStatusResponse* response) 
   message->set_max_waiting_calls(limits.max_waiting_calls);
   message->set_max_calls_per_client(limits.max_calls_per_client);
   message->set_max_batches_per_client(limits.max_batches_per_client);
+  message->set_request_memory_bytes(limits.request_memory);
   message->set_max_streams_per_client(limits.max_streams_per_client);
   message->set_max_concurrent_batches(limits.max_concurrent_batches);
   if (limits.max_request_time > std::chrono::milliseconds::zero()) {

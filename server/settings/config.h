@@ -51,12 +51,13 @@ struct Limits {
   // Calls of one client that run, open streams included: fewer than max_waiting_calls, so that no
   // client alone makes others be refused. A client is a token or, without tokens, a peer address.
   uint64_t max_calls_per_client = 512;
-  // Of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and watches.
+  // Streams of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup, watches and reflection.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns. All, and of one client.
   uint64_t max_concurrent_batches = 32;
   uint64_t max_batches_per_client = 16;
-  // The longest time of one request, or one message of StreamCollisions; zero: unlimited.
+  // The longest time of one request, or of one message of StreamCollisions and WatchCollisions;
+  // zero: unlimited.
   std::chrono::milliseconds max_request_time{300'000};
   // Requests that take longer are logged; zero: none.
   std::chrono::milliseconds slow_request{1000};

@@ -27,7 +27,8 @@ void AddMoreLimits(const v1::Limits& limits, Table* table) {
       .Row({"max batches per client", std::to_string(limits.max_batches_per_client())})
       .Row({"max pieces per body", std::to_string(limits.max_pieces_per_body())})
       .Row({"max writers per hull", std::to_string(limits.max_writers_per_hull())})
-      .Row({"memory limit bytes", std::to_string(limits.memory_limit_bytes())});
+      .Row({"memory limit bytes", std::to_string(limits.memory_limit_bytes())})
+      .Row({"request memory bytes", std::to_string(limits.request_memory_bytes())});
   if (limits.has_max_request_time()) {
     table->Row({"max request time", DurationText(limits.max_request_time())});
   }

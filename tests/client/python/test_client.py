@@ -59,6 +59,7 @@ def test_status_tells_version_and_limits(either: Any) -> None:
     assert status.limits.max_request_time == 300
     assert status.limits.max_calls_per_client == 512
     assert status.limits.max_batches_per_client == 16
+    assert status.limits.request_memory_bytes == 128 << 20
     assert status.uptime >= 0 and status.started.tzinfo is not None
     assert either.check_health() is True
 

@@ -120,6 +120,7 @@ TEST_F(LimitsTest, StatusShowsEveryLimitEvenWhenTheServerIsFull) {
   EXPECT_EQ(limits.max_concurrent_batches(), 32);
   EXPECT_EQ(limits.max_calls_per_client(), 512);
   EXPECT_EQ(limits.max_batches_per_client(), 16);
+  EXPECT_EQ(limits.request_memory_bytes(), 128 << 20);
   EXPECT_EQ(limits.max_placements(), 200'000);
   EXPECT_EQ(limits.max_points_per_hull(), uint64_t{1} << 53);
   EXPECT_EQ(limits.max_message_bytes(), 16 << 20);

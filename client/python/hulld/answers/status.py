@@ -27,13 +27,15 @@ class Limits:
     max_streams_per_client: int
     max_concurrent_batches: int
     max_pieces_per_body: int
-    #: Seconds for one request, or one message of a collision stream; None: unlimited.
+    #: Seconds for one request, or one message of a collision stream or watch; None: unlimited.
     max_request_time: float | None
     max_writers_per_hull: int
     memory_limit_bytes: int
     #: Of a client, which is a token or, without tokens, an address.
     max_calls_per_client: int
     max_batches_per_client: int
+    #: Bytes that requests may take until they are answered.
+    request_memory_bytes: int
 
 
 @dataclass(frozen=True)
