@@ -16,6 +16,11 @@ for file in man/man1/hullctl.1 man/man1/hullctl-check.1 bash-completion/completi
   zsh/site-functions/_hullctl fish/vendor_completions.d/hullctl.fish; do
   [[ -s $work/prefix/share/$file ]] || { echo "share/$file is not installed"; exit 1; }
 done
+# Every header that is installed finds what it includes.
+headers=$work/prefix/include/hulld
+find "$headers" -name '*.h' -printf '#include "%P"\n' | sort >"$work/headers.cc"
+(($(grep -c '"client/' "$work/headers.cc") > 10)) || { echo "few headers are installed"; exit 1; }
+"$compiler" -std=c++20 -fsyntax-only -I "$headers" "$work/headers.cc"
 cmake -S "$here/consumer" -B "$work/consumer" -DCMAKE_PREFIX_PATH="$work/prefix" \
   -DCMAKE_CXX_COMPILER="$compiler" >"$work/configure.log"
 cmake --build "$work/consumer" >"$work/build.log" || { cat "$work/build.log"; exit 1; }
