@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -164,6 +165,44 @@ TEST(Includes, NoRoomIsCrowded) {
     }
     for (const auto& [folder, count] : files) EXPECT_LE(count, kMostFiles) << folder;
   }
+}
+
+// The folders of the sources of a name, as a test is named for one: by name, without the extension.
+std::multimap<std::string, std::string> FoldersOfSources() {
+  std::set<std::string> seen;
+  std::multimap<std::string, std::string> folders;
+  const fs::path root = SourceTree();
+  for (const std::string top : {"core", "server", "client"}) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / top)) {
+      const std::string extension = entry.path().extension().string();
+      if (extension != ".h" && extension != ".cc") continue;
+      const std::string folder = fs::relative(entry.path().parent_path(), root).string();
+      const bool is_new = seen.insert(folder + "/" + entry.path().stem().string()).second;
+      if (is_new) folders.emplace(entry.path().stem().string(), folder);
+    }
+  }
+  return folders;
+}
+
+TEST(Tests, StandWhereWhatTheyAreNamedForStands) {
+  const std::multimap<std::string, std::string> folders = FoldersOfSources();
+  const fs::path root = SourceTree() / "tests";
+  constexpr std::string_view kEnd = "_test";
+  int checked = 0;
+  for (const std::string top : {"core", "server", "client"}) {
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(root / top)) {
+      std::string name = entry.path().stem().string();
+      if (entry.path().extension() != ".cc" || !name.ends_with(kEnd)) continue;
+      name.resize(name.size() - kEnd.size());
+      const auto [first, last] = folders.equal_range(name);
+      if (first == last) continue;  // named for what it shows
+      const std::string folder = fs::relative(entry.path().parent_path(), root).string();
+      EXPECT_TRUE(std::any_of(first, last, [&](const auto& each) { return each.second == folder; }))
+          << "tests/" << folder << "/" << name << "_test.cc: the source is in " << first->second;
+      ++checked;
+    }
+  }
+  EXPECT_GT(checked, 50);
 }
 
 // What follows a call of hulld_add_test in a CMakeLists.txt, word by word.
