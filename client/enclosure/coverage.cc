@@ -282,7 +282,7 @@ class Cover {
   const TriangleMesh& mesh_;
   CommonExponent grid_;
   std::vector<ConvexRegion> regions_;
-  // Of each piece, for distances.
+  // The vertices of each piece, for distances.
   std::vector<std::vector<Point>> vertices_;
   std::vector<BigVector> on_grid_;
   // For each vertex, which pieces hold it.

@@ -18,7 +18,7 @@ namespace hulld {
 
 // WatchCollisions, message by message: tells when pairs begin and end to collide. A watch whose
 // connection is lost goes on where it was: it opens another call with the poses as they are by now,
-// tells what changed meanwhile and nothing twice, and ends that as `synced` once more. So whoever
+// tells what changed meanwhile and nothing twice, and ends that as `synced` once more. So code that
 // folds the events needs to know nothing of connections. Next is for one thread, Update for one,
 // which may be another, and Cancel for any.
 class CollisionWatch {

@@ -18,7 +18,7 @@ struct TlsIdentity {
   // Whose clients may connect; empty: no certificate is asked of them.
   std::string client_authorities;
 
-  // Of the server's certificate.
+  // The subject and the validity of the server's certificate.
   std::string subject;
   std::chrono::system_clock::time_point not_before;
   std::chrono::system_clock::time_point not_after;

@@ -33,7 +33,7 @@ class Call {
       : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
 
   Rpc rpc() const { return rpc_; }
-  // Who calls. Requires that Begin succeeded.
+  // The caller. Requires that Begin succeeded.
   const Caller& caller() const {
     HULLD_CHECK(ticket_.has_value());
     return caller_;

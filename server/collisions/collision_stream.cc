@@ -326,9 +326,9 @@ ClaimedRange::Block CollisionStream::Claim() {
   return block;
 }
 
-// Works on blocks until none is left, or it is the turn of others. By any thread, several at a
-// time; whoever comes last goes on. Nothing of this stream may be touched after the last block was
-// given back, or when there was none.
+// Works on blocks until none is left, or it is the turn of others. Runs on any thread, and on
+// several at a time; the thread that gives back the last block goes on. Nothing of this stream may
+// be touched after the last block was given back, or when there was none.
 void CollisionStream::TakePart() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {

@@ -37,7 +37,7 @@ struct Place {
   std::string data_dir;
   std::string conninfo_file;
   std::string shards_file = {};
-  // Of a shard: as PostgresOptions::slots.
+  // The slots of a shard, as PostgresOptions::slots.
   std::string slots = {};
 
   bool is_one() const {

@@ -11,7 +11,7 @@
 namespace hulld::server {
 namespace {
 
-// A transaction ends once it has so many vertices (24 MB), or changes of hulls and bodies. A
+// A transaction ends once it has this many vertices (24 MB), or changes of hulls and bodies. A
 // choice.
 constexpr size_t kMostVertices = 1'000'000;
 constexpr size_t kMostChanges = 1000;

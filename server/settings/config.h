@@ -45,13 +45,14 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of max_calls and of max_calls_per_client, one in so many is kept for single calls: what lasts
-  // cannot fill them.
+  // One call in this many, of max_calls and of max_calls_per_client, is kept for single calls:
+  // calls that last cannot fill either.
   static constexpr uint64_t kKeptForSingleCalls = 4;
   // Calls of one client that run, open streams included: fewer than max_waiting_calls, so that no
   // client alone makes others be refused. A client is a token or, without tokens, a peer address.
   uint64_t max_calls_per_client = 512;
-  // Of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and watches.
+  // Calls of AppendPoints, ReplaceHull, StreamCollisions and SaveBackup, and watches, that one
+  // client has open.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns. All, and of one client.
   uint64_t max_concurrent_batches = 32;

@@ -104,7 +104,7 @@ absl::StatusOr<Bodies> BodiesAmong(Shards& shards, std::span<const std::string> 
   return std::move(found.bodies);
 }
 
-// One that was read again is another object. Of those that are damaged no more is known.
+// A body that was read again is another object. No more is known of bodies that are damaged.
 bool IsSameBody(const std::shared_ptr<const Body>& a, const std::shared_ptr<const Body>& b) {
   if (a == b) return true;
   return a != nullptr && b != nullptr && a->record().revision == b->record().revision &&

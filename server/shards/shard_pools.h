@@ -23,10 +23,11 @@ class ShardPools {
     }
   }
 
-  // Of calls about IDs of this shard alone.
+  // The pool for calls about IDs of this shard alone.
   WorkerPool& of(size_t shard) { return *pools_[shard]; }
   WorkerPool& of_several() { return *pools_.back(); }
-  // That of each shard, in their order, and at the end, where there are several, that of several.
+  // The pool of each shard, in their order, and at the end, where there are several shards, the
+  // pool for calls about several.
   std::vector<WorkerPool*> all() const {
     std::vector<WorkerPool*> pools;
     for (const auto& pool : pools_) pools.push_back(pool.get());

@@ -66,7 +66,7 @@ class Shards {
   Registry& of(std::string_view id) { return *registries_[shard_of(id)]; }
   Registry& at(size_t shard) { return *registries_[shard]; }
   const Registry& at(size_t shard) const { return *registries_[shard]; }
-  // Of each shard, and of the one that has this ID. They stay.
+  // The ID of each shard's store, and of the store that has this ID. They stay the same.
   std::span<const std::string> store_ids() const { return store_ids_; }
   const std::string& store_id_of(std::string_view id) const { return store_ids_[shard_of(id)]; }
   // What all stores have in common: their kind, and how durable they are.

@@ -56,7 +56,7 @@ struct Change {
   // Whether this is a new incarnation of the hull, or the beginning of the body.
   bool begins = false;
   bool deleted = false;
-  // Of a body that begins: whether there is one whose place it takes, as one that is damaged.
+  // For a body that begins: whether it takes the place of one, such as one that is damaged.
   bool replaces_body = false;
   // A change of a hull that neither begins nor ends: its revisions when all changes that were
   // submitted before are committed, and those of the same batch are not.
@@ -67,7 +67,7 @@ struct Change {
   VertexLayout former_layout;
   VertexChange vertex_change = VertexChange::kNone;
   std::vector<Vector> vertices;
-  // Who wrote the chunk, if the change is one.
+  // The writer of the chunk, if the change is one.
   std::optional<WriterSequence> writer;
   // The incarnation that this one takes the place of, if there is one.
   std::optional<StoredHull> replaced;
@@ -94,7 +94,7 @@ struct FoundRecords {
   // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull, or the body.
   std::map<std::string, absl::StatusOr<StoredHull>> hulls;
   std::map<std::string, absl::StatusOr<StoredBody>> bodies;
-  // Of a list: whether there are others after these.
+  // For a list: whether there are others after these.
   bool more = false;
 };
 
@@ -167,8 +167,8 @@ class Store {
   virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {
     return absl::UnimplementedError("this store does not find records");
   }
-  // At most so many, of these kinds, whose IDs start with `prefix` and come after `after`, in byte
-  // order. Fewer, but one at least, where they take more than kMostListedBytes.
+  // At most `most` records, of these kinds, whose IDs start with `prefix` and come after `after`,
+  // in byte order. Fewer, but one at least, where they take more than kMostListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
                                                    const std::string& /*after*/, size_t /*most*/,
                                                    RecordKinds /*kinds*/) {

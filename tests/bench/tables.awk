@@ -61,7 +61,8 @@ function origin_of(file,   command, line, names, fields, count, i, cpu, compiler
   return cpu == "" ? "" : "a virtual " cpu ", " compiler
 }
 
-# Of rows that name none: as that of the hulls, but for the generation, which may be another.
+# The origin of rows that name none: that of the hulls, but for the generation, which may be
+# another.
 function usual_origin(   origin) {
   origin = origin_of("hull_build_" machine)
   sub(/ family [0-9]+ model [0-9]+/, "", origin)

@@ -44,7 +44,7 @@ struct CheckArguments {
   QueryWishes wishes;
 };
 
-// Who is asked about: the parts of the robot, then what stands around it.
+// What the questions are about: the parts of the robot, then what stands around it.
 struct Cast {
   std::vector<std::string> names;
   std::vector<std::string> fixed_hulls;

@@ -21,8 +21,8 @@ namespace hulld {
 // turns in the order of their oldest edits. Not thread-safe.
 class EditQueue {
  public:
-  // More than so many numbers of points do not wait, about 100 MB. A choice: a page sends 4 MiB at
-  // a time at most (BridgeOptions::max_message_bytes).
+  // At most this many numbers of points wait, about 100 MB. A choice: a page sends 4 MiB at a time
+  // at most (BridgeOptions::max_message_bytes).
   static constexpr size_t kMostNumbers = size_t{12} << 20;
 
   // Whether it was taken: there is room for it.

@@ -195,7 +195,7 @@ class BlockInsertion {
   std::vector<Vector> astray_;
   // Points that are to be inserted in rounds.
   std::vector<Vector> rest_;
-  // Of the points that are looked up in the map, those to keep.
+  // Those points to keep, among the ones that are looked up in the map.
   std::vector<uint32_t> indices_;
 };
 

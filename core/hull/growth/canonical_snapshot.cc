@@ -79,7 +79,7 @@ struct Ranking {
   std::vector<uint32_t> index_of;
 };
 
-// Of all vertices that live. After the poll said stop, nothing holds.
+// Ranks all vertices that live. The result means nothing after the poll said stop.
 Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   std::vector<Ranked> ranked;
   ranked.reserve(vertices.size());
@@ -170,7 +170,8 @@ class FaceCollector {
   }
 
  private:
-  // Of a triangle: bit i tells that edge i lies within a facet, the fourth that the facet is known.
+  // Flags of a triangle: bit i tells that edge i lies within a facet, the fourth that the facet is
+  // known.
   static constexpr uint8_t kAnyFlat = 7;
   static constexpr uint8_t kVisited = 8;
 

@@ -226,7 +226,7 @@ void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
   cursors_[0] = end_ * PointBlock::kSize;
 }
 
-// Makes room for so many blocks at the end, by leaving out the gaps.
+// Makes room for this many blocks at the end, by leaving out the gaps.
 void ConflictLists::Reserve(size_t blocks) {
   if (end_ + blocks <= capacity_) return;
   size_t kept = 0;

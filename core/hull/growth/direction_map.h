@@ -45,7 +45,7 @@ class MapFrame {
 
  private:
   Vector center_;
-  // Of L, row by row up to the diagonal.
+  // The entries of L, row by row up to the diagonal.
   std::array<double, 6> entries_ = {1, 0, 1, 0, 0, 1};
   bool is_plain_ = true;
 };

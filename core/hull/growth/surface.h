@@ -154,11 +154,11 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Measures the surface anew when a map is worth that for so many points to be looked up; where
+  // Measures the surface anew when a map is worth that for `points` points to be looked up; where
   // it changed much since it was last measured, round a center and in a frame that suit its present
-  // shape. fineness: at most so many times the cells a side that suit points one by one. True when
-  // it did; it does not where no interior point is known, or the poll, whose steps are walks, said
-  // stop. Cost: at most `walks_per_point` walks for each point.
+  // shape. fineness: the map has at most this many times the cells a side that suit points one by
+  // one. True when it did; it does not where no interior point is known, or the poll, whose steps
+  // are walks, said stop. Cost: at most `walks_per_point` walks for each point.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll);
   // False where the map rejected too few of the points looked up since it was measured.
@@ -229,8 +229,8 @@ class Surface {
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
   struct Measurement {
     DirectionMap map;
-    // Of the corners of the last row up to the one to measure, and of the row before from there on:
-    // where the direction leaves the surface.
+    // Where the direction leaves the surface: for the corners of the last row up to the one to
+    // measure, and for those of the row before from there on.
     std::vector<TriangleId> hint;
     // The one that stood before in the last one's place.
     TriangleId hint_before = 0;
@@ -262,8 +262,9 @@ class Surface {
   TriangleId NewId();
   void Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat);
 
-  // Of a triangle and those beyond its edges, the one that the point is farthest outside, where
-  // doubles are certain that it is. Faster than the steps of a walk that it saves.
+  // The one among a triangle and those beyond its edges that the point is farthest outside; none
+  // where doubles are not certain that it is outside any. Faster than the steps of a walk that it
+  // saves.
   std::optional<Location> SeenNear(TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
@@ -350,8 +351,8 @@ class Surface {
   double extent_ = 0;
   // The count of triangles at which measuring the surface anew starts.
   size_t next_update_ = 0;
-  // Of the points since the last measurement, how many were looked up in the map and rejected by
-  // it.
+  // How many points were looked up in the map since the last measurement, and how many of them it
+  // rejected.
   size_t asked_ = 0;
   size_t rejected_ = 0;
   // The count of triangles when it was last measured.

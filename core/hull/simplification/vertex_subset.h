@@ -112,7 +112,7 @@ class VertexSubset {
   // By point that is not chosen: the next one of its list, and a proven bound of its distance.
   std::vector<uint32_t> next_;
   std::vector<double> distance_;
-  // Of each cell with a list, one entry that counts, and some that no longer do.
+  // Each cell with a list has one entry that counts, and may have some that no longer do.
   std::priority_queue<Entry> queue_;
   uint64_t entries_ = 0;
   // Triangles whose lists changed since they were put into the queue.

@@ -30,7 +30,8 @@ struct PiecesAnswer {
 };
 
 struct BodyAnswer : PiecesAnswer {
-  // Of the bodies. Axis, witness points and analysis are those of the pair that decided.
+  // The answer for the two bodies. Axis, witness points and analysis are those of the pair that
+  // decided.
   Answer answer;
 };
 
@@ -64,9 +65,9 @@ class BodySearch {
   BodySearch(const BodySearch&) = delete;
   BodySearch& operator=(const BodySearch&) = delete;
 
-  // Makes at most so many steps, of one node or one pair of pieces each. Returns whether the search
-  // has ended. CANCELLED: should_stop said so. RESOURCE_EXHAUSTED: more certificates would be
-  // needed than options.max_piece_certificates.
+  // Makes at most this many steps, of one node or one pair of pieces each. Returns whether the
+  // search has ended. CANCELLED: should_stop said so. RESOURCE_EXHAUSTED: more certificates would
+  // be needed than options.max_piece_certificates.
   absl::StatusOr<bool> Advance(uint64_t steps);
   // Requires that the search has ended; once.
   absl::StatusOr<BodyAnswer> Take();
@@ -123,7 +124,8 @@ class BodySearch {
   StopPoll poll_;
 
   std::vector<Nodes> waiting_;
-  // Of two leaves, the last one first.
+  // Pairs of pieces from two leaves. The search takes them from the end, where the nearest ones
+  // are.
   std::vector<Candidate> candidates_;
   PlacedLeaf leaf_x_;
   PlacedLeaf leaf_y_;

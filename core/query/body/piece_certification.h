@@ -64,7 +64,7 @@ class PieceCertification {
   Relation strongest_ = Relation::kSeparated;
 
   Stage stage_ = Stage::kBoxesOfB;
-  // Of the stage: the piece, or the pair.
+  // The next piece, or the next pair, of the stage.
   size_t next_ = 0;
   std::vector<Box> boxes_;
   BoxTree tree_{std::span<const Box>()};

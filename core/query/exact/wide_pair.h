@@ -123,7 +123,7 @@ class WidePair {
   // Own coordinates of at most this many bits take one word, and sums of ten of them do.
   static constexpr int kOneWordBits = 59;
   static constexpr int kMostOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
-  // The first so many vertices are kept once they are multiplied out.
+  // This many vertices, from the first on, are kept once they are multiplied out.
   static constexpr uint32_t kKept = 32;
 
   struct Side {

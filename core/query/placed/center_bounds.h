@@ -38,10 +38,10 @@ class CenterBounds {
  public:
   // None: every bound is unknown.
   CenterBounds() = default;
-  // Of the hull of some points about a centre. None for one that is flat (`dimension` below 3). The
-  // gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
+  // Bounds for the hull of some points about a centre. A flat hull (`dimension` below 3) has none.
+  // The gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
   // largest absolute coordinate. The points and the support map must outlive the bounds and stay in
-  // place. Cost: O(V) comparisons; of the first direction some 100 support points more, and of the
+  // place. Cost: O(V) comparisons; the first direction takes some 100 support points more, and the
   // first in each of 24 or 384 cells some 25.
   CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
                const SupportMap& support);
@@ -97,10 +97,10 @@ class CenterBounds {
     double max_abs;
     const SupportMap* support;
 
-    // By face, a bit for each cell, by rows: whether its corners are made. Whoever sees a bit may
-    // read these corners, and the largest gauge.
+    // By face, a bit for each cell, by rows: whether its corners are made. A thread that sees a bit
+    // set may read these corners, and the largest gauge.
     std::array<std::atomic<uint64_t>, 6> cells = {};
-    // Held by whoever makes a cell.
+    // Held by the thread that makes a cell.
     std::mutex mutex;
     // (side + 1)^2 for each of the six faces; none before the first cell is made.
     std::vector<Corner> corners;

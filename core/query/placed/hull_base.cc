@@ -59,7 +59,7 @@ void HullBase::Measure() {
     const Vector& p = points_[i];
     for (int axis = 0; axis < 3; ++axis) {
       if (p[axis] < points_[extremes[axis]][axis]) extremes[axis] = i;
-      // Of equal ones the last, so that a box has a centre in its middle.
+      // The last of equal ones counts, so that a box has a centre in its middle.
       if (p[axis] >= points_[extremes[axis + 3]][axis]) extremes[axis + 3] = i;
     }
     exponent_ = LowestBitExponent(p, exponent_);

@@ -80,8 +80,8 @@ __attribute__((target("avx2"))) SupportPoint ScanAvx2(std::span<const SupportBlo
 #endif
 
 #ifdef HULLD_HAS_NEON_PATH
-// ScanWhole with each four lanes as two registers of two, step by step. Of lanes wider than a
-// register the compiler compares one after the other.
+// ScanWhole with each four lanes as two registers of two, step by step. The compiler compares the
+// lanes of a vector wider than a register one after the other.
 using Pair = double __attribute__((vector_size(16)));
 using PairIds = int64_t __attribute__((vector_size(16)));
 

@@ -40,7 +40,7 @@ struct SceneOptions {
   std::span<const GroupPair> ignored_groups;
   // Empty, or each placement as a body: those that are no hulls are asked about in this form.
   std::span<const PlacedBody> bodies;
-  // One against many: only pairs with at least one of the first so many placements.
+  // One against many: only pairs that include at least one of the first `movers` placements.
   std::optional<uint32_t> movers;
   // OpenMP threads.
   int threads = 1;

@@ -64,7 +64,8 @@ class PlacementTable {
   size_t hull_count() const { return ids_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
-  // Of a body, an empty hull stands in. Requires that they are not placed on demand.
+  // The placed hulls; an empty hull stands in for a body. Requires that they are not placed on
+  // demand.
   std::span<const PlacedHull> placed() const {
     HULLD_DCHECK(!places_on_demand_);
     return placed_;
@@ -179,7 +180,7 @@ class PlacementTable {
   PlacedBody PlaceBody(size_t i) const;
   PlacedHull Place(size_t i) const;
 
-  // Of each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
+  // For each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
   // not the caller's; and its pose, as packed placements have it.
   std::vector<uint32_t> hull_of_;
   google::protobuf::RepeatedField<double> poses_;
@@ -201,7 +202,7 @@ class PlacementTable {
   // by_hull_begin_[k + 1].
   std::vector<uint32_t> by_hull_;
   std::vector<size_t> by_hull_begin_;
-  // Of the last Resolve.
+  // Where the last Resolve found the hulls, and as of when.
   const Shards* shards_ = nullptr;
   ShardsAsOf as_of_;
   // Whether no placement had a problem when the hulls were last resolved; most often so.

@@ -250,8 +250,8 @@ void CollisionWatch::TellOf(size_t hull) {
   TellOfPieces(hull);
 }
 
-// Of those of its pieces that it did not hear of: a body may have been resolved before they were
-// followed.
+// The client is to hear of those hulls of a body's pieces that it did not hear of yet: a body may
+// have been resolved before they were followed.
 void CollisionWatch::TellOfPieces(size_t hull) {
   const HullView& view = *table_.hull(hull);
   if (view.body == nullptr) return;

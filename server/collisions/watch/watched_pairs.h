@@ -38,8 +38,8 @@ struct WatchedPair {
 class WatchedPairs {
  public:
   WatchedPairs() = default;
-  // Of an `open` whose pairs, groups and movers are valid for so many placements. max_pairs: of a
-  // scene, those of which something is kept (--max-pairs-per-batch).
+  // The pairs of an `open` whose pairs, groups and movers are valid for this many placements.
+  // max_pairs: the most pairs of a scene of which something is kept (--max-pairs-per-batch).
   WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
   // The pairs that these placements, which moved or changed, have or come to have are to be asked

@@ -67,8 +67,9 @@ std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth
 
 }  // namespace
 
-// Who else became active meanwhile may have changed what was read. The owner is asked last, so all
-// that came before is of a time when it was still us; what was found missing or damaged, too.
+// A server that became active meanwhile may have changed what was read. The owner is asked last, so
+// all that came before is of a time when the owner was still us, and so is what was found missing
+// or damaged.
 absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> statements) {
   if (absl::Status s = ended(); !s.ok()) return s;
   statements.push_back({.name = "hulld_owner"});

@@ -105,8 +105,8 @@ Statement AskForOthers(uint64_t batch) {
           .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
 }
 
-// The create_revision of the incarnation that a change ends; 0: it ends none. Of a damaged hull
-// nobody knows it: it was there before, which is what others need to know.
+// The create_revision of the incarnation that a change ends; 0: it ends none. Nobody knows it of a
+// damaged hull; 1 says that the hull was there before, which is what others need to know.
 uint64_t BeganOfEnded(const Change& change) {
   const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
   if (change.replaced.has_value()) return known(change.replaced->record.create_revision);

@@ -55,7 +55,7 @@ PostgresStore::~PostgresStore() {
   notices_ = nullptr;
   if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
   if (options_.shared) Leave();
-  // Who waits need not wait until the database sees that the session is closed.
+  // A server that waits need not wait until the database sees that the session is closed.
   if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
 }
 

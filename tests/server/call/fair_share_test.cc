@@ -73,7 +73,7 @@ TEST_F(FairShare, APartIsKeptForSingleCalls) {
   EXPECT_THAT(last_message_, HasSubstr("the last 2 are kept for single calls"));
   for (int i = 0; i < 2; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "max-calls-per-client");
-  // Of the whole server, too.
+  // The same holds for the whole server.
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "");
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "max-calls");
   EXPECT_THAT(last_message_, HasSubstr("the last 3 are kept for single calls"));

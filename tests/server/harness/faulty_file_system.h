@@ -40,7 +40,7 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   FaultyFileSystem() : FileSystemWrapper(rocksdb::FileSystem::Default()) {}
   const char* Name() const override { return "FaultyFileSystem"; }
 
-  // failures: after so many the fault is over.
+  // failures: after this many, the fault is over.
   void SetFault(Fault fault, int64_t failures = std::numeric_limits<int64_t>::max());
   // Syncs of files so far.
   int64_t syncs() const;

@@ -234,7 +234,7 @@ TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
 // The state of the store as the events of a watch say.
 class Mirror {
  public:
-  // Of a hull: when it was created and when it changed last.
+  // For each hull, when it was created and when it changed last.
   using State = std::map<std::string, std::pair<uint64_t, uint64_t>>;
 
   void Fold(const v1::WatchHullsResponse& message) {

@@ -395,7 +395,7 @@ TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
   EXPECT_TRUE(absl::IsUnavailable(follow()));
 }
 
-// Who comes while a question is on its way waits for the next one, and so does a change.
+// A caller that comes while a question is on its way waits for the next one, and so does a change.
 TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
   SharedStore store;
   FairMutex order;

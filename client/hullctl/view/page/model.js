@@ -2,13 +2,13 @@
 import {CROWD_COLOUR, OBJECT_COLOURS} from 'hulld/palette.js';
 import {samePose, toWorld} from 'hulld/pose.js';
 
-// At most so many objects are each drawn and labelled on their own; more are drawn as a crowd.
+// At most this many objects are each drawn and labelled on their own; more are drawn as a crowd.
 export const MOST_SINGLE_OBJECTS = 200;
 
-// Of bodies with more pairs of pieces no certificate is asked for.
+// No certificate is asked for about bodies with more pairs of pieces than this.
 const MOST_PIECE_PAIRS = 1000;
 
-// Of larger shapes the box stands for them.
+// The box stands for shapes with more vertices than this.
 const MOST_CORNERS = 100;
 
 export class Model extends EventTarget {

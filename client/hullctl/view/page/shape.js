@@ -28,7 +28,7 @@ function triangulate(rest, facets) {
     for (let i = 0; i < size; ++i) {
       const a = corners[first + i];
       const b = corners[first + (i + 1) % size];
-      // Of a closed surface each edge comes once in each direction.
+      // On a closed surface, each edge comes once in each direction.
       if (a < b || facets === 1) {
         edges[e++] = a;
         edges[e++] = b;

@@ -22,7 +22,7 @@ namespace hulld::server {
 // The hull of one point at the origin, which probes points of others. Not part of any history.
 inline constexpr const char* kProbeHull = "probe";
 
-// The cloud that histories are made of: so many points, all extreme.
+// The cloud that histories are made of: this many points, all extreme.
 inline constexpr int kCloudSize = 48;
 const Coordinates& HistoryCloud();
 
@@ -153,7 +153,7 @@ class HistoryClient {
   std::shared_ptr<CollisionStream> collision_stream_;
   bool any_freshness_ = false;
   bool tells_stores_ = false;
-  // Of the last answer.
+  // The header of the last answer.
   v1::ResponseHeader last_header_;
   // Where there are several: the greatest revision told of each, and the store of each hull.
   std::map<std::string, uint64_t> store_revisions_;

@@ -20,13 +20,12 @@ struct Seen {
   std::string hull_id;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
-  // Of the store of this hull: as those of Operation.
+  // The store of this hull and its revisions, as in Operation.
   std::string store_id = {};
   uint64_t store_revision = 0;
   uint64_t at_least_revision = 0;
 
-  // Of a batch alone, about a hull or a body.
-  // There is none.
+  // The following are for batches only. There is no such hull, or body.
   bool is_missing = false;
   // The hull that a piece of it lacks; empty: none.
   std::string missing_piece = {};
@@ -69,7 +68,7 @@ struct Operation {
 
   Kind kind = Kind::kGet;
   Outcome outcome = Outcome::kUnknown;
-  // Of the history's clock: the call took effect between the two, if it did.
+  // Times of the history's clock: the call took effect between the two, if it did.
   uint64_t invoked = 0;
   uint64_t returned = UINT64_MAX;
 
@@ -90,8 +89,8 @@ struct Operation {
   uint64_t sent = 0;
   PointSet points = 0;
   int probe = 0;
-  // Of a read that may be answered from the past: of any, or of at most this long ago, in
-  // nanoseconds; and not before this revision of the store.
+  // For a read that may be answered from the past: from how long ago at most, in nanoseconds, or
+  // from any time; and not before this revision of the store.
   std::optional<uint64_t> max_staleness = 0;
   uint64_t at_least_revision = 0;
 
@@ -102,7 +101,7 @@ struct Operation {
   uint64_t store_revision = 0;
   // Whose that is, where hulls are spread over several stores.
   std::string store_id;
-  // Of how long ago it may be, in nanoseconds.
+  // How old the state that was answered from may be, in nanoseconds.
   uint64_t staleness = 0;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
