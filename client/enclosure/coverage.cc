@@ -42,9 +42,10 @@ Corner Crossing(const Corner& a, const BigInteger& h, const Corner& b, const Big
   return crossing;
 }
 
-// The two parts of a polygon. The one outside is empty where no corner is strictly outside; else
-// the one inside is empty where no corner is strictly inside, for what is on the boundary then has
-// less than the polygon's dimension: pieces are closed, so what covers the rest covers that, too.
+// The two parts of a polygon. The one outside is empty where no corner is strictly outside.
+// Otherwise the one inside is empty where no corner is strictly inside, because what is on the
+// boundary then has less than the polygon's dimension: pieces are closed, so what covers the rest
+// covers that, too.
 struct Parts {
   Polygon inside;
   Polygon outside;

@@ -47,7 +47,8 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
-  // When it came; of a stream that BeginMessage is called for, the message that is under way.
+  // When it came; in a stream that BeginMessage is called for, when the message that is under way
+  // came.
   std::chrono::steady_clock::time_point arrival() const { return arrival_; }
   std::chrono::steady_clock::time_point message_arrival() const { return message_arrival_; }
   Metrics& metrics() const { return admission_.metrics(); }

@@ -107,7 +107,7 @@ void CollisionStream::Handle() {
   if (!awaits) AnswerMessage(absl::OkStatus());
 }
 
-// Looks the hulls up, if the message has them looked up, and answers it. status: of what came
+// Looks the hulls up, if the message has them looked up, and answers it. status: that of what came
 // before.
 void CollisionStream::AnswerMessage(absl::Status status) {
   if (status.ok() && refresh_.has_value()) status = OfMessage(Refresh(*refresh_));

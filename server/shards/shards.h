@@ -46,9 +46,9 @@ class Shards {
   Shards(Store& store, const Limits& limits, WorkerPool& writers,
          std::optional<PoolMetrics> preparers = std::nullopt,
          std::optional<PoolMetrics> loaders = std::nullopt);
-  // Each store has the same share of --memory-limit; --max-hulls holds over all. writers: of each
-  // store; may be one for all. The rest is as in Registry. Requires a shard of `stores` for each
-  // slot, and writers for each store.
+  // Each store has the same share of --memory-limit; --max-hulls holds over all. writers: those of
+  // each store; may be one for all. The rest is as in Registry. Requires a shard of `stores` for
+  // each slot, and writers for each store.
   Shards(std::span<Store* const> stores, const ShardOfSlot& shard_of_slot, const Limits& limits,
          std::span<WorkerPool* const> writers, std::optional<PoolMetrics> preparers = std::nullopt,
          std::optional<PoolMetrics> loaders = std::nullopt);

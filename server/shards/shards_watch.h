@@ -50,7 +50,7 @@ struct ShardsWatchPiece {
 // one shard it is that shard's watch and nothing else.
 class ShardsWatch : public std::enable_shared_from_this<ShardsWatch> {
  public:
-  // shard_of: of an ID of the target, and of those that come later.
+  // shard_of: the shard of an ID of the target, and of IDs that come later.
   using ShardOf = std::function<size_t(const std::string&)>;
 
   // Watches these registries, by their places among all, which outlive this. As

@@ -186,7 +186,7 @@ function set_name(set) {
   sub(/^sphere:/, "", set)
   return set
 }
-# The same, short, where the vertices are told elsewhere; of a scene, "N of SET".
+# The same, short, where the vertices are told elsewhere; for a scene, "N of SET".
 function set_label(set) {
   sub(/of sphere:64/, "of 64 vertices", set)
   sub(/of ur5/, "UR5 links", set)

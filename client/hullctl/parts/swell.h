@@ -18,7 +18,7 @@ inline constexpr double kSwellToWarn = 1.5;
 // "1.07 times the mesh", or that there is nothing to compare. ratio: see VolumeRatio.
 std::string SwellText(std::optional<double> ratio);
 
-// Warns where the hull is so much larger than the mesh that it stands badly for it.
+// Warns where the hull is so much larger than the mesh that it represents it badly.
 void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio);
 
 // The meshes of all files as one. Nothing where a file has none: not IsMeshFormat, an input that

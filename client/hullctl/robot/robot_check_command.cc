@@ -26,7 +26,7 @@
 namespace hulld {
 namespace {
 
-// Values beyond limits that are told one by one; of the rest, how many there are.
+// Values beyond limits that are told one by one; the rest are only counted.
 constexpr size_t kMostWarnings = 5;
 
 struct CheckArguments {

@@ -193,8 +193,8 @@ class FaceCollector {
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
   }
 
-  // Edges at which triangles were joined know whether they are flat; of those between triangles
-  // that were made together, with a common apex, the one to the next round the apex is asked for.
+  // Edges at which triangles were joined know whether they are flat. Triangles that were made
+  // together have a common apex; for each, the edge to the next one round the apex is tested here.
   void FindFlatEdges(StopPoll& poll) {
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;

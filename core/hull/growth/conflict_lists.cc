@@ -186,8 +186,8 @@ void ConflictLists::Scatter() {
   }
 }
 
-// The index of a target that the point sees, else kBelowAll. Counts the point when it equals a
-// vertex.
+// The index of a target that the point sees, or kBelowAll if there is none. Counts the point when
+// it equals a vertex.
 int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const TriangleId> targets) {
   for (size_t k = 0; k < targets.size(); ++k) {
     if (IsCertainlyBelow(planes_[k], point)) continue;

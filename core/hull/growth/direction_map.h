@@ -134,8 +134,8 @@ class DirectionMap {
     return gauges_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
   }
 
-  // Appends the indices of the points that are not certainly inside, ascending; of some of the
-  // points only once the poll says stop.
+  // Appends the indices of the points that are not certainly inside, ascending. Once the poll says
+  // stop, only some of the points are looked at.
   void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
                        StopPoll& poll) const;
 

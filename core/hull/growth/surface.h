@@ -37,7 +37,7 @@ struct alignas(64) SurfaceTriangle {
   // The last traversal in whose region this triangle was.
   uint32_t mark : 29;
   // Bit i: the triangle beyond edge i is in the same plane. That is known where one of the two was
-  // joined to the other across a horizon; of two that were made together it is not, and then the
+  // joined to the other across a horizon. It is not known of two that were made together; then the
   // bit is 0.
   uint32_t flat : 3;
 };
@@ -278,7 +278,7 @@ class Surface {
     return Location{Side::kOutside, best};
   }
   // The point's height above the triangle's plane, times the length of its normal, where that is
-  // certainly above zero; else zero.
+  // certainly above zero; otherwise zero.
   static double HeightAbove(const SurfaceTriangle& t, const Vector& point, double size) {
     const double height = t.normal.dot(point) - t.offset;
     return height > static_cast<double>(t.slope) * size ? height : 0;
@@ -341,7 +341,7 @@ class Surface {
   ChunkedVector<TriangleId> free_;
   size_t alive_ = 0;
   // By vertex: where in the horizon the edge is that leaves it, if it is on the horizon at all, as
-  // that edge's tail tells; else any number.
+  // that edge's tail tells; otherwise any number.
   ChunkedVector<uint32_t> place_of_vertex_;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.

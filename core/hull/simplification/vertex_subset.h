@@ -45,8 +45,8 @@ class VertexSubset {
   bool is_complete() const { return chosen_.size() == points_.size(); }
   // See Surface.
   bool IsMeasurable() const { return surface_->IsMeasurable(); }
-  // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: of n choices of V
-  // vertices O((V + n) log n) for round shapes.
+  // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: O((V + n) log n) for n
+  // choices of V vertices of round shapes.
   void ChooseNext(StopPoll& poll);
   // Proven: no vertex is farther than this from the hull of those chosen. In units. Cost: O(log V)
   // amortized.

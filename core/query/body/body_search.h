@@ -48,9 +48,9 @@ struct BodyCounts {
 // decided as two hulls are, at the exact products of the poses.
 //
 // Two trees of boxes are descended together, first where boxes are nearest. Without wishes beyond
-// the relation and the clearance, the first pair that can be outdone by no other ends the search,
-// and it is the named pair; else that of the least separation is. So swapping A and B mirrors an
-// answer, and the named pair does not depend on threads.
+// the relation and the clearance, the first pair that no other can outdo ends the search and is the
+// named pair. With other wishes, the pair of the least separation is named. So swapping A and B
+// mirrors an answer, and the named pair does not depend on threads.
 //
 // A certificate does not count among these wishes: where it is wanted, those of pieces that prove
 // the relation are found once it is known.

@@ -18,7 +18,7 @@ double LargestOf(const Vector& u, const Vector& v, const Vector& w) {
   return u.cwiseAbs().cwiseMax(v.cwiseAbs()).cwiseMax(w.cwiseAbs()).maxCoeff();
 }
 
-// Sign of `value` where it exceeds `bound`, else nothing.
+// Sign of `value` where it exceeds `bound`, otherwise nothing.
 std::optional<int> CertainSign(double value, double bound) {
   if (value > bound) return 1;
   if (value < -bound) return -1;

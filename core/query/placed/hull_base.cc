@@ -75,8 +75,8 @@ void HullBase::Measure() {
   for (const Vector& p : points_) radius_ = std::max(radius_, RadiusTo(p - center_));
 }
 
-// Adds the point of largest size, in floating point, that is_off says is off the span so far; of
-// equal ones the first.
+// Adds the point of largest size, in floating point, that is_off says is off the span so far; the
+// first of equal ones.
 template <typename Size, typename IsOff>
 void HullBase::SpanWith(Size size, IsOff is_off) {
   uint32_t farthest = 0;

@@ -34,7 +34,7 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
   values = (x * px + y * py) + z * pz;
 }
 
-// The farthest of whole blocks; of equal ones the first. Requires one block.
+// The farthest of whole blocks; the first of equal ones. Requires one block.
 [[gnu::always_inline]] inline SupportPoint ScanWhole(std::span<const SupportBlock> blocks,
                                                      const PlainVector& n) {
   Lanes x, y, z, best, values;

@@ -83,7 +83,7 @@ class PlacementTable {
   Box BoxOf(size_t i) const {
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
-  // What is placed; of a body, or what cannot be answered for, an empty hull.
+  // What is placed; an empty hull for a body, or for what cannot be answered for.
   const QueryHull& HullAt(size_t i) const;
   // The same, but of a body the hull of a piece.
   const QueryHull& HullOfPiece(size_t i, uint32_t piece) const {
@@ -93,18 +93,18 @@ class PlacementTable {
   bool is_answerable(size_t i) const {
     return is_all_answerable_ || (!IsMalformed(i) && hulls_[hull_of_[i]].ok());
   }
-  // Why not, else OK. Requires that the hulls were resolved.
+  // Why it is not answerable; OK if it is. Requires that the hulls were resolved.
   const absl::Status& problem(size_t i) const;
-  // Whether the last Resolve gave this placement another hull, or took it, or gave it one; of a
-  // body, also another hull of a piece.
+  // Whether the last Resolve gave this placement another hull, took its hull, or gave it one; for a
+  // body, also whether it gave a piece another hull.
   bool hull_changed(size_t i) const;
   // Whether it gave it another QueryHull, perhaps of the same hull: what was found before must not
   // name that one's points.
   bool query_hull_changed(size_t i) const;
 
-  // The same as Resolve for a few of hull_ids(), by index, each once, of which the registry told
-  // that they changed, so that they are taken as they are there; the others stay as they are.
-  // Requires SortByHull.
+  // The same as Resolve for a few of hull_ids(), by index, each once: those that the registry told
+  // had changed. They are taken as the registry has them now; the others stay as they are. Requires
+  // SortByHull.
   absl::Status ResolveSome(Shards& shards, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
@@ -207,8 +207,8 @@ class PlacementTable {
   ShardsAsOf as_of_;
   // Whether no placement had a problem when the hulls were last resolved; most often so.
   bool is_all_answerable_ = false;
-  // How many placements the table of hulls tells of, from the first: of packed ones, which have no
-  // row but for a problem, none where none has one.
+  // How many placements the table of hulls tells of, from the first. Packed ones have no row but
+  // for a problem, so there are none where none has one.
   size_t told_placements_ = 0;
   bool places_on_demand_ = false;
   // Empty where they are placed on demand.
@@ -216,8 +216,8 @@ class PlacementTable {
 
   // The caller's.
   std::string prefix_;
-  // Where any of hulls_ is a body: of each what is asked; parallel to ids_. Those of hulls are
-  // kept here.
+  // Where any of hulls_ is a body, what is asked of each; parallel to ids_. Those of hulls are kept
+  // here.
   std::vector<const QueryBody*> query_bodies_;
   std::vector<std::unique_ptr<const QueryBody>> bodies_of_hulls_;
   std::vector<PlacedBody> bodies_;
@@ -225,7 +225,7 @@ class PlacementTable {
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
 
-// Checks an update of a stream with `count` placements: of each of `placements` the new pose, as
+// Checks an update of a stream with `count` placements: the new pose of each of `placements`, as
 // ReadPose reads it. INVALID_ARGUMENT: numbers that do not fit the placements, an index out of
 // range or named twice, a malformed pose.
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,

@@ -150,7 +150,7 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
                          began.Take(), bodies_began.Take()}};
 }
 
-// Which incarnation ended first. rows: of hulld_follow.
+// Which incarnation ended first. rows: those of hulld_follow.
 void NoteFormer(const Rows& rows, int row, OtherChange& other) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);

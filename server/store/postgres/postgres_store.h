@@ -259,7 +259,8 @@ class PostgresStore : public Store {
   absl::Status unknown_;
 
   SessionPool readers_;
-  // Shared: of its own, so that all that wait to know what others did do not wait for readers.
+  // For a shared store: a pool of its own, so that calls that wait to know what others did do not
+  // wait for readers.
   SessionPool follower_;
 
   mutable std::mutex mutex_;

@@ -62,8 +62,8 @@ struct RemoteWorkload {
   std::function<Sample()> run_placing = nullptr;
 };
 
-// The workloads; hulls are created on hulld when first needed. `seconds`: of one round of those
-// that are as long as one likes.
+// The workloads; hulls are created on hulld when first needed. `seconds`: how long one round takes,
+// for those that can take any time.
 std::vector<RemoteWorkload> MakeCheckWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeBatchWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeStreamWorkloads(double seconds);

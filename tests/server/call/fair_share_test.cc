@@ -102,7 +102,7 @@ TEST(CallLifetime, DeadlinesDoNotFollowTheTimeOfDay) {
   using std::chrono::hours;
   using std::chrono::seconds;
   const Clock::time_point now = Clock::now();
-  // What the time of day says of itself does not matter, be it set a year on or back.
+  // The time of day does not matter, even when it is set a year on or back.
   for (const WallClock::time_point wall :
        {WallClock::now(), WallClock::now() + hours(8760), WallClock::now() - hours(8760)}) {
     EXPECT_EQ(CallLifetime(wall + seconds(5), wall, now).deadline(), now + seconds(5));

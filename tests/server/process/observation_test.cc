@@ -393,7 +393,7 @@ TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(25)), 1);
 }
 
-// A name that is not UTF-8, of which protobuf would tell standard error in full, every time.
+// A name that is not UTF-8: protobuf would write about it to standard error in full, every time.
 TEST_F(Observation, MalformedMessagesDoNotFloodTheLog) {
   const CapturedLog log;
   RouteLibraryLogs();

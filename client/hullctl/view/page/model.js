@@ -146,8 +146,8 @@ export class Model extends EventTarget {
     return this.shapeOf(object)?.radius || 0;
   }
 
-  // Points of the world that are about an object: its vertices where they are few, else the corners
-  // of its box.
+  // Points of the world that are about an object: its vertices where they are few, otherwise the
+  // corners of its box.
   cornersOf(object) {
     const {low, high, xyz, vertexCount} = this.shapeOf(object);
     if (vertexCount <= MOST_CORNERS) {
@@ -226,7 +226,7 @@ export class Model extends EventTarget {
     return pair.every((i) => this.objects[i].hullId) ? pair : null;
   }
 
-  // Whether the pair's certificate is asked for: of large bodies it is one for each of very many
+  // Whether the pair's certificate is asked for: for large bodies it is one for each of very many
   // pairs of pieces.
   wantsCertificate(rest) {
     const counts = (this.pair || []).map((i) => this.bodyOf(this.objects[i])?.pieces.length ?? 0);

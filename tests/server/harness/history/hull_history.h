@@ -15,7 +15,7 @@ namespace hulld::server {
 // them has exactly these as vertices.
 using PointSet = uint64_t;
 
-// What an answer about several says of a hull beside the first; of a batch, of any.
+// What an answer about several says of a hull beside the first; in a batch, of any hull.
 struct Seen {
   std::string hull_id;
   uint64_t create_revision = 0;
@@ -79,7 +79,7 @@ struct Operation {
   std::optional<uint64_t> if_revision;
   std::string writer;
   uint64_t sequence = 0;
-  // Append: of the stream, as its opening said.
+  // Append: that of the stream, as its opening said.
   uint64_t incarnation = 0;
   // Append: acknowledged with chunks after it, so that nobody told what it did alone; and with
   // chunks before it, so that counts, and whether it was applied already, are of all.
@@ -122,7 +122,7 @@ struct Operation {
   std::string deciding;
   // Ask that found nothing: the hull that a piece lacks; empty: it is the body that is missing.
   std::string missing;
-  // Ask: of the pieces, `others` has those of the body's store alone, so that nothing follows from
+  // Ask: `others` has only those pieces that are in the body's store, so that nothing follows from
   // whether it touches.
   bool is_part = false;
 };
@@ -151,7 +151,7 @@ class HullHistory {
 
 // Whether the operations on one hull are linearizable: whether there is an order that agrees with
 // real time in which a hull that does one thing at a time, as hull.proto says, would have answered
-// the same. Empty when there is one; else what could not be explained.
+// the same. Empty when there is one; otherwise what could not be explained.
 //
 // A read that may be answered from the past took effect between its answer and as long before its
 // call as that says, which is no longer than was asked for, and after every change up to the

@@ -105,8 +105,8 @@ class SimulatedStore : public Store {
     std::map<std::string, uint64_t> sequences;
   };
 
-  // A change that was kept: of which hull or body, at which revision, and whether an incarnation
-  // ended then.
+  // A change that was kept: which hull or body it changed, at which revision, and whether an
+  // incarnation ended then.
   struct Logged {
     std::string hull_id;
     uint64_t revision = 0;
