@@ -37,8 +37,8 @@ class CollisionWatch {
   absl::StatusOr<v1::WatchCollisionsResponse> Next();
 
   // Says where placements are now. While there is no connection it is noted, for the next.
-  // INVALID_ARGUMENT, without saying anything: it names a placement that there is not, or has not
-  // seven numbers for each.
+  // INVALID_ARGUMENT, without saying anything: it names a placement that does not exist, or does
+  // not have seven numbers for each.
   absl::Status Update(const v1::CollisionWatchUpdate& update);
 
   // Has Next return, now and ever after.

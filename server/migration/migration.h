@@ -18,7 +18,7 @@ namespace hulld::server {
 struct MigrationCounts {
   uint64_t hulls = 0;
   uint64_t bodies = 0;
-  // Hulls and bodies, of these, that an earlier run had copied.
+  // How many of these hulls and bodies an earlier run had copied.
   uint64_t resumed = 0;
 };
 

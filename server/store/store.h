@@ -115,7 +115,7 @@ struct StoreFailures {
 
 // What a store takes of its disk, and whether it keeps up with what is written.
 struct StoreDisk {
-  // All its files, and its log of these.
+  // All its files, and the log among them.
   uint64_t bytes = 0;
   uint64_t log_bytes = 0;
   // What the disk has left for it; none where that is not known.

@@ -319,7 +319,7 @@ void RobotCheck::PrintRow(uint64_t waypoint, const char* event, size_t pair, con
            << (run_.names() ? RelationText(row.relation) : TextOf(pair, row)) << "\n";
 }
 
-// With the piece of what stands around that decided, where that is a body.
+// The answer's text; where the surroundings are a body, with its piece that decided.
 std::string RobotCheck::TextOf(size_t pair, const AnswerRow& row) const {
   const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
   const uint32_t b = pairs_[2 * pair + 1];

@@ -12,7 +12,7 @@
 namespace hulld {
 
 // A growing subset of the vertices of a convex polygon, the next one always the vertex farthest
-// from the polygon of those chosen, as far as rounding lets tell.
+// from the polygon of those chosen, as far as rounding can tell.
 //
 // Idea: an edge of the chosen ones stands for the arc of vertices beyond it. Its farthest vertex
 // splits it. Source: Ramer 1972, An Iterative Procedure for the

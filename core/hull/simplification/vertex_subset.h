@@ -16,7 +16,7 @@
 namespace hulld {
 
 // A growing subset of the vertices of a hull of dimension 3, the next one always the vertex
-// farthest from the hull of those chosen, as far as rounding lets tell.
+// farthest from the hull of those chosen, as far as rounding can tell.
 //
 // Idea: the hull of those chosen grows as any hull does, exactly, and each other vertex waits in
 // the list of a triangle that it sees strictly: a vertex of the whole is outside the hull of any

@@ -90,7 +90,8 @@ void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
 }
 
 LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
-  // Only who holds this changes now_ and the tail, so both can be read without the other mutex.
+  // Only the holder of this mutex changes now_ and the tail, so both can be read without the other
+  // mutex.
   const std::lock_guard changing(changing_);
   if (points.empty()) return now_;
   Mark next = now_;

@@ -53,7 +53,8 @@ struct SceneAnswer {
 };
 
 struct SceneTotals {
-  // Pairs that the groups and movers leave, of these those whose boxes meet, of these those found.
+  // Pairs that the groups and movers leave; those of them whose boxes meet; and those of the latter
+  // that are found.
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;

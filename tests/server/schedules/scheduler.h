@@ -94,7 +94,7 @@ class Scheduler {
 
   size_t StartThread(std::function<void()> task, const char* name, const Location& where);
   void JoinThread(size_t thread);
-  // Waits until who holds an object lets go of it.
+  // Waits until the thread that holds an object lets go of it.
   void Block(const char* what, const void* object, const Location& where);
   void Unblock(const void* object);
   // Waits for a notification, which is true, or for the deadline.

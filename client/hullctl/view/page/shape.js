@@ -226,7 +226,7 @@ export class MeshShape extends Shape {
   }
 }
 
-// The vertices of `after` that `before` has not, as indices.
+// The vertices of `after` that `before` does not have, as indices.
 export function newVertices(before, after) {
   const known = new Set();
   const key = (xyz, i) => `${xyz[i]},${xyz[i + 1]},${xyz[i + 2]}`;

@@ -109,8 +109,8 @@ TEST(InsideSearch, IsNeverWorseThanFarthestFirst) {
   EXPECT_GT(better, 20);
 }
 
-// The bound of any start, and of what is chosen from there, is true by the oracle's exact
-// arithmetic.
+// By the oracle's exact arithmetic, the bound of any start is true, and so is that of what is
+// chosen from there.
 TEST(VertexSubset, StartsWithAnyVertices) {
   Random random(TestSeed(41));
   const Hull full = BuildHull(RandomOnSphere(random, 18, 3.0));
