@@ -33,7 +33,7 @@ Permission PermissionFor(Rpc rpc);
 // The caller of a call, and what the caller may do and see. The default is the caller of a server
 // without tokens, who may do everything.
 struct Caller {
-  // The token's; empty without tokens. It is no secret.
+  // The token's name; empty without tokens. It is no secret.
   std::string name;
   Permission permission = Permission::kAdmin;
   // What the IDs that the caller sees start with: ends in "/", or is empty for all.

@@ -15,7 +15,7 @@ struct TlsIdentity {
   // The server's certificate first, then those that lead to its authority.
   std::string certificates;
   std::string key;
-  // Whose clients may connect; empty: no certificate is asked of them.
+  // The authorities whose clients may connect; empty: clients need no certificate.
   std::string client_authorities;
 
   // The subject and the validity of the server's certificate.

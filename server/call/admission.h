@@ -131,7 +131,7 @@ class Admission {
     Rpc rpc;
     // Whose share it uses.
     std::string client;
-    // gRPC's.
+    // gRPC's object of the call.
     grpc_call* call = nullptr;
     // Whose token it carries, if it does, and what ends when that is no longer valid, which must
     // outlive the ticket. Then on_revoked is called, if there is one, on any thread, perhaps when

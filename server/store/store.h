@@ -89,7 +89,7 @@ using StoredBodyVisitor = std::function<void(const std::string&, absl::StatusOr<
 
 // What a store holds of hulls and bodies that were asked for, all of it of one moment.
 struct FoundRecords {
-  // The store's at that moment.
+  // The store's revision at that moment.
   uint64_t revision = 0;
   // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull, or the body.
   std::map<std::string, absl::StatusOr<StoredHull>> hulls;

@@ -70,7 +70,7 @@ class PlacementTable {
     HULLD_DCHECK(!places_on_demand_);
     return placed_;
   }
-  // One of them; held by `made` where they are placed on demand.
+  // One placed hull; held by `made` where they are placed on demand.
   const PlacedHull& PlacedAt(size_t i, std::optional<PlacedHull>* made) const {
     return places_on_demand_ ? made->emplace(Place(i)) : placed_[i];
   }
@@ -214,7 +214,7 @@ class PlacementTable {
   // Empty where they are placed on demand.
   std::vector<PlacedHull> placed_;
 
-  // The caller's.
+  // The prefix of IDs that the caller sees.
   std::string prefix_;
   // Where any of hulls_ is a body, what is asked of each; parallel to ids_. Those of hulls are kept
   // here.

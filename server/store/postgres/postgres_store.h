@@ -237,7 +237,7 @@ class PostgresStore : public Store {
   const std::string owner_;
   std::string id_;
   uint64_t revision_ = 0;
-  // As of that.
+  // The totals as of that revision.
   StoreTotals totals_;
   Durability durability_ = Durability::kSync;
   // The value of synchronous_commit.

@@ -64,7 +64,7 @@ class SharedStore : public Store {
     // Its changes.
     size_t seen = 0;
     uint64_t revision = 0;
-    // As of that.
+    // As of that revision.
     StoreTotals totals = {};
     // That nobody took yet.
     OtherChanges others = {};
