@@ -126,7 +126,7 @@ class Admission {
   // first call.
   void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
-  // What is to be known of a call.
+  // What must be known of a call to let it in.
   struct Arrival {
     Rpc rpc;
     // Whose share it uses.

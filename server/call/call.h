@@ -38,9 +38,10 @@ class Call {
     HULLD_CHECK(ticket_.has_value());
     return caller_;
   }
-  // The client's (metadata x-request-id), or ours, made when it is first needed: most calls succeed
-  // and have nothing said of them. All that is logged about the call carries it, and the reply of a
-  // call that is logged or fails, or whose client gave one.
+  // The request ID: the client's (metadata x-request-id), or ours, which is made when it is first
+  // needed, as most calls succeed and nothing is logged about them. All that is logged about the
+  // call carries it, and so does the reply of a call that is logged or fails, or whose client gave
+  // one.
   const std::string& request_id() const;
   // Whose share of the threads it uses. Requires that Begin succeeded.
   ClientId client() const {

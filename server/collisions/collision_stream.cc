@@ -295,7 +295,7 @@ void CollisionStream::DecideTogether() {
     return TellDecided();
   }
   const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
-  // Those of a step before that did not have their turn yet will do.
+  // Helpers of an earlier step that did not have their turn yet count as well.
   for (size_t helpers = helpers_waiting_.load(); helpers < wished; ++helpers) {
     ++helpers_waiting_;
     RunOn(lane_, [this] {
@@ -336,7 +336,7 @@ void CollisionStream::TakePart() {
     if (block.empty()) return;
     // What is begun next waits until this block is given back.
     const bool is_placing = is_placing_;
-    // What is left is given back as it is, so that somebody comes last.
+    // When the call is to stop, blocks are given back undone, so that one thread is still the last.
     if (!call().ShouldStop()) {
       for (uint32_t i = block.begin; i < block.end; ++i) {
         is_placing ? table_.PlaceAgain(moved_[i]) : Decide(i);

@@ -120,8 +120,8 @@ absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   return migration;
 }
 
-// A target that a migration has begun to fill from this source, as it is now, is gone on with; one
-// that was filled from the source as it was before is begun anew.
+// If a migration has begun to fill the target from this source as it is now, it is continued. A
+// target that was filled from the source as it was before is begun anew.
 absl::Status Migration::Prepare(MigrationTarget& target) {
   const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
   if (!mark.ok()) return mark.status();

@@ -92,7 +92,8 @@ ShardsPlan PlanOf(const PlacedLookup& lookup) {
 }
 
 // The bodies among the IDs; empty where there are none. What cannot be read now is not among them:
-// who looks for a hull under the ID is told why. CANCELLED, RESOURCE_EXHAUSTED: as FindBodies.
+// a caller that looks for a hull under the ID is told why. CANCELLED, RESOURCE_EXHAUSTED: as
+// FindBodies.
 absl::StatusOr<Bodies> BodiesAmong(Shards& shards, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop) {
   if (!shards.has_bodies()) return Bodies();

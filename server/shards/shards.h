@@ -31,12 +31,12 @@ namespace hulld::server {
 
 // The hulls and bodies of one server, spread by ID over one store or several, each with a registry
 // of its own: its revisions, its commits, its watches. What is about one ID goes to the registry of
-// that ID. With one shard everything does, as if this were not there.
+// that ID. With one shard, everything goes to its registry, as if this class were not there.
 //
-// What is about several shards is put together here, of parts of which each is of one revision of
-// its store. No change is made in two at once. A read of
-// several that is to be linearizable is proven to be of one instant by looking again; where it
-// never is, changes are held back for a moment (shards_read.cc). Thread-safe.
+// What is about several shards is put together here from parts, each of one revision of its store.
+// No change is made in two at once. A read of several that is to be linearizable is proven to be of
+// one instant by looking again; where it never is, changes are held back for a moment
+// (shards_read.cc). Thread-safe.
 class Shards {
  public:
   // What spreads IDs: the shard of each slot.

@@ -71,8 +71,7 @@ struct Change {
   std::optional<WriterSequence> writer;
   // The incarnation that this one takes the place of, if there is one.
   std::optional<StoredHull> replaced;
-  // The body after the change, or what is deleted if it is. Then nothing that says of a hull is
-  // used.
+  // The body after the change, or what is deleted if it is. Then no field about a hull is used.
   std::shared_ptr<StoredBody> body;
 
   const std::string& id() const {
@@ -204,9 +203,9 @@ class Store {
 
   // Whether other servers may commit to the same store while this one is open. Then Commit leaves
   // out, of the changes that it is given, all of an ID that is in what TakeOthers is about to give:
-  // they were made of what was not the last any more. LoadVertices and LoadSequence answer ABORTED
-  // where the hull was changed since. Follow finds out what others have committed by the time of
-  // the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
+  // they were made from a state that is no longer the last. LoadVertices and LoadSequence answer
+  // ABORTED where the hull was changed since. Follow finds out what others have committed by the
+  // time of the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
   virtual bool is_shared() const { return false; }
   virtual absl::Status Follow() { return absl::OkStatus(); }
   // Sends what the next Follow asks, which then finds out what others have committed by the time of

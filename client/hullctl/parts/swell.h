@@ -12,7 +12,7 @@
 
 namespace hulld {
 
-// From this ratio of volumes on, a hull is said to stand badly for its mesh.
+// From this ratio of volumes on, a hull is said to represent its mesh badly.
 inline constexpr double kSwellToWarn = 1.5;
 
 // "1.07 times the mesh", or that there is nothing to compare. ratio: see VolumeRatio.

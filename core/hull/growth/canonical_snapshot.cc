@@ -27,7 +27,7 @@ void Sort(std::span<Ranked> vertices) {
   });
 }
 
-// Sorts into canonical order; after the poll said stop, nothing holds.
+// Sorts into canonical order. After the poll said stop, the result means nothing.
 //
 // Idea: the x of most hulls are spread out, so as many slices across x as there are vertices leave
 // few in each, and only these are compared. The slice of an x is a composition of rounded

@@ -302,7 +302,7 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
 // nothing branches on it: each neighbour is written to both lists, and one of them then counts it.
 bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
   const uint32_t mark = NextMark();
-  // Local, as what is stored below may be them for all that the compiler knows.
+  // Local, because for all that the compiler knows, the stores below may change them.
   const double x = point.x();
   const double y = point.y();
   const double z = point.z();

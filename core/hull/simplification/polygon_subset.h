@@ -21,7 +21,7 @@ class PolygonSubset {
  public:
   // points: at unit scale. loop: their indices in order round the polygon; both must outlive this.
   // Starts with three. Requires at least three. After the poll said stop, here or in ChooseNext,
-  // nothing holds but that this may be destroyed.
+  // this may only be destroyed.
   PolygonSubset(std::span<const Vector> points, std::span<const uint32_t> loop, StopPoll& poll);
 
   // Indices, in the order chosen.

@@ -29,8 +29,8 @@ namespace hulld {
 class VertexSubset {
  public:
   // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must
-  // outlive this. Starts with four. After the poll said stop, here or in ChooseNext, nothing holds
-  // but that this may be destroyed. Cost: O(points).
+  // outlive this. Starts with four. After the poll said stop, here or in ChooseNext, this may only
+  // be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
   // The same, but it starts with the vertices given, each once. Nothing where these lie in a plane,
   // where no double is found inside their hull, where walks on it are longer than round shapes

@@ -98,8 +98,8 @@ class PlacementTable {
   // Whether the last Resolve gave this placement another hull, took its hull, or gave it one; for a
   // body, also whether it gave a piece another hull.
   bool hull_changed(size_t i) const;
-  // Whether it gave it another QueryHull, perhaps of the same hull: what was found before must not
-  // name that one's points.
+  // Whether it gave this placement another QueryHull, perhaps of the same hull; what was found
+  // before names points of the former one.
   bool query_hull_changed(size_t i) const;
 
   // The same as Resolve for a few of hull_ids(), by index, each once: those that the registry told

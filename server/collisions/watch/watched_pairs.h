@@ -28,7 +28,7 @@ struct WatchedPair {
   bool is_within_clearance = false;
   bool is_asked = false;
 
-  // Whether the client holds it for close.
+  // Whether the client was told that it is close.
   bool is_told() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 

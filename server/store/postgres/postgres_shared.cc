@@ -24,9 +24,9 @@ constexpr uint64_t kSchemaLock = 0x68756c6c65;
 // older ones are dropped.
 constexpr uint64_t kKeptBatches = 1 << 16;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
-// IDs that a server takes note of at a time, at most. So many took 0.2 s under the registry's mutex
-// (observed, with hulls that had come and gone, at load 6); they are one moment for readers, so
-// that they cannot be taken over in parts.
+// IDs that a server takes note of at a time, at most. That many took 0.2 s under the registry's
+// mutex (observed, with hulls that had come and gone, at load 6); they are one moment for readers,
+// so that they cannot be taken over in parts.
 constexpr int kMostFollowed = 1 << 17;
 constexpr std::chrono::milliseconds kFirstPause{10};
 constexpr std::chrono::milliseconds kLongestPause{500};
@@ -203,7 +203,7 @@ absl::Status PostgresStore::Join() {
         "the store was open with synchronous_commit = off and was not closed: start and end one "
         "hulld with --postgres-servers one first, which makes it another store");
   }
-  // Those that were killed. Who still asks for its last batch committed it just now.
+  // Drops servers that were killed. One that still asks for its last batch committed it just now.
   const absl::Status dropped = writer_->Ask({.name = "hulld_drop_old_servers"}).status();
   if (!dropped.ok()) return dropped;
   epoch_ = joined->bigint(0, 0);
@@ -220,7 +220,7 @@ absl::Status PostgresStore::Join() {
   return absl::OkStatus();
 }
 
-// Others need not remember what a server did last that ended in order.
+// Others need not remember the last batch of a server that ended in order.
 void PostgresStore::Leave() {
   if (writer_ == nullptr) return;
   writer_->Ask({.name = "hulld_drop_server", .parameters = {owner_}}).status().IgnoreError();
