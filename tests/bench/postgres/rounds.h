@@ -66,7 +66,7 @@ class Rows {
   std::FILE* out_ = stdout;
 };
 
-// A row of each subject. peer_of: whom a subject is compared with.
+// A row for each subject. peer_of: the one that a subject is compared with.
 void Report(const Arguments& arguments, std::vector<Subject>& subjects,
             const std::map<std::string, std::string>& peer_of);
 
