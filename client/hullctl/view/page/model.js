@@ -25,7 +25,7 @@ export class Model extends EventTarget {
     // By ID, and by file. Hulls are those of objects and of the pieces of bodies.
     this.hulls = new Map();
     this.bodies = new Map();
-    // Hulls of pieces that there are not.
+    // Hulls of pieces that do not exist.
     this.absent = new Set();
     this.meshes = new Map();
     this.info = new Map();
@@ -73,7 +73,7 @@ export class Model extends EventTarget {
     return this.objects.length > MOST_SINGLE_OBJECTS;
   }
 
-  // The hull, or of a body all of its pieces; undefined while it is on its way.
+  // The hull, or all pieces of a body; undefined while it is on its way.
   hullOf(object) {
     return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
   }
