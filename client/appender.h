@@ -38,7 +38,7 @@ struct AppendTotals {
   uint64_t reconnects = 0;
   // Sums over the acknowledgements received.
   v1::PointCounts counts;
-  // The last of them; without fields before the first.
+  // The last acknowledgement; it has no fields before the first one.
   v1::AppendAck last_ack;
   uint64_t hull_revision = 0;
   uint64_t vertex_count = 0;

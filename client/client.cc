@@ -149,7 +149,8 @@ absl::StatusOr<Response> Client::Call(Stub* stub,
     context.set_deadline(options_.retry.ForCall(deadline));
     response.Clear();
     const grpc::Status status = (stub->*method)(&context, request, &response);
-    // Nobody here cancels it: gRPC ends so what reaches a server in the moment in which it goes.
+    // Nobody here cancels it: gRPC ends a call like this when it reaches a server at the moment at
+    // which that goes.
     if (status.error_code() == grpc::StatusCode::CANCELLED) {
       return absl::UnavailableError("the server ended the call, as it is going");
     }

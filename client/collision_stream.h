@@ -20,7 +20,7 @@ namespace hulld {
 class CollisionStream final
     : public grpc::ClientBidiReactor<v1::StreamCollisionsRequest, v1::StreamCollisionsResponse> {
  public:
-  // timeout: for each answer. freshness: of an `open` that has none.
+  // timeout: for each answer. freshness: for an `open` that has none.
   CollisionStream(std::shared_ptr<v1::CollisionService::Stub> stub,
                   std::chrono::milliseconds timeout,
                   std::optional<v1::Freshness> freshness = std::nullopt);

@@ -28,7 +28,7 @@ absl::Status CheckDataDir(const std::string& path);
 
 // OK when this file holds a connection string for PostgreSQL that only we may read; whether the
 // database is there is not asked. INVALID_ARGUMENT names the setting that led to the file, and
-// quotes nothing of what that holds.
+// quotes nothing from the file.
 absl::Status CheckConninfoFile(const std::string& path,
                                const char* setting = "--postgres-conninfo-file");
 

@@ -174,7 +174,7 @@ void Server::AddSizesToMetrics() {
     if (const std::optional<StoreDisk> disk = shards_.disk(); disk.has_value()) {
       store.disk_bytes.Set(static_cast<double>(disk->bytes));
       store.log_bytes.Set(static_cast<double>(disk->log_bytes));
-      // Not a number is less than nothing, as an alert needs it.
+      // NaN is not less than any number, so that no alert fires.
       store.free_bytes.Set(disk->free_bytes.has_value() ? static_cast<double>(*disk->free_bytes)
                                                         : std::numeric_limits<double>::quiet_NaN());
       store.stalled.Set(disk->is_stalled ? 1 : 0);
@@ -270,7 +270,8 @@ bool Server::Drain(std::chrono::milliseconds timeout) {
     const auto left = deadline - std::chrono::steady_clock::now();
     grpc_server_->Shutdown(std::chrono::system_clock::now() + left);
   });
-  // What is idle only after the deadline was cancelled, however late this thread notices.
+  // A server that is idle only after the deadline has cancelled calls, however late this thread
+  // notices.
   const bool is_idle = admission_.WaitIdle(deadline) && std::chrono::steady_clock::now() < deadline;
   closing.join();
   return is_idle;

@@ -96,7 +96,7 @@ class Server {
   Admission admission_;
   std::vector<std::unique_ptr<Store>> stores_;
   // Chunks and replacements, and what may wait for the store. Three kinds of pools, so that readers
-  // never wait for writers, nor those of microseconds for those of seconds.
+  // never wait for writers, and reads of microseconds never wait for reads of seconds.
   ShardPools writers_;
   Shards shards_;
   ShardPools readers_;

@@ -7,8 +7,9 @@
 
 namespace hulld {
 
-// The freshness asks for at least what an answer with this header was of, in each of its stores;
-// what it asked for of these, or of another one in at_least_revision, is replaced.
+// Makes the freshness ask for at least the revision that an answer with this header was of, in each
+// of its stores. What it asked for of these stores, or of another one in at_least_revision, is
+// replaced.
 void AskForAtLeast(const v1::ResponseHeader& header, v1::Freshness* freshness);
 
 // The watch resumes after the last message that it told, which had this header.

@@ -42,9 +42,10 @@ Corner Crossing(const Corner& a, const BigInteger& h, const Corner& b, const Big
   return crossing;
 }
 
-// The two parts of a polygon. The one outside is empty where no corner is strictly outside; else
-// the one inside is empty where no corner is strictly inside, for what is on the boundary then has
-// less than the polygon's dimension: pieces are closed, so what covers the rest covers that, too.
+// The two parts of a polygon. The one outside is empty where no corner is strictly outside.
+// Otherwise the one inside is empty where no corner is strictly inside, because what is on the
+// boundary then has less than the polygon's dimension: pieces are closed, so what covers the rest
+// covers that, too.
 struct Parts {
   Polygon inside;
   Polygon outside;
@@ -282,7 +283,7 @@ class Cover {
   const TriangleMesh& mesh_;
   CommonExponent grid_;
   std::vector<ConvexRegion> regions_;
-  // Of each piece, for distances.
+  // The vertices of each piece, for distances.
   std::vector<std::vector<Point>> vertices_;
   std::vector<BigVector> on_grid_;
   // For each vertex, which pieces hold it.

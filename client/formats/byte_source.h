@@ -55,7 +55,7 @@ class ByteSource {
   // INVALID_ARGUMENT "NAME:LINE: message" and "NAME: byte OFFSET: message".
   absl::Status ErrorAtLine(const std::string& message) const;
   absl::Status ErrorAtByte(const std::string& message) const;
-  // The error that stopped reading, else one that says that the file ends too early.
+  // The error that stopped reading; if there is none, one that says that the file ends too early.
   absl::Status Truncated(const std::string& what) const;
 
  private:

@@ -10,9 +10,9 @@
 
 namespace hulld {
 
-// The vertex that a corner of an OBJ face names: of "7", "7/1", "7//3" and "7/1/3" it is 7. Counted
-// from 1; a negative number counts back from the last vertex before the face. False when it is none
-// of these, or 0.
+// The vertex that a corner of an OBJ face names: 7 for "7", "7/1", "7//3" and "7/1/3". Counted from
+// 1; a negative number counts back from the last vertex before the face. False when it is none of
+// these, or 0.
 bool ParseObjCorner(std::string_view token, int64_t* vertex);
 
 // Checks the faces of an OBJ file for a reader that wants its points alone: a face that names a

@@ -13,7 +13,7 @@
 namespace hulld {
 
 // Consecutive points of a file, three coordinates per point, all finite: in `xyz_float` where the
-// file's scalars are floats, else in `xyz`; the other is empty.
+// file's scalars are floats, otherwise in `xyz`; the other is empty.
 struct PointBlock {
   std::vector<double> xyz;
   std::vector<float> xyz_float;

@@ -176,7 +176,7 @@ ExitCode Act(Invocation* invocation) {
   return ExitCode::kUsage;
 }
 
-// One command line; of a shell, unless `session` is null.
+// Runs one command line; it is one of a shell unless `session` is null.
 int Run(const std::vector<std::string>& arguments, const Invocation* session, std::ostream& out,
         std::ostream& err) {
   CommandLine command_line(

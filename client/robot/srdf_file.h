@@ -20,7 +20,7 @@ LinkPair MakeLinkPair(int a, int b);
 // The pairs of links that a semantic description (SRDF, as MoveIt writes it) leaves out: of
 // disable_collisions, and of disable_default_collisions without enable_collisions. - is standard
 // input. INVALID_ARGUMENT names file and line: XML that is not well-formed, an element without its
-// links, a link that the robot has not.
+// links, a link that the robot does not have.
 absl::StatusOr<std::set<LinkPair>> ReadDisabledPairs(const std::string& path, const Robot& robot);
 absl::StatusOr<std::set<LinkPair>> ParseDisabledPairs(const std::string& text,
                                                       const std::string& name, const Robot& robot);

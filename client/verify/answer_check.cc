@@ -16,7 +16,7 @@ constexpr int kAttempts = 5;
 
 constexpr char kOtherStore[] = "the server holds another store than the answer's";
 
-// Of a hull or a body.
+// Whether a hull or a body is still at that version.
 template <typename Info>
 bool IsSame(const Info& info, const v1::HullVersion& version) {
   return info.create_revision() == version.create_revision() &&

@@ -54,9 +54,9 @@ struct CheckedBodies {
   const v1::HullVersion& hull_a;
   const v1::HullVersion& hull_b;
   const PieceCertificates& certificates;
-  // The hulls of all pieces, and of a hull beside bodies itself or not.
+  // The hulls of all pieces; a hull beside bodies may be among them or not.
   const HullVersions& piece_hulls;
-  // The pieces that the answer says decided; none of a hull, and where it names none.
+  // The pieces that the answer says decided; none for a hull, and none where it names none.
   std::optional<uint32_t> piece_a;
   std::optional<uint32_t> piece_b;
 };

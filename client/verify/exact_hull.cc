@@ -91,7 +91,7 @@ BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& length
   return std::make_shared<const std::vector<BigVector>>(std::move(vertices));
 }
 
-// p_W = R(q) p / |q|^2 + t, and of a piece R(q_B) (R(q_P) p / |q_P|^2 + t_P) / |q_B|^2 + t_B.
+// p_W = R(q) p / |q|^2 + t, and for a piece R(q_B) (R(q_P) p / |q_P|^2 + t_P) / |q_B|^2 + t_B.
 ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths)
     : xyz(hull.xyz), vertices(std::move(given)) {
   const BigRotation outer = ToIntegers(Rotation(hull.pose));

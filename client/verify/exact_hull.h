@@ -18,7 +18,7 @@ namespace hulld {
 struct PlacedVertices {
   std::span<const double> xyz;
   const v1::Pose& pose;
-  // Of a piece of a body: its pose in the frame of the body, which is at `pose`; else null.
+  // For a piece of a body: its pose in the frame of the body, which is at `pose`; otherwise null.
   const v1::Pose* in_body = nullptr;
 };
 

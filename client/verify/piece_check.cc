@@ -130,7 +130,7 @@ class ExactPieces {
  private:
   std::span<const PlacedVertices> pieces_;
   std::vector<std::optional<ExactHull>> exact_;
-  // Of a hull that is a piece several times, once.
+  // By the coordinates of a piece, so that a hull that is a piece several times is converted once.
   std::map<const double*, BigVertices> vertices_;
 };
 

@@ -22,10 +22,10 @@ namespace hulld {
 // convex set is largest at vertices. No more vertices than max_vertices; with max_error alone, no
 // larger error. With both, whether some other hull keeps both is not looked at.
 //
-// A point is within the error when it is so of a triangle of vertices, and inside when a
-// tetrahedron of vertices holds it: facets only tell where to look, so that wrong ones make the
-// check refuse what is true, and never accept what is not. Cost: about n log n, and some ten
-// microseconds of exact arithmetic for each vertex.
+// A point counts as within the error when it is within the error of a triangle of vertices, and as
+// inside when a tetrahedron of vertices holds it. Facets only tell where to look, so wrong facets
+// make the check refuse what is true, and never accept what is not. Cost: about n log n, and some
+// ten microseconds of exact arithmetic for each vertex.
 absl::Status CheckSimplification(const v1::Simplification& asked, const HullMesh& hull,
                                  const HullMesh& simplified);
 

@@ -30,7 +30,7 @@ class UnitBox {
   double LengthToUnit(double length) const;
 
  private:
-  // Of the largest coordinate, so that no difference overflows.
+  // The exponent of the largest coordinate, divided out so that no difference overflows.
   int exponent_ = 0;
   Point3 low_ = {0, 0, 0};
   double size_ = 1;

@@ -18,7 +18,7 @@ namespace hulld {
 
 // WatchCollisions, message by message: tells when pairs begin and end to collide. A watch whose
 // connection is lost goes on where it was: it opens another call with the poses as they are by now,
-// tells what changed meanwhile and nothing twice, and ends that as `synced` once more. So whoever
+// tells what changed meanwhile and nothing twice, and ends that as `synced` once more. So code that
 // folds the events needs to know nothing of connections. Next is for one thread, Update for one,
 // which may be another, and Cancel for any.
 class CollisionWatch {
@@ -37,8 +37,8 @@ class CollisionWatch {
   absl::StatusOr<v1::WatchCollisionsResponse> Next();
 
   // Says where placements are now. While there is no connection it is noted, for the next.
-  // INVALID_ARGUMENT, without saying anything: it names a placement that there is not, or has not
-  // seven numbers for each.
+  // INVALID_ARGUMENT, without saying anything: it names a placement that does not exist, or does
+  // not have seven numbers for each.
   absl::Status Update(const v1::CollisionWatchUpdate& update);
 
   // Has Next return, now and ever after.

@@ -14,7 +14,7 @@
 namespace hulld {
 
 // WatchHulls, message by message. A watch whose connection is lost goes on where it was: it opens
-// another call that resumes after the last header, which ends as `synced` once more. So whoever
+// another call that resumes after the last header, which ends as `synced` once more. So code that
 // folds the events needs to know nothing of connections. Next is for one thread, Cancel for any.
 class HullWatch {
  public:

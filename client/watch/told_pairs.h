@@ -33,7 +33,7 @@ class ToldPairs {
     bool within_clearance = false;
   };
 
-  // Empty for a placement that there is not.
+  // Empty for a placement that does not exist.
   const std::string& HullOf(uint32_t placement) const;
   void TakeHulls(const v1::WatchCollisionsResponse& message);
   void TakeProblems(v1::WatchCollisionsResponse* message);

@@ -46,7 +46,7 @@ class ScratchList {
     HULLD_DCHECK(size <= capacity_);
     size_ = size;
   }
-  // Makes room for so many elements in all; keeps the first `used`.
+  // Makes room for this many elements in all; keeps the first `used`.
   void MakeRoom(size_t room, size_t used) {
     if (room > capacity_) Grow(room, used);
   }

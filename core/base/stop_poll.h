@@ -9,8 +9,8 @@
 namespace hulld {
 
 // Polls a caller's should_stop from within long work: at the first step, so that work which nobody
-// waits for any more does not begin, and then once in so many steps. A caller that said stop is not
-// asked again. One thread's; threads that share work have a poll each.
+// waits for any more does not begin, and then once in `steps_per_poll` steps. A caller that said
+// stop is not asked again. One thread's; threads that share work have a poll each.
 class StopPoll {
  public:
   // For steps that take at most about 10 us each, most of them far less.

@@ -25,8 +25,8 @@ struct Edge {
 // Vertices are the extreme points, in lexicographic order (x, then y, then z); -0 is stored as +0.
 // Facets are maximal coplanar polygons, each from its lowest vertex, counter-clockwise seen from
 // outside, sorted by their vertex sequences. A hull of dimension 2 has one facet, which stands for
-// both its sides (its second vertex is lower than its last); of dimension 1, no facet and one edge;
-// of dimension 0, one vertex; of dimension -1, nothing. Edges are sorted.
+// both its sides (its second vertex is lower than its last); one of dimension 1 has no facet and
+// one edge, one of dimension 0 one vertex, one of dimension -1 nothing. Edges are sorted.
 class Hull {
  public:
   Hull() = default;

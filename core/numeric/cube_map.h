@@ -36,7 +36,7 @@ inline Vector CubeDirection(uint32_t face, double s, double t) {
 }
 
 // Where a direction meets the cube: the face, and the coordinates there times largest(). Without
-// branches on data, as directions come in no foreseeable order. Of components equally large the
+// branches on data, as directions come in no foreseeable order. Among equally large components, the
 // first counts. Zero meets face 0; a direction that is not finite meets some face.
 class OnCube {
  public:

@@ -10,7 +10,7 @@ namespace hulld {
 
 // Sign of det[b-a, c-a, d-a]: +1 when d lies on the side that the normal (b-a) x (c-a) points to, 0
 // when the four points are coplanar, -1 otherwise. Exact for all finite input: a floating-point
-// filter with a proven bound decides almost always. Of the rest, the same filter decides where
+// filter with a proven bound decides almost always. For the rest, the same filter decides where
 // points lie close together, seen from one of these, and at extreme magnitudes, where a power of
 // two brings them into range; integers of fixed size decide what they can hold, 60 bits a
 // coordinate on one scale; expansions what is left within the exponent range of kExpansionMin and

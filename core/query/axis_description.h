@@ -9,9 +9,9 @@ namespace hulld {
 
 // Names an axis n (world frame): its direction rounded to unit length, the features of A and B that
 // it supports, exactly, and its kind by these: the normal of a whole facet (of A first), the cross
-// product of two edges, else FLAT when A - B is flat, else GENERAL. Requires n not zero, and n.(a -
-// b) <= 0 throughout (unchecked: this is what the search has just proven). Cost: O(V) and a scan of
-// the facets.
+// product of two edges, otherwise FLAT when A - B is flat, and GENERAL when it is not. Requires n
+// not zero, and n.(a - b) <= 0 throughout (unchecked: this is what the search has just proven).
+// Cost: O(V) and a scan of the facets.
 SeparatingAxis DescribeAxis(ExactPair& pair, const IntegerVector& n);
 
 // n rounded to unit length. Requires n not zero.

@@ -29,8 +29,8 @@ absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
 // may have their turn between two pieces.
 class TextbookCheck {
  public:
-  // All must outlive the check. Requires options.method to be the textbook. Errors as
-  // CheckCollision's, but for CANCELLED.
+  // All must outlive the check. Requires options.method to be the textbook. Errors: those of
+  // CheckCollision, but for CANCELLED.
   static absl::StatusOr<TextbookCheck> Begin(const PlacedHull& a, const PlacedHull& b,
                                              const QueryOptions& options);
 

@@ -26,9 +26,9 @@ struct SeparationAnswer {
   std::optional<bool> within_clearance;
 };
 
-// Fills `answer`: from floating point with a proven bound where that is close enough, else from
-// exact arithmetic, whose result is rounded. The values depend on the pair alone, not on how the
-// relation was found. Requires a relation other than kWithinTolerance. `cold`: whether no cache
+// Fills `answer`: from floating point with a proven bound where that is close enough, otherwise
+// from exact arithmetic, whose result is rounded. The values depend on the pair alone, not on how
+// the relation was found. Requires a relation other than kWithinTolerance. `cold`: whether no cache
 // helped to find the decision, so that its pairs may be used. CANCELLED when should_stop, which may
 // be empty, said so.
 absl::Status FindSeparation(const FloatPair& pair, const Decision& decision, bool cold,

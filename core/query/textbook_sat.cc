@@ -224,7 +224,7 @@ struct Scan {
   std::atomic<uint64_t> separated = kNone;
   std::atomic<uint64_t> zero = kNone;
   std::atomic<bool> stopped = false;
-  // Blocks of axes are taken in their order, and who takes one tests it.
+  // Blocks of axes are taken in their order, and the thread that takes one tests it.
   std::atomic<uint64_t> next_axis = 0;
 
   // Goes on until `end`. Whether nothing is left to test.

@@ -19,11 +19,11 @@ namespace hulld {
 // edges of A with the edges of B (edge of A major) and, where A - B is flat, its normals and the
 // in-plane normals of its edges, which the textbook forgets. On each, every vertex is projected, in
 // floating point with a proven bound; where that leaves the order of the intervals open, exactly.
-// The lowest-numbered strictly separating axis decides SEPARATED, else the lowest with zero gap
-// TOUCHING, else the hulls are OVERLAPPING. The axes are shared among options.threads OpenMP
-// threads; the answer and its report do not depend on their number. Cost: O(E_A E_B (V_A + V_B)).
-// Source: Gottschalk 1996, Separating axis theorem; Eberly 2001, Dynamic Collision Detection using
-// Oriented Bounding Boxes.
+// The lowest-numbered strictly separating axis decides SEPARATED, otherwise the lowest with zero
+// gap TOUCHING; otherwise the hulls are OVERLAPPING. The axes are shared among options.threads
+// OpenMP threads; the answer and its report do not depend on their number. Cost: O(E_A E_B (V_A +
+// V_B)). Source: Gottschalk 1996, Separating axis theorem; Eberly 2001, Dynamic Collision Detection
+// using Oriented Bounding Boxes.
 //
 // Requires both hulls not empty. RESOURCE_EXHAUSTED: more axes than options.max_textbook_axes.
 // CANCELLED: should_stop.

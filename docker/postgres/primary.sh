@@ -3,5 +3,5 @@
 # standby copy it. The image of PostgreSQL runs what lies in /docker-entrypoint-initdb.d.
 set -euo pipefail
 psql --set ON_ERROR_STOP=1 --dbname "$POSTGRES_DB" --command "CREATE ROLE standby REPLICATION LOGIN"
-# Whoever is in their network may connect, as for the database itself: nobody else can reach it.
+# All machines in their network may connect, as for the database itself: nobody else can reach it.
 echo "host replication standby samenet trust" >>"$PGDATA/pg_hba.conf"

@@ -58,7 +58,7 @@ absl::StatusOr<Caller> Authenticator::Authenticate(const Metadata& metadata, Rpc
   const std::optional<Caller> caller = table->Find(value.substr(sizeof kScheme - 1));
   if (!caller.has_value()) {
     return WithReason(absl::UnauthenticatedError("the call's token is unknown or no longer valid; "
-                                                 "ask whoever runs the server for another"),
+                                                 "ask the server's operator for another"),
                       v1::ERROR_REASON_TOKEN_UNKNOWN);
   }
   if (absl::Status s = CheckPermission(*caller, rpc); !s.ok()) return s;

@@ -28,9 +28,10 @@ class Authenticator {
   // From now on callers need one of these tokens. Calls that run are for others to end (Knows).
   void SetTokens(TokenTable tokens);
 
-  // Whether the token of a caller that was let in is still valid for what it was.
+  // Whether the token of a caller that was let in is still valid, with the rights that it had.
   bool Knows(const Caller& caller) const;
-  // How often the tokens changed: what was found of a caller holds as long as this stays.
+  // How often the tokens changed. What was found out about a caller holds as long as this stays the
+  // same.
   uint64_t generation() const { return generation_.load(std::memory_order_acquire); }
 
  private:

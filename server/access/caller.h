@@ -30,10 +30,10 @@ const char* RoleName(Permission permission);
 // What a call needs: the one table of that.
 Permission PermissionFor(Rpc rpc);
 
-// Who makes a call, and what they may see. The default is whoever reaches a server without tokens:
-// they may do everything.
+// The caller of a call, and what the caller may do and see. The default is the caller of a server
+// without tokens, who may do everything.
 struct Caller {
-  // The token's; empty without tokens. It is no secret.
+  // The token's name; empty without tokens. It is no secret.
   std::string name;
   Permission permission = Permission::kAdmin;
   // What the IDs that the caller sees start with: ends in "/", or is empty for all.

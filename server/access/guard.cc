@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// Says once what is wrong with a file, and once that it is well again.
+// Logs once what is wrong with a file, and once that it is in order again.
 void Complain(const char* what, const absl::Status& status, std::string* complaint) {
   const std::string message(status.message());
   if (message == *complaint) return;

@@ -17,11 +17,10 @@
 
 namespace hulld::server {
 
-// Who may connect and who may call, as the files of --tls-cert, --tls-key, --tls-client-ca and
-// --tokens-file say. It looks at the files every Config::kReloadInterval; what is new and valid is
-// taken for connections and calls from then on (and calls that run on tokens that are gone are
-// ended), what is broken is reported and leaves what was
-// there.
+// Decides who may connect and who may call, as the files of --tls-cert, --tls-key, --tls-client-ca
+// and --tokens-file say. It looks at the files every Config::kReloadInterval. New files that are
+// valid hold for connections and calls from then on, and calls that run on tokens that are gone are
+// ended. Files that are broken are reported and change nothing.
 class Guard {
  public:
   // INVALID_ARGUMENT names the setting whose file is wrong.

@@ -13,9 +13,9 @@
 
 namespace hulld::server {
 
-// TLS 1.2 or later with an identity that can be exchanged: connections made after SetIdentity are
-// shaken hands with under the new one, those that stand stay. Clients need a certificate when the
-// first identity names authorities.
+// TLS 1.2 or later with an identity that can be exchanged: connections made after SetIdentity use
+// the new one, and existing connections stay. Clients need a certificate when the first identity
+// names authorities.
 //
 // gRPC's C++ interface offers this only by watching files, which it takes as they come, whether
 // or not key and certificate belong together; so this goes to its core, which asks for the identity

@@ -15,10 +15,10 @@ struct TlsIdentity {
   // The server's certificate first, then those that lead to its authority.
   std::string certificates;
   std::string key;
-  // Whose clients may connect; empty: no certificate is asked of them.
+  // The authorities whose clients may connect; empty: clients need no certificate.
   std::string client_authorities;
 
-  // Of the server's certificate.
+  // The subject and the validity of the server's certificate.
   std::string subject;
   std::chrono::system_clock::time_point not_before;
   std::chrono::system_clock::time_point not_after;
@@ -27,9 +27,9 @@ struct TlsIdentity {
 };
 
 // Reads --tls-cert, --tls-key and --tls-client-ca, and checks that they are whole and belong
-// together, so that files caught in the middle of an exchange are told from good ones. Requires
-// config.has_tls(). INVALID_ARGUMENT names the setting. A certificate that has expired is not an
-// error here.
+// together, so that files caught in the middle of an exchange are told apart from good ones.
+// Requires config.has_tls(). INVALID_ARGUMENT names the setting. A certificate that has expired is
+// not an error here.
 absl::StatusOr<TlsIdentity> LoadTlsIdentity(const Config& config);
 
 // Why nobody would trust the certificate at `now`: INVALID_ARGUMENT when it has expired or is not

@@ -21,7 +21,7 @@ constexpr int kExitDamaged = 1;
 constexpr int kExitUsage = 2;
 
 struct Finding {
-  // Or a body's.
+  // The ID of a hull, or of a body.
   std::string hull_id;
   std::string what;
 };

@@ -22,7 +22,7 @@ using BodyServiceOfBytes =
             v1::BodyService::WithRawCallbackMethod_DeleteBody<v1::BodyService::Service>>>>;
 
 // hulld.v1.BodyService: the contract in body.proto over the shards. Calls that look into records
-// are answered where they arrive; those with pieces, of which there may be many, on `readers`.
+// are answered where they arrive; those with pieces, which may be many, on `readers`.
 class BodyService : public BodyServiceOfBytes {
  public:
   BodyService(Shards& shards, Admission& admission, ShardPools& readers)

@@ -13,7 +13,7 @@
 namespace hulld::server {
 namespace {
 
-// A unary call takes well under a millisecond, a batch rather a second: when to try again.
+// When to try again: a unary call takes well under a millisecond, a batch about a second.
 constexpr std::chrono::milliseconds kRetryCall(100);
 constexpr std::chrono::milliseconds kRetryBatch(1000);
 // A call that polls notices by itself that its time is up, and says so better than a cancellation.
@@ -137,7 +137,7 @@ absl::StatusOr<Admission::Ticket> Admission::Admit(const Arrival& arrival) {
   const std::lock_guard lock(mutex_);
   if (draining_) return Draining();
   const auto known = clients_.find(arrival.client);
-  // What tells the operator how the server is must work when it is full, too.
+  // Calls that tell the operator how the server is must work even when it is full.
   if (arrival.rpc != Rpc::kGetStatus) {
     const absl::Status room =
         CheckRoom(arrival.rpc, known == clients_.end() ? Ticket::Client{} : known->second);

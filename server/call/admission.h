@@ -51,12 +51,12 @@ bool UsesWriters(Rpc rpc);
 // tells those to end whose token is no longer valid, and cancels those that neither end nor poll
 // for their end, as when a client reads no more.
 //
-// Each client has its share: so many calls, streams and batches. A part of all calls, and of each
-// client's, is kept for single calls, so what lasts never keeps them out.
+// Each client has its share of calls, streams and batches. A part of all calls, and of each
+// client's, is kept for single calls, so calls that last never keep them out.
 class Admission {
  public:
-  // Who tells who calls; set before the first call, and outlives this. Without one everyone may do
-  // everything.
+  // Sets what tells callers apart. Called before the first call; `authenticator` must outlive this.
+  // Without one, everyone may do everything.
   void SetAuthenticator(const Authenticator& authenticator) { authenticator_ = &authenticator; }
   const Authenticator* authenticator() const { return authenticator_; }
 
@@ -126,12 +126,12 @@ class Admission {
   // first call.
   void SetBacklog(std::function<size_t(Rpc)> backlog) { backlog_ = std::move(backlog); }
 
-  // What is to be known of a call.
+  // What must be known of a call to let it in.
   struct Arrival {
     Rpc rpc;
     // Whose share it uses.
     std::string client;
-    // gRPC's.
+    // gRPC's object of the call.
     grpc_call* call = nullptr;
     // Whose token it carries, if it does, and what ends when that is no longer valid, which must
     // outlive the ticket. Then on_revoked is called, if there is one, on any thread, perhaps when
@@ -196,7 +196,7 @@ class Admission {
   std::list<Ticket::Watched> watched_;
   // Those of which the time was up: nothing more is done about them.
   std::list<Ticket::Watched> cancelled_;
-  // Of watched_ or revoked_.
+  // Notified when watched_ or revoked_ changes.
   std::condition_variable watched_changed_;
   bool ending_ = false;
   std::thread watchman_;

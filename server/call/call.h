@@ -33,21 +33,23 @@ class Call {
       : context_(context), admission_(admission), rpc_(rpc), lifetime_(context.deadline()) {}
 
   Rpc rpc() const { return rpc_; }
-  // Who calls. Requires that Begin succeeded.
+  // The caller. Requires that Begin succeeded.
   const Caller& caller() const {
     HULLD_CHECK(ticket_.has_value());
     return caller_;
   }
-  // The client's (metadata x-request-id), or ours, made when it is first needed: most calls succeed
-  // and have nothing said of them. All that is logged about the call carries it, and the reply of a
-  // call that is logged or fails, or whose client gave one.
+  // The request ID: the client's (metadata x-request-id), or ours, which is made when it is first
+  // needed, as most calls succeed and nothing is logged about them. All that is logged about the
+  // call carries it, and so does the reply of a call that is logged or fails, or whose client gave
+  // one.
   const std::string& request_id() const;
   // Whose share of the threads it uses. Requires that Begin succeeded.
   ClientId client() const {
     HULLD_CHECK(ticket_.has_value());
     return ticket_->client();
   }
-  // When it came; of a stream that BeginMessage is called for, the message that is under way.
+  // When it came; in a stream that BeginMessage is called for, when the message that is under way
+  // came.
   std::chrono::steady_clock::time_point arrival() const { return arrival_; }
   std::chrono::steady_clock::time_point message_arrival() const { return message_arrival_; }
   Metrics& metrics() const { return admission_.metrics(); }

@@ -67,7 +67,7 @@ class CallLifetime {
   }
 
   static constexpr char kRevoked[] =
-      "the call's token is no longer valid; ask whoever runs the server for another";
+      "the call's token is no longer valid; ask the server's operator for another";
 
  private:
   static Clock::time_point Monotonic(WallClock::time_point deadline, WallClock::time_point wall_now,

@@ -18,7 +18,7 @@
 
 namespace hulld::server {
 
-// gRPC's reactors for the kinds of streams: of bytes, as message_bytes.h says.
+// gRPC's reactors for the kinds of streams. They are streams of bytes, as message_bytes.h says.
 using ReadReactor = grpc::ServerReadReactor<grpc::ByteBuffer>;
 using WriteReactor = grpc::ServerWriteReactor<grpc::ByteBuffer>;
 using BidiReactor = grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>;
@@ -81,7 +81,7 @@ class CallStream : public Reactor, public std::enable_shared_from_this<CallStrea
     step();
   }
 
-  // Why the call stopped, if it did; else `status`.
+  // Why the call stopped, if it did; otherwise `status`.
   absl::Status OrStopped(const absl::Status& status) const {
     return call_.ShouldStop() ? call_.StopStatus() : status;
   }

@@ -12,9 +12,9 @@ namespace hulld::server {
 // Messages as gRPC carries them. Every call takes and gives bytes, not messages: gRPC would parse a
 // request before anyone can ask who calls, and without any limit.
 
-// Parses a request that a caller who was let in sent, and frees its bytes. `share` covers the
-// message from then on: keep it as long as the message. INVALID_ARGUMENT: the bytes are no such
-// message. RESOURCE_EXHAUSTED: as RequestMemory::Take; the message is not parsed then.
+// Parses a request of a caller that was let in, and frees its bytes. `share` covers the message
+// from then on: keep it as long as the message. INVALID_ARGUMENT: the bytes are no such message.
+// RESOURCE_EXHAUSTED: as RequestMemory::Take; the message is not parsed then.
 absl::Status ParseRequest(grpc::ByteBuffer& bytes, RequestMemory& memory,
                           google::protobuf::Message* message, RequestMemory::Share& share);
 

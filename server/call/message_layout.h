@@ -29,7 +29,8 @@ class MessageLayout {
     enum class Kind : uint8_t { kUnknown, kNumber, kText, kMessage };
     Kind kind = Kind::kUnknown;
     bool is_repeated = false;
-    // Of its elements on the wire where they are numbers; packed ones are of the same kind.
+    // Whether its elements, where they are numbers, are varints on the wire; packed ones are of the
+    // same kind.
     bool is_varint = false;
     uint32_t element_bytes = 0;
     const MessageLayout* message = nullptr;

@@ -56,8 +56,8 @@ class QueuedStream : public CallStream<Reactor> {
   virtual void StartWork() = 0;
   // Whether something is under way that must be over before the stream ends.
   virtual bool IsWorking() const = 0;
-  // Whether the only reply that waits is to wait on for others to join it, which saves writes.
-  // Requires, where it says so, that a Locked step follows soon.
+  // Whether the only reply that waits is to wait longer, so that others join it, which saves
+  // writes. Requires, if true, that a Locked step follows soon.
   virtual bool KeepsWaiting() const { return false; }
 
   // Queues a reply. bytes: its size, where the stream bounds what waits.

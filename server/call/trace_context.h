@@ -12,12 +12,12 @@ namespace hulld::server {
 class TraceContext {
  public:
   // None when `text` is not a traceparent: 00, the trace's ID of 32 digits, its parent's of 16 and
-  // flags of 2, all hexadecimal in lower case, with "-" between them; neither ID is zero. Of a
-  // later version than 00 what 00 knows is read.
+  // flags of 2, all hexadecimal in lower case, with "-" between them; neither ID is zero. A later
+  // version than 00 is read as far as 00 knows it.
   static std::optional<TraceContext> Parse(std::string_view text);
 
   std::string trace_id() const { return text_.substr(kTraceId, 32); }
-  // Of the client's span.
+  // The ID of the client's span.
   std::string parent_id() const { return text_.substr(kParentId, 16); }
   // As a traceparent of version 00.
   const std::string& text() const { return text_; }

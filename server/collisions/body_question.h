@@ -38,8 +38,9 @@ class BodyQuestion : public std::enable_shared_from_this<BodyQuestion> {
   };
   using Done = std::function<void(absl::StatusOr<BodyAnswer>, const Side& a, const Side& b)>;
 
-  // client: who waits for it. `done` is called once, on a thread of the pool. Requires valid
-  // options for bodies (ValidateBodyOptions). CANCELLED: options.should_stop said so.
+  // client: the one that waits for the answer. `done` is called once, on a thread of the pool.
+  // Requires valid options for bodies (ValidateBodyOptions). CANCELLED: options.should_stop said
+  // so.
   static void Start(TaskPool& pool, HullView a, const Pose& X_WA, HullView b, const Pose& X_WB,
                     const QueryOptions& options, ClientId client, Done done);
 

@@ -9,10 +9,10 @@
 
 namespace hulld::server {
 
-// A range of work, [0, count), that several threads claim block by block, from its end. Unlike
-// SharedLoop nobody waits: whoever gives back the last block goes on with what comes after, and a
-// thread that comes when all is claimed finds nothing, also once the next range has begun or this
-// one's owner has ended its work. Any thread may claim at any time.
+// A range of work, [0, count), that several threads claim block by block, from its end. Unlike in
+// SharedLoop, nobody waits: the thread that gives back the last block goes on with what comes
+// after, and a thread that comes when all is claimed finds nothing. That also holds once the next
+// range has begun or this one's owner has ended its work. Any thread may claim at any time.
 class ClaimedRange {
  public:
   struct Block {
@@ -22,8 +22,8 @@ class ClaimedRange {
     bool empty() const { return begin == end; }
   };
 
-  // Begins a range. Whoever claims of it sees what was written before. Requires that the range
-  // before was given back.
+  // Begins a range. A thread that claims a block of it sees what was written before. Requires that
+  // the range before was given back.
   void Begin(uint32_t count) {
     HULLD_CHECK(left_.load(std::memory_order_relaxed) == 0);
     left_.store(count, std::memory_order_relaxed);

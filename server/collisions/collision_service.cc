@@ -109,7 +109,7 @@ const QueryHull& HullOfPiece(const BodyQuestion::Side& side, uint32_t piece) {
   return *side.placed().body().pieces()[piece].hull;
 }
 
-// The hulls of all pieces, each once; of a hull, itself.
+// The hulls of all pieces, each once; for a hull, itself.
 void EncodeHulls(const Shards& shards, const BodyQuestion::Side& side,
                  std::set<std::string_view>* known, v1::CheckCollisionResponse* response) {
   const auto encode = [&](const HullView& view) {

@@ -107,7 +107,7 @@ void CollisionStream::Handle() {
   if (!awaits) AnswerMessage(absl::OkStatus());
 }
 
-// Looks the hulls up, if the message has them looked up, and answers it. status: of what came
+// Looks the hulls up, if the message has them looked up, and answers it. status: that of what came
 // before.
 void CollisionStream::AnswerMessage(absl::Status status) {
   if (status.ok() && refresh_.has_value()) status = OfMessage(Refresh(*refresh_));
@@ -295,7 +295,7 @@ void CollisionStream::DecideTogether() {
     return TellDecided();
   }
   const size_t wished = std::min<size_t>(pool_.threads() - 1, asked_.size() / kPairsPerHelper);
-  // Those of a step before that did not have their turn yet will do.
+  // Helpers of an earlier step that did not have their turn yet count as well.
   for (size_t helpers = helpers_waiting_.load(); helpers < wished; ++helpers) {
     ++helpers_waiting_;
     RunOn(lane_, [this] {
@@ -326,9 +326,9 @@ ClaimedRange::Block CollisionStream::Claim() {
   return block;
 }
 
-// Works on blocks until none is left, or it is the turn of others. By any thread, several at a
-// time; whoever comes last goes on. Nothing of this stream may be touched after the last block was
-// given back, or when there was none.
+// Works on blocks until none is left, or it is the turn of others. Runs on any thread, and on
+// several at a time; the thread that gives back the last block goes on. Nothing of this stream may
+// be touched after the last block was given back, or when there was none.
 void CollisionStream::TakePart() {
   const auto end = std::chrono::steady_clock::now() + TaskPool::kSliceTime;
   while (true) {
@@ -336,7 +336,7 @@ void CollisionStream::TakePart() {
     if (block.empty()) return;
     // What is begun next waits until this block is given back.
     const bool is_placing = is_placing_;
-    // What is left is given back as it is, so that somebody comes last.
+    // When the call is to stop, blocks are given back undone, so that one thread is still the last.
     if (!call().ShouldStop()) {
       for (uint32_t i = block.begin; i < block.end; ++i) {
         is_placing ? table_.PlaceAgain(moved_[i]) : Decide(i);

@@ -141,7 +141,8 @@ class CollisionStream
   bool is_decided_ = false;
   // Parallel to asked_.
   std::vector<Decided> decided_;
-  // Of moved_ while they are placed, and then of asked_: what no thread has begun with.
+  // What no thread has begun with: entries of moved_ while they are placed, and then entries of
+  // asked_.
   ClaimedRange unclaimed_;
   std::atomic<bool> is_placing_ = false;
   // Slices of helpers that wait for their turn.

@@ -26,7 +26,7 @@ enum class Rpc {
   kGetBody,
   kListBodies,
   kDeleteBody,
-  // Of gRPC's own protocol.
+  // Reflection, which is a protocol of gRPC's own.
   kServerReflectionInfo,
 };
 

@@ -149,9 +149,9 @@ void WatchStream::TellNext() {
   }
 }
 
-// Reads what is missing from the store: of each hull as it is by now, and nothing of one that is
-// gone by now, which is told later. One hull after another, so that they need not be in memory
-// together.
+// Reads what is missing from the store: the box of each hull as it is by now, and nothing for one
+// that is gone by now, which is told later. One hull after another, so that they need not be in
+// memory together.
 absl::Status WatchStream::LoadBoxes(ShardsWatchPiece* piece) {
   std::vector<HullChange> loaded;
   loaded.reserve(piece->changes.size());

@@ -48,12 +48,12 @@ class WatchStream : public RequestStream<PulledStream<WriteReactor, v1::WatchHul
 
   Shards& shards_;
   WorkerPool& readers_;
-  // Guards its beginning and its end against who cancels. Between these it stays.
+  // Guards the beginning and the end of watch_ against threads that cancel. Between these it stays.
   std::mutex watch_mutex_;
   std::shared_ptr<ShardsWatch> watch_;
   // What was there has been told.
   bool is_synced_ = false;
-  // Of the header that was sent last.
+  // The revisions in the header that was sent last.
   ShardRevisions sent_revisions_;
 };
 

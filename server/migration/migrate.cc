@@ -37,7 +37,7 @@ struct Place {
   std::string data_dir;
   std::string conninfo_file;
   std::string shards_file = {};
-  // Of a shard: as PostgresOptions::slots.
+  // The slots of a shard, as PostgresOptions::slots.
   std::string slots = {};
 
   bool is_one() const {
@@ -158,7 +158,8 @@ absl::Status CompareAnew(const Place& to, const Migration& migration,
   return migration.Compare(target->value()->store());
 }
 
-// The places of the shards, and which of them has which slot; of what is none of several, itself.
+// The places of the shards, and which of them has which slot; for a place that is not several,
+// itself.
 struct Places {
   std::vector<Place> all;
   std::array<uint16_t, kSlots> shard_of{};

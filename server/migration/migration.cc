@@ -11,7 +11,7 @@
 namespace hulld::server {
 namespace {
 
-// A transaction ends once it has so many vertices (24 MB), or changes of hulls and bodies. A
+// A transaction ends once it has this many vertices (24 MB), or changes of hulls and bodies. A
 // choice.
 constexpr size_t kMostVertices = 1'000'000;
 constexpr size_t kMostChanges = 1000;
@@ -120,8 +120,8 @@ absl::StatusOr<Migration> Migration::Read(Store& source, Progress progress) {
   return migration;
 }
 
-// A target that a migration has begun to fill from this source, as it is now, is gone on with; one
-// that was filled from the source as it was before is begun anew.
+// If a migration has begun to fill the target from this source as it is now, it is continued. A
+// target that was filled from the source as it was before is begun anew.
 absl::Status Migration::Prepare(MigrationTarget& target) {
   const absl::StatusOr<std::optional<MigrationSource>> mark = target.ReadMark();
   if (!mark.ok()) return mark.status();

@@ -18,7 +18,7 @@ namespace hulld::server {
 struct MigrationCounts {
   uint64_t hulls = 0;
   uint64_t bodies = 0;
-  // Hulls and bodies, of these, that an earlier run had copied.
+  // How many of these hulls and bodies an earlier run had copied.
   uint64_t resumed = 0;
 };
 
@@ -35,7 +35,7 @@ class Migration {
   static absl::StatusOr<Migration> Read(Store& source, Progress progress);
 
   // Copies what the target does not have yet, in byte order of the IDs, all of a hull at once; so a
-  // run that was ended anywhere is gone on with. FAILED_PRECONDITION, without changing anything:
+  // run that was ended anywhere can be continued. FAILED_PRECONDITION, without changing anything:
   // the target is a store of its own, or of a migration from another store. DATA_LOSS: a hull of
   // the source is damaged. Others: as the target's.
   absl::StatusOr<MigrationCounts> CopyTo(MigrationTarget& target);

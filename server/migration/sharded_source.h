@@ -26,13 +26,13 @@ class ShardedSource : public Store {
   ShardedSource(std::span<Store* const> stores, HasId has, StoreOfId store_of);
 
   std::string kind() const override { return stores_.front()->kind(); }
-  // Of one store its own; of several, all, joined by "+".
+  // The ID of the one store; of several, all IDs, joined by "+".
   std::string id() const override;
   Durability durability() const override { return stores_.front()->durability(); }
   bool keeps_hulls() const override { return true; }
   // The greatest: every revision that was given is at most this.
   uint64_t revision() const override;
-  // Of several stores, all records are kept in memory for the time of the visit.
+  // With several stores, all records are kept in memory for the time of the visit.
   absl::Status ForEachHull(const StoredHullVisitor& visit) override;
   absl::Status ForEachBody(const StoredBodyVisitor& visit) override;
   absl::StatusOr<std::vector<Vector>> LoadVertices(const StoredHull& hull) override {

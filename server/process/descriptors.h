@@ -8,7 +8,7 @@ namespace hulld::server {
 
 // What this process has open.
 struct OpenDescriptors {
-  // All of them; 0 where /proc is not there.
+  // All that are open; 0 where /proc is not there.
   uint64_t count = 0;
   // Connections that others made to the address.
   uint64_t connections = 0;

@@ -18,7 +18,7 @@ class Executor {
   // How long a slice may take: far longer than that wait, and too short for others to notice.
   static constexpr std::chrono::microseconds kSliceTime{20'000};
 
-  // threads: of the team. metrics: what waits of batches. Requires threads > 0.
+  // threads: how many the team has. metrics: told of the batches that wait. Requires threads > 0.
   explicit Executor(int threads, std::optional<PoolMetrics> metrics = std::nullopt);
 
   // The size of the team.

@@ -11,7 +11,8 @@
 
 namespace hulld::server {
 
-// Who asks for work, as far as threads are shared: a token or, without tokens, an address.
+// The client that asks for work, as far as threads are shared: a token or, without tokens, an
+// address.
 using ClientId = uint64_t;
 // The server itself.
 inline constexpr ClientId kNoClient = 0;
@@ -50,7 +51,7 @@ class FairQueue {
   }
 
  private:
-  // Of clients that have something here alone.
+  // Holds only clients that have something here.
   std::unordered_map<ClientId, std::deque<Item>> waiting_;
   std::deque<ClientId> turns_;
   size_t size_ = 0;

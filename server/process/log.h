@@ -24,8 +24,8 @@ class LineBudget {
 
   LineBudget(int lines, Clock::duration stretch) : lines_(lines), stretch_(stretch) {}
 
-  // Whether a line may be written at `now`; if so, how many before it might not since the last that
-  // might.
+  // nullopt: no line may be written at `now`. Otherwise one may, and this many were left out since
+  // the last.
   std::optional<uint64_t> Spend(Clock::time_point now);
 
  private:

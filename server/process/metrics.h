@@ -51,8 +51,8 @@ struct StoreMetrics {
   prometheus::Gauge& cache_limit_bytes;
   // hulld_snapshot_duration_seconds: making the canonical snapshot of a version.
   prometheus::Histogram& snapshot_seconds;
-  // hulld_store_disk_bytes, and hulld_store_log_bytes of these; hulld_store_free_bytes: what the
-  // disk has left.
+  // hulld_store_disk_bytes: all files. hulld_store_log_bytes: the log among them.
+  // hulld_store_free_bytes: what the disk has left.
   prometheus::Gauge& disk_bytes;
   prometheus::Gauge& log_bytes;
   prometheus::Gauge& free_bytes;

@@ -37,7 +37,7 @@ class SharedLoop {
       : count_(count), step_(step), work_(std::move(work)) {}
 
  private:
-  // Until nothing is left to begin with.
+  // Works until no step is left to take.
   void TakePart() {
     for (size_t begin = next_.fetch_add(step_); begin < count_; begin = next_.fetch_add(step_)) {
       const size_t end = std::min(count_, begin + step_);

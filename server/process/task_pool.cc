@@ -97,7 +97,7 @@ std::optional<TaskPool::Task> TaskPool::Next() {
 }
 
 void TaskPool::Work() {
-  // Else the system may let a pause last 50 us longer.
+  // Otherwise the system may let a pause last 50 us longer.
   prctl(PR_SET_TIMERSLACK, 1000UL);
   std::unique_lock lock(mutex_);
   while (true) {

@@ -40,10 +40,10 @@ class TaskPool {
   // system lets a thread that computes go on for some milliseconds (a tick of Linux is 1 to 10 ms)
   // before gRPC's threads, which bring the calls, get their turn.
   static constexpr std::chrono::milliseconds kReserveTime{20};
-  // Meanwhile a thread pauses so long after each slice: the system gives its core to the threads of
-  // gRPC, and of clients on this machine, that wait for one, and would otherwise let this thread go
-  // on until the next tick. Observed on two cores: single calls beside batches have a p99 of 2.2 to
-  // 3.0 times idle, without pauses 7 to 9 times; batches make a third to a half fewer pairs
+  // Meanwhile a thread pauses this long after each slice: the system gives its core to the threads
+  // of gRPC, and of clients on this machine, that wait for one, and would otherwise let this thread
+  // go on until the next tick. Observed on two cores: single calls beside batches have a p99 of 2.2
+  // to 3.0 times idle, without pauses 7 to 9 times; batches make a third to a half fewer pairs
   // meanwhile (tests/bench/results/server_overload_*.csv).
   static constexpr std::chrono::microseconds kPauseTime{80};
 
@@ -57,7 +57,7 @@ class TaskPool {
     ~Lane();
 
     // Slices of a lane start in the order in which they were submitted, on any thread; several may
-    // run at the same time. client: who waits for it, the same for all of a lane.
+    // run at the same time. client: the one that waits for it, the same for all of a lane.
     void Submit(std::function<void()> slice, ClientId client = kNoClient);
 
    private:
@@ -80,7 +80,7 @@ class TaskPool {
 
   int threads() const { return static_cast<int>(threads_.size()); }
 
-  // Queues the answer of a single call ahead of all slices. client: who waits for it.
+  // Queues the answer of a single call ahead of all slices. client: the one that waits for it.
   void Submit(std::function<void()> task, ClientId client = kNoClient);
 
   // Says that a single call was answered without this pool, so that slices leave it a core.

@@ -27,7 +27,7 @@ class WorkerPool {
   // Runs what is queued, then ends.
   ~WorkerPool();
 
-  // client: who waits for it.
+  // client: the one that waits for it.
   void Submit(std::function<void()> task, ClientId client = kNoClient);
 
   size_t threads() const { return threads_.size(); }

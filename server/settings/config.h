@@ -23,7 +23,8 @@ struct Limits {
   // pairs at their defaults.
   uint64_t max_message_bytes = 16 << 20;
   uint64_t max_points_per_chunk = 200'000;
-  // Points that one hull takes in its life; what a double counts exactly, which is no limit.
+  // Points that one hull takes in its life. The default is what a double counts exactly, which no
+  // hull reaches.
   uint64_t max_points_per_hull = uint64_t{1} << 53;
   uint64_t max_vertices_per_hull = 1'000'000;
   uint64_t max_hulls = 100'000;
@@ -34,10 +35,10 @@ struct Limits {
   uint64_t max_writers_per_hull = 100'000;
   // GetBody's answer, at the longest IDs, stays under the 4 MiB that every gRPC client takes.
   uint64_t max_pieces_per_body = 10'000;
-  // Bytes that hulls in memory may hold, replacements under way too, points that wait to be built
-  // or stored, and the placements, pairs and answers of batches, scenes and streams; beside
-  // messages of calls and the store's own buffers. 0: half of what the machine or the control group
-  // of the process has.
+  // Bytes that hulls in memory may hold, together with replacements under way, points that wait to
+  // be built or stored, and the placements, pairs and answers of batches, scenes and streams.
+  // Messages of calls and the store's own buffers come on top. 0: half of what the machine or the
+  // control group of the process has.
   uint64_t memory_limit = 0;
   // Bytes that requests may take from when they are parsed until they are answered, and the same
   // again for those that are on their way.
@@ -45,13 +46,15 @@ struct Limits {
   // Calls that run, open streams included, and those of them that wait for a thread.
   uint64_t max_calls = 4096;
   uint64_t max_waiting_calls = 1024;
-  // Of max_calls and of max_calls_per_client, one in so many is kept for single calls: what lasts
-  // cannot fill them.
+  // One call in this many, of max_calls and of max_calls_per_client, is kept for single calls:
+  // calls that last cannot fill either.
   static constexpr uint64_t kKeptForSingleCalls = 4;
   // Calls of one client that run, open streams included: fewer than max_waiting_calls, so that no
-  // client alone makes others be refused. A client is a token or, without tokens, a peer address.
+  // client by itself can cause others to be refused. A client is a token or, without tokens, a peer
+  // address.
   uint64_t max_calls_per_client = 512;
-  // Streams of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup, watches and reflection.
+  // Calls of AppendPoints, ReplaceHull, StreamCollisions, SaveBackup and reflection, and watches,
+  // that one client has open.
   uint64_t max_streams_per_client = 256;
   // BatchCheckCollisions and FindCollisions that run; they take turns. All, and of one client.
   uint64_t max_concurrent_batches = 32;
@@ -80,15 +83,15 @@ struct Config {
   int threads = 0;
   // Where hulls live: "rocksdb", "postgres" or "memory".
   std::string store = "rocksdb";
-  // The directory of "rocksdb". Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state, or
-  // else hulld-data where the server is started; ParseCommandLine puts that in its place.
+  // The directory of "rocksdb". Empty: hulld in $XDG_STATE_HOME, or in ~/.local/state; without a
+  // home, hulld-data where the server is started; ParseCommandLine puts that in its place.
   std::string data_dir;
   // The file that holds the connection string of "postgres".
   std::string postgres_conninfo_file;
   // Instead: the file that spreads IDs over several databases.
   std::string postgres_shards;
   // Whether this takes the store of "postgres" from the server that is active, instead of waiting;
-  // on the command line alone, as servers that always did would take it from each other.
+  // on the command line only, as servers that always did this would take it from each other.
   bool take_over = false;
   // Whether servers over one database of "postgres" are active together: "one" or "many".
   std::string postgres_servers = "one";

@@ -11,8 +11,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// In a container the path may be the one that the host knows; of that the root alone is there, and
-// is the container's own.
+// In a container, the path may be the one that the host knows. Then only its root is there, and is
+// the container's own.
 uint64_t LeastAlong(const fs::path& mount, const std::string& group, const GroupLimit& limit) {
   uint64_t least = limit(mount);
   fs::path path = mount;

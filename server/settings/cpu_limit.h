@@ -9,8 +9,8 @@ namespace hulld::server {
 
 // How many processors' time this process may use.
 struct CpuLimit {
-  // Those that the process may run on: of the machine, or of its affinity, which taskset and
-  // cpusets set. At least 1.
+  // Those that the process may run on: all of the machine, or those of its affinity, which taskset
+  // and cpusets set. At least 1.
   int processors = 1;
   // What the control groups grant, in processors; infinity: there is no such limit.
   double quota = std::numeric_limits<double>::infinity();

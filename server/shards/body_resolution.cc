@@ -92,7 +92,8 @@ ShardsPlan PlanOf(const PlacedLookup& lookup) {
 }
 
 // The bodies among the IDs; empty where there are none. What cannot be read now is not among them:
-// who looks for a hull under the ID is told why. CANCELLED, RESOURCE_EXHAUSTED: as FindBodies.
+// a caller that looks for a hull under the ID is told why. CANCELLED, RESOURCE_EXHAUSTED: as
+// FindBodies.
 absl::StatusOr<Bodies> BodiesAmong(Shards& shards, std::span<const std::string> ids,
                                    const std::function<bool()>& should_stop) {
   if (!shards.has_bodies()) return Bodies();
@@ -104,7 +105,7 @@ absl::StatusOr<Bodies> BodiesAmong(Shards& shards, std::span<const std::string> 
   return std::move(found.bodies);
 }
 
-// One that was read again is another object. Of those that are damaged no more is known.
+// A body that was read again is another object. No more is known of bodies that are damaged.
 bool IsSameBody(const std::shared_ptr<const Body>& a, const std::shared_ptr<const Body>& b) {
   if (a == b) return true;
   return a != nullptr && b != nullptr && a->record().revision == b->record().revision &&

@@ -32,7 +32,7 @@ struct PlacedLookup {
 // What a reader that asks again and again for the same IDs keeps in between. Not thread-safe.
 class KnownPlaced {
  public:
-  // What it holds of bodies, in bytes; of hulls, KnownInShards::kBytesEach for each ID.
+  // What it holds of bodies, in bytes. For hulls, KnownInShards::kBytesEach for each ID.
   size_t BodyBytes() const;
 
  private:

@@ -12,8 +12,8 @@
 
 namespace hulld::server {
 
-// As KnownHulls, over shards: what is known of the hulls of each, apart. Who asks again and again
-// for the same IDs keeps it (Shards::Refresh). Not thread-safe.
+// As KnownHulls, over shards: what is known of the hulls of each, apart. A caller that asks again
+// and again for the same IDs keeps it (Shards::Refresh). Not thread-safe.
 class KnownInShards {
  public:
   // About what it holds of each ID, in bytes, the ID and the hull apart. (Of IDs in several shards

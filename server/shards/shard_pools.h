@@ -11,11 +11,12 @@
 namespace hulld::server {
 
 // Threads for work that may wait for a store: each shard has its own, and calls that may concern
-// several have others. So a store that does not answer holds up who asks about it, and not who asks
-// about one hull of another. With one shard all of them are one pool.
+// several have others. So a store that does not answer holds up calls that ask about it, and not
+// calls that ask about one hull of another. With one shard all of them are one pool.
 class ShardPools {
  public:
-  // threads: of each pool. metrics: told the sum of all. Requires shards > 0, threads > 0.
+  // threads: how many each pool has. metrics: told the sum of all. Requires shards > 0, threads >
+  // 0.
   ShardPools(size_t shards, int threads, const PoolMetrics& metrics) {
     const size_t pools = shards == 1 ? 1 : shards + 1;
     for (size_t i = 0; i < pools; ++i) {
@@ -23,10 +24,11 @@ class ShardPools {
     }
   }
 
-  // Of calls about IDs of this shard alone.
+  // The pool for calls about IDs of this shard alone.
   WorkerPool& of(size_t shard) { return *pools_[shard]; }
   WorkerPool& of_several() { return *pools_.back(); }
-  // That of each shard, in their order, and at the end, where there are several, that of several.
+  // The pool of each shard, in their order, and at the end, where there are several shards, the
+  // pool for calls about several.
   std::vector<WorkerPool*> all() const {
     std::vector<WorkerPool*> pools;
     for (const auto& pool : pools_) pools.push_back(pool.get());

@@ -22,8 +22,8 @@ Limits LimitsOfShard(Limits limits, size_t shards) {
 }
 
 // The first of some sorted pages, all of them merged. A page that is not its shard's last may hold
-// few: what comes after its end is not known, so that nothing that does is in the merged one.
-// id_of: of an entry.
+// few: what comes after its end is not known, so the merged page ends there. id_of: the ID of an
+// entry.
 template <typename Page, typename IdOf>
 auto MergePages(const std::vector<Page>& pages, size_t page_size, const IdOf& id_of) {
   std::pair<decltype(pages.front().entries), bool> merged;

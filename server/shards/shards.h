@@ -31,12 +31,12 @@ namespace hulld::server {
 
 // The hulls and bodies of one server, spread by ID over one store or several, each with a registry
 // of its own: its revisions, its commits, its watches. What is about one ID goes to the registry of
-// that ID. With one shard everything does, as if this were not there.
+// that ID. With one shard, everything goes to its registry, as if this class were not there.
 //
-// What is about several shards is put together here, of parts of which each is of one revision of
-// its store. No change is made in two at once. A read of
-// several that is to be linearizable is proven to be of one instant by looking again; where it
-// never is, changes are held back for a moment (shards_read.cc). Thread-safe.
+// What is about several shards is put together here from parts, each of one revision of its store.
+// No change is made in two at once. A read of several that is to be linearizable is proven to be of
+// one instant by looking again; where it never is, changes are held back for a moment
+// (shards_read.cc). Thread-safe.
 class Shards {
  public:
   // What spreads IDs: the shard of each slot.
@@ -46,9 +46,9 @@ class Shards {
   Shards(Store& store, const Limits& limits, WorkerPool& writers,
          std::optional<PoolMetrics> preparers = std::nullopt,
          std::optional<PoolMetrics> loaders = std::nullopt);
-  // Each store has the same share of --memory-limit; --max-hulls holds over all. writers: of each
-  // store; may be one for all. The rest is as in Registry. Requires a shard of `stores` for each
-  // slot, and writers for each store.
+  // Each store has the same share of --memory-limit; --max-hulls holds over all. writers: those of
+  // each store; may be one for all. The rest is as in Registry. Requires a shard of `stores` for
+  // each slot, and writers for each store.
   Shards(std::span<Store* const> stores, const ShardOfSlot& shard_of_slot, const Limits& limits,
          std::span<WorkerPool* const> writers, std::optional<PoolMetrics> preparers = std::nullopt,
          std::optional<PoolMetrics> loaders = std::nullopt);
@@ -66,7 +66,7 @@ class Shards {
   Registry& of(std::string_view id) { return *registries_[shard_of(id)]; }
   Registry& at(size_t shard) { return *registries_[shard]; }
   const Registry& at(size_t shard) const { return *registries_[shard]; }
-  // Of each shard, and of the one that has this ID. They stay.
+  // The ID of each shard's store, and of the store that has this ID. They stay the same.
   std::span<const std::string> store_ids() const { return store_ids_; }
   const std::string& store_id_of(std::string_view id) const { return store_ids_[shard_of(id)]; }
   // What all stores have in common: their kind, and how durable they are.

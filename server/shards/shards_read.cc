@@ -8,8 +8,8 @@
 //
 // If those of one shard alone change from each look to the next, take three looks: what that shard
 // had at the time of the second was current then, and what the others had is the same before and
-// after it. So a hull that changes all the time does not hold up who asks how it stands to one of
-// another shard that does not.
+// after it. So a hull that changes all the time does not hold up a call that asks about it and one
+// of another shard that does not change.
 //
 // Where those of two shards change all the time, looking does not come to an end. After
 // Shards::kLooks, all shards of the call but one are held: nothing is committed there. What they
@@ -59,7 +59,7 @@ struct Asked {
   }
 
   const std::function<void(const absl::Status&)> done;
-  // One of them is who asks.
+  // One of them is the asking thread.
   std::atomic<size_t> due = 1;
   Mutex mutex;
   absl::Status status;
@@ -196,7 +196,8 @@ absl::StatusOr<Shards::Look> Shards::LookOnce(KnownInShards& known,
   return look;
 }
 
-// to_ask: of the shards of the call those that are to be as fresh as the plan says; the others are.
+// to_ask: those shards of the call that are still to become as fresh as the plan says; the others
+// are.
 absl::StatusOr<Shards::Look> Shards::LookAt(KnownInShards& known, std::span<const size_t> to_ask,
                                             const std::function<bool()>& should_stop,
                                             const ShardsPlan& plan) {

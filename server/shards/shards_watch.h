@@ -50,7 +50,7 @@ struct ShardsWatchPiece {
 // one shard it is that shard's watch and nothing else.
 class ShardsWatch : public std::enable_shared_from_this<ShardsWatch> {
  public:
-  // shard_of: of an ID of the target, and of those that come later.
+  // shard_of: the shard of an ID of the target, and of IDs that come later.
   using ShardOf = std::function<size_t(const std::string&)>;
 
   // Watches these registries, by their places among all, which outlive this. As
@@ -73,7 +73,7 @@ class ShardsWatch : public std::enable_shared_from_this<ShardsWatch> {
     Registry* registry = nullptr;
     WatchTarget target;
     std::shared_ptr<ChangeWatch> watch;
-    // Of its watches so far; what an earlier one says counts for nothing.
+    // The number of its watches so far; what an earlier one says counts for nothing.
     uint64_t generation = 0;
     // It may have something to tell.
     bool is_ready = true;
@@ -90,7 +90,8 @@ class ShardsWatch : public std::enable_shared_from_this<ShardsWatch> {
   const std::function<void()> on_ready_;
   ShardOf shard_of_;
   bool tells_present_ = false;
-  // The number of parts and their targets stay; whose watch is open belongs to who takes changes.
+  // The number of parts and their targets stay the same. Only the thread that takes changes opens
+  // and closes the watches of parts, until Close.
   std::vector<Part> parts_;
   // The next to be asked, so that each gets its turn.
   size_t next_ = 0;

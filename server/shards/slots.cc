@@ -80,7 +80,7 @@ std::string FormatSlots(const std::vector<bool>& slots) {
 absl::StatusOr<ShardFile> ParseShardFile(std::string_view text, const std::string& directory) {
   ShardFile file;
   file.shard_of.fill(kNoShard);
-  // Of each shard.
+  // The line of each shard.
   std::vector<size_t> lines;
   size_t line = 0;
   const std::vector<std::string> rows = absl::StrSplit(std::string(text), '\n');

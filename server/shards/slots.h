@@ -13,7 +13,7 @@
 
 namespace hulld::server {
 
-// IDs are spread over so many slots, and slots over shards; for good, as the databases remember
+// IDs are spread over this many slots, and slots over shards; for good, as the databases remember
 // which slots they hold.
 inline constexpr size_t kSlots = 1024;
 

@@ -41,7 +41,7 @@ class Reader {
     return number;
   }
   std::string NextText() { return std::string(NextBytes(Next<uint64_t>())); }
-  // A number of entries of at least so many bytes each; none when there is no room for them.
+  // A number of entries of at least this many bytes each; none when there is no room for them.
   uint64_t NextCount(size_t least_bytes) {
     const uint64_t count = Next<uint64_t>();
     ok_ = ok_ && count <= rest_.size() / least_bytes;

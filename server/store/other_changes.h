@@ -17,10 +17,10 @@ namespace hulld::server {
 
 // What other servers made of one ID.
 struct OtherChange {
-  // The store's revision at the last change that can be seen: that of what there is by now, or that
-  // at which it ended.
+  // The store's revision at the last change that can be seen: the revision of what there is by now,
+  // or the one at which it ended.
   uint64_t revision = 0;
-  // At which an incarnation ended last; 0: none did.
+  // The revision at which an incarnation ended last; 0: none did.
   uint64_t ended_at = 0;
   // create_revision of the first incarnation that ended, and whether it was a body's; 0: none did,
   // or that is not known.
@@ -43,7 +43,7 @@ struct StoreTotals {
 
 // What other servers committed to a store that is shared (Store::is_shared), up to a moment.
 struct OtherChanges {
-  // The store's at that moment; 0: there is nothing that was not known.
+  // The store's revision at that moment; 0: there is nothing that was not known.
   uint64_t revision = 0;
   std::map<std::string, OtherChange> by_id;
   // What the store held at that moment, where it finds records (Store::finds_records).

@@ -142,7 +142,7 @@ class RocksDbStore : public Store {
   // Shared while db_ is used, exclusive in Reopen.
   mutable std::shared_mutex db_mutex_;
   std::unique_ptr<rocksdb::DB> db_;
-  // Of the databases that were open here before this one, which each count their own.
+  // The stalls of the databases that were open here before this one, as each counts its own.
   uint64_t former_stalls_ = 0;
 
   // Held while the log is written or synced.

@@ -56,7 +56,7 @@ struct Change {
   // Whether this is a new incarnation of the hull, or the beginning of the body.
   bool begins = false;
   bool deleted = false;
-  // Of a body that begins: whether there is one whose place it takes, as one that is damaged.
+  // For a body that begins: whether it takes the place of one, such as one that is damaged.
   bool replaces_body = false;
   // A change of a hull that neither begins nor ends: its revisions when all changes that were
   // submitted before are committed, and those of the same batch are not.
@@ -67,12 +67,11 @@ struct Change {
   VertexLayout former_layout;
   VertexChange vertex_change = VertexChange::kNone;
   std::vector<Vector> vertices;
-  // Who wrote the chunk, if the change is one.
+  // The writer of the chunk, if the change is one.
   std::optional<WriterSequence> writer;
   // The incarnation that this one takes the place of, if there is one.
   std::optional<StoredHull> replaced;
-  // The body after the change, or what is deleted if it is. Then nothing that says of a hull is
-  // used.
+  // The body after the change, or what is deleted if it is. Then no field about a hull is used.
   std::shared_ptr<StoredBody> body;
 
   const std::string& id() const {
@@ -89,12 +88,12 @@ using StoredBodyVisitor = std::function<void(const std::string&, absl::StatusOr<
 
 // What a store holds of hulls and bodies that were asked for, all of it of one moment.
 struct FoundRecords {
-  // The store's at that moment.
+  // The store's revision at that moment.
   uint64_t revision = 0;
   // Those that are there: their IDs, and the rest, or DATA_LOSS naming the hull, or the body.
   std::map<std::string, absl::StatusOr<StoredHull>> hulls;
   std::map<std::string, absl::StatusOr<StoredBody>> bodies;
-  // Of a list: whether there are others after these.
+  // For a list: whether there are others after these.
   bool more = false;
 };
 
@@ -115,7 +114,7 @@ struct StoreFailures {
 
 // What a store takes of its disk, and whether it keeps up with what is written.
 struct StoreDisk {
-  // All its files, and its log of these.
+  // All its files, and the log among them.
   uint64_t bytes = 0;
   uint64_t log_bytes = 0;
   // What the disk has left for it; none where that is not known.
@@ -167,8 +166,8 @@ class Store {
   virtual absl::StatusOr<FoundRecords> FindRecords(std::span<const std::string> /*ids*/) {
     return absl::UnimplementedError("this store does not find records");
   }
-  // At most so many, of these kinds, whose IDs start with `prefix` and come after `after`, in byte
-  // order. Fewer, but one at least, where they take more than kMostListedBytes.
+  // At most `most` records, of these kinds, whose IDs start with `prefix` and come after `after`,
+  // in byte order. Fewer, but one at least, where they take more than kMostListedBytes.
   virtual absl::StatusOr<FoundRecords> ListRecords(const std::string& /*prefix*/,
                                                    const std::string& /*after*/, size_t /*most*/,
                                                    RecordKinds /*kinds*/) {
@@ -204,9 +203,9 @@ class Store {
 
   // Whether other servers may commit to the same store while this one is open. Then Commit leaves
   // out, of the changes that it is given, all of an ID that is in what TakeOthers is about to give:
-  // they were made of what was not the last any more. LoadVertices and LoadSequence answer ABORTED
-  // where the hull was changed since. Follow finds out what others have committed by the time of
-  // the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
+  // they were made from a state that is no longer the last. LoadVertices and LoadSequence answer
+  // ABORTED where the hull was changed since. Follow finds out what others have committed by the
+  // time of the call; never while Commit or Recover runs. UNAVAILABLE: the store cannot be asked.
   virtual bool is_shared() const { return false; }
   virtual absl::Status Follow() { return absl::OkStatus(); }
   // Sends what the next Follow asks, which then finds out what others have committed by the time of

@@ -50,9 +50,10 @@ inline void WritePose(const Pose& pose, size_t i, google::protobuf::RepeatedFiel
   for (int k = 0; k < 3; ++k) numbers[4 + k] = pose.t[k];
 }
 
-// How fresh the answer to a read must be that began at this time; an empty message, as an absent
-// one is: linearizable. store_ids: of all shards. INVALID_ARGUMENT: a negative or malformed
-// duration, or a revision without the store. FAILED_PRECONDITION: a revision is of another store.
+// How fresh the answer to a read must be that began at this time; an empty message means
+// linearizable, as an absent one does. store_ids: those of all shards. INVALID_ARGUMENT: a negative
+// or malformed duration, or a revision without the store. FAILED_PRECONDITION: a revision is of
+// another store.
 absl::StatusOr<ShardsFreshness> DecodeFreshness(const v1::Freshness& message,
                                                 std::span<const std::string> store_ids,
                                                 SteadyClock::time_point began);

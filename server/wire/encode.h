@@ -24,7 +24,7 @@ void EncodeCounts(const PointCounts& counts, v1::PointCounts* message);
 void EncodeHeader(const Store& store, uint64_t revision, v1::ResponseHeader* message);
 // The same of a read.
 void EncodeHeader(const Store& store, const AsOf& as_of, v1::ResponseHeader* message);
-// The same of one shard or several. store_ids: of all shards.
+// The same of one shard or several. store_ids: those of all shards.
 void EncodeHeader(std::span<const std::string> store_ids, const ShardsAsOf& as_of,
                   v1::ResponseHeader* message);
 void EncodeRecord(const HullRecord& record, v1::HullInfo* message);

@@ -62,7 +62,8 @@ bool IsFinal(const benchmark::BenchmarkReporter::Run& run) {
 }  // namespace
 
 std::string CpuName() {
-  // The first processor's. Where a machine is virtual its name may leave the generation out.
+  // The fields of the first processor. Where a machine is virtual its name may leave the generation
+  // out.
   std::map<std::string, std::string> values;
   std::ifstream in("/proc/cpuinfo");
   for (std::string line; std::getline(in, line) && !line.empty();) {

@@ -61,7 +61,8 @@ function origin_of(file,   command, line, names, fields, count, i, cpu, compiler
   return cpu == "" ? "" : "a virtual " cpu ", " compiler
 }
 
-# Of rows that name none: as that of the hulls, but for the generation, which may be another.
+# The origin of rows that name none: that of the hulls, but for the generation, which may be
+# another.
 function usual_origin(   origin) {
   origin = origin_of("hull_build_" machine)
   sub(/ family [0-9]+ model [0-9]+/, "", origin)
@@ -185,7 +186,7 @@ function set_name(set) {
   sub(/^sphere:/, "", set)
   return set
 }
-# The same, short, where the vertices are told elsewhere; of a scene, "N of SET".
+# The same, short, where the vertices are told elsewhere; for a scene, "N of SET".
 function set_label(set) {
   sub(/of sphere:64/, "of 64 vertices", set)
   sub(/of ur5/, "UR5 links", set)
@@ -539,7 +540,7 @@ function summary(   one) {
   hull("hull of 100000 points on a sphere", "sphere:100000")
   one = "sphere:100000"
   # 100000 points, milliseconds: 10 ns a point for each.
-  compare("one more of 100000 points on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
+  compare("insert one point, hull of 100000 points on a sphere", 10 * cell[one, "hulld one at a time", "milliseconds"], "CGAL Delaunay",
           10 * cell[one, "cgal delaunay one at a time", "milliseconds"],
           cell[one, "hulld one at a time", "vertices_missing_or_extra"] " / " \
           cell[one, "cgal delaunay one at a time", "vertices_missing_or_extra"])

@@ -36,7 +36,7 @@ struct FakeHull {
 
 // What happens to the next append stream; the default is that all goes well.
 struct StreamScript {
-  // The stream breaks as if the connection did, after so many chunks were committed...
+  // The stream breaks as if the connection did, after this many chunks were committed...
   std::optional<int> break_after;
   // ... and their acknowledgements are lost.
   bool lose_acks = false;
@@ -91,7 +91,7 @@ class FakeHulld final {
   class Collisions;
   class Status;
 
-  // Counts the call; the status that was asked for, else OK.
+  // Counts the call; returns the status that was asked for, or OK if none was.
   grpc::Status Enter(const std::string& method);
 
   std::mutex mutex_;

@@ -223,7 +223,7 @@ TEST_P(CollisionWatches, TellNothingTwiceAndWhatEnded) {
     EXPECT_EQ(event.revision_a(), Get("cube").hull().revision());
     EXPECT_EQ(event.revision_b(), event.revision_a());
   }
-  // As ever after that.
+  // After that, it answers as before.
   ASSERT_TRUE(watch->Update(MoveTo(7, 29.5)).ok());
   const v1::WatchCollisionsResponse last = Round(*watch);
   EXPECT_THAT(Events(last), ElementsAre("ENTER 6 7"));

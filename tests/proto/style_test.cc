@@ -168,7 +168,7 @@ TEST_F(ContractStyle, EachRpcHasARequestAndAResponseOfItsOwn) {
   EXPECT_GE(rpcs, 13);
 }
 
-// Of buf's category COMMENTS: COMMENT_SERVICE and COMMENT_RPC.
+// From buf's category COMMENTS: COMMENT_SERVICE and COMMENT_RPC.
 TEST_F(ContractStyle, ServicesAndRpcsAreExplained) {
   ForEachService([](const ServiceDescriptor& service) {
     EXPECT_NE(CommentOf(service), "") << service.full_name();

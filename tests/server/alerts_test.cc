@@ -68,8 +68,8 @@ class Alerts : public ServerTest {
     return config;
   }
 
-  // Reads the metrics so many times, at steps of the clock that the rules go by, with `act` before
-  // each.
+  // Reads the metrics this many times, at steps of the clock that the rules go by, with `act`
+  // before each.
   void Scrape(int minutes, const std::function<void()>& act) {
     for (int i = 0; i < minutes * kStepsPerMinute; ++i, ++steps_) {
       act();

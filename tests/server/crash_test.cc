@@ -228,7 +228,8 @@ class Interrupted : public RestartableServer {
                                                      ReconnectAtOnce()));
   }
 
-  // That the hull is the one of these points, to the last bit, and has been given them once each.
+  // Checks that the hull is the one of these points, to the last bit, and has been given each of
+  // them once.
   void ExpectHullOf(const std::string& hull_id, const std::vector<std::vector<Vector>>& blocks) {
     HullBuilder builder;
     uint64_t points = 0;

@@ -301,8 +301,8 @@ TEST_F(DurableServer, ABackupIsRestoredWithinADirectoryThatIsThere) {
   const v1::GetHullResponse before = Get("sphere");
   const std::string file = directory_ + "/backup";
   SaveBackup(file);
-  // A mount point cannot be replaced, and nothing can be made beside it by who owns no more than
-  // itself.
+  // A mount point cannot be replaced, and a user who owns no more than the mount point can make
+  // nothing beside it.
   const std::string target = directory_ + "/mounted";
   std::filesystem::create_directories(target + "/lost+found");
   // What a restoring that was killed left behind.

@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 using Kind = Operation::Kind;
 using Outcome = Operation::Outcome;
 
-// Of the incarnation that CreateAt makes.
+// An answered operation on the incarnation that CreateAt makes.
 Operation AnsweredOf(Kind kind, uint64_t invoked, uint64_t returned, uint64_t revision) {
   Operation operation = Answered(kind, invoked, returned, revision);
   operation.create_revision = 1;
@@ -355,7 +355,7 @@ TEST(FreshnessCheck, ABoundedReadMayBeAnsweredFromAsLongAgoAsItSays) {
   EXPECT_EQ(FaultOf(PastProbe(150, 150, 2, true)), "");
   // The change was acknowledged before that.
   EXPECT_NE(FaultOf(PastProbe(150, 97, 1, false)), "");
-  // Of before the hull was there.
+  // An answer from before the hull was there.
   Operation too_early = PastProbe(199, 199, 1, false);
   EXPECT_EQ(FaultOf(too_early), "");
   too_early.outcome = Outcome::kNotFound;

@@ -192,7 +192,7 @@ TEST_F(ManyServers, AHullThatGrowsThroughSeveralIsTheHullOfAllTheirPoints) {
   const Client clients[] = {ClientOf(0), ClientOf(1), ClientOf(2)};
   std::mt19937_64 random(7);
   v1::PointBlock all;
-  // Most are outside of what was before.
+  // Most are outside of the hull before.
   const auto make_points = [&](int round) {
     std::uniform_int_distribution<int> coordinate(-10 - round, 10 + round);
     v1::PointBlock points;

@@ -7,7 +7,7 @@
 namespace hulld {
 
 // `name` as a segment of a hull's ID: at most 100 bytes of [A-Za-z0-9._-] that start with a letter
-// or digit. What is none of these becomes "_", and "x" goes in front where the start is none.
+// or digit. Any other byte becomes "_", and "x" goes in front where the name starts with neither.
 std::string HullSegment(std::string name);
 
 // The same, unlike all in `taken`, to which it is added: "-2", "-3" and so on follow where names

@@ -33,7 +33,7 @@ class Option {
   Option& ValueName(const std::string& name);
   // What completion offers for the value.
   Option& Completes(ValueKind kind);
-  // The environment variable that the help names; who declares the option reads it.
+  // The environment variable that the help names; the code that declares the option reads it.
   Option& Variable(const std::string& variable);
   // Only these values are allowed.
   Option& OneOf(const std::vector<std::string>& values);
@@ -120,8 +120,8 @@ class CommandLine {
   const CommandDescription& description() const { return description_; }
 
   // Parses the arguments that follow the program's name and calls what is to be called. Prints
-  // help, version and errors; then the program is to end with the code that it returns, and else to
-  // go on.
+  // help, version and errors, and then returns the code that the program is to end with; without a
+  // code, the program is to go on.
   std::optional<ExitCode> Parse(const std::vector<std::string>& arguments, std::ostream& out,
                                 std::ostream& err);
 

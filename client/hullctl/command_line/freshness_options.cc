@@ -14,7 +14,7 @@
 namespace hulld {
 namespace {
 
-// One that options may go on to fill.
+// The freshness of the invocation, for options to fill.
 v1::Freshness* FreshnessOf(Invocation* invocation) {
   if (!invocation->freshness.has_value()) invocation->freshness.emplace();
   return &*invocation->freshness;
@@ -41,7 +41,7 @@ absl::Status TakeRevision(const std::string& text, v1::Freshness* freshness) {
                      "(--output json)"));
   }
   const std::string store_id = text.substr(0, colon);
-  // The first goes where a server looks that knows one store alone.
+  // The first goes where a server that knows only one store looks.
   if (freshness->store_id().empty()) {
     freshness->set_store_id(store_id);
     freshness->set_at_least_revision(revision);

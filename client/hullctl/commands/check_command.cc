@@ -29,13 +29,13 @@ std::string PieceText(const v1::DecidingPiece& piece) {
   return std::to_string(piece.index()) + ": " + VersionText(piece.hull());
 }
 
-// Of bodies, the pieces that decided.
+// For bodies, the pieces that decided.
 void AddPieces(const v1::CheckCollisionResponse& response, Table* table) {
   if (response.has_piece_a()) table->Row({"piece of A", PieceText(response.piece_a())});
   if (response.has_piece_b()) table->Row({"piece of B", PieceText(response.piece_b())});
 }
 
-// What proves the relation: of bodies, a list that is for programs.
+// What proves the relation; for bodies that is a list, meant for programs.
 std::string ProofText(const v1::CheckCollisionResponse& response) {
   if (response.piece_hulls().empty()) return CertificateText(response.certificate());
   const int count = response.piece_certificates_size();

@@ -44,7 +44,7 @@ void Sort(const ListArguments& arguments, v1::ListHullsResponse* response) {
   if (arguments.reverse) std::reverse(begin, end);
 }
 
-// bodies: how many there are beside the hulls, of which names alone do not tell.
+// bodies: how many there are beside the hulls; lists of names do not tell of them.
 void PrintCount(const Invocation& run, const v1::ListHullsResponse& response, uint64_t bodies) {
   uint64_t vertices = 0;
   uint64_t points = 0;

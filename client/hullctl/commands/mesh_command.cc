@@ -51,7 +51,8 @@ void WriteMessages(const HullMesh& mesh, std::ostream& out) {
   out << MessageJson(facets) << "\n";
 }
 
-// The mesh; with --verify only one that is what it claims, else its verification says why not.
+// The mesh. With --verify, only one that is what it claims; otherwise its verification says why
+// not.
 absl::StatusOr<VerifiedMesh> Fetch(const Invocation& run, const MeshArguments& arguments) {
   const v1::GetHullMeshRequest request = RequestFor(arguments);
   std::optional<ProgressBar> bar;

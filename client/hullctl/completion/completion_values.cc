@@ -16,7 +16,7 @@ namespace {
 
 // A person waits.
 constexpr std::chrono::milliseconds kPatience(500);
-// That a list takes little of that time.
+// The most IDs of a list, so that it takes little of that time.
 constexpr uint64_t kMostListed = 20000;
 // More than fill a screen are shown by their parts.
 constexpr size_t kMostShown = 100;

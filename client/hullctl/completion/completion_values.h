@@ -7,8 +7,9 @@
 namespace hulld {
 
 // Names of contexts from the file, and IDs of hulls from the server that the invocation's options
-// name. Nothing comes where the server does not answer within half a second, or refuses. Of very
-// many IDs, only what stands before their next "/" comes. `invocation` must outlive the result.
+// name. Nothing comes where the server does not answer within half a second, or refuses. When there
+// are very many IDs, only what stands before their next "/" comes. `invocation` must outlive the
+// result.
 ValueSource ValuesFor(Invocation* invocation);
 
 }  // namespace hulld

@@ -68,8 +68,8 @@ struct ChosenSetting {
   std::string source;
 };
 
-// What the layers together say, the first one first; with "server" always there. Of a token and a
-// file of one, the earlier layer's is chosen, and in one layer the file.
+// What the layers together say, the first one first; with "server" always there. Where a token and
+// a file of one are both set, the earlier layer's is chosen, and within one layer the file.
 std::map<std::string, ChosenSetting> Combine(const std::vector<SettingsLayer>& layers);
 
 // What the variables of the environment set.

@@ -8,7 +8,7 @@
 
 namespace hulld {
 
-// What a value is, for who completes it. kPlaced: a hull or a body.
+// What a value is, so that the shell can complete it. kPlaced: a hull or a body.
 enum class ValueKind { kText, kFile, kDirectory, kHull, kBody, kPlaced, kContext };
 
 // An option, a flag, or an argument that is known by its place.

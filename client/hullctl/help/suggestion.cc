@@ -12,7 +12,7 @@ namespace {
 // The number of letters to insert, delete, replace or exchange with their neighbours that makes b
 // of a.
 size_t EditDistance(const std::string& a, const std::string& b) {
-  // distance[i][j]: of the first i letters of a and the first j of b.
+  // distance[i][j]: the distance between the first i letters of a and the first j of b.
   std::vector<std::vector<size_t>> distance(a.size() + 1, std::vector<size_t>(b.size() + 1));
   for (size_t i = 0; i <= a.size(); ++i) distance[i][0] = i;
   for (size_t j = 0; j <= b.size(); ++j) distance[0][j] = j;

@@ -43,7 +43,7 @@ void FillPlacement(const std::string& hull_id, Xoshiro256& random, v1::Placement
   t->set_z(kHalfRoom * random.NextSigned());
 }
 
-// Of the hulls that the load makes, none is to be missed.
+// A connection whose answers miss none of the hulls that the load makes.
 ClientOptions Linearizable(ClientOptions connection) {
   connection.freshness.reset();
   return connection;

@@ -12,13 +12,13 @@
 
 namespace hulld {
 
-// From this ratio of volumes on, a hull is said to stand badly for its mesh.
+// From this ratio of volumes on, a hull is said to represent its mesh badly.
 inline constexpr double kSwellToWarn = 1.5;
 
 // "1.07 times the mesh", or that there is nothing to compare. ratio: see VolumeRatio.
 std::string SwellText(std::optional<double> ratio);
 
-// Warns where the hull is so much larger than the mesh that it stands badly for it.
+// Warns where the hull is so much larger than the mesh that it represents it badly.
 void WarnOfSwell(const Invocation& run, const std::string& hull_id, std::optional<double> ratio);
 
 // The meshes of all files as one. Nothing where a file has none: not IsMeshFormat, an input that

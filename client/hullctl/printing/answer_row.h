@@ -21,7 +21,7 @@ struct AnswerRow {
   const v1::Axis* axis = nullptr;
   const v1::Analysis* analysis = nullptr;
   const v1::Certificate* certificate = nullptr;
-  // Of a pair with a body, instead of the certificate.
+  // For a pair with a body, instead of the certificate.
   const v1::PieceProof* proof = nullptr;
   std::optional<v1::Separation> separation;
   std::optional<v1::Witness> witness;

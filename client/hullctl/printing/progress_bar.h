@@ -10,7 +10,7 @@ namespace hulld {
 
 // How far something is.
 struct Progress {
-  // Of `total`, which is 0 when that is not known.
+  // How much of `total` is done; `total` is 0 when it is not known.
   uint64_t done = 0;
   uint64_t total = 0;
   // What is counted, and how much there is of it: "points", or "B" for bytes.

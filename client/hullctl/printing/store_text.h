@@ -9,7 +9,7 @@ namespace hulld {
 
 // The stores of an answer: one, or several separated by spaces.
 std::string StoresText(const v1::ResponseHeader& header);
-// Its revision: of several stores STORE:REVISION each, as --at-least takes them.
+// Its revision; with several stores, STORE:REVISION for each, as --at-least takes them.
 std::string RevisionsText(const v1::ResponseHeader& header);
 
 }  // namespace hulld

@@ -26,7 +26,7 @@
 namespace hulld {
 namespace {
 
-// Values beyond limits that are told one by one; of the rest, how many there are.
+// Values beyond limits that are told one by one; the rest are only counted.
 constexpr size_t kMostWarnings = 5;
 
 struct CheckArguments {
@@ -44,7 +44,7 @@ struct CheckArguments {
   QueryWishes wishes;
 };
 
-// Who is asked about: the parts of the robot, then what stands around it.
+// What the questions are about: the parts of the robot, then what stands around it.
 struct Cast {
   std::vector<std::string> names;
   std::vector<std::string> fixed_hulls;
@@ -319,7 +319,7 @@ void RobotCheck::PrintRow(uint64_t waypoint, const char* event, size_t pair, con
            << (run_.names() ? RelationText(row.relation) : TextOf(pair, row)) << "\n";
 }
 
-// With the piece of what stands around that decided, where that is a body.
+// The answer's text; where the surroundings are a body, with its piece that decided.
 std::string RobotCheck::TextOf(size_t pair, const AnswerRow& row) const {
   const auto robot_parts = static_cast<uint32_t>(model_.parts.size());
   const uint32_t b = pairs_[2 * pair + 1];

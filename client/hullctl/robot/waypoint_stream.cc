@@ -7,8 +7,8 @@ namespace hulld {
 namespace {
 
 constexpr size_t kPoseNumbers = 7;
-// So many that the round trip is small beside them. Observed, 18 pairs of a UR5: 2.4 million pairs
-// a second.
+// Enough that the round trip is small beside them. Observed, 18 pairs of a UR5: 2.4 million pairs a
+// second.
 constexpr size_t kPairsPerMessage = 4096;
 constexpr size_t kMostLanes = 1024;
 

@@ -22,7 +22,7 @@ struct LengthScale {
   bool is_one() const { return factor == 1 && divisor == 1; }
 };
 
-// A hull that the file defines: of a file's points, or of points that it lists itself.
+// A hull that the file defines, by the points of another file or by points that it lists itself.
 struct HullDefinition {
   std::string name;
   // With the prefix.

@@ -33,12 +33,12 @@ struct Scene {
   // and movers leave.
   std::optional<std::vector<uint32_t>> pairs;
   v1::Method method = v1::METHOD_UNSPECIFIED;
-  // Of a stream: answer updates by changes only.
+  // For a stream: answer updates by changes only.
   bool only_changes = false;
   // The names of the placements; none where the format has none.
   std::vector<std::string> names;
-  // Of a scene in YAML: which body it defines a placement stands for, -1 for none; and the names of
-  // the pieces of each.
+  // For a scene in YAML: the body of the file that each placement stands for, -1 for none; and the
+  // names of the pieces of each body.
   std::vector<int> body_of;
   std::vector<std::vector<std::string>> piece_names;
 

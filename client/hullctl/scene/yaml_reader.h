@@ -27,7 +27,7 @@ class YamlReader {
   // a key that is no text, one that is there twice.
   using Entries = std::vector<std::pair<std::string, YAML::Node>>;
   absl::StatusOr<Entries> EntriesOf(const YAML::Node& node, const std::string& what) const;
-  // The same where only some keys are known; of one that is not, the nearest is suggested.
+  // The same where only some keys are known; for one that is not, the nearest is suggested.
   absl::StatusOr<Entries> EntriesOf(const YAML::Node& node, const std::string& what,
                                     const std::vector<std::string>& known) const;
 

@@ -17,8 +17,8 @@ bool LooksLikeYaml(std::string_view line);
 
 // Reads a scene in YAML; client/README.md#scene-files tells its keys. `name` stands in errors, and
 // relative names of files start at its folder. No file that it names is opened. INVALID_ARGUMENT
-// "NAME:LINE:COLUMN: message": no YAML; a key that there is not; a value of another kind; a name
-// that is not defined, or twice; more than kMostPieces pieces.
+// "NAME:LINE:COLUMN: message": no YAML; an unknown key; a value of another kind; a name that is not
+// defined, or twice; more than kMostPieces pieces.
 absl::StatusOr<SceneDescription> ParseYamlScene(const std::string& text, const std::string& name);
 
 // The same of a file; - is standard input.

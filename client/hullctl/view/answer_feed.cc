@@ -14,7 +14,7 @@ namespace {
 
 // While something is dragged, a scene of more objects is asked about at rest only.
 constexpr size_t kMostObjectsInMotion = 3000;
-// Of a scene's colliding pairs, the page lists and lights these; totals count all.
+// The page lists and lights at most this many of a scene's colliding pairs; totals count all.
 constexpr size_t kMostPairs = 5000;
 
 v1::Pose ToPose(const Pose7& numbers) {

@@ -12,7 +12,7 @@ namespace hulld {
 namespace {
 
 constexpr char kModels[] = "/usr/share/assimp/models/OBJ/";
-// The pace of the growing hull: so many points, so often.
+// The pace of the growing hull: this many points, this often.
 constexpr uint64_t kGrowthPoints = 40;
 constexpr std::chrono::milliseconds kGrowthPause{120};
 constexpr int kGrowthSteps = 200;

@@ -16,13 +16,13 @@
 
 namespace hulld {
 
-// Edits that wait. Those of one hull keep their order; one that is like the last that waits of its
-// hull joins it: points are appended together, and deleting twice is deleting once. Hulls take
-// turns in the order of their oldest edits. Not thread-safe.
+// Edits that wait. Those of one hull keep their order; an edit that is like the last one that waits
+// for its hull joins it: points are appended together, and deleting twice is deleting once. Hulls
+// take turns in the order of their oldest edits. Not thread-safe.
 class EditQueue {
  public:
-  // More than so many numbers of points do not wait, about 100 MB. A choice: a page sends 4 MiB at
-  // a time at most (BridgeOptions::max_message_bytes).
+  // At most this many numbers of points wait, about 100 MB. A choice: a page sends 4 MiB at a time
+  // at most (BridgeOptions::max_message_bytes).
   static constexpr size_t kMostNumbers = size_t{12} << 20;
 
   // Whether it was taken: there is room for it.
@@ -50,7 +50,7 @@ class EditQueue {
 class EditFeed {
  public:
   EditFeed(const Client& client, std::shared_ptr<PageChannel> page);
-  // Makes the changes that wait: who asked for them and closed the page meant them.
+  // Makes the changes that wait: a user who asked for them and closed the page meant them.
   ~EditFeed();
   EditFeed(const EditFeed&) = delete;
   EditFeed& operator=(const EditFeed&) = delete;

@@ -29,7 +29,7 @@ class GeometryFeed {
  private:
   struct Order {
     GeometryWish wish;
-    // Of the scene that it is about.
+    // The files of the scene that the wish is about.
     std::shared_ptr<const ShapeFiles> files;
   };
 
@@ -41,7 +41,7 @@ class GeometryFeed {
   OrderedWorker<Order> worker_;
 };
 
-// The frame that answers a wish. Of a body, `pieces`, unless null, gets the IDs of its hulls.
+// The frame that answers a wish. For a body, `pieces`, unless null, gets the IDs of its hulls.
 std::string FrameFor(const Client& client, const ShapeFiles& files, const GeometryWish& wish,
                      std::vector<std::string>* pieces = nullptr);
 

@@ -51,8 +51,8 @@ namespace hulld {
 //   answer     {update, rest, pair, poses, hullA, hullB, relation, rung, axis, certificate,
 //              separation, witness, pieces, tolerant} or {update, pair, problem}: of the pair that
 //              was asked for; with a body, of the pieces that decided. At rest this is what
-//              CheckCollision says, and else what StreamCollisions says. tolerant, at rest and with
-//              a tolerance: {tolerance, relation, rung}, what CheckCollision says with it.
+//              CheckCollision says, otherwise what StreamCollisions says. tolerant, at rest and
+//              with a tolerance: {tolerance, relation, rung}, what CheckCollision says with it.
 //   collisions {update, revision, pairs: [[a, b, relation]], problems: [text], totals}: all pairs
 //              of the scene that collide (FindCollisions), a < b.
 //   edited     {hullId, done, message}: how an edit ended; message is for people.

@@ -10,7 +10,7 @@
 namespace hulld {
 
 // All that the page shows of one scene as it is now, for a page without a bridge (protocol.h):
-// shapes, the pairs that collide, and, of scenes of at most kMostRecordedObjects objects, the full
+// shapes, the pairs that collide, and, for scenes of at most kMostRecordedObjects objects, the full
 // answer for each two. Errors are those of the calls.
 absl::StatusOr<std::string> RecordScene(const ViewProgram& program, const ViewScene& scene);
 

@@ -483,8 +483,8 @@ class Client(ClientBase):
 
         groups: the group of each placement; with ignore_same_group, placements of one group are
         never asked about together, nor those of two groups that ignored_group_pairs (k x 2) names.
-        movers: asks only about pairs with at least one of the first so many placements. The rest as
-        in check_collisions; with a clearance, all pairs within it are found.
+        movers: asks only about pairs with at least one of the first `movers` placements. The
+        rest as in check_collisions; with a clearance, all pairs within it are found.
         """
         scene = SceneFilter(groups, ignore_same_group, ignored_group_pairs, movers)
         wanted = Wanted(axis, analysis, certificate, separation, max_error, witness, clearance)

@@ -22,7 +22,7 @@ from hulld.connection import PathLike
 from hulld.programs import find_program
 
 _LISTENING = re.compile(r"listening on (\S+)")
-#: Kept of what the server logs.
+#: The last lines of the server's log that are kept.
 _LINES = 200
 _START_SECONDS = 60.0
 _STOP_SECONDS = 10.0

@@ -30,7 +30,7 @@ constexpr double kWalksPerSurvivor = 0.6;
 
 // One call of InsertBlock.
 //
-// Idea: of most clouds most points are inside. Samples of growing size shape the surface; then the
+// Idea: in most clouds, most points are inside. Samples of growing size shape the surface; then the
 // map of directions rejects most of what follows, read once and in order, and what remains goes
 // into conflict lists. A block most of which is outside is inserted in rounds instead.
 class BlockInsertion {
@@ -195,7 +195,7 @@ class BlockInsertion {
   std::vector<Vector> astray_;
   // Points that are to be inserted in rounds.
   std::vector<Vector> rest_;
-  // Of the points that are looked up in the map, those to keep.
+  // Those points to keep, among the ones that are looked up in the map.
   std::vector<uint32_t> indices_;
 };
 

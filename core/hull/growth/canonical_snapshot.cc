@@ -27,7 +27,7 @@ void Sort(std::span<Ranked> vertices) {
   });
 }
 
-// Sorts into canonical order; after the poll said stop, nothing holds.
+// Sorts into canonical order. After the poll said stop, the result means nothing.
 //
 // Idea: the x of most hulls are spread out, so as many slices across x as there are vertices leave
 // few in each, and only these are compared. The slice of an x is a composition of rounded
@@ -79,7 +79,7 @@ struct Ranking {
   std::vector<uint32_t> index_of;
 };
 
-// Of all vertices that live. After the poll said stop, nothing holds.
+// Ranks all vertices that live. The result means nothing after the poll said stop.
 Ranking Rank(const VertexTable& vertices, StopPoll& poll) {
   std::vector<Ranked> ranked;
   ranked.reserve(vertices.size());
@@ -170,7 +170,8 @@ class FaceCollector {
   }
 
  private:
-  // Of a triangle: bit i tells that edge i lies within a facet, the fourth that the facet is known.
+  // Flags of a triangle: bit i tells that edge i lies within a facet, the fourth that the facet is
+  // known.
   static constexpr uint8_t kAnyFlat = 7;
   static constexpr uint8_t kVisited = 8;
 
@@ -192,8 +193,8 @@ class FaceCollector {
         .subspan(polygon_starts_[k], polygon_starts_[k + 1] - polygon_starts_[k]);
   }
 
-  // Edges at which triangles were joined know whether they are flat; of those between triangles
-  // that were made together, with a common apex, the one to the next round the apex is asked for.
+  // Edges at which triangles were joined know whether they are flat. Triangles that were made
+  // together have a common apex; for each, the edge to the next one round the apex is tested here.
   void FindFlatEdges(StopPoll& poll) {
     surface_.ForEachTriangle([&](TriangleId id, const SurfaceTriangle& t) {
       if (poll.Step()) return;

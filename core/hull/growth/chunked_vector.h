@@ -134,7 +134,7 @@ class ChunkedVector {
   }
 
   std::vector<std::unique_ptr<T[]>> chunks_;
-  // By chunk; of the last chunks perhaps none yet, so that a vector without a journal has none.
+  // By chunk; the last chunks may have none yet, so that a vector without a journal has none.
   std::vector<Noted> noted_;
   // Elements that the first chunk has room for.
   size_t first_capacity_ = 0;

@@ -186,8 +186,8 @@ void ConflictLists::Scatter() {
   }
 }
 
-// The index of a target that the point sees, else kBelowAll. Counts the point when it equals a
-// vertex.
+// The index of a target that the point sees, or kBelowAll if there is none. Counts the point when
+// it equals a vertex.
 int64_t ConflictLists::MatchExactly(const Vector& point, std::span<const TriangleId> targets) {
   for (size_t k = 0; k < targets.size(); ++k) {
     if (IsCertainlyBelow(planes_[k], point)) continue;
@@ -226,7 +226,7 @@ void ConflictLists::AllocateLists(std::span<const TriangleId> targets) {
   cursors_[0] = end_ * PointBlock::kSize;
 }
 
-// Makes room for so many blocks at the end, by leaving out the gaps.
+// Makes room for this many blocks at the end, by leaving out the gaps.
 void ConflictLists::Reserve(size_t blocks) {
   if (end_ + blocks <= capacity_) return;
   size_t kept = 0;

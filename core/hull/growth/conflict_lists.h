@@ -101,8 +101,8 @@ class ConflictLists {
   // Largest absolute coordinate of a point.
   double size_ = 0;
 
-  // Of one distribution: the lists to empty, their blocks, the targets' planes, what MatchPlanes
-  // says, and, by match + 1, how many points there are and where the next one goes.
+  // Scratch of one distribution: the lists to empty, their blocks, the targets' planes, what
+  // MatchPlanes says, and, by match + 1, how many points there are and where the next one goes.
   std::vector<List> sources_;
   ScratchList<const PointBlock*> source_blocks_;
   std::vector<PlaneWithBound> planes_;

@@ -19,7 +19,7 @@ namespace hulld {
 
 namespace {
 
-// Of moments relative to their sum along the axes: flatter sets have no frame.
+// The least pivot of the moments, relative to their sum along the axes: flatter sets have no frame.
 constexpr double kLeastRelativeMoment = 0x1p-40;
 // The condition number of L from which on it is worth its multiplications.
 constexpr double kWorthAFrame = 4;

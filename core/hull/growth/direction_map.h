@@ -18,16 +18,16 @@ namespace hulld {
 
 // The coordinates in which a map measures a set: q = L (p - center), L a lower triangular matrix.
 // Where a set is flat or slender, in any direction, L makes it about as wide in all directions, so
-// that the cells of a map divide its surface evenly. L is what its doubles say; that they are
-// rounded matters to nobody.
+// that the cells of a map divide its surface evenly. L is exactly what its doubles say; it does not
+// matter that they were rounded.
 class MapFrame {
  public:
   // L = 1.
   explicit MapFrame(const Vector& center) : center_(center) {}
   // The frame that turns points with these second moments about `center`, the sums of the products
   // of their differences, into points equally spread in all directions, times a factor; |L| is at
-  // most 1, component by component. L = 1 where the points nearly are so, or are so flat that
-  // rounding would matter, or where the moments are not finite.
+  // most 1, component by component. L = 1 where the points are nearly spread so already, where they
+  // are so flat that rounding would matter, or where the moments are not finite.
   MapFrame(const Vector& center, const Eigen::Matrix3d& moments);
 
   const Vector& center() const { return center_; }
@@ -45,7 +45,7 @@ class MapFrame {
 
  private:
   Vector center_;
-  // Of L, row by row up to the diagonal.
+  // The entries of L, row by row up to the diagonal.
   std::array<double, 6> entries_ = {1, 0, 1, 0, 0, 1};
   bool is_plain_ = true;
 };
@@ -134,8 +134,8 @@ class DirectionMap {
     return gauges_.capacity() * sizeof(double) + hints_.capacity() * sizeof(uint32_t);
   }
 
-  // Appends the indices of the points that are not certainly inside, ascending; of some of the
-  // points only once the poll says stop.
+  // Appends the indices of the points that are not certainly inside, ascending. Once the poll says
+  // stop, only some of the points are looked at.
   void AppendSurvivors(std::span<const Vector> points, std::vector<uint32_t>& survivors,
                        StopPoll& poll) const;
 

@@ -60,12 +60,11 @@ class HullBuilder {
   HullBuilder& operator=(HullBuilder&&) noexcept;
   ~HullBuilder();
 
-  // Adds a block: all of it, or nothing when the result is an error.
-  // points: n x 3, the caller's length unit. -0 is stored as +0.
-  // Where the limits may end it, a journal of what changes is kept to undo it: of each triangle and
-  // vertex that was there before and changes, what it was.
-  // Errors: INVALID_ARGUMENT "points[17].y is NaN" (or "is infinite"); RESOURCE_EXHAUSTED when the
-  // hull would exceed limits.max_vertices; CANCELLED when limits.should_stop said so.
+  // Adds a block: all of it, or nothing when the result is an error. points: n x 3, the caller's
+  // length unit. -0 is stored as +0. Where the limits may end it, a journal of what changes is kept
+  // to undo it: what each triangle and vertex that changes was before. Errors: INVALID_ARGUMENT
+  // "points[17].y is NaN" (or "is infinite"); RESOURCE_EXHAUSTED when the hull would exceed
+  // limits.max_vertices; CANCELLED when limits.should_stop said so.
   absl::StatusOr<PointCounts> Add(std::span<const Vector> points, const AddLimits& limits = {});
 
   int dimension() const;

@@ -13,7 +13,7 @@ namespace {
 // Points of the first round, about.
 constexpr size_t kFirstRound = 64;
 
-// Of the map of directions for a round (see Surface::MeasureBefore).
+// Parameters of the map of directions for a round (see Surface::MeasureBefore).
 constexpr double kMapFineness = 2.8;
 constexpr double kWalksPerPoint = 0.2;
 

@@ -53,8 +53,8 @@ inline constexpr int64_t kBelowAll = -1;
 inline constexpr int64_t kUncertain = -2;
 
 // For each point of the blocks, the index of a plane that it is certainly above, the one with the
-// largest normal . p - offset, else kBelowAll or kUncertain. matches: 4 per block. True when some
-// are uncertain. The same bits with AVX2 and without.
+// largest normal . p - offset; kBelowAll or kUncertain when there is none. matches: 4 per block.
+// True when some are uncertain. The same bits with AVX2 and without.
 bool MatchPlanes(std::span<const PointBlock* const> blocks, std::span<const PlaneWithBound> planes,
                  int64_t* matches);
 

@@ -297,12 +297,12 @@ void Surface::Traverse(TriangleId first, Classify&& classify) {
   }
 }
 
-// The same as CollectRegion where doubles are certain of all signs, and then the horizon is in no
-// order; else false. Which triangles a point sees cannot be foreseen, so nothing branches on it:
-// each neighbour is written to both lists, and one of them then counts it.
+// The same as CollectRegion where doubles are certain of all signs, but with the horizon in no
+// order. False where they are not certain. Which triangles a point sees cannot be foreseen, so
+// nothing branches on it: each neighbour is written to both lists, and one of them then counts it.
 bool Surface::CollectCertainRegion(TriangleId first, const Vector& point, double size) {
   const uint32_t mark = NextMark();
-  // Local, as what is stored below may be them for all that the compiler knows.
+  // Local, because for all that the compiler knows, the stores below may change them.
   const double x = point.x();
   const double y = point.y();
   const double z = point.z();

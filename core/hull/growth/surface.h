@@ -37,7 +37,7 @@ struct alignas(64) SurfaceTriangle {
   // The last traversal in whose region this triangle was.
   uint32_t mark : 29;
   // Bit i: the triangle beyond edge i is in the same plane. That is known where one of the two was
-  // joined to the other across a horizon; of two that were made together it is not, and then the
+  // joined to the other across a horizon. It is not known of two that were made together; then the
   // bit is 0.
   uint32_t flat : 3;
 };
@@ -154,11 +154,11 @@ class Surface {
   bool IsMeasurable() const {
     return directions_ && extent_ >= kTripleProductMin && extent_ <= kTripleProductMax;
   }
-  // Measures the surface anew when a map is worth that for so many points to be looked up; where
+  // Measures the surface anew when a map is worth that for `points` points to be looked up; where
   // it changed much since it was last measured, round a center and in a frame that suit its present
-  // shape. fineness: at most so many times the cells a side that suit points one by one. True when
-  // it did; it does not where no interior point is known, or the poll, whose steps are walks, said
-  // stop. Cost: at most `walks_per_point` walks for each point.
+  // shape. fineness: the map has at most this many times the cells a side that suit points one by
+  // one. True when it did; it does not where no interior point is known, or the poll, whose steps
+  // are walks, said stop. Cost: at most `walks_per_point` walks for each point.
   bool MeasureBefore(const VertexTable& vertices, size_t points, double fineness,
                      double walks_per_point, StopPoll& poll);
   // False where the map rejected too few of the points looked up since it was measured.
@@ -229,8 +229,8 @@ class Surface {
   // insertion waits for all; as the polytope grows, what was measured early is low but not wrong.
   struct Measurement {
     DirectionMap map;
-    // Of the corners of the last row up to the one to measure, and of the row before from there on:
-    // where the direction leaves the surface.
+    // Where the direction leaves the surface: for the corners of the last row up to the one to
+    // measure, and for those of the row before from there on.
     std::vector<TriangleId> hint;
     // The one that stood before in the last one's place.
     TriangleId hint_before = 0;
@@ -262,8 +262,9 @@ class Surface {
   TriangleId NewId();
   void Link(TriangleId a, uint32_t edge_a, TriangleId b, uint32_t edge_b, bool is_flat);
 
-  // Of a triangle and those beyond its edges, the one that the point is farthest outside, where
-  // doubles are certain that it is. Faster than the steps of a walk that it saves.
+  // The one among a triangle and those beyond its edges that the point is farthest outside; none
+  // where doubles are not certain that it is outside any. Faster than the steps of a walk that it
+  // saves.
   std::optional<Location> SeenNear(TriangleId id, const Vector& point, double size) const {
     const SurfaceTriangle& t = triangles_[id];
     TriangleId best = id;
@@ -277,7 +278,7 @@ class Surface {
     return Location{Side::kOutside, best};
   }
   // The point's height above the triangle's plane, times the length of its normal, where that is
-  // certainly above zero; else zero.
+  // certainly above zero; otherwise zero.
   static double HeightAbove(const SurfaceTriangle& t, const Vector& point, double size) {
     const double height = t.normal.dot(point) - t.offset;
     return height > static_cast<double>(t.slope) * size ? height : 0;
@@ -340,7 +341,7 @@ class Surface {
   ChunkedVector<TriangleId> free_;
   size_t alive_ = 0;
   // By vertex: where in the horizon the edge is that leaves it, if it is on the horizon at all, as
-  // that edge's tail tells; else any number.
+  // that edge's tail tells; otherwise any number.
   ChunkedVector<uint32_t> place_of_vertex_;
 
   // Round a point strictly inside, when one is known: it stays so while the polytope grows.
@@ -350,8 +351,8 @@ class Surface {
   double extent_ = 0;
   // The count of triangles at which measuring the surface anew starts.
   size_t next_update_ = 0;
-  // Of the points since the last measurement, how many were looked up in the map and rejected by
-  // it.
+  // How many points were looked up in the map since the last measurement, and how many of them it
+  // rejected.
   size_t asked_ = 0;
   size_t rejected_ = 0;
   // The count of triangles when it was last measured.

@@ -10,7 +10,7 @@
 namespace hulld {
 
 // Checks of a surface by laws that every one obeys, each stated for a triangle and its neighbours.
-// Both return null when all hold, else the law that is broken, in words.
+// Both return null when all hold, otherwise the law that is broken, in words.
 
 // Checks the triangles with the given IDs: they are alive; their corners are three vertices that
 // live and span a plane; their neighbours are alive, link back, and run along the common edge the

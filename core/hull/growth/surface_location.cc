@@ -46,9 +46,9 @@ Surface::Ray Surface::RayTo(const Vector& point) const {
 
 // The edge of a triangle to cross on the way to the point: one whose plane through the interior
 // point has the point on its far side, strictly and exactly. 3 when there is none: the triangle's
-// cone holds the point. Of several the one of which this is most so, or, from `first` on round the
-// triangle, the next one. Computing all three without a branch is faster than guessing which to
-// start with.
+// cone holds the point. When there are several: the one of which this is most so, or, from `first`
+// on round the triangle, the next one. Computing all three without a branch is faster than guessing
+// which to start with.
 size_t Surface::EdgeTowards(const VertexTable& vertices, const SurfaceTriangle& t,
                             const Vector& point, const Ray& ray,
                             std::optional<uint32_t> first) const {

@@ -24,8 +24,8 @@ constexpr int kMostAttempts = 18;
 // A vertex is pushed along the mean of the normals round it; where that is farther than this from a
 // normal, as at the tip of a needle, no farther than this lets.
 constexpr double kLeastCosine = 0.05;
-// Vertices of the full hull that are checked at once; before, so many spread over all of them: most
-// that fail, fail early.
+// Vertices of the full hull that are checked at once. As many, spread over all of them, are checked
+// first: most hulls that fail, fail early.
 constexpr size_t kVerticesPerCheck = 1024;
 
 Vector MeanOf(std::span<const Vector> points) {

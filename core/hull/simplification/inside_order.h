@@ -18,15 +18,15 @@ namespace hulld {
 // The vertices of a hull of dimension 2 or 3, farthest first, as far as anyone has asked.
 class InsideOrder {
  public:
-  // The hull and the poll must outlive this. After the poll said stop, nothing holds.
+  // The hull and the poll must outlive this. After the poll said stop, its answers mean nothing.
   InsideOrder(const Hull& hull, const UnitScale& scale, StopPoll& poll);
   InsideOrder(const InsideOrder&) = delete;
   InsideOrder& operator=(const InsideOrder&) = delete;
 
   // The fewest vertices that this order begins with.
   size_t least() const { return least_; }
-  // How many of the first vertices bring the error within `error`, or else `most`. Requires most >=
-  // least(). Not less than least().
+  // How many of the first vertices bring the error within `error`; `most` if that is not reached
+  // before. Requires most >= least(). Not less than least().
   size_t CountFor(double error, size_t most);
   // Proven: no point of the hull is farther than this from the hull of the first `count` vertices.
   // The caller's length unit. Requires least() <= count <= the hull's vertices.

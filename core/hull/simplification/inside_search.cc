@@ -16,7 +16,7 @@ constexpr int kAttempts = 6;
 constexpr int kMovesPerAttempt = 4;
 // Attempts after which the search ends if nothing was gained.
 constexpr int kAttemptsInVain = 2;
-// Moves of single vertices, for each vertex of the hull, after which no attempt begins. So many
+// Moves of single vertices, for each vertex of the hull, after which no attempt begins. That many
 // come up where a large part of the vertices is chosen, and then there is little to choose from.
 constexpr size_t kMovesPerVertex = 3;
 
@@ -77,7 +77,7 @@ void InsideSearch::Improve() {
   }
 }
 
-// Keeps it if it is better than the best: near enough with fewer vertices, or else nearer.
+// Keeps it if it is better than the best: near enough with fewer vertices, or nearer.
 bool InsideSearch::Consider(const VertexSubset& subset, double error) {
   const size_t count = subset.chosen().size();
   const bool reaches = error <= max_error_;

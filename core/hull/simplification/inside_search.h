@@ -14,8 +14,8 @@
 
 namespace hulld {
 
-// Chooses vertices of a hull of dimension 2 or 3: few for an error, or for a small error of so
-// many.
+// Chooses vertices of a hull of dimension 2 or 3: few for a given error, or a given number for a
+// small error.
 //
 // Idea: farthest first, and then, for a solid, attempts to do better: some fewer vertices, spread
 // more evenly (Relaxation), and again farthest first from there, until the error is reached or the
@@ -27,7 +27,8 @@ class InsideSearch {
   // and at most the hull's. All given must outlive this.
   InsideSearch(const Hull& hull, double max_error, size_t most, StopPoll& poll);
 
-  // After the poll said stop, nothing holds. Cost: that of farthest first, some times over.
+  // After the poll said stop, the answer means nothing. Cost: that of farthest first, some times
+  // over.
   void Run();
   const VertexChoice& best() const { return best_; }
 

@@ -12,7 +12,7 @@
 namespace hulld {
 
 // A growing subset of the vertices of a convex polygon, the next one always the vertex farthest
-// from the polygon of those chosen, as far as rounding lets tell.
+// from the polygon of those chosen, as far as rounding can tell.
 //
 // Idea: an edge of the chosen ones stands for the arc of vertices beyond it. Its farthest vertex
 // splits it. Source: Ramer 1972, An Iterative Procedure for the
@@ -21,7 +21,7 @@ class PolygonSubset {
  public:
   // points: at unit scale. loop: their indices in order round the polygon; both must outlive this.
   // Starts with three. Requires at least three. After the poll said stop, here or in ChooseNext,
-  // nothing holds but that this may be destroyed.
+  // this may only be destroyed.
   PolygonSubset(std::span<const Vector> points, std::span<const uint32_t> loop, StopPoll& poll);
 
   // Indices, in the order chosen.

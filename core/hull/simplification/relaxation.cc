@@ -9,7 +9,7 @@
 namespace hulld {
 namespace {
 
-// Of so many vertices one is among those that stick out least; about half of these have a neighbour
+// One vertex in this many is among those that stick out least; about half of these have a neighbour
 // that sticks out even less, and stay.
 constexpr size_t kVerticesPerFlat = 10;
 

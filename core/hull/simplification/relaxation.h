@@ -25,8 +25,8 @@ namespace hulld {
 // Lloyd 1982, Least Squares Quantization in PCM, for moving all at once.
 class Relaxation {
  public:
-  // unit_points: the hull's vertices at unit scale. All given must outlive this. After
-  // the poll said stop, here or later, nothing holds. Cost: O(V log V).
+  // unit_points: the hull's vertices at unit scale. All given must outlive this. After the poll
+  // said stop, here or later, the answers mean nothing. Cost: O(V log V).
   Relaxation(const Hull& hull, std::span<const Vector> unit_points, StopPoll& poll);
 
   // Moves each of the chosen vertices once; they may meet, so that fewer come back, ascending.

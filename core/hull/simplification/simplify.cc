@@ -79,7 +79,8 @@ class OutsideSearch {
     return target_.max_error > 0 && hull.error <= target_.max_error;
   }
 
-  // Fewer vertices among those that keep max_error, which go before all others; else less error.
+  // Hulls that keep max_error go before all others, and the one with fewer vertices first;
+  // otherwise the one with less error is better.
   bool IsBetter(const SimplifiedHull& a, const SimplifiedHull& b) const {
     if (Reaches(a) != Reaches(b)) return Reaches(a);
     const size_t count_a = a.hull.vertices().size();

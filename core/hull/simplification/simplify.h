@@ -13,8 +13,9 @@ namespace hulld {
 // How far to simplify. At least one limit must be given.
 //
 // max_vertices is never exceeded. max_error alone is always kept, if need be by the hull itself,
-// whose error is 0. With both, max_error is kept where the method finds a hull within both; else
-// the answer is the best that it finds within max_vertices, so look at the error achieved.
+// whose error is 0. With both, max_error is kept where the method finds a hull within both;
+// otherwise the answer is the best that it finds within max_vertices, so look at the error
+// achieved.
 struct SimplifyTarget {
   // 0: any number.
   size_t max_vertices = 0;
@@ -41,14 +42,14 @@ struct SimplifiedHull {
 // vertices within a constant of the fewest that any method can do with (Kamenev 1992); on spheres
 // this needs less than 1.5 times the fewest (observed: SimplifyQuality). Errors: INVALID_ARGUMENT:
 // no limit, a max_error that is negative, infinite or NaN, or fewer vertices than the dimension
-// needs to be kept (dimension + 1). CANCELLED. Cost: of n choices of V vertices O((V + n) log n)
-// for round shapes; two to six times that of choosing farthest first (observed).
+// needs to be kept (dimension + 1). CANCELLED. Cost: O((V + n) log n) for n choices of V vertices
+// of round shapes; two to six times that of choosing farthest first (observed).
 absl::StatusOr<SimplifiedHull> SimplifyInside(const Hull& hull, const SimplifyTarget& target);
 
 // A hull that encloses the given one, exactly for the doubles returned: the vertices of inside
-// simplifications pushed outwards, or the planes that support the given hull along their facets,
-// or a box, whichever is best: of those within both limits the one with fewest vertices when
-// max_error is given, else the one with the least error. Never more vertices than the hull itself.
+// simplifications pushed outwards, or the planes that support the given hull along their facets, or
+// a box, whichever is best: the one with fewest vertices of those within both limits when max_error
+// is given, otherwise the one with the least error. Never more vertices than the hull itself.
 // Errors: as for SimplifyInside, but at least 8 vertices must be allowed. Cost: some ten
 // simplifications inside.
 absl::StatusOr<SimplifiedHull> SimplifyOutside(const Hull& hull, const SimplifyTarget& target);

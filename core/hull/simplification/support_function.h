@@ -21,7 +21,7 @@ namespace hulld {
 class SupportFunction {
  public:
   // points: the hull's vertices at unit scale, which must outlive this. Requires a vertex. After
-  // the poll said stop, nothing holds but that this may be destroyed. Cost: O(V log V).
+  // the poll said stop, this may only be destroyed. Cost: O(V log V).
   SupportFunction(const Hull& hull, std::span<const Vector> points, StopPoll& poll);
 
   // The index of the vertex farthest along the direction. Any start is right; a near one is fast.

@@ -16,7 +16,7 @@
 namespace hulld {
 
 // A growing subset of the vertices of a hull of dimension 3, the next one always the vertex
-// farthest from the hull of those chosen, as far as rounding lets tell.
+// farthest from the hull of those chosen, as far as rounding can tell.
 //
 // Idea: the hull of those chosen grows as any hull does, exactly, and each other vertex waits in
 // the list of a triangle that it sees strictly: a vertex of the whole is outside the hull of any
@@ -29,8 +29,8 @@ namespace hulld {
 class VertexSubset {
  public:
   // points: all vertices of a hull of dimension 3; unit_points: the same at unit scale. Both must
-  // outlive this. Starts with four. After the poll said stop, here or in ChooseNext, nothing holds
-  // but that this may be destroyed. Cost: O(points).
+  // outlive this. Starts with four. After the poll said stop, here or in ChooseNext, this may only
+  // be destroyed. Cost: O(points).
   VertexSubset(std::span<const Vector> points, std::span<const Vector> unit_points, StopPoll& poll);
   // The same, but it starts with the vertices given, each once. Nothing where these lie in a plane,
   // where no double is found inside their hull, where walks on it are longer than round shapes
@@ -45,8 +45,8 @@ class VertexSubset {
   bool is_complete() const { return chosen_.size() == points_.size(); }
   // See Surface.
   bool IsMeasurable() const { return surface_->IsMeasurable(); }
-  // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: of n choices of V
-  // vertices O((V + n) log n) for round shapes.
+  // Chooses the vertex that seems farthest. Requires !is_complete(). Cost: O((V + n) log n) for n
+  // choices of V vertices of round shapes.
   void ChooseNext(StopPoll& poll);
   // Proven: no vertex is farther than this from the hull of those chosen. In units. Cost: O(log V)
   // amortized.
@@ -112,7 +112,7 @@ class VertexSubset {
   // By point that is not chosen: the next one of its list, and a proven bound of its distance.
   std::vector<uint32_t> next_;
   std::vector<double> distance_;
-  // Of each cell with a list, one entry that counts, and some that no longer do.
+  // Each cell with a list has one entry that counts, and may have some that no longer do.
   std::priority_queue<Entry> queue_;
   uint64_t entries_ = 0;
   // Triangles whose lists changed since they were put into the queue.

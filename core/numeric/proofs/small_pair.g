@@ -10,7 +10,7 @@
 # what the exact value of the farthest exceeds its X, `below`, and X of the one found exceeds
 # `fresh`, `again`. In the other direction fresh errs by less.
 
-# Of its part, Q is M and 1 - Q the translation, 0 for A.
+# Q of its part is M and 1 - Q the translation, 0 for A.
 x1 = Q * y1; x2 = Q * y2; x3 = Q * y3;
 t = (1 - Q) * y4;
 s1 = R1 + g1; s2 = R2 + g2; s3 = R3 + g3;

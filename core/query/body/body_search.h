@@ -30,7 +30,8 @@ struct PiecesAnswer {
 };
 
 struct BodyAnswer : PiecesAnswer {
-  // Of the bodies. Axis, witness points and analysis are those of the pair that decided.
+  // The answer for the two bodies. Axis, witness points and analysis are those of the pair that
+  // decided.
   Answer answer;
 };
 
@@ -47,9 +48,9 @@ struct BodyCounts {
 // decided as two hulls are, at the exact products of the poses.
 //
 // Two trees of boxes are descended together, first where boxes are nearest. Without wishes beyond
-// the relation and the clearance, the first pair that can be outdone by no other ends the search,
-// and it is the named pair; else that of the least separation is. So swapping A and B mirrors an
-// answer, and the named pair does not depend on threads.
+// the relation and the clearance, the first pair that no other can outdo ends the search and is the
+// named pair. With other wishes, the pair of the least separation is named. So swapping A and B
+// mirrors an answer, and the named pair does not depend on threads.
 //
 // A certificate does not count among these wishes: where it is wanted, those of pieces that prove
 // the relation are found once it is known.
@@ -64,9 +65,9 @@ class BodySearch {
   BodySearch(const BodySearch&) = delete;
   BodySearch& operator=(const BodySearch&) = delete;
 
-  // Makes at most so many steps, of one node or one pair of pieces each. Returns whether the search
-  // has ended. CANCELLED: should_stop said so. RESOURCE_EXHAUSTED: more certificates would be
-  // needed than options.max_piece_certificates.
+  // Makes at most this many steps, of one node or one pair of pieces each. Returns whether the
+  // search has ended. CANCELLED: should_stop said so. RESOURCE_EXHAUSTED: more certificates would
+  // be needed than options.max_piece_certificates.
   absl::StatusOr<bool> Advance(uint64_t steps);
   // Requires that the search has ended; once.
   absl::StatusOr<BodyAnswer> Take();
@@ -123,7 +124,8 @@ class BodySearch {
   StopPoll poll_;
 
   std::vector<Nodes> waiting_;
-  // Of two leaves, the last one first.
+  // Pairs of pieces from two leaves. The search takes them from the end, where the nearest ones
+  // are.
   std::vector<Candidate> candidates_;
   PlacedLeaf leaf_x_;
   PlacedLeaf leaf_y_;

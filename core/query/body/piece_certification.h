@@ -33,8 +33,8 @@ struct PieceCertificate {
 // each pair that is certified.
 class PieceCertification {
  public:
-  // All must outlive this. relation: of the bodies, exact; `decided`: that of a pair which shows
-  // it, needed for OVERLAPPING.
+  // All must outlive this. relation: that of the bodies, exact. `decided`: a pair that shows it,
+  // needed for OVERLAPPING.
   PieceCertification(const PlacedBody& a, const PlacedBody& b, const QueryOptions& options,
                      Relation relation, std::optional<PiecePair> decided);
   PieceCertification(const PieceCertification&) = delete;
@@ -64,7 +64,7 @@ class PieceCertification {
   Relation strongest_ = Relation::kSeparated;
 
   Stage stage_ = Stage::kBoxesOfB;
-  // Of the stage: the piece, or the pair.
+  // The next piece, or the next pair, of the stage.
   size_t next_ = 0;
   std::vector<Box> boxes_;
   BoxTree tree_{std::span<const Box>()};

@@ -59,8 +59,8 @@ class ExactExpansion {
   }
 
  private:
-  // Adds a corner for which differs(w) holds: of the seed, or farthest along one of the directions
-  // or against it.
+  // Adds a corner for which differs(w) holds: one of the seed, or one that is farthest along one of
+  // the directions or against it.
   template <typename Differs>
   void AddCorner(std::span<const VertexPair> seed, std::vector<IntegerVector> directions,
                  Differs differs) {

@@ -14,7 +14,7 @@ namespace {
 
 // Four squares of them, and sums of products as large, stay below 2^123.
 constexpr int kMostQuaternionBits = 60;
-// So do products of two norms of so many bits together, and sums of three such.
+// So do products of two norms that have this many bits together, and sums of three such.
 constexpr int kMostNormBits = 120;
 
 int BitWidth(Int128 magnitude) {

@@ -79,7 +79,8 @@ class ExactPair {
     return FeatureB(n, candidates).front();
   }
 
-  // The vertex of A - B farthest along n: of the lowest such vertex of A, and of B.
+  // The vertex of A - B farthest along n: the one made of the lowest such vertex of A and that of
+  // B.
   ExactCorner Farthest(const IntegerVector& n) { return Corner({FarthestA(n), FarthestB(n)}); }
 
   // A positive multiple of a point in the relative interior of A - B: the difference of the means

@@ -18,7 +18,7 @@ double LargestOf(const Vector& u, const Vector& v, const Vector& w) {
   return u.cwiseAbs().cwiseMax(v.cwiseAbs()).cwiseMax(w.cwiseAbs()).maxCoeff();
 }
 
-// Sign of `value` where it exceeds `bound`, else nothing.
+// Sign of `value` where it exceeds `bound`, otherwise nothing.
 std::optional<int> CertainSign(double value, double bound) {
   if (value > bound) return 1;
   if (value < -bound) return -1;
@@ -331,8 +331,8 @@ std::optional<typename PortalSearch<Pair>::Result> PortalSearch<Pair>::TryDirect
     const Vector& direction, const Point& corner) {
   const double largest = LargestOf(direction);
   if (!(largest > 0)) return std::nullopt;
-  // Of few bits, so that nearly the direction of an axis becomes one. It need not be exact: where
-  // the corner is the only contact, a cone of directions supports C there.
+  // Rounded to few bits, so that a direction close to an axis becomes that axis. It need not be
+  // exact: where the corner is the only contact, a cone of directions supports C there.
   const Vector n = (direction * std::ldexp(1.0, 30 - std::ilogb(largest))).array().round();
   Direction rounded(*this, n);
   const Point* const holding = IsZero(Exact(corner)) ? &corner : nullptr;

@@ -72,8 +72,8 @@ class WidePair {
   Coordinates VertexB(uint32_t i) { return b_.Vertex(i); }
   Coordinates Difference(VertexPair pair) { return VertexA(pair.a) - VertexB(pair.b); }
 
-  // The lowest of the vertices of A farthest along n, and of B farthest against it; of all, or when
-  // it is known to be among `candidates`, ascending.
+  // The lowest of the vertices of A farthest along n, and of B farthest against it; among all, or
+  // among `candidates`, ascending, when it is known to be one of these.
   uint32_t FarthestA(const Direction& n) {
     CandidateBuffer buffer;
     return a_.Farthest(n, CandidatesOf(a_, n, [&](const Vector& n_W, double error) {
@@ -123,7 +123,7 @@ class WidePair {
   // Own coordinates of at most this many bits take one word, and sums of ten of them do.
   static constexpr int kOneWordBits = 59;
   static constexpr int kMostOwnBits = kWords == 1 ? kOneWordBits : kOneWordBits + 64;
-  // The first so many vertices are kept once they are multiplied out.
+  // This many vertices, from the first on, are kept once they are multiplied out.
   static constexpr uint32_t kKept = 32;
 
   struct Side {
@@ -223,7 +223,8 @@ class WidePair {
     std::array<Coordinates, kKept> kept;
   };
 
-  // What floating point leaves of a large hull; of a small one nothing, which stands for all.
+  // The candidates that floating point leaves of a large hull. None of a small one, which stands
+  // for all.
   template <typename Candidates>
   std::span<const uint32_t> CandidatesOf(const Side& side, const Direction& n,
                                          Candidates candidates) const {

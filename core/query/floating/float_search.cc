@@ -293,7 +293,7 @@ class FloatSearch {
     if (farthest.value < -error) return EndSeparated(n);
     const PlainVector along = n;
     along_ = along;
-    // Else nothing is farther towards the origin.
+    // Without progress, nothing is farther towards the origin.
     const bool progress = !simplex_.Contains(farthest.pair);
     bool outside = true;
     bool at_corner = false;

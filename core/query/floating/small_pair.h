@@ -18,9 +18,9 @@ namespace hulld {
 // of A - B is a difference of two that are known. The farthest is found without a branch, as which
 // vertex it is cannot be predicted.
 //
-// kMostVertices: of either hull; more of them need bounds of their own (kSupportErrorFactor).
-// Positions are those of FloatPair, to the bit. Everything is inlined, so that it is compiled for
-// the registers of the function that searches.
+// kMostVertices: the most that either hull may have; more of them need bounds of their own
+// (kSupportErrorFactor). Positions are those of FloatPair, to the bit. Everything is inlined, so
+// that it is compiled for the registers of the function that searches.
 template <uint32_t kMostVertices>
 class SmallPair {
   static_assert(kMostVertices == 8 || kMostVertices == 16);

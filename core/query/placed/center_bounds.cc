@@ -42,7 +42,7 @@ constexpr double kMostTilt = 0.7;
 float RoundedUp(double value) {
   const auto rounded = static_cast<float>(value);
   if (!(static_cast<double>(rounded) < value)) return rounded;
-  // Of positive numbers the next one has the next bits.
+  // The next positive number has the next bit pattern.
   return rounded > 0 ? std::bit_cast<float>(std::bit_cast<uint32_t>(rounded) + 1)
                      : std::nextafter(rounded, std::numeric_limits<float>::infinity());
 }
@@ -187,7 +187,7 @@ class Lookout {
   }
 
   Vector Farthest(const Vector& n) const { return points_[support_.Farthest(n).vertex]; }
-  // Of the farthest points along n and against it the one that is farther from p.
+  // The farthest point along n or the farthest one against it: the one that is farther from p.
   Vector FartherOf(const Vector& n, const Vector& p) const {
     const Vector along = Farthest(n);
     const Vector against = Farthest(-n);

@@ -44,11 +44,11 @@ class CenterBounds {
 
   // None: every bound is unknown.
   CenterBounds() = default;
-  // Of the hull of some points about a centre. None for one that is flat (`dimension` below 3). The
-  // gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
+  // Bounds for the hull of some points about a centre. A flat hull (`dimension` below 3) has none.
+  // The gauge is unknown unless the centre is certain to be strictly inside. max_abs: the points'
   // largest absolute coordinate. The points and the support map must outlive the bounds and stay in
-  // place. Cost: O(V) comparisons; of the first cell that is made some 100 support points more, and
-  // of each of 24 or 384 cells some 25.
+  // place. Cost: O(V) comparisons; the first cell that is made takes some 100 support points more,
+  // and each of 24 or 384 cells some 25.
   CenterBounds(std::span<const Vector> points, int dimension, const Vector& center, double max_abs,
                const SupportMap& support, Making making);
   CenterBounds(const Hull& hull, const SupportMap& support)
@@ -103,12 +103,12 @@ class CenterBounds {
     double max_abs;
     const SupportMap* support;
 
-    // By face, a bit for each cell, by rows: whether its corners are made. Whoever sees a bit may
-    // read these corners, and the largest gauge.
+    // By face, a bit for each cell, by rows: whether its corners are made. A thread that sees a bit
+    // set may read these corners, and the largest gauge.
     std::array<std::atomic<uint64_t>, 6> cells = {};
     // Likewise: whether the next look makes it.
     std::array<std::atomic<uint64_t>, 6> awaited = {};
-    // Held by whoever makes a cell.
+    // Held by the thread that makes a cell.
     std::mutex mutex;
     // (side + 1)^2 for each of the six faces; none before the first cell is made.
     std::vector<Corner> corners;

@@ -60,7 +60,7 @@ void HullBase::Measure() {
     const Vector& p = points_[i];
     for (int axis = 0; axis < 3; ++axis) {
       if (p[axis] < points_[extremes[axis]][axis]) extremes[axis] = i;
-      // Of equal ones the last, so that a box has a centre in its middle.
+      // The last of equal ones counts, so that a box has a centre in its middle.
       if (p[axis] >= points_[extremes[axis + 3]][axis]) extremes[axis + 3] = i;
     }
     exponent_ = LowestBitExponent(p, exponent_);
@@ -76,8 +76,8 @@ void HullBase::Measure() {
   for (const Vector& p : points_) radius_ = std::max(radius_, RadiusTo(p - center_));
 }
 
-// Adds the point of largest size, in floating point, that is_off says is off the span so far; of
-// equal ones the first.
+// Adds the point of largest size, in floating point, that is_off says is off the span so far; the
+// first of equal ones.
 template <typename Size, typename IsOff>
 void HullBase::SpanWith(Size size, IsOff is_off) {
   uint32_t farthest = 0;

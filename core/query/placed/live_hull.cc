@@ -15,7 +15,7 @@ constexpr size_t kFirstTailCapacity = 16;
 constexpr uint64_t kScansPerPrepared = 800;
 // Directions that a question looks along, on average.
 constexpr uint64_t kDirectionsPerQuestion = 6;
-// A new level takes up those before it that are at most so many times larger.
+// A new level takes up those before it that are at most this many times larger.
 constexpr size_t kMergeRatio = 2;
 
 std::vector<Vector> PointsOf(const LiveParts& parts, uint64_t count) {
@@ -90,7 +90,8 @@ void LiveHull::Begin(std::vector<Vector> points, int dimension, Mark& next) {
 }
 
 LiveHull::Mark LiveHull::Append(std::span<const Vector> points, int dimension) {
-  // Only who holds this changes now_ and the tail, so both can be read without the other mutex.
+  // Only the holder of this mutex changes now_ and the tail, so both can be read without the other
+  // mutex.
   const std::lock_guard changing(changing_);
   if (points.empty()) return now_;
   Mark next = now_;

@@ -35,7 +35,7 @@ class LiveHull {
   // A moment in the growth: what was appended up to then. It keeps alive what its version needs.
   class Mark {
    public:
-    // Of a LiveHull that nothing was appended to.
+    // The mark of a LiveHull that nothing was appended to.
     Mark() = default;
 
     int dimension() const { return dimension_; }
@@ -75,7 +75,8 @@ class LiveHull {
   // At least the vertices of the hull at `mark`, and no point outside it. Cost: O(n).
   std::vector<Vector> PointsAt(const Mark& mark) const;
 
-  // Whether questions have paid for preparing what they scan; as if so many more had been asked.
+  // Whether questions have paid for preparing what they scan; as if `more_questions` more had been
+  // asked.
   bool WantsPreparing(const Mark& mark, uint64_t more_questions = 0) const;
   // Prepares what there is up to `mark`; versions made from then on use it. Appending and questions
   // go on meanwhile. Cost: O(m log m) for the m points that it moves.
@@ -106,8 +107,8 @@ class LiveHull {
   static void Begin(std::vector<Vector> points, int dimension, Mark& next);
   static void AppendToTail(std::span<const Vector> points, Mark& next);
 
-  // Held by whoever appends and at the end of Prepare(), for as long as that copies points. Taken
-  // before the other.
+  // Held by the thread that appends, and at the end of Prepare() for as long as that copies points.
+  // Taken before mutex_.
   std::mutex changing_;
   // Held for moments only, so that no version waits for what is appended.
   mutable std::mutex mutex_;

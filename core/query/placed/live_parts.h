@@ -18,7 +18,7 @@ struct PreparedLevel {
       : mapped(std::move(mapped_in)), radius(radius_in) {}
 
   const MappedPoints mapped;
-  // Of the points about the base's centre.
+  // The radius of the points about the base's centre.
   const double radius;
 };
 

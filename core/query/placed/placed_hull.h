@@ -24,7 +24,7 @@ class PlacedHull {
   // Requires a canonical one.
   const Hull& hull() const { return hull_->hull(); }
   bool empty() const { return hull_->empty(); }
-  // Of a piece of a body: rounded (PoseProduct::rounded).
+  // Rounded for a piece of a body (PoseProduct::rounded).
   const Pose& X_WH() const { return X_WH_; }
   // Null but for a piece of a body.
   const PoseProduct* product() const { return product_; }

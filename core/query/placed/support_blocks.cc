@@ -34,7 +34,7 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
   values = (x * px + y * py) + z * pz;
 }
 
-// The farthest of whole blocks; of equal ones the first. Requires one block.
+// The farthest of whole blocks; the first of equal ones. Requires one block.
 [[gnu::always_inline]] inline SupportPoint ScanWhole(std::span<const SupportBlock> blocks,
                                                      const PlainVector& n) {
   Lanes x, y, z, best, values;
@@ -80,8 +80,8 @@ __attribute__((target("avx2"))) SupportPoint ScanAvx2(std::span<const SupportBlo
 #endif
 
 #ifdef HULLD_HAS_NEON_PATH
-// ScanWhole with each four lanes as two registers of two, step by step. Of lanes wider than a
-// register the compiler compares one after the other.
+// ScanWhole with each four lanes as two registers of two, step by step. The compiler compares the
+// lanes of a vector wider than a register one after the other.
 using Pair = double __attribute__((vector_size(16)));
 using PairIds = int64_t __attribute__((vector_size(16)));
 

@@ -36,8 +36,8 @@ inline double SupportValue(const PlainVector& n, double x, double y, double z) {
 }
 
 // The first of the points with the largest computed value, among the first `count` points. Reads no
-// others, so that another thread may write those. Requires count > 0 and so many points.
-// Cost: 0.3 ns a point with AVX2.
+// others, so that another thread may write those. Requires count > 0 and that there are `count`
+// points. Cost: 0.3 ns a point with AVX2.
 SupportPoint FarthestOf(std::span<const SupportBlock> blocks, size_t count, const PlainVector& n);
 
 }  // namespace hulld

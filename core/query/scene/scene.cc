@@ -18,8 +18,8 @@
 namespace hulld {
 namespace {
 
-// The candidates of so many placements are gathered side by side: about as many as gave so many
-// candidates last time, enough to keep the threads busy.
+// Candidates are gathered for a window of placements side by side: for about as many placements as
+// had kCandidatesPerWindow candidates last time, enough to keep the threads busy.
 constexpr uint64_t kCandidatesPerWindow = 16384;
 constexpr uint32_t kFirstPlacements = 16;
 constexpr uint32_t kMostPlacements = 1024;
@@ -27,7 +27,7 @@ constexpr uint32_t kMostPlacements = 1024;
 constexpr size_t kPairsPerTask = 64;
 // Nodes of the tree between two polls.
 constexpr uint64_t kNodesPerPoll = 1024;
-// Beyond so many candidates a bit for each placement takes less.
+// Beyond this many candidates, a bit for each placement takes less memory.
 constexpr size_t kMostListed = 1024;
 constexpr size_t kWordBits = 64;
 
@@ -210,7 +210,7 @@ uint64_t SceneSearch::CountPairs() const {
   const uint64_t movers = options_->movers ? std::min<uint64_t>(*options_->movers, count) : count;
   uint64_t pairs = pairs_among(count) - pairs_among(count - movers);
   if (options_->groups.empty()) return pairs;
-  // Of each group how many are movers and how many are not.
+  // How many members of each group are movers, and how many are not.
   std::map<uint32_t, std::pair<uint64_t, uint64_t>> sizes;
   for (uint32_t i = 0; i < count; ++i) {
     auto& [moving, resting] = sizes[options_->groups[i]];

@@ -40,7 +40,7 @@ struct SceneOptions {
   std::span<const GroupPair> ignored_groups;
   // Empty, or each placement as a body: those that are no hulls are asked about in this form.
   std::span<const PlacedBody> bodies;
-  // One against many: only pairs with at least one of the first so many placements.
+  // One against many: only pairs that include at least one of the first `movers` placements.
   std::optional<uint32_t> movers;
   // OpenMP threads.
   int threads = 1;
@@ -53,7 +53,8 @@ struct SceneAnswer {
 };
 
 struct SceneTotals {
-  // Pairs that the groups and movers leave, of these those whose boxes meet, of these those found.
+  // Pairs that the groups and movers leave; those of them whose boxes meet; and those of the latter
+  // that are found.
   uint64_t pairs = 0;
   uint64_t candidates = 0;
   uint64_t found = 0;

@@ -16,7 +16,7 @@ namespace hulld {
 // SEPARATED: the direction n, world frame, with max n.A < min n.B. TOUCHING: n not zero, max n.A <=
 // min n.B, and at most four pairs whose differences hold 0 in their hull. OVERLAPPING: no
 // direction, and at most six pairs whose differences hold 0 strictly inside their hull (Steinitz
-// 1913). The direction is exact as it stands, of any length: doubles where these suffice, else
+// 1913). The direction is exact as it stands, of any length: doubles where these suffice, otherwise
 // integers.
 struct Certificate {
   std::variant<std::monostate, Vector, IntegerVector> direction;

@@ -23,8 +23,8 @@ struct PlacedAnswer {
   PiecesAnswer of_body = {};
 };
 
-// Asks about a pair of placements. What is for hulls alone leaves a pair with a body without an
-// answer, as more certificates than a reply holds do. cache: of a pair of hulls; may be null.
+// Asks about a pair of placements. A pair with a body gets no answer to a question for hulls alone,
+// or if it needs more certificates than a reply holds. cache: that of a pair of hulls; may be null.
 // Requires that both are answerable.
 PlacedAnswer AskPlaced(const PlacementTable& table, uint32_t a, uint32_t b,
                        const QueryOptions& options, PairCache* cache);

@@ -64,12 +64,13 @@ class PlacementTable {
   size_t hull_count() const { return ids_.size(); }
   // About what this holds once it is resolved, in bytes, hulls apart.
   size_t MemoryBytes() const;
-  // Of a body, an empty hull stands in. Requires that they are not placed on demand.
+  // The placed hulls; an empty hull stands in for a body. Requires that they are not placed on
+  // demand.
   std::span<const PlacedHull> placed() const {
     HULLD_DCHECK(!places_on_demand_);
     return placed_;
   }
-  // One of them; held by `made` where they are placed on demand.
+  // One placed hull; held by `made` where they are placed on demand.
   const PlacedHull& PlacedAt(size_t i, std::optional<PlacedHull>* made) const {
     return places_on_demand_ ? made->emplace(Place(i)) : placed_[i];
   }
@@ -82,7 +83,7 @@ class PlacementTable {
   Box BoxOf(size_t i) const {
     return is_body(i) ? BoundingBox(bodies_[i]) : BoundingBox(placed()[i]);
   }
-  // What is placed; of a body, or what cannot be answered for, an empty hull.
+  // What is placed; an empty hull for a body, or for what cannot be answered for.
   const QueryHull& HullAt(size_t i) const;
   // The same, but of a body the hull of a piece.
   const QueryHull& HullOfPiece(size_t i, uint32_t piece) const {
@@ -92,18 +93,18 @@ class PlacementTable {
   bool is_answerable(size_t i) const {
     return is_all_answerable_ || (!IsMalformed(i) && hulls_[hull_of_[i]].ok());
   }
-  // Why not, else OK. Requires that the hulls were resolved.
+  // Why it is not answerable; OK if it is. Requires that the hulls were resolved.
   const absl::Status& problem(size_t i) const;
-  // Whether the last Resolve gave this placement another hull, or took it, or gave it one; of a
-  // body, also another hull of a piece.
+  // Whether the last Resolve gave this placement another hull, took its hull, or gave it one; for a
+  // body, also whether it gave a piece another hull.
   bool hull_changed(size_t i) const;
-  // Whether it gave it another QueryHull, perhaps of the same hull: what was found before must not
-  // name that one's points.
+  // Whether it gave this placement another QueryHull, perhaps of the same hull; what was found
+  // before names points of the former one.
   bool query_hull_changed(size_t i) const;
 
-  // The same as Resolve for a few of hull_ids(), by index, each once, of which the registry told
-  // that they changed, so that they are taken as they are there; the others stay as they are.
-  // Requires SortByHull.
+  // The same as Resolve for a few of hull_ids(), by index, each once: those that the registry told
+  // had changed. They are taken as the registry has them now; the others stay as they are. Requires
+  // SortByHull.
   absl::Status ResolveSome(Shards& shards, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
@@ -179,7 +180,7 @@ class PlacementTable {
   PlacedBody PlaceBody(size_t i) const;
   PlacedHull Place(size_t i) const;
 
-  // Of each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
+  // For each placement, its hull as an index into hulls_, or kNoHull where the ID is malformed or
   // not the caller's; and its pose, as packed placements have it.
   std::vector<uint32_t> hull_of_;
   google::protobuf::RepeatedField<double> poses_;
@@ -201,22 +202,22 @@ class PlacementTable {
   // by_hull_begin_[k + 1].
   std::vector<uint32_t> by_hull_;
   std::vector<size_t> by_hull_begin_;
-  // Of the last Resolve.
+  // Where the last Resolve found the hulls, and as of when.
   const Shards* shards_ = nullptr;
   ShardsAsOf as_of_;
   // Whether no placement had a problem when the hulls were last resolved; most often so.
   bool is_all_answerable_ = false;
-  // How many placements the table of hulls tells of, from the first: of packed ones, which have no
-  // row but for a problem, none where none has one.
+  // How many placements the table of hulls tells of, from the first. Packed ones have no row but
+  // for a problem, so there are none where none has one.
   size_t told_placements_ = 0;
   bool places_on_demand_ = false;
   // Empty where they are placed on demand.
   std::vector<PlacedHull> placed_;
 
-  // The caller's.
+  // The prefix of IDs that the caller sees.
   std::string prefix_;
-  // Where any of hulls_ is a body: of each what is asked; parallel to ids_. Those of hulls are
-  // kept here.
+  // Where any of hulls_ is a body, what is asked of each; parallel to ids_. Those of hulls are kept
+  // here.
   std::vector<const QueryBody*> query_bodies_;
   std::vector<std::unique_ptr<const QueryBody>> bodies_of_hulls_;
   std::vector<PlacedBody> bodies_;
@@ -224,7 +225,7 @@ class PlacementTable {
   std::vector<const HullRecord*> hulls_of_pieces_;
 };
 
-// Checks an update of a stream with `count` placements: of each of `placements` the new pose, as
+// Checks an update of a stream with `count` placements: the new pose of each of `placements`, as
 // ReadPose reads it. INVALID_ARGUMENT: numbers that do not fit the placements, an index out of
 // range or named twice, a malformed pose.
 absl::Status ValidateMoves(const google::protobuf::RepeatedField<uint32_t>& placements,

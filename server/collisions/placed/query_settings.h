@@ -37,7 +37,7 @@ absl::Status NameQueryLimit(const absl::Status& status, const QueryOptions& opti
 // certificates.
 absl::Status NameProofLimit(const absl::Status& status);
 
-// RESOURCE_EXHAUSTED: certificates of so many pairs of pieces take more than `limit` bytes.
+// RESOURCE_EXHAUSTED: the certificates of this many pairs of pieces take more than `limit` bytes.
 absl::Status ProofTooLarge(uint64_t certificates, uint64_t limit);
 
 }  // namespace hulld::server

@@ -217,9 +217,9 @@ absl::Status CollisionWatch::WatchHulls() {
   return absl::OkStatus();
 }
 
-// From now on changes of the hulls of pieces are noticed, of those of the table's that are bodies.
-// A body that changes after this is noticed itself: then it is followed, and resolved, once more.
-// As Shards::FindBodies where a body cannot be read.
+// From now on, changes of the hulls of pieces are noticed, for those of `hulls`, as the table
+// numbers them, that are bodies. A body that changes after this is noticed itself: then it is
+// followed, and resolved, once more. As Shards::FindBodies where a body cannot be read.
 absl::Status CollisionWatch::FollowPieces(std::span<const size_t> hulls) {
   if (!shards_.has_bodies() && pieces_.MemoryBytes() == 0) return absl::OkStatus();
   std::vector<std::string> ids;
@@ -250,8 +250,8 @@ void CollisionWatch::TellOf(size_t hull) {
   TellOfPieces(hull);
 }
 
-// Of those of its pieces that it did not hear of: a body may have been resolved before they were
-// followed.
+// The client is to hear of those hulls of a body's pieces that it did not hear of yet: a body may
+// have been resolved before they were followed.
 void CollisionWatch::TellOfPieces(size_t hull) {
   const HullView& view = *table_.hull(hull);
   if (view.body == nullptr) return;

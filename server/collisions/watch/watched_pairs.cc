@@ -10,7 +10,7 @@
 namespace hulld::server {
 namespace {
 
-// So few placements are compared with all others; for more, building a tree costs less.
+// Up to this many placements are compared with all others; for more, building a tree costs less.
 constexpr size_t kMostCompared = 16;
 
 uint64_t KeyOf(uint32_t a, uint32_t b) { return uint64_t{a} << 32 | b; }

@@ -28,7 +28,7 @@ struct WatchedPair {
   bool is_within_clearance = false;
   bool is_asked = false;
 
-  // Whether the client holds it for close.
+  // Whether the client was told that it is close.
   bool is_told() const { return relation != v1::RELATION_SEPARATED || is_within_clearance; }
 };
 
@@ -38,8 +38,8 @@ struct WatchedPair {
 class WatchedPairs {
  public:
   WatchedPairs() = default;
-  // Of an `open` whose pairs, groups and movers are valid for so many placements. max_pairs: of a
-  // scene, those of which something is kept (--max-pairs-per-batch).
+  // The pairs of an `open` whose pairs, groups and movers are valid for this many placements.
+  // max_pairs: the most pairs of a scene of which something is kept (--max-pairs-per-batch).
   WatchedPairs(const v1::CollisionWatchOpen& open, size_t placements, uint64_t max_pairs);
 
   // The pairs that these placements, which moved or changed, have or come to have are to be asked

@@ -18,7 +18,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Of a database there is one store, so its channel needs no more of a name.
+// A database holds one store, so the name of the channel need not say which.
 constexpr char kListen[] = "LISTEN hulld_batches";
 constexpr char kNotify[] = "NOTIFY hulld_batches";
 constexpr std::chrono::milliseconds kForEver{-1};
@@ -90,7 +90,7 @@ absl::Status BatchNotices::Serve() {
   if (!opened.ok()) return opened.status();
   Session& session = **opened;
   if (absl::Status s = session.Run(kListen).status(); !s.ok()) return s;
-  // Of what comes later a notice is heard.
+  // From here on, each later batch is heard of by a notice.
   const absl::StatusOr<uint64_t> last = LastBatch(session);
   if (!last.ok()) return last.status();
   is_listening_ = true;

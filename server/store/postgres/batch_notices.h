@@ -20,8 +20,9 @@ namespace hulld::server {
 absl::StatusOr<uint64_t> LastBatch(Session& session);
 
 // How the servers over one database tell each other that there is a new batch (LISTEN and NOTIFY).
-// A notice is a hint and holds no more than the number of a batch: whoever hears it looks at the
-// store, whoever does not looks there now and then, and nothing depends on its arrival.
+// A notice is a hint and holds no more than the number of a batch: a server that hears it looks at
+// the store, a server that does not hear it looks there now and then, and nothing depends on its
+// arrival.
 //
 // A notice is sent after the commit, in a transaction of its own that waits for no disk, and
 // notices that would follow each other within kLeastPause are one. NOTIFY within the transaction of

@@ -19,7 +19,7 @@ constexpr int kBeatsPerMeasure = 10;
 
 }  // namespace
 
-// Whether there are tables of ours. FAILED_PRECONDITION: of a newer hulld.
+// Whether there are tables of ours. FAILED_PRECONDITION: they are those of a newer hulld.
 absl::StatusOr<bool> PostgresStore::CheckFormat(Session& session) const {
   const absl::StatusOr<Rows> exists = session.Run("SELECT to_regclass('hulld.store') IS NOT NULL");
   if (!exists.ok()) return exists.status();

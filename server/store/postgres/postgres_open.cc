@@ -19,7 +19,7 @@ namespace {
 constexpr int kMostReaders = 8;
 constexpr int kLeastServerVersion = 140'000;
 constexpr char kLockNotAvailable[] = "55P03";
-// Between attempts of who waits for its turn.
+// Pauses between the attempts of a server that waits for its turn.
 constexpr std::chrono::milliseconds kFirstTurnPause{10};
 constexpr std::chrono::milliseconds kLongestTurnPause{250};
 
@@ -144,10 +144,10 @@ absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
   return all;
 }
 
-// Of every session. The database gives up what is asked by a server that is gone, or that stands
-// still while it holds locks; the times are a choice, as those in conninfo.cc, and shorter than
-// PostgresOptions::answer_time. Every statement has an index to go by, also where a plan was made
-// when its table was small.
+// Settings of every session. The database gives up what is asked by a server that is gone, or that
+// stands still while it holds locks; the times are a choice, as those in conninfo.cc, and shorter
+// than PostgresOptions::answer_time. Every statement has an index to go by, also where a plan was
+// made when its table was small.
 constexpr char kSettings[] = R"(
   SET search_path = '';
   SET default_transaction_isolation = 'read committed';
@@ -235,7 +235,7 @@ std::string OwnerName() {
   return absl::StrCat(host, " process ", getpid(), " ", RandomId());
 }
 
-// What failed, for whoever starts a server.
+// The error for the person who starts a server: what failed and, where we know it, what to do.
 absl::Status OpenFailed(const PostgresOptions& options, const absl::Status& status) {
   std::string advice;
   if (SqlState(status) == "42501") {
@@ -342,7 +342,7 @@ absl::StatusOr<std::unique_ptr<Session>> PostgresStore::OpenListener() const {
                                   "; SET synchronous_commit = off"));
 }
 
-// Of the tables of a former format, a server that starts makes those of its own, and shuts all
+// A server that starts turns the tables of a former format into those of its own, and shuts all
 // others out meanwhile: for minutes where hulls are counted by hundreds of millions.
 absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::string& sql) const {
   for (bool is_first = true;; is_first = false) {

@@ -27,8 +27,8 @@ Statement AskForDeltas(const HullRecord& hull, uint64_t after, uint64_t up_to) {
 // A boolean in PostgreSQL's binary format.
 std::string EncodeBoolean(bool value) { return std::string(1, value ? '\1' : '\0'); }
 
-// rows: the store's revision, and of a hull or body each its ID, whether it is a body, whether its
-// value is left out, and that; without an ID where there is none.
+// rows: the store's revision and, for each hull or body, its ID, whether it is a body, whether its
+// value is left out, and the value. A row without an ID means that there is none.
 absl::StatusOr<FoundRecords> FoundIn(const Rows& rows, std::string_view prefix, size_t most) {
   if (rows.count() == 0) return absl::DataLossError("the row of hulld.store is missing");
   FoundRecords found;
@@ -67,8 +67,9 @@ std::optional<std::vector<Vector>> PointsOf(const Rows& deltas, const HullGrowth
 
 }  // namespace
 
-// Who else became active meanwhile may have changed what was read. The owner is asked last, so all
-// that came before is of a time when it was still us; what was found missing or damaged, too.
+// A server that became active meanwhile may have changed what was read. The owner is asked last, so
+// all that came before is of a time when the owner was still us, and so is what was found missing
+// or damaged.
 absl::StatusOr<std::vector<Rows>> PostgresStore::Read(std::vector<Statement> statements) {
   if (absl::Status s = ended(); !s.ok()) return s;
   statements.push_back({.name = "hulld_owner"});

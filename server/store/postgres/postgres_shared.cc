@@ -24,9 +24,9 @@ constexpr uint64_t kSchemaLock = 0x68756c6c65;
 // older ones are dropped.
 constexpr uint64_t kKeptBatches = 1 << 16;
 constexpr uint64_t kBatchesPerPruning = 1 << 10;
-// IDs that a server takes note of at a time, at most. So many took 0.2 s under the registry's mutex
-// (observed, with hulls that had come and gone, at load 6); they are one moment for readers, so
-// that they cannot be taken over in parts.
+// IDs that a server takes note of at a time, at most. That many took 0.2 s under the registry's
+// mutex (observed, with hulls that had come and gone, at load 6); they are one moment for readers,
+// so that they cannot be taken over in parts.
 constexpr int kMostFollowed = 1 << 17;
 constexpr std::chrono::milliseconds kFirstPause{10};
 constexpr std::chrono::milliseconds kLongestPause{500};
@@ -105,8 +105,8 @@ Statement AskForOthers(uint64_t batch) {
           .parameters = {EncodeBigint(batch), EncodeBigint(kMostFollowed + 1)}};
 }
 
-// The create_revision of the incarnation that a change ends; 0: it ends none. Of a damaged hull
-// nobody knows it: it was there before, which is what others need to know.
+// The create_revision of the incarnation that a change ends; 0: it ends none. Nobody knows it of a
+// damaged hull; 1 says that the hull was there before, which is what others need to know.
 uint64_t BeganOfEnded(const Change& change) {
   const auto known = [](uint64_t revision) { return std::max<uint64_t>(revision, 1); };
   if (change.replaced.has_value()) return known(change.replaced->record.create_revision);
@@ -150,7 +150,7 @@ Statement ChangesRow(std::span<Change* const> changes, uint64_t batch) {
                          began.Take(), bodies_began.Take()}};
 }
 
-// Which incarnation ended first. rows: of hulld_follow.
+// Which incarnation ended first. rows: those of hulld_follow.
 void NoteFormer(const Rows& rows, int row, OtherChange& other) {
   const auto began = [&](int column) {
     return rows.at(row, column).empty() ? UINT64_MAX : rows.bigint(row, column);
@@ -203,7 +203,7 @@ absl::Status PostgresStore::Join() {
         "the store was open with synchronous_commit = off and was not closed: start and end one "
         "hulld with --postgres-servers one first, which makes it another store");
   }
-  // Those that were killed. Who still asks for its last batch committed it just now.
+  // Drops servers that were killed. One that still asks for its last batch committed it just now.
   const absl::Status dropped = writer_->Ask({.name = "hulld_drop_old_servers"}).status();
   if (!dropped.ok()) return dropped;
   epoch_ = joined->bigint(0, 0);
@@ -220,7 +220,7 @@ absl::Status PostgresStore::Join() {
   return absl::OkStatus();
 }
 
-// Others need not remember what a server did last that ended in order.
+// Others need not remember the last batch of a server that ended in order.
 void PostgresStore::Leave() {
   if (writer_ == nullptr) return;
   writer_->Ask({.name = "hulld_drop_server", .parameters = {owner_}}).status().IgnoreError();

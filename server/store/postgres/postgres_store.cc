@@ -55,7 +55,7 @@ PostgresStore::~PostgresStore() {
   notices_ = nullptr;
   if (durability_ == Durability::kRelaxed && ended().ok()) EndRelaxedRun();
   if (options_.shared) Leave();
-  // Who waits need not wait until the database sees that the session is closed.
+  // A server that waits need not wait until the database sees that the session is closed.
   if (has_lock_) keeper_session_->Run("SELECT pg_advisory_unlock_all()").status().IgnoreError();
 }
 
@@ -72,7 +72,7 @@ absl::Status PostgresStore::WriteFailed(const absl::Status& status) {
   return status;
 }
 
-// Writes what is so after the batch, if this is still of its epoch.
+// Writes the revision, the number of the batch and the totals after it, if the epoch is still ours.
 Statement PostgresStore::Fence(uint64_t revision, uint64_t batch, const StoreTotals& added) const {
   return {.name = "hulld_fence",
           .parameters = {EncodeBigint(revision), EncodeBigint(batch), EncodeBigint(epoch()),
@@ -114,9 +114,9 @@ absl::StatusOr<bool> PostgresStore::FindOutcome(uint64_t batch, Clock::time_poin
   }
 }
 
-// Raises the epoch in a new session. That waits until the transaction of the batch, which has
-// locked the row, has ended, and takes its right to write from it if it has not come so far. Its
-// sync takes along what was committed before.
+// Raises the epoch in a new session. That waits until the transaction of the batch has ended, if it
+// has locked the row, and takes its right to write from it if it has not come so far. Its sync
+// takes along what was committed before.
 absl::StatusOr<bool> PostgresStore::Reclaim(uint64_t batch) {
   absl::StatusOr<std::unique_ptr<Session>> session = OpenWriter();
   if (!session.ok()) return session.status();

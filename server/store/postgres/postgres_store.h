@@ -83,10 +83,10 @@ struct PostgresOptions {
 // together and belong to one epoch, so that they and a server that is active alone shut each other
 // out. A transaction takes the turn first, which is the lock of the row of the store, and is told
 // what others committed since this server knew of it; its revisions are the next after those.
-// Changes of IDs that others changed are left out, and made anew by the registry. Whoever commits
-// tells the others to look (BatchNotices), and they look now and then as well. COMMIT is sent
-// only by a session that was given the turn, so none can arrive after the turn went on; a server
-// that lost the answer finds its batch, or does not, once it has the turn again.
+// Changes of IDs that others changed are left out, and made anew by the registry. The server that
+// commits tells the others to look (BatchNotices), and they look now and then as well. COMMIT is
+// sent only by a session that was given the turn, so none can arrive after the turn went on; a
+// server that lost the answer finds its batch, or does not, once it has the turn again.
 class PostgresStore : public Store {
  public:
   // Waits while another server is active, unless take_over. Makes the schema where there is none.
@@ -154,7 +154,7 @@ class PostgresStore : public Store {
 
   PostgresStore(PostgresOptions options, Conninfo conninfo);
 
-  // Who has the store while this is active.
+  // The owner of the store while this is active.
   std::string store_owner() const { return options_.shared ? kSeveralServers : owner_; }
 
   absl::StatusOr<std::unique_ptr<Session>> OpenSession(const std::string& settings) const;
@@ -233,11 +233,11 @@ class PostgresStore : public Store {
 
   const PostgresOptions options_;
   const Conninfo conninfo_;
-  // Who we are in the database: unique, and tells an operator which process it is.
+  // Our name in the database: unique, and tells an operator which process it is.
   const std::string owner_;
   std::string id_;
   uint64_t revision_ = 0;
-  // As of that.
+  // The totals as of that revision.
   StoreTotals totals_;
   Durability durability_ = Durability::kSync;
   // The value of synchronous_commit.
@@ -259,7 +259,8 @@ class PostgresStore : public Store {
   absl::Status unknown_;
 
   SessionPool readers_;
-  // Shared: of its own, so that all that wait to know what others did do not wait for readers.
+  // For a shared store: a pool of its own, so that calls that wait to know what others did do not
+  // wait for readers.
   SessionPool follower_;
 
   mutable std::mutex mutex_;

@@ -18,11 +18,11 @@ class SessionPool {
  public:
   using Opener = std::function<absl::StatusOr<std::unique_ptr<Session>>()>;
 
-  // open: makes one. most: how many there are at a time; who finds them all taken waits.
+  // open: makes one. most: how many there are at a time; a thread that finds them all taken waits.
   SessionPool(Opener open, int most) : open_(std::move(open)), most_(most) {}
 
-  // Session::Ask on one of them. One that was lost meanwhile, as after a restart of the
-  // database, is taken for another once.
+  // Session::Ask on one of them. If that was lost meanwhile, as after a restart of the database, it
+  // asks once more on a new one.
   absl::StatusOr<std::vector<Rows>> Ask(std::span<const Statement> statements);
 
   // The two halves of Ask. TryStart waits for nothing: null where no session is idle. What is

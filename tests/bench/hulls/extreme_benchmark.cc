@@ -46,7 +46,7 @@ HullBuilder BuildOneByOne(const std::vector<Vector>& points) {
 
 using Build = HullBuilder (*)(const std::vector<Vector>&);
 
-// Seconds of one build; of several where one is too short to measure.
+// Seconds of one build, by the time of several where one is too short to measure.
 double SecondsOf(Build build, const std::vector<Vector>& points) {
   int builds = 0;
   const double start = ThreadSeconds();

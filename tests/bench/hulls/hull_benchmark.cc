@@ -39,7 +39,7 @@ class Workload {
     if (points_.empty()) points_ = MakeCloud(name_);
     return points_;
   }
-  // Of the exact hull; 0 when the audit found anything.
+  // The number of vertices of the exact hull; 0 when the audit found anything.
   size_t vertices() {
     if (vertices_ == 0) {
       HullBuilder builder;

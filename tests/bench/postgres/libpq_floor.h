@@ -50,8 +50,8 @@ class LibpqFloor {
   std::string delta_;
 };
 
-// Runs one statement as who may make databases, and returns the first column of its first row, or
-// nothing.
+// Runs one statement as a role that may make databases, and returns the first column of its first
+// row, or nothing.
 std::string AskDatabase(const std::string& conninfo, const std::string& statement);
 
 }  // namespace hulld::bench

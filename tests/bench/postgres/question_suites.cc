@@ -116,7 +116,7 @@ std::vector<double> AskAll(Askers& askers, double seconds) {
   });
 }
 
-// Askers that have asked for a while already, which ask for so many seconds in each round.
+// Askers that have asked for a while already; they ask for this many seconds in each round.
 Subject MakeSubject(const Arguments& arguments, const std::string& name, const ChildServer& server,
                     bool bounded, double seconds) {
   const auto askers = std::make_shared<Askers>(MakeAskers(arguments, server, bounded));
@@ -187,7 +187,7 @@ void MeasureCold(const Arguments& arguments) {
   std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
   const std::unique_ptr<ChildServer> server = stores.Start("many", kStartDatabase);
   Askers askers = MakeAskers(arguments, *server, true);
-  // Each asker takes pairs of its own, of which none comes twice.
+  // Each asker takes pairs of its own; none comes twice.
   const auto ask = [&](size_t i) {
     const Clock::time_point begin = Clock::now();
     Asker& asker = askers[i];

@@ -40,7 +40,7 @@ struct Subject {
   std::vector<double> all = {};
 };
 
-// Runs `once` so many times; the microseconds of each.
+// Runs `once` this many times; returns the microseconds of each.
 std::vector<double> Timed(int times, const std::function<void()>& once);
 
 // Rounds in which each is run once, until this time has passed.
@@ -53,7 +53,7 @@ class Rows {
   // kAppend: after what the file holds, whose header stays.
   enum class Mode { kWrite, kAppend };
 
-  // header: of the columns before those. Ends the program where the file cannot be written.
+  // header: names the columns before those. Ends the program where the file cannot be written.
   Rows(const std::string& path, const char* header, Mode mode = Mode::kWrite);
   Rows(const Rows&) = delete;
   Rows& operator=(const Rows&) = delete;
@@ -66,7 +66,7 @@ class Rows {
   std::FILE* out_ = stdout;
 };
 
-// A row of each subject. peer_of: whom a subject is compared with.
+// A row for each subject. peer_of: the one that a subject is compared with.
 void Report(const Arguments& arguments, std::vector<Subject>& subjects,
             const std::map<std::string, std::string>& peer_of);
 

@@ -23,8 +23,8 @@ class Stores {
   // An empty one.
   void Make(const std::string& database) const;
 
-  // kind: rocksdb, one, many or shard; the last is many, in a file of one shard. name: of the
-  // database or directory.
+  // kind: rocksdb, one, many or shard; the last is many, in a file of one shard. name: the name of
+  // the database or directory.
   std::unique_ptr<ChildServer> Start(const std::string& kind, const std::string& name) const;
   // The same, over nothing.
   std::unique_ptr<ChildServer> StartEmpty(const std::string& kind, const std::string& name) const;

@@ -38,7 +38,7 @@ std::vector<v1::AppendPointsRequest> MakeBall(int points) {
   return chunks;
 }
 
-// Into a hull of its own, of which there is none before.
+// Sends into a hull of its own, which does not exist before.
 void SendAll(v1::HullService::Stub& stub, const std::string& hull_id,
              const std::vector<v1::AppendPointsRequest>& chunks) {
   grpc::ClientContext context;

@@ -41,10 +41,11 @@ namespace hulld::bench {
 namespace {
 
 constexpr size_t kQuestions = 128;
-// So many relations that a branch predictor does not know the block by heart: with 128 questions
+// Enough relations that a branch predictor does not know the block by heart: with 128 questions
 // again and again it does, and most methods seem to take two thirds of the time.
 constexpr size_t kRelations = 4096;
-// Of large hulls, whose support points take most of the time, and some peers milliseconds.
+// Fewer for large hulls: their support points take most of the time, and some peers take
+// milliseconds.
 constexpr size_t kRelationsOfLarge = 256;
 
 // Questions, made when the first benchmark asks for them, and their exact answers.

@@ -192,7 +192,7 @@ struct PlainGjk {
     return Verdict::kColliding;
   }
 
-  // Whether four points surround the origin; else drops what the origin is not near and turns n
+  // Whether four points surround the origin. If not, drops what the origin is not near and turns n
   // towards it.
   static bool Surrounds(Simplex& simplex, Vector3& n) {
     switch (simplex.count) {

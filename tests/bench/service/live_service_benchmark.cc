@@ -3,14 +3,14 @@
 //   live_service_benchmark [HULLD [VERTICES...]]
 //
 // For each number of vertices (64 to 1000000, in tens from 1000 on, where none is given): starts a
-// hulld of its own on a durable store and asks single questions about a hull of so many vertices
+// hulld of its own on a durable store and asks single questions about a hull of that many vertices
 // and a probe near it: at rest; right after each acknowledged chunk of one outside point; about
 // another hull then, which tells what the append costs any call that follows it; while another
-// connection streams such chunks at full rate; about another hull meanwhile, which tells
-// what the machine's load alone costs; and as the first question after a restart. One row of CSV
-// per case: the questions' percentiles, their ratios to those at rest, and the writer's rate, which
-// the row "writer alone" has without any reader. The cases take turns, so that drifts of the
-// machine's speed meet all of them.
+// connection streams such chunks at full rate; about another hull meanwhile, which tells what the
+// machine's load alone costs; and as the first question after a restart. One row of CSV per case:
+// the questions' percentiles, their ratios to those at rest, and the writer's rate, which the row
+// "writer alone" has without any reader. The cases take turns, so that drifts of the machine's
+// speed meet all of them.
 
 #include <grpcpp/grpcpp.h>
 

@@ -192,7 +192,7 @@ Sample PlaceAndAnswerBatch(const Batch& batch, double seconds) {
 struct Motion {
   v1::CollisionStreamOpen open;
   std::vector<v1::CollisionStreamUpdate> frames;
-  // The same for core: of each pair the first placement, the hull of the second, and its poses.
+  // The same for core: the first placement of each pair, the hull of the second, and its poses.
   std::vector<PlacedHull> first;
   std::vector<const QueryHull*> second;
   std::vector<std::vector<Pose>> poses;

@@ -43,7 +43,7 @@ v1::CollisionService::Stub& RemoteSubject::stub(size_t i) {
     grpc::ChannelArguments arguments;
     arguments.SetMaxReceiveMessageSize(-1);
     arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
-    // Else channels to one address share a connection.
+    // Otherwise channels to one address share a connection.
     arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
     stubs_.push_back(v1::CollisionService::NewStub(grpc::CreateCustomChannel(
         server_.address(), grpc::InsecureChannelCredentials(), arguments)));

@@ -40,12 +40,12 @@ class RemoteSubject {
 
 // What one round of a workload saw.
 struct Sample {
-  // Of the workload's unit: calls, pairs, points, updates.
+  // In the workload's unit: calls, pairs, points, updates.
   double per_second = 0;
-  // Of one call; 0: not measured.
+  // The time of one call; 0: not measured.
   double p50_us = 0;
   double p99_us = 0;
-  // The server's processor time per unit, filled in by whoever runs the workload.
+  // The server's processor time per unit, filled in by the code that runs the workload.
   double server_cpu_us = 0;
 };
 
@@ -62,8 +62,8 @@ struct RemoteWorkload {
   std::function<Sample()> run_placing = nullptr;
 };
 
-// The workloads; hulls are created on hulld when first needed. `seconds`: of one round of those
-// that are as long as one likes.
+// The workloads; hulls are created on hulld when first needed. `seconds`: how long one round takes,
+// for those that can take any time.
 std::vector<RemoteWorkload> MakeCheckWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeBatchWorkloads(double seconds);
 std::vector<RemoteWorkload> MakeStreamWorkloads(double seconds);

@@ -52,7 +52,7 @@ void AddTradeOptions(CLI::App& command, TradeArguments& arguments) {
   command.add_option("--plot", arguments.plot, "Write a plot to this file, as SVG");
 }
 
-// The hulls that the user names, else our own. False after an error was told.
+// The hulls that the user names, or our own if there are none. False after an error was told.
 bool CollectHulls([[maybe_unused]] const TradeArguments& arguments, std::vector<Hull>& hulls) {
 #ifdef HULLD_HAVE_CLIENT
   const auto take = [&](absl::StatusOr<Hull> hull) {

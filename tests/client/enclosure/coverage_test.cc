@@ -72,7 +72,7 @@ TEST(Coverage, APieceStandsAtItsPose) {
 TEST(Coverage, APoseIsNotRounded) {
   const PlacedHull turned = Placed(BoxHull({0, 0, 0}, {5, 1, 1}), {2, 0, 0, 1, 0, 0, 0});
   for (const double s : {0.1, 0.3, 0x1.123456789abcdp-3}) {
-    // Of few digits, so that three times and four times it are not rounded.
+    // Rounded to few digits, so that three times and four times it are not rounded.
     const double t = std::ldexp(std::round(std::ldexp(s, 40)), -40);
     const Corner3 on = {3 * t, 4 * t, 0.5};
     EXPECT_TRUE(Cover({turned}, Triangle(on, on, on)).uncovered.empty());

@@ -1,5 +1,5 @@
 // The library and hullctl against a server that wants TLS and tokens: what works, and what hullctl
-// says to whoever got it wrong.
+// says to a user who got it wrong.
 
 #include <absl/strings/str_cat.h>
 #include <gmock/gmock.h>

@@ -15,7 +15,7 @@
 
 namespace hulld {
 
-// Hides the contexts of whoever runs the tests.
+// Hides the contexts of the user who runs the tests.
 inline void UseNoContexts() { setenv("XDG_CONFIG_HOME", "/nonexistent", 1); }
 
 // What a run of hullctl ended with and printed.

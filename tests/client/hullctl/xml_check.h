@@ -6,7 +6,7 @@
 
 namespace hulld {
 
-// Empty when `text` is one well-formed XML element, perhaps after a declaration, else what is
+// Empty when `text` is one well-formed XML element, perhaps after a declaration; otherwise what is
 // wrong. Knows what the pictures use: elements, attributes in double quotes, text with the
 // predefined entities.
 inline std::string XmlProblem(const std::string& text) {

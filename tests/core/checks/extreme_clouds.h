@@ -31,7 +31,7 @@ struct Extreme {
   std::function<std::vector<Vector>(int n)> make;
   Arithmetic needs = Arithmetic::kAny;
   // How many triangles adding n points one by one in their order creates, where the order forces
-  // quadratically many; else null.
+  // quadratically many; otherwise null.
   int64_t (*facets_one_by_one)(int n) = nullptr;
 };
 

@@ -75,7 +75,7 @@ TEST(Orient3d, ExactNextToAPlaneAtEveryScaleAndEveryStageIsReached) {
       const double s = unit(random);
       const double t = unit(random);
       p[3] = i % 3 == 0 ? Vector(s, t, unit(random)) : p[0] + s * (p[1] - p[0]) + t * (p[2] - p[0]);
-      // Of like magnitudes along the axes, or of unlike ones, which take more bits.
+      // With like magnitudes along the axes, or with unlike ones, which take more bits.
       const int spread = i % 2 == 0 ? 0 : 12;
       for (Vector& v : p) {
         for (int k = 0; k < 3; ++k) v[k] = std::ldexp(v[k], scale - k * spread);

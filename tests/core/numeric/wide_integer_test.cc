@@ -41,7 +41,7 @@ WideInteger<kWords> AnyInteger(std::mt19937_64& random) {
   return value;
 }
 
-// What a number wraps to in so many words.
+// What a number wraps to in this many words.
 Integer Wrapped(const Integer& value, int words) {
   const Integer range = Integer(1) << (64 * words);
   Integer rest = value % range;

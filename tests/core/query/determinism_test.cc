@@ -1,5 +1,5 @@
 // Same question, same bits: on every SIMD path, asked either way round, and with a warm cache as
-// far as DESIGN promises it.
+// far as core/README.md promises it (Exactness, determinism).
 
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ QueryOptions Everything() {
   return options;
 }
 
-// What DESIGN calls never varying at tolerance 0.
+// What core/README.md says never varies at tolerance 0.
 void ExpectSameValues(const Answer& actual, const Answer& expected) {
   EXPECT_EQ(actual.relation, expected.relation);
   EXPECT_EQ(actual.separation->value, expected.separation->value);

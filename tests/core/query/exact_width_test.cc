@@ -79,7 +79,7 @@ class WidthCheck {
     }
     return 0;
   }
-  // Of the last question, where its frame is small.
+  // The bits of the last question, where its frame is small.
   std::optional<int> bits() const { return bits_; }
 
  private:

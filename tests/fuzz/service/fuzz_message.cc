@@ -279,7 +279,8 @@ class MessageFiller {
 
   ByteReader& in_;
   const MessageHints hints_;
-  // Of the message that is being filled: its table, and the placements that an update moves.
+  // Counts of the message that is being filled: the placements of its table, and those that an
+  // update moves.
   size_t placements_;
   size_t moved_ = 0;
   const bool tame_;

@@ -16,7 +16,7 @@ using google::protobuf::MessageFactory;
 using google::protobuf::MethodDescriptor;
 using google::protobuf::ServiceDescriptor;
 
-// Of the services that the program is linked with.
+// Looks in the services that the program is linked with.
 const MethodDescriptor* FindMethod(server::Rpc rpc) {
   for (const char* service :
        {"hulld.v1.HullService", "hulld.v1.BodyService", "hulld.v1.CollisionService",

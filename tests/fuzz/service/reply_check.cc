@@ -37,7 +37,7 @@ bool IsProblemCode(int code) {
          code == grpc::RESOURCE_EXHAUSTED;
 }
 
-// Of a request whose placements have one of two forms.
+// The number of placements of a request that has them in one of two forms.
 template <typename Request>
 int PlacementCount(const Request& request) {
   return request.placements_size() + request.packed_placements().hulls_size();

@@ -22,7 +22,7 @@ std::vector<uint8_t> RandomProgram(Random& random) {
   return bytes;
 }
 
-// What was reached at least so many times.
+// What was reached at least this many times.
 struct Goal {
   const char* what;
   int times;

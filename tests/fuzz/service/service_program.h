@@ -80,7 +80,7 @@ class ServiceProgram {
   bool Ended(server::Rpc rpc, const CallManner& manner, const grpc::Status& status);
   // A call that its client gives up may still change something: waits until all calls have ended.
   void Settle();
-  // Of a watch: its revision is that of what was told.
+  // Takes the header of a watch, whose revision is that of what was told.
   void SeeStore(const v1::ResponseHeader& header);
   void SeeHeader(const v1::ResponseHeader& header);
   void SeeHull(const v1::HullInfo& hull);
@@ -153,7 +153,7 @@ class ServiceProgram {
   ServiceFuzz& service_;
   ByteReader in_;
   std::string finding_;
-  // Of the hull that was last seen.
+  // The revision of the hull that was last seen.
   uint64_t revision_ = 0;
   // What the server has acknowledged of each hull, and of which that is not all.
   std::map<std::string, v1::HullInfo> hulls_;

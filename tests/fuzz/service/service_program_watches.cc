@@ -22,7 +22,7 @@ void ServiceProgram::WatchHulls() {
   v1::WatchHullsRequest request;
   FillMessage(in_, Hints(), &request);
   const size_t kind = in_.Below(4);
-  // Mostly from the start, else as after a break of the connection.
+  // Mostly from the start, sometimes as after a break of the connection.
   if (kind > 0) request.clear_after_revision();
   if (kind > 0) request.clear_after();
   if (kind == 0) request.set_store_id(service_.store_id_);

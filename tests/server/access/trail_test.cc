@@ -1,4 +1,4 @@
-// Who changed what: each change of a hull leaves one line in the log, which names the caller.
+// The trail of changes: each change of a hull leaves one line in the log, which names the caller.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -197,7 +197,7 @@ TEST_F(BodyCertificates, TooManyAreRefusedAndTheLimitIsNamed) {
 class BodyProofs : public BodyCertificates {
  protected:
   // Whether every row is answered and proven. `placement_of`: by index among the call's; `pairs`:
-  // of the rows. Hulls, pieces' too, are those of the whole call. Returns how many rows had
+  // those of the rows. Hulls, pieces' too, are those of the whole call. Returns how many rows had
   // certificates of pieces.
   int ExpectProven(const std::vector<v1::Placement>& placements, const std::vector<uint32_t>& pairs,
                    const std::vector<v1::HullVersion>& hulls,

@@ -73,7 +73,7 @@ TEST_F(FairShare, APartIsKeptForSingleCalls) {
   EXPECT_THAT(last_message_, HasSubstr("the last 2 are kept for single calls"));
   for (int i = 0; i < 2; ++i) EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "");
   EXPECT_EQ(Refusal(Rpc::kCheckCollision, "token:a"), "max-calls-per-client");
-  // Of the whole server, too.
+  // The same holds for the whole server.
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "");
   EXPECT_EQ(Refusal(Rpc::kFindCollisions, "token:b"), "max-calls");
   EXPECT_THAT(last_message_, HasSubstr("the last 3 are kept for single calls"));
@@ -102,7 +102,7 @@ TEST(CallLifetime, DeadlinesDoNotFollowTheTimeOfDay) {
   using std::chrono::hours;
   using std::chrono::seconds;
   const Clock::time_point now = Clock::now();
-  // What the time of day says of itself does not matter, be it set a year on or back.
+  // The time of day does not matter, even when it is set a year on or back.
   for (const WallClock::time_point wall :
        {WallClock::now(), WallClock::now() + hours(8760), WallClock::now() - hours(8760)}) {
     EXPECT_EQ(CallLifetime(wall + seconds(5), wall, now).deadline(), now + seconds(5));

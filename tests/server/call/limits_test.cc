@@ -274,7 +274,7 @@ TEST_F(LimitsTest, AReplacementUnderWayCountsAgainstTheMemoryLimit) {
     return appender.Finish();
   };
   ExpectRefused(append(), "memory-limit");
-  // Of itself, too.
+  // The replacement itself is refused, too.
   writer->Write(request);
   ExpectRefused(writer->Finish(), "memory-limit");
   ASSERT_TRUE(WaitIdle());

@@ -30,7 +30,7 @@ TEST(ClaimedRange, BlocksAreDisjointAndTheLastOneGivenBackIsTold) {
   EXPECT_TRUE(range.GiveBack(range.Claim(4)));
 }
 
-// As the steps of a stream: whoever ends one begins the next, while others still claim.
+// As the steps of a stream: the thread that ends one begins the next, while others still claim.
 TEST(ClaimedRange, RangesThatFollowEachOtherAreEachDoneOnce) {
   constexpr uint32_t kCount = 100;
   constexpr int kRanges = 20'000;

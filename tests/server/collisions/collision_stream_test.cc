@@ -433,7 +433,7 @@ TEST_F(StreamCollisionsCall, ManyPlacementsThatMoveMayHaveFewPairsOrNone) {
   EXPECT_TRUE(stream.Finish().ok());
 }
 
-// Steps of any size, of which some have the hulls looked up: those of many placements are placed
+// Steps of any size, some of which have the hulls looked up: those of many placements are placed
 // and decided by several threads.
 TEST_F(StreamCollisionsCall, RandomStepsAreAnsweredAsInABatch) {
   Put("cube", Cube());

@@ -28,7 +28,7 @@ class SceneMemory : public ServerTest {
     return sum;
   }
 
-  // One cube so many times at one pose: every pair overlaps.
+  // `placements` cubes at one pose: every pair overlaps.
   static v1::FindCollisionsRequest Heap(int placements) {
     v1::FindCollisionsRequest request;
     v1::PackedPlacements& packed = *request.mutable_packed_placements();
@@ -64,7 +64,7 @@ TEST_F(SceneMemory, OfASceneThatNobodyReadsIsCountedAndBounded) {
   while (read->Read(&part)) EXPECT_LT(Metric("hulld_cache_bytes") - before, kMost);
   ASSERT_TRUE(read->Finish().ok());
   EXPECT_EQ(part.totals().overlapping(), 1500u * 1499 / 2);
-  // Of 2e10.
+  // There are 2e10 pairs.
   EXPECT_LT(Metric("hulld_pairs_total"), 2e6);
   context.TryCancel();
   while (unread->Read(&part)) {

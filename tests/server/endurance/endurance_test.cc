@@ -80,7 +80,7 @@ v1::Relation TrueRelation(const Hull& a, const Pose& X_WA, const Hull& b, const 
   }
 }
 
-// How often each kind of call was made, and how it ended; of all clients.
+// How often all clients together made each kind of call, and how it ended.
 class Tally {
  public:
   void Count(const std::string& kind, const absl::Status& status) {

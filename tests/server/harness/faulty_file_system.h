@@ -17,8 +17,8 @@
 namespace hulld::server {
 
 // A file system in front of the real one that can fail, and that knows what a disk would hold if
-// the power went out now: of each file the bytes that were synced, and of each directory the
-// entries that were there when it was synced last. Deletions count at once.
+// the power went out now: the bytes of each file that were synced, and the entries of each
+// directory that were there when it was synced last. Deletions count at once.
 class FaultyFileSystem : public rocksdb::FileSystemWrapper {
  public:
   enum class Fault {
@@ -40,7 +40,7 @@ class FaultyFileSystem : public rocksdb::FileSystemWrapper {
   FaultyFileSystem() : FileSystemWrapper(rocksdb::FileSystem::Default()) {}
   const char* Name() const override { return "FaultyFileSystem"; }
 
-  // failures: after so many the fault is over.
+  // failures: after this many, the fault is over.
   void SetFault(Fault fault, int64_t failures = std::numeric_limits<int64_t>::max());
   // Syncs of files so far.
   int64_t syncs() const;

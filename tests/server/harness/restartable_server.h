@@ -37,8 +37,8 @@ class RestartableServer : public ::testing::Test {
  protected:
   std::string address() const { return absl::StrCat("unix:", directory_.path(), "/socket"); }
 
-  // Of a connection that tries again at once while the server starts. It may take a second to be
-  // made, which is what gRPC means by the least backoff.
+  // Arguments of a connection that tries again at once while the server starts. It may take a
+  // second to be made, which is what gRPC means by the least backoff.
   static grpc::ChannelArguments ReconnectAtOnce() {
     grpc::ChannelArguments arguments;
     arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 5);

@@ -234,7 +234,7 @@ TEST_F(WatchHulls, ASlowReaderFindsTheLastStateOfEachHull) {
 // The state of the store as the events of a watch say.
 class Mirror {
  public:
-  // Of a hull: when it was created and when it changed last.
+  // For each hull, when it was created and when it changed last.
   using State = std::map<std::string, std::pair<uint64_t, uint64_t>>;
 
   void Fold(const v1::WatchHullsResponse& message) {
@@ -383,7 +383,7 @@ class Writer {
 using Moments = std::vector<std::pair<uint64_t, Mirror::State>>;
 
 // Each state that a watch told is what the histories say of its revision, but for hulls that
-// changed since: of those it may tell what came first, or what came since.
+// changed since: for those it may tell what came first, or what came since.
 void ExpectTrue(const Moments& moments, const Writer::History& histories) {
   for (const auto& [revision, state] : moments) {
     for (const auto& [id, history] : histories) {

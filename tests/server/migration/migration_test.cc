@@ -100,7 +100,7 @@ Ran Migrate(const StorePlace& from, const StorePlace& to) {
   return {code, out.str(), err.str()};
 }
 
-// The target of another, which fails once it has kept so many batches.
+// The target of another, which fails once it has kept this many batches.
 class InterruptedTarget : public MigrationTarget {
  public:
   InterruptedTarget(std::unique_ptr<MigrationTarget> target, int batches)

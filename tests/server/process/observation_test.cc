@@ -325,7 +325,7 @@ TEST_F(Observation, RepliesCarryTheRequestIdThatWasGivenOrThatErrorsName) {
   EXPECT_FALSE(made.contains(""));
   EXPECT_FALSE(made.contains("no spaces"));
   EXPECT_EQ(ask(std::string(128, 'x')), std::string(128, 'x'));
-  // Of a call that succeeds nobody else speaks.
+  // A call that succeeds gets no ID when its client sent none: nothing is logged about it.
   Put("cube", Cube());
   EXPECT_EQ(ask("", "cube"), "");
   EXPECT_EQ(ask("mine", "cube"), "mine");
@@ -393,7 +393,7 @@ TEST(LineBudget, TakesSoManyLinesAndCountsTheRest) {
   EXPECT_EQ(budget.Spend(start + std::chrono::seconds(25)), 1);
 }
 
-// A name that is not UTF-8, of which protobuf would tell standard error in full, every time.
+// A name that is not UTF-8: protobuf would write about it to standard error in full, every time.
 TEST_F(Observation, MalformedMessagesDoNotFloodTheLog) {
   const CapturedLog log;
   RouteLibraryLogs();

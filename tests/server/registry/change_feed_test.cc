@@ -128,7 +128,7 @@ class ChangeFeedTest : public ::testing::Test {
     ASSERT_TRUE(replacement.builder->Add(CubeCorners(0, 7)).ok());
     ASSERT_TRUE(hulls_->Replace(std::move(replacement)).ok());
   }
-  // Of one piece, whose hull need not exist.
+  // Puts a body of one piece, whose hull need not exist.
   void PutBody(const std::string& id) {
     std::promise<absl::Status> done;
     registry().PutBody({{id, 0, 0}, {"piece"}, {{0, Pose()}}}, std::nullopt,

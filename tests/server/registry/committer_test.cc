@@ -221,7 +221,7 @@ TEST_F(CommitterTest, ManyCompletionsLetOthersPassButNotBetweenRefusals) {
     constexpr uint64_t kMany = 3 * Committer::kMostPerHold;
     for (uint64_t revision = 3; revision < kMany; ++revision) Submit(revision);
     std::future<void> last = Submit(kMany);
-    // A refusal takes all with it, as if they were one batch; else 1 is a batch of its own.
+    // A refusal takes all with it, as if they were one batch; otherwise 1 is a batch of its own.
     gate.outcome.set_value(outcome);
     last.wait();
     passer.join();
@@ -395,7 +395,7 @@ TEST(Committer, WhoFollowsIsToldOfWhatTheStoreFoundAfterwards) {
   EXPECT_TRUE(absl::IsUnavailable(follow()));
 }
 
-// Who comes while a question is on its way waits for the next one, and so does a change.
+// A caller that comes while a question is on its way waits for the next one, and so does a change.
 TEST(Committer, AQuestionIsSentByWhoAsksAndSharedByNobodyWhoComesLater) {
   SharedStore store;
   FairMutex order;

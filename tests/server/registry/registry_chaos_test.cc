@@ -22,7 +22,7 @@ namespace {
 // it holds, in whatever order writers, readers, refusals, evictions and ends come.
 class RegistryChaos : public RegistryInterleaving {
  protected:
-  // Appends, and deletes the hull at times, so many times.
+  // Appends this many times, and deletes the hull now and then.
   void Write(const std::string& id, uint64_t seed, uint64_t times) {
     std::mt19937_64 random(seed);
     std::optional<AppendSession> session;

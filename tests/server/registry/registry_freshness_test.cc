@@ -115,7 +115,7 @@ class RegistryFreshnessTest : public ::testing::Test {
   RegistryFreshnessTest() { EXPECT_TRUE(hulls_.loaded().ok()); }
   ~RegistryFreshnessTest() override { store_.Release(); }
 
-  // A read that begins so long after now.
+  // A read that begins this long after now.
   static Freshness AtMost(nanoseconds bound, nanoseconds later = nanoseconds(0)) {
     Freshness freshness;
     freshness.max_staleness = bound;

@@ -119,7 +119,7 @@ TEST_F(RegistryInterleaving, ManyHullsAreReadByManyThreads) {
 }
 
 // Those that come next are read while the first are looked up: what is deleted meanwhile is not
-// found, and who waits for one of them is not held up by a reader that is cancelled.
+// found, and a reader that waits for one of them is not held up by a reader that is cancelled.
 TEST_F(RegistryInterleaving, HullsThatAreReadAheadMayGoOrBeWaitedFor) {
   constexpr int kHulls = 300;
   std::vector<std::string> ids;

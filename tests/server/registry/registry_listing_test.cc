@@ -85,7 +85,7 @@ TEST(RegistryListing, PointsInsideThatAreBeingCommittedAreToldByAllReadsOrNone) 
     return hulls.Append(writer->session, writer->last_sequence + 1, {{0.5, 0.5, 0.5}});
   });
   store.AwaitCommit(commits + 1);
-  // Who lists may have to wait until the registry is told.
+  // A listing may have to wait until the registry is told.
   const auto release = [&] {
     store.Hold(false);
     return false;

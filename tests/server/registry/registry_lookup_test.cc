@@ -177,7 +177,7 @@ TEST_F(RegistryLookup, ALookupCanBeCancelledBetweenSlices) {
   EXPECT_LE(Lookups(), kMost);
 }
 
-// Whoever waits for the mutex has it before the one who lets go of it and wants it again.
+// A thread that waits for the mutex gets it before the one that lets go of it and wants it again.
 TEST(FairMutexTest, WhoWaitsGoesFirst) {
   FairMutex mutex;
   for (int round = 0; round < 100; ++round) {

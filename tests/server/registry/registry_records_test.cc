@@ -64,7 +64,7 @@ class VastStore : public MemoryStore {
   std::atomic<uint64_t> questions = 0;
   std::atomic<uint64_t> records = 0;
   std::atomic<bool> is_gone = false;
-  // Of each body.
+  // The number of pieces of each body.
   size_t pieces = 1;
 
  private:
@@ -188,7 +188,7 @@ TEST_F(RegistryRecords, BodiesAreReadOnceAndManyAtATime) {
   EXPECT_EQ(store_.questions, 4);
 }
 
-// Who looks for bodies among hulls learns what there is under all of the IDs at once.
+// A caller that looks for bodies among hulls learns what there is under all of the IDs at once.
 TEST_F(RegistryRecords, WhatIsNoBodyIsKnownByThen) {
   Start(1000);
   const std::vector<std::string> ids = {"h1", "b2", "none"};

@@ -360,7 +360,7 @@ void Client::MakeCanonical(const Call& before, const HullView& view) {
   ++simulation_.reached.snapshots;
 }
 
-// Whatever nobody uses leaves memory, and who asks for more meanwhile is refused.
+// Whatever nobody uses leaves memory, and a call that asks for more meanwhile is refused.
 void Client::Press() {
   const bool reads = random().OneIn(2);
   Scheduler::Current().Note("presses on memory");

@@ -91,7 +91,7 @@ class Client {
   void CheckSequences(size_t hull);
 
   Simulation& simulation_;
-  // Of all hulls of the plan.
+  // What it knows of all hulls of the plan.
   KnownHulls known_;
 };
 

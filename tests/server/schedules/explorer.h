@@ -19,7 +19,7 @@ struct FoundFault {
   std::string steps;
 };
 
-// Runs the schedules of so many seeds, until one has a fault; nothing is to be explored in the
+// Runs the schedules of this many seeds, until one has a fault; nothing is to be explored in the
 // process after that. A broken invariant (HULLD_CHECK) prints its seed and its steps as it ends the
 // process.
 std::optional<FoundFault> Explore(uint64_t first_seed, uint64_t count, Reached& reached);

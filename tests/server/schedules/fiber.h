@@ -23,7 +23,7 @@ class Fiber {
   void Start(std::function<void()> task);
   // Runs the task until it suspends or ends. Returns whether it ended. Not within a fiber.
   bool Resume();
-  // Within the task: goes back to who resumed.
+  // Within the task: returns to the caller of Resume.
   void Suspend();
   // Not within a fiber: its task is never resumed. The fiber is not used again, and what its stack
   // refers to does not count as leaked.

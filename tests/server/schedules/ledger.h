@@ -35,7 +35,7 @@ class Ledger {
     bool exists = false;
     // There is a body under the ID; then no hull exists.
     bool is_body = false;
-    // Of the hull that is there, or that went; of a body, its revisions alone.
+    // The record of the hull that is there, or that went; for a body, its revisions alone.
     HullRecord record;
     // The store's, when the hull last became another for readers.
     uint64_t revision = 0;
@@ -57,7 +57,7 @@ class Ledger {
   // that made it will not be answered.
   std::optional<std::string> Keep(const Change& change, bool nobody_waits);
 
-  // Of the last change.
+  // The store's revision at the last change.
   uint64_t revision() const { return revision_; }
   const State& Last(size_t hull) const { return states_[hull].back(); }
   const State& At(size_t hull, size_t index) const { return states_[hull][index]; }

@@ -48,7 +48,7 @@ struct ScheduleFault {
 // allows.
 class Scheduler {
  public:
-  // Beyond so many steps a schedule does not end. Observed: 3 000 at most.
+  // A schedule of more steps than this does not end. Observed: 3 000 at most.
   static constexpr size_t kMostSteps = 100'000;
   static constexpr int64_t kNoDeadline = -1;
 
@@ -60,7 +60,7 @@ class Scheduler {
     const void* context = nullptr;
   };
 
-  // Of the schedule that runs on this thread. There must be one.
+  // The scheduler of the schedule that runs on this thread. There must be one.
   static Scheduler& Current();
 
   explicit Scheduler(uint64_t seed);
@@ -75,7 +75,7 @@ class Scheduler {
   // What happened, a line for each step.
   std::string Steps() const;
   size_t step_count() const { return steps_.size(); }
-  // Of all steps: equal for equal schedules.
+  // A digest of all steps, equal for equal schedules.
   uint64_t Digest() const;
 
   // The rest is for threads of the schedule.
@@ -94,7 +94,7 @@ class Scheduler {
 
   size_t StartThread(std::function<void()> task, const char* name, const Location& where);
   void JoinThread(size_t thread);
-  // Waits until who holds an object lets go of it.
+  // Waits until the thread that holds an object lets go of it.
   void Block(const char* what, const void* object, const Location& where);
   void Unblock(const void* object);
   // Waits for a notification, which is true, or for the deadline.
@@ -114,7 +114,7 @@ class Scheduler {
     int64_t deadline = kNoDeadline;
     Condition condition = {};
     Location where = {};
-    // Of PCT; the highest goes first.
+    // The thread's priority in PCT; the highest goes first.
     int64_t priority = 0;
     const char* name = nullptr;
     Location started = {};
@@ -141,12 +141,12 @@ class Scheduler {
   Random choices_;
   Random random_;
   bool by_priority_ = false;
-  // Walk: stays with a thread in so many of 16 steps.
+  // Walk: stays with a thread in this many of 16 steps.
   uint32_t stickiness_ = 0;
   // PCT: the steps at which the running thread gets the lowest priority, descending.
   std::vector<size_t> change_points_;
   int64_t lowest_priority_ = 0;
-  // One in so many steps; 0: never.
+  // Once in this many steps; 0: never.
   uint32_t timeouts_ = 0;
   uint32_t spurious_ = 0;
 

@@ -18,7 +18,7 @@ namespace {
 
 using Kind = ScheduleFault::Kind;
 
-// The first fault among so many seeds.
+// The first fault among this many seeds.
 std::optional<ScheduleFault> Find(const std::function<void()>& body, uint64_t seeds = 1000) {
   for (uint64_t seed = 1; seed <= seeds; ++seed) {
     if (auto fault = Scheduler(seed).Run(body)) return fault;

@@ -15,7 +15,7 @@ namespace hulld::server {
 namespace {
 
 constexpr uint64_t kPlentyOfMemory = uint64_t{1} << 30;
-// Of one piece.
+// The most that a body of one piece takes.
 constexpr uint64_t kMostBytesOfBody = 512;
 
 // What an idle registry must say of itself: that it holds what the store keeps, that it can let go

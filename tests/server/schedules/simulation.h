@@ -80,7 +80,7 @@ struct Plan {
   uint32_t listings = 0;
   uint32_t bodies = 0;
   uint32_t pressure = 0;
-  // One in so many; 0: none.
+  // One in this many; 0: none.
   uint32_t conditions = 0;
   uint32_t cancellations = 0;
   uint32_t preparations = 0;

@@ -40,7 +40,7 @@ Operation GetAt(uint64_t invoked, uint64_t returned, uint64_t revision,
   return operation;
 }
 
-// Of revisions of the body, of a and of c, with a certificate, which names these.
+// Asks at these revisions of the body, of a and of c, with a certificate, which names them.
 Operation AskAt(uint64_t invoked, uint64_t returned, uint64_t revision, uint64_t a, uint64_t c,
                 bool touching) {
   Operation operation = Answered(Kind::kAsk, invoked, returned, revision);

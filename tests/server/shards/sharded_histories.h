@@ -141,7 +141,7 @@ class ShardedHistories : public ManyServersTest {
   }
 
   std::string directory_;
-  // Of each server, one for each shard. They outlive the servers of a run.
+  // For each server, one proxy for each shard. They outlive the servers of a run.
   std::vector<std::unique_ptr<CuttingProxy>> proxies_;
   uint64_t calls_ = 0;
   uint64_t from_the_past_ = 0;

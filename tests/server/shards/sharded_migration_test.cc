@@ -196,7 +196,7 @@ class ShardedMigration : public ::testing::Test {
     std::string said;
     uint64_t bytes = 0;
   };
-  // A run that is killed once the databases have answered so many bytes.
+  // A run that is killed once the databases have answered this many bytes.
   Outcome MigrateUpTo(uint64_t bytes, const Place& from, const Place& to) {
     Process program(Words{"migrate"} + from.from + to.to);
     const uint64_t before = network_->answered_bytes();
@@ -253,7 +253,7 @@ class ShardedMigration : public ::testing::Test {
     served.process->Wait();
   }
 
-  // Moves to one new place after another until so many runs were killed; the last of these.
+  // Moves to one new place after another until this many runs were killed; returns the last place.
   Place Move(const Place& from, const std::function<Place()>& make_destination) {
     const uint64_t kills = NumberIn("HULLD_KILLS", 3);
     Place to = make_destination();

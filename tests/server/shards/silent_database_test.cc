@@ -37,7 +37,7 @@ class SilentDatabase : public ShardedHistories {
     Begin({path});
   }
 
-  // Who looks into this table of the second database waits as long as this is there.
+  // A session that looks into this table of the second database waits as long as the result lives.
   std::shared_ptr<void> Hold(const std::string& table) const {
     return PostgresCluster::Shared().HoldTable(databases_[1], table);
   }
@@ -90,7 +90,7 @@ TEST_F(SilentDatabase, DoesNotHoldUpReadsOfAnother) {
 // Batches, scenes and streams, which share threads with those about hulls of several databases.
 TEST_F(SilentDatabase, DoesNotHoldUpQueriesOfAnother) {
   constexpr size_t kOthers = 20;
-  // Of each kind: more than a pool has threads, and half of what one client may have.
+  // Queries of each kind: more than a pool has threads, and half of what one client may have.
   constexpr size_t kQueries = 4;
   // Where they are held up, the test is to end.
   constexpr std::chrono::seconds kPatience{60};

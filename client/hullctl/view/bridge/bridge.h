@@ -36,7 +36,7 @@ struct BridgeOptions {
   uint16_t port = 0;
   // Connections at once; more are closed. A page takes one that stays and some while it loads.
   size_t max_connections = 32;
-  // Of one message of a page, in bytes; the page that sends more is disconnected.
+  // The most bytes of one message of a page; a page that sends more is disconnected.
   size_t max_message_bytes = size_t{4} << 20;
   size_t max_queued_bytes = size_t{64} << 20;
   // Called when a page connects, by the bridge's thread.

@@ -80,7 +80,7 @@ SessionGuard::Decision SessionGuard::Judge(const PageRequest& request) {
       one_time_token_.clear();
       return {Verdict::kExchange, 200, ""};
     }
-    // Whoever has been let in and opens the address again comes in again.
+    // A browser that has been let in and opens the address again comes in again.
     if (has_session) return {Verdict::kExchange, 200, ""};
     return Refuse(403,
                   "This address worked once and was used. Run 'hullctl view' again for another.");

@@ -123,7 +123,7 @@ export class AnswerPanel {
     return list;
   }
 
-  // Of bodies, the pieces that decided.
+  // For bodies, the pieces that decided.
   pieceRows({pieces}) {
     return this.model.decidingPieces().map(
         (piece, k) => [`piece of ${'AB'[k]}`, piece && `${pieces[k]}: ${piece.hullId}`]);

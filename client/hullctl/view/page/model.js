@@ -2,13 +2,13 @@
 import {CROWD_COLOUR, OBJECT_COLOURS} from 'hulld/palette.js';
 import {samePose, toWorld} from 'hulld/pose.js';
 
-// At most so many objects are each drawn and labelled on their own; more are drawn as a crowd.
+// At most this many objects are each drawn and labelled on their own; more are drawn as a crowd.
 export const MOST_SINGLE_OBJECTS = 200;
 
-// Of bodies with more pairs of pieces no certificate is asked for.
+// No certificate is asked for about bodies with more pairs of pieces than this.
 const MOST_PIECE_PAIRS = 1000;
 
-// Of larger shapes the box stands for them.
+// The box stands for shapes with more vertices than this.
 const MOST_CORNERS = 100;
 
 export class Model extends EventTarget {
@@ -25,7 +25,7 @@ export class Model extends EventTarget {
     // By ID, and by file. Hulls are those of objects and of the pieces of bodies.
     this.hulls = new Map();
     this.bodies = new Map();
-    // Hulls of pieces that there are not.
+    // Hulls of pieces that do not exist.
     this.absent = new Set();
     this.meshes = new Map();
     this.info = new Map();
@@ -73,7 +73,7 @@ export class Model extends EventTarget {
     return this.objects.length > MOST_SINGLE_OBJECTS;
   }
 
-  // The hull, or of a body all of its pieces; undefined while it is on its way.
+  // The hull, or all pieces of a body; undefined while it is on its way.
   hullOf(object) {
     return this.hulls.get(object.hullId) ?? this.bodyOf(object)?.shape(this.hulls, this.absent);
   }
@@ -146,8 +146,8 @@ export class Model extends EventTarget {
     return this.shapeOf(object)?.radius || 0;
   }
 
-  // Points of the world that are about an object: its vertices where they are few, else the corners
-  // of its box.
+  // Points of the world that are about an object: its vertices where they are few, otherwise the
+  // corners of its box.
   cornersOf(object) {
     const {low, high, xyz, vertexCount} = this.shapeOf(object);
     if (vertexCount <= MOST_CORNERS) {
@@ -226,7 +226,7 @@ export class Model extends EventTarget {
     return pair.every((i) => this.objects[i].hullId) ? pair : null;
   }
 
-  // Whether the pair's certificate is asked for: of large bodies it is one for each of very many
+  // Whether the pair's certificate is asked for: for large bodies it is one for each of very many
   // pairs of pieces.
   wantsCertificate(rest) {
     const counts = (this.pair || []).map((i) => this.bodyOf(this.objects[i])?.pieces.length ?? 0);

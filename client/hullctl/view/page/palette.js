@@ -2,7 +2,7 @@
 // them. Source: Okabe and Ito 2008, Color Universal Design.
 export const OBJECT_COLOURS = ['#56b4e9', '#009e73', '#cc79a7', '#f0e442', '#0072b2', '#999999'];
 
-// Of many objects those that collide shall stand out, and nothing else.
+// Among many objects, those that collide are to stand out, and nothing else.
 export const CROWD_COLOUR = '#8fa9bd';
 
 // `sign` tells relations apart without colour.

@@ -28,7 +28,7 @@ function triangulate(rest, facets) {
     for (let i = 0; i < size; ++i) {
       const a = corners[first + i];
       const b = corners[first + (i + 1) % size];
-      // Of a closed surface each edge comes once in each direction.
+      // On a closed surface, each edge comes once in each direction.
       if (a < b || facets === 1) {
         edges[e++] = a;
         edges[e++] = b;
@@ -226,7 +226,7 @@ export class MeshShape extends Shape {
   }
 }
 
-// The vertices of `after` that `before` has not, as indices.
+// The vertices of `after` that `before` does not have, as indices.
 export function newVertices(before, after) {
   const known = new Set();
   const key = (xyz, i) => `${xyz[i]},${xyz[i + 1]},${xyz[i + 2]}`;

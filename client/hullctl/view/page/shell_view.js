@@ -97,9 +97,9 @@ function shellGeometry(hull, distance) {
   const [cx, cy, cz] = hull.centre;
   const positions = [];
   const indices = [];
-  // Of each directed edge, where its two ends went.
+  // For each directed edge, where its two ends went.
   const moved = new Map();
-  // Of each vertex, where its copies are, with the facet that follows each around it.
+  // For each vertex, where its copies are, with the facet that follows each around it.
   const around = new Map();
   let first = 0;
   for (let f = 0; f < sizes.length; ++f) {

@@ -5,7 +5,7 @@ import {RELATIONS} from 'hulld/palette.js';
 // More rows make the page slow; the search finds the rest.
 const MOST_ROWS = 400;
 
-// Of a body, so many pieces are listed unasked, and at most.
+// The pieces of a body that are listed unasked, and the most that are listed.
 const MOST_OPEN_PIECES = 8;
 const MOST_PIECE_ROWS = 100;
 

@@ -51,7 +51,7 @@ class AsyncDuplex:
         except (grpc.RpcError, asyncio.InvalidStateError):
             pass
         except asyncio.CancelledError:
-            # Of this task, with which gRPC cancels the call; else of the call alone.
+            # Either this task was cancelled, with which gRPC cancels the call, or the call alone.
             task = asyncio.current_task()
             if task is not None and task.cancelling() > 0:
                 raise

@@ -76,7 +76,7 @@ class HullVersion:
 
 @dataclass(frozen=True)
 class DecidingPiece:
-    """Of a body, the piece of the pair of pieces that decided. index: in the order of the body,
+    """The piece of a body in the pair of pieces that decided. index: in the order of the body,
     from 0. hull: the hull of the piece that the answer was computed from."""
 
     index: int

@@ -18,10 +18,10 @@ from hulld.wire import Unsigned, packed_doubles, packed_varints, read_fields
 @dataclass(frozen=True)
 class Header:
     """The store, and its revision that a reply was answered from. Revisions of different stores
-    mean nothing to each other. Of several stores (shards) that a reply was answered from, `shards`
-    names each with its revision; store_id and revision are empty then. staleness: seconds; the
-    answer to a read with a Freshness holds everything that was committed up to that long before the
-    call, at least."""
+    mean nothing to each other. If a reply was answered from several stores (shards), `shards` names
+    each with its revision, and store_id and revision are empty. staleness: seconds; the answer to a
+    read with a Freshness holds everything that was committed up to that long before the call, at
+    least."""
 
     store_id: str
     revision: int

@@ -50,7 +50,7 @@ class Freshness:
         return message
 
     def for_next_page(self, header: Header) -> Freshness:
-        """Of the page after one with this header: what is on no page yet must not be missing."""
+        """For the page after one with this header: what is on no page yet must not be missing."""
         if self.max_staleness is None and self.at_least is None:
             return self
         return replace(self, at_least=header)

@@ -57,7 +57,7 @@ TEST_F(CompletionOnServer, IdsOfHullsComeFromTheServer) {
   EXPECT_THAT(Offers({"check", "box", "arm"}), ElementsAre("arm/1", "arm/2", ":"));
   EXPECT_THAT(Offers({"delete", "box", "b"}), ElementsAre("box", ":"));
   EXPECT_THAT(Offers({"create", ""}), ElementsAre(":"));
-  // Of many, the parts of their names.
+  // When there are many IDs, the parts of their names are offered.
   for (int i = 0; i < 100; ++i) Create("arm/" + std::to_string(i) + "/hand");
   EXPECT_THAT(Offers({"get", "arm/9"}).size(), 12U);
   const std::vector<std::string> parts = Offers({"list", "a"});

@@ -46,8 +46,9 @@ std::vector<Vector> GrowingShells(Random& random, size_t n) {
   return points;
 }
 
-// Of one point after another, none does much more than its share of the housekeeping: beyond the
-// triangles that it removes and creates, its work grows like the square of a logarithm.
+// When points are inserted one after another, none does much more than its share of the
+// housekeeping: beyond the triangles that it removes and creates, its work grows like the square of
+// a logarithm.
 TEST(HullCost, NoSinglePointStalls) {
   const uint64_t seed = TestSeed(501);
   Random random(seed);

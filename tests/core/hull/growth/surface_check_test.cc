@@ -123,7 +123,7 @@ TEST_F(SurfaceCheck, FindsATriangleTurnedInsideOut) {
 TEST_F(SurfaceCheck, FindsAVertexThatIsGone) {
   VertexTable without = vertices_;
   without.Remove(Triangle(0).corners[2]);
-  // Else the counts tell.
+  // Otherwise the counts tell.
   without.Add({9, 9, 9});
   without.Remove(without.Add({8, 8, 8}));
   EXPECT_STREQ(Defect(without), "a rounded plane misses a corner");

@@ -109,8 +109,8 @@ TEST(InsideSearch, IsNeverWorseThanFarthestFirst) {
   EXPECT_GT(better, 20);
 }
 
-// The bound of any start, and of what is chosen from there, is true by the oracle's exact
-// arithmetic.
+// By the oracle's exact arithmetic, the bound of any start is true, and so is that of what is
+// chosen from there.
 TEST(VertexSubset, StartsWithAnyVertices) {
   Random random(TestSeed(41));
   const Hull full = BuildHull(RandomOnSphere(random, 18, 3.0));
@@ -163,7 +163,7 @@ TEST(Relaxation, SpreadsWhatIsCrowded) {
   const std::vector<Vector> unit_points = scale.ToUnit(full.vertices());
   StopPoll poll;
   Relaxation relaxation(full, unit_points, poll);
-  // Of those on one half of the sphere many, of the others few.
+  // Many of the vertices on one half of the sphere, and few of the others.
   std::vector<uint32_t> chosen;
   for (uint32_t i = 0; i < full.vertices().size(); ++i) {
     if (i % (full.vertices()[i].x() < 0 ? 10 : 80) == 0) chosen.push_back(i);

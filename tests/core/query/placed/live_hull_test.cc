@@ -86,7 +86,7 @@ class Comparison {
   int counts_[4] = {};
 };
 
-// Of all extreme clouds, point by point, prepared now and then.
+// All extreme clouds, point by point, prepared now and then.
 TEST(LiveHull, EveryStepAnswersAsAFreshHull) {
   const uint64_t seed = TestSeed(941);
   Random random(seed);

@@ -13,11 +13,11 @@
 
 namespace hulld::server {
 
-// Of a call that ends long after any of these does, so that a defect ends as a failure and not as a
-// hang.
+// The context of a call, with a deadline long after any of these calls ends, so that a defect ends
+// as a failure and not as a hang.
 std::unique_ptr<grpc::ClientContext> NewContext();
 
-// Of the store with this ID, where there are several.
+// The revision of the store with this ID, where there are several.
 uint64_t RevisionOf(const v1::ResponseHeader& header, const std::string& store_id);
 
 void TakeVersion(const v1::HullVersion& version, const v1::ResponseHeader& header, Seen& seen);

@@ -22,7 +22,7 @@ namespace hulld::server {
 // The hull of one point at the origin, which probes points of others. Not part of any history.
 inline constexpr const char* kProbeHull = "probe";
 
-// The cloud that histories are made of: so many points, all extreme.
+// The cloud that histories are made of: this many points, all extreme.
 inline constexpr int kCloudSize = 48;
 const Coordinates& HistoryCloud();
 
@@ -82,8 +82,8 @@ class HistoryClient {
   // Which points of some of the cloud each touches.
   bool Batch(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
   bool Scene(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
-  // The same by a collision stream, which is opened when none is open; else it looks the hulls up
-  // anew, and moves a point now and then.
+  // The same by a collision stream, which is opened when none is open. One that is open looks the
+  // hulls up anew, and moves a point now and then.
   bool AskStream(const std::vector<std::string>& hulls, const std::vector<std::string>& bodies);
   // In one page or in pages of one. Requires that no others have their prefix.
   bool ListHulls(const std::vector<std::string>& hulls);
@@ -118,7 +118,7 @@ class HistoryClient {
   bool EndPart(Operation::Kind kind, const Operation& whole, const Seen& seen,
                const grpc::Status& status);
   // What an answer that came in now says of several. It is recorded as one operation where it is of
-  // one instant, else as one for each store.
+  // one instant, otherwise as one for each store.
   void RecordSeveral(Operation operation, const v1::ResponseHeader& header, std::vector<Seen> seen,
                      bool is_of_one_instant);
   std::vector<Seen> SeenIn(const Asked& asked, const Told& told, const v1::Freshness& freshness,
@@ -135,10 +135,10 @@ class HistoryClient {
                                      const std::string& token)>& ask);
   template <typename Response, typename Request, typename Call>
   bool DeleteAs(const std::string& id, bool if_known_revision, Request request, const Call& call);
-  // What an answer says of the store; of several, of the one with this ID.
+  // What an answer says of the store; if there are several, of the one with this ID.
   void TakeHeader(const v1::ResponseHeader& header, Operation& operation,
                   const std::string& store_id = "");
-  // Absent most times; else the revision last seen.
+  // Absent most times; otherwise the revision last seen.
   std::optional<uint64_t> SomeRevision(const std::string& hull_id);
   int Below(int n) { return static_cast<int>(random_() % static_cast<uint64_t>(n)); }
 
@@ -153,7 +153,7 @@ class HistoryClient {
   std::shared_ptr<CollisionStream> collision_stream_;
   bool any_freshness_ = false;
   bool tells_stores_ = false;
-  // Of the last answer.
+  // The header of the last answer.
   v1::ResponseHeader last_header_;
   // Where there are several: the greatest revision told of each, and the store of each hull.
   std::map<std::string, uint64_t> store_revisions_;

@@ -90,7 +90,7 @@ struct HistoryClient::Told {
   v1::ResponseHeader header;
   std::vector<v1::HullVersion> hulls;
   std::map<uint32_t, v1::PlacementProblem> problems;
-  // Of each pair; nullopt: it has no answer.
+  // For each pair, whether it touches; nullopt: it has no answer.
   std::vector<std::optional<bool>> touching;
 };
 
@@ -105,7 +105,7 @@ struct HistoryClient::CollisionStream {
   std::optional<uint64_t> max_staleness;
 };
 
-// Of a list.
+// One page of a list.
 struct HistoryClient::Page {
   grpc::Status status;
   v1::ResponseHeader header;
@@ -189,7 +189,7 @@ void HistoryClient::RecordSeveral(Operation operation, const v1::ResponseHeader&
       parts[""].push_back(std::move(each));
       continue;
     }
-    // Of what is missing one may not know the store.
+    // The store of what is missing may be unknown.
     if (each.store_id.empty()) continue;
     parts[each.store_id].push_back(std::move(each));
   }

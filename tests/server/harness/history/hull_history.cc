@@ -84,7 +84,7 @@ uint64_t ChangedAt(const Operation& operation) {
   if (operation.outcome != Outcome::kOk) return 0;
   switch (operation.kind) {
     case Kind::kAppend:
-      // Of several chunks that were told of together, any may have.
+      // When several chunks were told of together, any of them may have changed it.
       if (operation.is_untold || operation.is_told_with_others) return 0;
       return operation.already_applied || operation.outside == 0 ? 0 : operation.revision;
     case Kind::kDelete:
@@ -116,7 +116,7 @@ std::string FreshnessFault(const Operation& operation) {
       return absl::StrCat("an answer of revision ", other.store_revision, " of the store of ",
                           other.hull_id, " tells of a later one: ", Describe(operation));
     }
-    // Of what is missing one may not know the store.
+    // The store of what is missing may be unknown.
     const bool is_there = !other.is_missing && other.missing_piece.empty();
     if (other.store_revision == 0 && !is_there) continue;
     if (other.store_revision >= other.at_least_revision) continue;
@@ -179,7 +179,7 @@ class OrderSearch {
   struct Placed : Operation {
     size_t hull = 0;
   };
-  // Of each hull.
+  // The state of each hull.
   using State = std::vector<SpecifiedHull>;
 
   static std::string KeyOf(const State& state) {

@@ -15,18 +15,17 @@ namespace hulld::server {
 // them has exactly these as vertices.
 using PointSet = uint64_t;
 
-// What an answer about several says of a hull beside the first; of a batch, of any.
+// What an answer about several says of a hull beside the first; in a batch, of any hull.
 struct Seen {
   std::string hull_id;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
-  // Of the store of this hull: as those of Operation.
+  // The store of this hull and its revisions, as in Operation.
   std::string store_id = {};
   uint64_t store_revision = 0;
   uint64_t at_least_revision = 0;
 
-  // Of a batch alone, about a hull or a body.
-  // There is none.
+  // The following are for batches only. There is no such hull, or body.
   bool is_missing = false;
   // The hull that a piece of it lacks; empty: none.
   std::string missing_piece = {};
@@ -69,7 +68,7 @@ struct Operation {
 
   Kind kind = Kind::kGet;
   Outcome outcome = Outcome::kUnknown;
-  // Of the history's clock: the call took effect between the two, if it did.
+  // Times of the history's clock: the call took effect between the two, if it did.
   uint64_t invoked = 0;
   uint64_t returned = UINT64_MAX;
 
@@ -80,7 +79,7 @@ struct Operation {
   std::optional<uint64_t> if_revision;
   std::string writer;
   uint64_t sequence = 0;
-  // Append: of the stream, as its opening said.
+  // Append: that of the stream, as its opening said.
   uint64_t incarnation = 0;
   // Append: acknowledged with chunks after it, so that nobody told what it did alone; and with
   // chunks before it, so that counts, and whether it was applied already, are of all.
@@ -90,8 +89,8 @@ struct Operation {
   uint64_t sent = 0;
   PointSet points = 0;
   int probe = 0;
-  // Of a read that may be answered from the past: of any, or of at most this long ago, in
-  // nanoseconds; and not before this revision of the store.
+  // For a read that may be answered from the past: from how long ago at most, in nanoseconds, or
+  // from any time; and not before this revision of the store.
   std::optional<uint64_t> max_staleness = 0;
   uint64_t at_least_revision = 0;
 
@@ -102,7 +101,7 @@ struct Operation {
   uint64_t store_revision = 0;
   // Whose that is, where hulls are spread over several stores.
   std::string store_id;
-  // Of how long ago it may be, in nanoseconds.
+  // How old the state that was answered from may be, in nanoseconds.
   uint64_t staleness = 0;
   uint64_t create_revision = 0;
   uint64_t revision = 0;
@@ -123,7 +122,7 @@ struct Operation {
   std::string deciding;
   // Ask that found nothing: the hull that a piece lacks; empty: it is the body that is missing.
   std::string missing;
-  // Ask: of the pieces, `others` has those of the body's store alone, so that nothing follows from
+  // Ask: `others` has only those pieces that are in the body's store, so that nothing follows from
   // whether it touches.
   bool is_part = false;
 };
@@ -152,7 +151,7 @@ class HullHistory {
 
 // Whether the operations on one hull are linearizable: whether there is an order that agrees with
 // real time in which a hull that does one thing at a time, as hull.proto says, would have answered
-// the same. Empty when there is one; else what could not be explained.
+// the same. Empty when there is one; otherwise what could not be explained.
 //
 // A read that may be answered from the past took effect between its answer and as long before its
 // call as that says, which is no longer than was asked for, and after every change up to the

@@ -29,7 +29,7 @@ struct SpecifiedHull {
   uint64_t outside = 0;
   uint64_t duplicate = 0;
   std::map<std::string, uint64_t> writers;
-  // Of a body: the hull of each.
+  // The hull of each piece of a body.
   std::vector<std::string> pieces;
 
   uint64_t LastSequence(const std::string& writer) const {

@@ -30,7 +30,7 @@ class CuttingProxy {
     kHoldCommit,
   };
 
-  // socket_directory: of the server.
+  // socket_directory: that of the server.
   explicit CuttingProxy(const std::string& socket_directory);
   CuttingProxy(const CuttingProxy&) = delete;
   CuttingProxy& operator=(const CuttingProxy&) = delete;
@@ -50,7 +50,7 @@ class CuttingProxy {
   // that the server sends, as a network does that lost a connection and tells nobody.
   void CutListeners();
   void SetDeaf(bool deaf);
-  // Every piece of what the server answers comes so much later.
+  // Every piece of what the server answers comes this much later.
   void SetDelay(std::chrono::milliseconds delay);
   // From now on LISTEN is a statement that the server does not know.
   void RefuseToListen();
@@ -60,7 +60,7 @@ class CuttingProxy {
   // What was held arrives at the server; returns when that has ended the connection or answered
   // all.
   void Deliver();
-  // The same as soon as something is held; where nothing was after so long, nothing is any more.
+  // The same as soon as something is held; if nothing was held after `longest`, holding ends.
   void DeliverOnceHeld(std::chrono::milliseconds longest);
 
  private:

@@ -36,7 +36,7 @@ constexpr int kMostAttempts = 10'000;
   std::abort();
 }
 
-// Of initdb, wherever the data are.
+// The options of initdb, wherever the data are.
 constexpr const char* kInitialOptions[] = {
     "-U",        "postgres",         "--auth=scram-sha-256", "--locale=C", "--encoding=UTF8",
     "--no-sync", "--no-instructions"};

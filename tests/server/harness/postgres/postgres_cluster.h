@@ -40,7 +40,8 @@ class PostgresCluster {
 
   // An empty database that belongs to the role hulld; returns its name.
   std::string MakeDatabase(const std::string& tablespace = "pg_default");
-  // Of the role hulld, which is no superuser. host: of a proxy; empty: of the server itself.
+  // A connection string for the role hulld, which is no superuser. host: that of a proxy; empty:
+  // that of the server itself.
   std::string Conninfo(const std::string& database, const std::string& host = "") const;
   // In a file of ours, as --postgres-conninfo-file wants it; it goes with this. host: as above, or
   // several, separated by commas.

@@ -64,7 +64,7 @@ class SharedStore : public Store {
     // Its changes.
     size_t seen = 0;
     uint64_t revision = 0;
-    // As of that.
+    // As of that revision.
     StoreTotals totals = {};
     // That nobody took yet.
     OtherChanges others = {};
@@ -72,7 +72,7 @@ class SharedStore : public Store {
 
   SimulatedStore& database_;
   Known known_;
-  // What is on its way to Follow: of when it was asked for.
+  // What is on its way to Follow: what was known when it was asked for.
   std::optional<Known> started_;
   // Guarded by the database's mutex.
   std::function<void()> on_others_;

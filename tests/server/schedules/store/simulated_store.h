@@ -16,7 +16,7 @@ namespace hulld::server {
 
 class SharedStore;
 
-// How often something fails: once in so many calls; 0: never.
+// How often something fails: once in this many calls; 0: never.
 struct StoreFaults {
   // A batch is refused and nothing is left of it; it may be so, or not, until Recover succeeds.
   uint32_t refused = 0;
@@ -105,13 +105,13 @@ class SimulatedStore : public Store {
     std::map<std::string, uint64_t> sequences;
   };
 
-  // A change that was kept: of which hull or body, at which revision, and whether an incarnation
-  // ended then.
+  // A change that was kept: which hull or body it changed, at which revision, and whether an
+  // incarnation ended then.
   struct Logged {
     std::string hull_id;
     uint64_t revision = 0;
     uint64_t ended_at = 0;
-    // Of that incarnation, and whether it was a body's.
+    // When that incarnation began, and whether it was a body's.
     uint64_t former_began = 0;
     bool former_was_body = false;
   };
@@ -136,7 +136,8 @@ class SimulatedStore : public Store {
   bool is_dead_ = false;
 
   std::vector<Logged> log_;
-  // Of SharedStore: whose last batch failed; and all of them, guarded by the mutex.
+  // For SharedStore: how many servers' last batch failed; and all of the servers, guarded by the
+  // mutex.
   uint64_t failing_servers_ = 0;
   Mutex servers_mutex_;
   std::vector<SharedStore*> servers_;

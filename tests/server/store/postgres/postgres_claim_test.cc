@@ -16,7 +16,7 @@ using ::testing::Not;
 
 class PostgresClaim : public PostgresTest {};
 
-// Of a session: that it is the active server's, and makes it that.
+// Holds for the session whose lock makes its server the active one.
 constexpr char kHasLock[] =
     "pid IN (SELECT pid FROM pg_locks JOIN pg_database ON database = pg_database.oid WHERE "
     "locktype = 'advisory' AND granted AND pg_database.datname = current_database())";

@@ -19,7 +19,7 @@ using Server = std::unique_ptr<PostgresRegistry>;
 
 constexpr std::chrono::hours kNever{1};
 constexpr char kLook[] = "SELECT batch FROM hulld.store";
-// Whoever waits so long waits for something that does not come.
+// What has not come after this long does not come.
 constexpr std::chrono::seconds kLong{60};
 
 class PostgresFollow : public PostgresTest {
@@ -152,7 +152,7 @@ TEST_F(PostgresFollow, AServerThatAppendsGoesOnFromWhatTheOtherAdded) {
   for (int i = 0; i < 20; ++i) {
     const auto added = other_->Append(there->session, i + 1, {PointOutside(2 * i)});
     ASSERT_TRUE(added.ok()) << added.status();
-    // Whoever follows before it builds is not superseded.
+    // A server that follows before it builds is not superseded.
     ASSERT_TRUE(hulls_->View("h").ok());
     const auto result = hulls_->Append(here->session, i + 1, {PointOutside(2 * i + 1)});
     ASSERT_TRUE(result.ok()) << result.status();
@@ -219,7 +219,7 @@ TEST_F(PostgresFollow, AHullThatGrewByMuchIsReadAnew) {
   EXPECT_EQ(hulls_->registry().Cache().grown, 0);
 }
 
-// As without them: whoever asks is told.
+// As without deltas: every caller that asks is told.
 TEST_F(PostgresFollow, DamagedDeltasAreFoundOut) {
   FollowWhenCalled();
   StartWithHull(1000);

@@ -245,7 +245,7 @@ TEST_F(PostgresRecords, NoBodyIsReadUntilItIsAskedFor) {
     ASSERT_TRUE(DeleteBody(*hulls_, "body-3").ok());
     EXPECT_TRUE(hulls_->Create("body-3").ok());
     EXPECT_TRUE(absl::IsAlreadyExists(PutBody(*hulls_, "body-3").status()));
-    // Of a damaged one.
+    // A damaged body is replaced.
     ASSERT_TRUE(PutBody(*hulls_, "body-2").ok());
     EXPECT_EQ(KeptBodies(), CountedBodies());
     for (const char* id : {"body-1", "body-2"}) ASSERT_TRUE(DeleteBody(*hulls_, id).ok());

@@ -478,7 +478,7 @@ TEST_F(PostgresShared, AQuestionForTheTurnThatArrivesLateChangesNothing) {
   EXPECT_EQ(Received(*hulls_, "h"), 10);
 }
 
-// Of a creation and of a deletion nothing tells, when they are made again, that they were there.
+// When a creation or a deletion is made again, nothing tells that it was made before.
 TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
   Start();
   const Server other = StartBeside();
@@ -495,7 +495,7 @@ TEST_F(PostgresShared, ABeginningOrEndWhoseAnswerWasLostIsNotRepeated) {
   EXPECT_TRUE(absl::IsNotFound(other->View("h").status()));
 }
 
-// What belongs to a record is not given to who has another one.
+// What belongs to a record is not given to a caller that has another one.
 TEST_F(PostgresShared, WhoAsksWithAFormerRecordIsToldThatTheHullMoved) {
   LookOnlyWhenAsked();
   Start();

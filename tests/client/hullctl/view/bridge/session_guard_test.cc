@@ -34,7 +34,7 @@ TEST(SessionGuard, TokenIsExchangedOnceForTheCookie) {
   EXPECT_EQ(again.verdict, Verdict::kRefuse);
   EXPECT_EQ(again.http_status, 403);
   EXPECT_THAT(again.reason, HasSubstr("worked once"));
-  // Whoever is in comes in again, as by the back button.
+  // A browser that is in comes in again, as by the back button.
   EXPECT_EQ(guard.Judge(Page("/?token=token", kCookie)).verdict, Verdict::kExchange);
 }
 

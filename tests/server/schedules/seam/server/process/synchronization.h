@@ -17,10 +17,10 @@
 // types are used as those of the standard library.
 namespace hulld::server {
 
-// Not recursive. Whoever is first once it is free has it.
+// Not recursive. The first thread to run once it is free gets it.
 class Mutex {
  public:
-  // where: of who has the mutex, to name it.
+  // where: where the mutex is made, by which steps name it.
   explicit Mutex(const std::source_location& where = std::source_location::current())
       : where_(where) {}
   Mutex(const Mutex&) = delete;
