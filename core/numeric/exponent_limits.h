@@ -61,6 +61,11 @@ inline constexpr double kMapMaxDistance = 0x1p1000;
 // three products that underflow, 2^-1075 each, are far below the bound. Proven.
 inline constexpr double kAuditMinOffset = 0x1p-930;
 
+// An enclosure divides unit normals by the reach of their planes, at unit scale, and takes cross
+// products of differences of the quotients. From this reach on, quotients are at most 2^300, so
+// that these are below 2^604, their sums below 2^640, and nothing overflows. Proven.
+inline constexpr double kDualMinReach = 0x1p-300;
+
 // What underflow adds to the distance from a triangle (see kSubsetDistanceErrorFactor) and to a
 // radius. Proven.
 inline constexpr double kLeastPositive = 0x1p-1060;
