@@ -25,8 +25,8 @@ class InsideOrder {
 
   // The fewest vertices that this order begins with.
   size_t least() const { return least_; }
-  // How many of the first vertices bring the error within `error`, or else `most`. Requires most >=
-  // least(). Not less than least().
+  // How many of the first vertices bring the error within `error`, or else `most`. Not less than
+  // least(). Requires most >= least().
   size_t CountFor(double error, size_t most);
   // Proven: no point of the hull is farther than this from the hull of the first `count` vertices.
   // The caller's length unit. Requires least() <= count <= the hull's vertices.
