@@ -250,7 +250,7 @@ class FacetFilter {
   bool IsSurelyBelow(const Vector& point) const {
     const Vector offset = point - origin_;
     const double size = offset.cwiseAbs().sum();
-    return size > kAuditMinOffset &&
+    return size > kAuditMinOffset && size < kAuditMaxOffset &&
            normal_.dot(offset) < -kAuditErrorFactor * kScaledDoublesMax * size;
   }
 
