@@ -12,6 +12,7 @@
 
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
+#include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 
@@ -241,8 +242,7 @@ absl::Status AuditEnds(const Hull& hull) {
   return absl::OkStatus();
 }
 
-// Whether the point is surely below the facet: by doubles, with a generous bound; false when that
-// is not certain.
+// Whether the point is surely below the facet, by doubles; false when that is not certain.
 class FacetFilter {
  public:
   FacetFilter(const IntegerVector& normal, const Vector& origin)
@@ -250,9 +250,8 @@ class FacetFilter {
   bool IsSurelyBelow(const Vector& point) const {
     const Vector offset = point - origin_;
     const double size = offset.cwiseAbs().sum();
-    // The normal errs by 2^-52 relative to its largest component (below 2^63), offset and dot
-    // product by a few 2^-53.
-    return size > kAuditMinOffset && normal_.dot(offset) < -0x1p-48 * 0x1p63 * size;
+    return size > kAuditMinOffset && size < kAuditMaxOffset &&
+           normal_.dot(offset) < -kAuditErrorFactor * kScaledDoublesMax * size;
   }
 
  private:

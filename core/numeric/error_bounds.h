@@ -28,6 +28,19 @@ inline constexpr double kOrient2dErrorFactor = (3 + 16 * kUnitRoundoff) * kUnitR
 // bound itself. Proven.
 inline constexpr double kPlaneErrorFactor = 64 * kUnitRoundoff;
 
+// That factor times |e||f|, the slope of the bound, is kept as a float. It rounds once as a double,
+// by u, and once more with this factor; becoming a float, which is normal between kPlaneMinSlope
+// and kPlaneMaxSlope, takes up to 2^-24 of it. 1 + 2^-20 outweighs these, so that the float is not
+// below the slope: 2^-20 > 2^-24 + 2^-43 + 2 u. Proven.
+inline constexpr double kPlaneSlopeRoundUp = 1 + 0x1p-20;
+
+// The side of a facet's plane on which the audit finds a point (audit.cc): n . (p - a), n the exact
+// normal as doubles of at most 2^63 that each err by 2^-52 * 2^63 = 2 u 2^63 (ToScaledDoubles).
+// Differences err by u of themselves; a product with them and the two sums after it by 3 u: 6 u
+// 2^63 |p - a| in all, |.| the sum of absolute components, whose own rounding is 3 u of itself. 32
+// u leaves slack for the rest. Times 2^63 |p - a|. Proven.
+inline constexpr double kAuditErrorFactor = 32 * kUnitRoundoff;
+
 // y . (A x B) for differences y, A, B of doubles, |A|, |B|, |y| at most D: at most 48 u D^3 as
 // above; 64 u leaves slack. For D between kTripleProductMin and kTripleProductMax. Proven.
 inline constexpr double kTripleProductErrorFactor = 64 * kUnitRoundoff;
@@ -57,9 +70,9 @@ inline constexpr double kRotationEntryError = 16 * kUnitRoundoff;
 
 // The translation of a product of two poses, R(q) t_P / |q|^2 + t_B in double-double arithmetic
 // (double_double.h): the numerators of the entries are sums of four exact products, within 9 u^2
-// |q|^2, the squared norm within 9 u^2 of itself, their quotient within 15 u^2: entries, at most 1,
-// err by 33 u^2. Products with t_P err by 5 u^2 more, two sums of them, at most 3 |t_P|, by 3 u^2
-// each: 132 u^2 |t_P|; the last sum by 3 u^2 (3 |t_P| + |t_B|). Below 145 u^2 (|t_P| + |t_B|); 256
+// |q|^2, the squared norm within 9 u^2 of itself, their quotient within 17 u^2: entries, at most 1,
+// err by 35 u^2. Products with t_P err by 5 u^2 more, two sums of them, at most 3 |t_P|, by 3 u^2
+// each: 138 u^2 |t_P|; the last sum by 3 u^2 (3 |t_P| + |t_B|). Below 150 u^2 (|t_P| + |t_B|); 256
 // u^2 leaves slack for higher powers of u. Times |t_P| + |t_B|, |.| the largest component. Proven.
 inline constexpr double kProductTranslationError = 256 * kUnitRoundoff * kUnitRoundoff;
 
@@ -218,6 +231,14 @@ inline constexpr double kLeastOutward = 0x1p-35;
 // A rational number or the square root of one, with 60 bits or more, rounded to a double: u of
 // itself and less than 2^-60; twice that, and the least double for gradual underflow. Proven.
 inline constexpr double kRoundedRelativeError = 2 * kUnitRoundoff;
+
+// Which of two planes with integer coefficients is nearer to the origin, by |offset| / |n| in
+// doubles: offset and components err by 2 u of themselves (ToScaledDouble), squares by 5 u, their
+// sum, of positive terms, by 7 u, the root by 4.5 u, the quotient by 7.5 u. So two of them are
+// ordered rightly where they differ by more than 16 u of the larger, the subtraction's rounding
+// included. 2^-40, which is 2^13 u, is not tuned: planes nearer than that are compared exactly, and
+// are mostly equally near. Times the larger. Proven.
+inline constexpr double kDepthKeyErrorFactor = 0x1p-40;
 
 // Hull centre: the sum of the sixths of six vertices. Sixths err by u M in all, the sums by 3 u M:
 // at most 7 u M beyond the exact mean, within the slack of kMinkowskiErrorFactor (64 u S). So is

@@ -57,9 +57,16 @@ inline constexpr double kTripleProductMax = 0x1p300;
 inline constexpr double kMapMinDistance = 0x1p-1000;
 inline constexpr double kMapMaxDistance = 0x1p1000;
 
-// The audit's filter, n . p with |n| below 2^63 and a bound of 2^15 |p|, runs for |p| above this:
-// three products that underflow, 2^-1075 each, are far below the bound. Proven.
+// The audit's filter, n . p with |n| at most 2^63 and a bound of 2^15 |p|, runs for |p| between
+// these. Three products that underflow, 2^-1075 each, are far below the bound, and no product and
+// no sum of them exceeds 2^63 |p|. Proven.
 inline constexpr double kAuditMinOffset = 0x1p-930;
+inline constexpr double kAuditMaxOffset = 0x1p960;
+
+// An enclosure divides unit normals by the reach of their planes, at unit scale, and takes cross
+// products of differences of the quotients. From this reach on, quotients are at most 2^300, so
+// that these are below 2^604, their sums below 2^640, and nothing overflows. Proven.
+inline constexpr double kDualMinReach = 0x1p-300;
 
 // What underflow adds to the distance from a triangle (see kSubsetDistanceErrorFactor) and to a
 // radius. Proven.

@@ -146,6 +146,7 @@ unsigned BitLength(const IntegerVector& v);
 // exact quotient. Requires v not zero.
 Vector ToScaledDoubles(const IntegerVector& v);
 inline constexpr double kScaledDoublesError = 0x1p-52;
+inline constexpr double kScaledDoublesMax = 0x1p63;
 
 }  // namespace hulld
 

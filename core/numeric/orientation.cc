@@ -55,8 +55,9 @@ double LargestCoordinate(const FourPoints& points) {
   return largest;
 }
 
-// A power of two. Requires a normal one.
+// 2^exponent. Requires that this is a normal double.
 double PowerOfTwo(int exponent) {
+  HULLD_DCHECK(exponent > -1023 && exponent < 1024);
   return std::bit_cast<double>(static_cast<uint64_t>(1023 + exponent) << 52);
 }
 
@@ -84,7 +85,9 @@ std::optional<int> FilteredFromNearest(const FourPoints& points) {
   std::array<int, 4> sizes{};
   for (size_t i = 0; i < 4; ++i) {
     for (size_t j = i + 1; j < 4; ++j) {
-      const int exponent = ExponentOf(LargestComponent(points[j] - points[i]));
+      const double size = LargestComponent(points[j] - points[i]);
+      HULLD_DCHECK(size <= kLargestDouble);
+      const int exponent = ExponentOf(size);
       sizes[i] += exponent;
       sizes[j] += exponent;
     }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/base/stop_poll.h"
 #include "core/numeric/vector.h"
 #include "core/query/placed/placed_hull.h"
@@ -63,8 +64,11 @@ class BoxTree {
   bool empty() const { return nodes_.empty(); }
   const Box& box(uint32_t node) const { return nodes_[node].box; }
   bool is_leaf(uint32_t node) const { return nodes_[node].second == 0; }
-  // Requires that the node is no leaf.
-  std::array<uint32_t, 2> children(uint32_t node) const { return {node + 1, nodes_[node].second}; }
+  // Requires a node that is no leaf.
+  std::array<uint32_t, 2> children(uint32_t node) const {
+    HULLD_DCHECK(!is_leaf(node));
+    return {node + 1, nodes_[node].second};
+  }
   // The boxes of a leaf, at most kLeafBoxes, and their indices.
   std::span<const Box> boxes(uint32_t leaf) const { return Part(boxes_, leaf); }
   std::span<const uint32_t> indices(uint32_t leaf) const { return Part(indices_, leaf); }

@@ -162,23 +162,143 @@ void DirectionMap::AppendSurvivors(std::span<const Vector> points, std::vector<u
 #ifdef HULLD_HAS_AVX2_PATH
 namespace {
 
+// Steps of WriteSurvivorsAvx2, for four points at a time. Each computes, operation by operation,
+// what the function that it names computes for one, so that the results are the same.
+
+struct FourVectors {
+  __m256d x;
+  __m256d y;
+  __m256d z;
+};
+
+// Four points that lie one after the other.
+[[gnu::target("avx2"), gnu::always_inline]] inline FourVectors LoadFour(const Vector* points) {
+  const double* p = points->data();
+  const __m256d a = _mm256_loadu_pd(p);      // x0 y0 z0 x1
+  const __m256d b = _mm256_loadu_pd(p + 4);  // y1 z1 x2 y2
+  const __m256d c = _mm256_loadu_pd(p + 8);  // z2 x3 y3 z3
+  const __m256d ab = _mm256_permute2f128_pd(a, b, 0x30);
+  const __m256d ac = _mm256_permute2f128_pd(a, c, 0x21);
+  const __m256d bc = _mm256_permute2f128_pd(b, c, 0x30);
+  return {_mm256_shuffle_pd(ab, ac, 0b1010), _mm256_shuffle_pd(ab, bc, 0b0101),
+          _mm256_shuffle_pd(ac, bc, 0b1010)};
+}
+
+// MapFrame::ToMap.
+class FrameOfFour {
+ public:
+  [[gnu::target("avx2"), gnu::always_inline]] explicit FrameOfFour(const MapFrame& frame)
+      : center_{_mm256_set1_pd(frame.center().x()), _mm256_set1_pd(frame.center().y()),
+                _mm256_set1_pd(frame.center().z())},
+        is_plain_(frame.is_plain()),
+        l_(frame.matrix()) {}
+
+  [[gnu::target("avx2"), gnu::always_inline]] FourVectors ToMap(const FourVectors& points) const {
+    __m256d x = _mm256_sub_pd(points.x, center_.x);
+    __m256d y = _mm256_sub_pd(points.y, center_.y);
+    __m256d z = _mm256_sub_pd(points.z, center_.z);
+    if (!is_plain_) {
+      z = _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l_(2, 0)), x),
+                                      _mm256_mul_pd(_mm256_set1_pd(l_(2, 1)), y)),
+                        _mm256_mul_pd(_mm256_set1_pd(l_(2, 2)), z));
+      y = _mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l_(1, 0)), x),
+                        _mm256_mul_pd(_mm256_set1_pd(l_(1, 1)), y));
+      x = _mm256_mul_pd(_mm256_set1_pd(l_(0, 0)), x);
+    }
+    return {x, y, z};
+  }
+
+ private:
+  FourVectors center_;
+  bool is_plain_;
+  Eigen::Matrix3d l_;
+};
+
+// OnCube.
+struct FourOnCube {
+  [[gnu::target("avx2"), gnu::always_inline]] explicit FourOnCube(const FourVectors& v) {
+    const __m256d sign = _mm256_set1_pd(-0.0);
+    const __m256d zero = _mm256_setzero_pd();
+    const __m256d abs_x = _mm256_andnot_pd(sign, v.x);
+    const __m256d abs_y = _mm256_andnot_pd(sign, v.y);
+    const __m256d abs_z = _mm256_andnot_pd(sign, v.z);
+    // Not a number where y or z is not: then the point is out of range. x is always a number.
+    largest = _mm256_max_pd(abs_x, _mm256_max_pd(abs_y, abs_z));
+    const __m256d is_x = _mm256_cmp_pd(abs_x, largest, _CMP_EQ_OQ);
+    const __m256d is_y = _mm256_andnot_pd(is_x, _mm256_cmp_pd(abs_y, largest, _CMP_EQ_OQ));
+    const __m256d along = _mm256_blendv_pd(_mm256_blendv_pd(v.z, v.y, is_y), v.x, is_x);
+    first = _mm256_blendv_pd(_mm256_blendv_pd(v.x, v.z, is_y), v.y, is_x);
+    second = _mm256_blendv_pd(_mm256_blendv_pd(v.y, v.x, is_y), v.z, is_x);
+    face =
+        _mm256_blendv_pd(_mm256_blendv_pd(_mm256_set1_pd(4), _mm256_set1_pd(2), is_y), zero, is_x);
+    face = _mm256_add_pd(face,
+                         _mm256_and_pd(_mm256_cmp_pd(along, zero, _CMP_LT_OQ), _mm256_set1_pd(1)));
+  }
+  __m256d face;
+  __m256d largest;
+  __m256d first;
+  __m256d second;
+};
+
 // component * scale + half, from 0 to n.
-__attribute__((target("avx2"))) inline __m256d AlongSide(__m256d component, __m256d scale,
-                                                         __m256d half, __m256d n) {
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256d AlongSide(__m256d component,
+                                                                     __m256d scale, __m256d half,
+                                                                     __m256d n) {
   const __m256d along = _mm256_add_pd(_mm256_mul_pd(component, scale), half);
   return _mm256_max_pd(_mm256_min_pd(along, n), _mm256_setzero_pd());
 }
 
+// What DirectionMap::PlaceIn makes of a resolution.
+struct GridOfFour {
+  [[gnu::target("avx2"), gnu::always_inline]] explicit GridOfFour(int resolution)
+      : half(_mm256_set1_pd(0.5 * resolution)),
+        cells(_mm256_set1_pd(resolution)),
+        last(_mm256_set1_pd(resolution - 1)),
+        corners(_mm256_set1_pd(resolution + 1)) {}
+  __m256d half;
+  __m256d cells;
+  __m256d last;
+  __m256d corners;
+};
+
+// DirectionMap::PlaceIn, but for the cell.
+struct FourPlaces {
+  [[gnu::target("avx2"), gnu::always_inline]] FourPlaces(const FourVectors& v,
+                                                         const GridOfFour& grid) {
+    const FourOnCube on_cube(v);
+    distance = on_cube.largest;
+    const __m256d scale = _mm256_div_pd(grid.half, distance);
+    const __m256d first = AlongSide(on_cube.first, scale, grid.half, grid.cells);
+    const __m256d second = AlongSide(on_cube.second, scale, grid.half, grid.cells);
+    const __m256d row = _mm256_floor_pd(_mm256_min_pd(first, grid.last));
+    const __m256d column = _mm256_floor_pd(_mm256_min_pd(second, grid.last));
+    along_first = _mm256_sub_pd(first, row);
+    along_second = _mm256_sub_pd(second, column);
+    // A distance out of range, or zero, reads the first gauges and keeps its point.
+    in_range = _mm256_and_pd(_mm256_cmp_pd(distance, _mm256_set1_pd(kMapMinDistance), _CMP_GE_OQ),
+                             _mm256_cmp_pd(distance, _mm256_set1_pd(kMapMaxDistance), _CMP_LE_OQ));
+    const __m256d in_row = _mm256_add_pd(_mm256_mul_pd(on_cube.face, grid.corners), row);
+    const __m256d at = _mm256_add_pd(_mm256_mul_pd(in_row, grid.corners), column);
+    _mm_store_si128(reinterpret_cast<__m128i*>(corner),
+                    _mm256_cvttpd_epi32(_mm256_and_pd(at, in_range)));
+  }
+  alignas(16) int32_t corner[4];
+  __m256d along_first;
+  __m256d along_second;
+  __m256d distance;
+  __m256d in_range;
+};
+
 // a where t is 0, b where it is 1.
-__attribute__((target("avx2"))) inline __m256d Interpolate(__m256d a, __m256d b, __m256d t,
-                                                           __m256d rest) {
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256d Interpolate(__m256d a, __m256d b,
+                                                                       __m256d t, __m256d rest) {
   return _mm256_add_pd(_mm256_mul_pd(a, rest), _mm256_mul_pd(b, t));
 }
 
 // The gauges at four corners, and at the next corner after each. Pairs are loaded together, as four
 // gathers take longer.
 struct GaugesOfRow {
-  __attribute__((target("avx2"))) GaugesOfRow(const double* gauges, const int32_t* at) {
+  [[gnu::target("avx2"), gnu::always_inline]] GaugesOfRow(const double* gauges, const int32_t* at) {
     const __m256d even = _mm256_loadu2_m128d(gauges + at[2], gauges + at[0]);
     const __m256d odd = _mm256_loadu2_m128d(gauges + at[3], gauges + at[1]);
     first = _mm256_unpacklo_pd(even, odd);
@@ -188,6 +308,21 @@ struct GaugesOfRow {
   __m256d second;
 };
 
+// DirectionMap::GaugeAt.
+[[gnu::target("avx2"), gnu::always_inline]] inline __m256d GaugesAt(const FourPlaces& places,
+                                                                    const double* gauges,
+                                                                    int resolution) {
+  const __m256d one = _mm256_set1_pd(1);
+  const GaugesOfRow low(gauges, places.corner);
+  const GaugesOfRow high(gauges + resolution + 1, places.corner);
+  const __m256d s = places.along_first;
+  const __m256d t = places.along_second;
+  const __m256d rest_s = _mm256_sub_pd(one, s);
+  const __m256d rest_t = _mm256_sub_pd(one, t);
+  return Interpolate(Interpolate(low.first, low.second, t, rest_t),
+                     Interpolate(high.first, high.second, t, rest_t), s, rest_s);
+}
+
 // By which of four are kept: the numbers of these, in order, and then anything.
 alignas(16) constexpr int32_t kKeptFirst[16][4] = {
     {0, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {2, 0, 0, 0}, {0, 2, 0, 0},
@@ -196,84 +331,23 @@ alignas(16) constexpr int32_t kKeptFirst[16][4] = {
 
 }  // namespace
 
-// Four points at a time, operation by operation as PlaceOf and OnCube compute, so that the results
-// are the same. Writes the survivors' indices to `end` and moves it beyond them, without a branch
-// on which these are; up to four places beyond are overwritten. Returns how many points it has
-// done.
+// IsCertainlyInside for four points at a time. Writes the survivors' indices to `end` and moves it
+// beyond them, without a branch on which these are; up to four places beyond are overwritten.
+// Returns how many points it has done.
 __attribute__((target("avx2"))) size_t DirectionMap::WriteSurvivorsAvx2(
     std::span<const Vector> points, uint32_t*& end) const {
-  const __m256d center_x = _mm256_set1_pd(center().x());
-  const __m256d center_y = _mm256_set1_pd(center().y());
-  const __m256d center_z = _mm256_set1_pd(center().z());
-  const bool is_plain = frame_.is_plain();
-  const Eigen::Matrix3d l = frame_.matrix();
-  const __m256d sign = _mm256_set1_pd(-0.0);
-  const __m256d zero = _mm256_setzero_pd();
-  const __m256d half = _mm256_set1_pd(half_);
-  const __m256d n = _mm256_set1_pd(n_);
-  const __m256d last = _mm256_set1_pd(n_ - 1);
-  const __m256d least = _mm256_set1_pd(kMapMinDistance);
-  const __m256d largest = _mm256_set1_pd(kMapMaxDistance);
-  const __m256d one = _mm256_set1_pd(1);
-  const __m256d corners = _mm256_set1_pd(n_ + 1);
+  // The indices that are written might change what is a member, so all is taken out of the loop.
+  const FrameOfFour frame(frame_);
+  const GridOfFour grid(n_);
+  const int resolution = n_;
   const double* const gauges = gauges_.data();
   size_t i = 0;
   for (; i + 4 <= points.size(); i += 4) {
-    const double* p = points[i].data();
-    const __m256d a = _mm256_loadu_pd(p);      // x0 y0 z0 x1
-    const __m256d b = _mm256_loadu_pd(p + 4);  // y1 z1 x2 y2
-    const __m256d c = _mm256_loadu_pd(p + 8);  // z2 x3 y3 z3
-    const __m256d ab = _mm256_permute2f128_pd(a, b, 0x30);
-    const __m256d ac = _mm256_permute2f128_pd(a, c, 0x21);
-    const __m256d bc = _mm256_permute2f128_pd(b, c, 0x30);
-    __m256d x = _mm256_sub_pd(_mm256_shuffle_pd(ab, ac, 0b1010), center_x);
-    __m256d y = _mm256_sub_pd(_mm256_shuffle_pd(ab, bc, 0b0101), center_y);
-    __m256d z = _mm256_sub_pd(_mm256_shuffle_pd(ac, bc, 0b1010), center_z);
-    if (!is_plain) {
-      z = _mm256_add_pd(_mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l(2, 0)), x),
-                                      _mm256_mul_pd(_mm256_set1_pd(l(2, 1)), y)),
-                        _mm256_mul_pd(_mm256_set1_pd(l(2, 2)), z));
-      y = _mm256_add_pd(_mm256_mul_pd(_mm256_set1_pd(l(1, 0)), x),
-                        _mm256_mul_pd(_mm256_set1_pd(l(1, 1)), y));
-      x = _mm256_mul_pd(_mm256_set1_pd(l(0, 0)), x);
-    }
-    const __m256d abs_x = _mm256_andnot_pd(sign, x);
-    const __m256d abs_y = _mm256_andnot_pd(sign, y);
-    const __m256d abs_z = _mm256_andnot_pd(sign, z);
-    // Not a number where y or z is not: then the point is out of range. x is always a number.
-    const __m256d m = _mm256_max_pd(abs_x, _mm256_max_pd(abs_y, abs_z));
-    const __m256d is_x = _mm256_cmp_pd(abs_x, m, _CMP_EQ_OQ);
-    const __m256d is_y = _mm256_andnot_pd(is_x, _mm256_cmp_pd(abs_y, m, _CMP_EQ_OQ));
-    const __m256d along = _mm256_blendv_pd(_mm256_blendv_pd(z, y, is_y), x, is_x);
-    const __m256d first = _mm256_blendv_pd(_mm256_blendv_pd(x, z, is_y), y, is_x);
-    const __m256d second = _mm256_blendv_pd(_mm256_blendv_pd(y, x, is_y), z, is_x);
-    __m256d face =
-        _mm256_blendv_pd(_mm256_blendv_pd(_mm256_set1_pd(4), _mm256_set1_pd(2), is_y), zero, is_x);
-    face = _mm256_add_pd(face,
-                         _mm256_and_pd(_mm256_cmp_pd(along, zero, _CMP_LT_OQ), _mm256_set1_pd(1)));
-    const __m256d scale = _mm256_div_pd(half, m);
-    const __m256d along_first = AlongSide(first, scale, half, n);
-    const __m256d along_second = AlongSide(second, scale, half, n);
-    const __m256d row = _mm256_floor_pd(_mm256_min_pd(along_first, last));
-    const __m256d column = _mm256_floor_pd(_mm256_min_pd(along_second, last));
-    const __m256d s = _mm256_sub_pd(along_first, row);
-    const __m256d t = _mm256_sub_pd(along_second, column);
-    // A distance out of range, or zero, reads the first gauges and keeps its point.
-    const __m256d in_range =
-        _mm256_and_pd(_mm256_cmp_pd(m, least, _CMP_GE_OQ), _mm256_cmp_pd(m, largest, _CMP_LE_OQ));
-    const __m256d corner = _mm256_add_pd(
-        _mm256_mul_pd(_mm256_add_pd(_mm256_mul_pd(face, corners), row), corners), column);
-    alignas(16) int32_t at[4];
-    _mm_store_si128(reinterpret_cast<__m128i*>(at),
-                    _mm256_cvttpd_epi32(_mm256_and_pd(corner, in_range)));
-    const GaugesOfRow low(gauges, at);
-    const GaugesOfRow high(gauges + n_ + 1, at);
-    const __m256d rest_s = _mm256_sub_pd(one, s);
-    const __m256d rest_t = _mm256_sub_pd(one, t);
-    const __m256d gauge = Interpolate(Interpolate(low.first, low.second, t, rest_t),
-                                      Interpolate(high.first, high.second, t, rest_t), s, rest_s);
-    const __m256d inside =
-        _mm256_and_pd(_mm256_cmp_pd(_mm256_mul_pd(m, gauge), one, _CMP_LT_OQ), in_range);
+    const FourPlaces places(frame.ToMap(LoadFour(&points[i])), grid);
+    const __m256d gauge = GaugesAt(places, gauges, resolution);
+    const __m256d inside = _mm256_and_pd(
+        _mm256_cmp_pd(_mm256_mul_pd(places.distance, gauge), _mm256_set1_pd(1), _CMP_LT_OQ),
+        places.in_range);
     const auto kept = static_cast<unsigned>(~_mm256_movemask_pd(inside)) & 0b1111;
     const __m128i numbers = _mm_load_si128(reinterpret_cast<const __m128i*>(kKeptFirst[kept]));
     _mm_storeu_si128(reinterpret_cast<__m128i*>(end),

@@ -28,8 +28,14 @@ class KeptBefore {
 
   explicit operator bool() const { return value_ != nullptr; }
   // Requires a journal.
-  T* operator->() { return value_.get(); }
-  const T* operator->() const { return value_.get(); }
+  T* operator->() {
+    HULLD_DCHECK(value_ != nullptr);
+    return value_.get();
+  }
+  const T* operator->() const {
+    HULLD_DCHECK(value_ != nullptr);
+    return value_.get();
+  }
 
  private:
   std::unique_ptr<T> value_;

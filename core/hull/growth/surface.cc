@@ -39,7 +39,7 @@ inline void SetPlane(SurfaceTriangle& t, const Vector& a, const Vector& b, const
   }
   t.normal = Cross(e, f);
   t.offset = t.normal.dot(a);
-  t.slope = static_cast<float>(slope * (1 + 0x1p-20));
+  t.slope = static_cast<float>(slope * kPlaneSlopeRoundUp);
 }
 
 }  // namespace

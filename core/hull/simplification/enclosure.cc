@@ -11,6 +11,7 @@
 
 #include "core/base/check.h"
 #include "core/hull/simplification/subset_hull.h"
+#include "core/numeric/exponent_limits.h"
 
 namespace hulld {
 namespace {
@@ -24,6 +25,8 @@ constexpr int kMostAttempts = 18;
 // A vertex is pushed along the mean of the normals round it; where that is farther than this from a
 // normal, as at the tip of a needle, no farther than this lets.
 constexpr double kLeastCosine = 0.05;
+// Corners farther from the centre, in units of the hull's size, enclose nothing tightly. A choice.
+constexpr double kFarthestCorner = 0x1p20;
 // Vertices of the full hull that are checked at once. As many, spread over all of them, are checked
 // first: most hulls that fail, fail early.
 constexpr size_t kVerticesPerCheck = 1024;
@@ -153,8 +156,8 @@ std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> plane
   std::vector<Corner> dual;
   for (const Plane& plane : planes) {
     const double reach = plane.offset + plane.gap - plane.normal.dot(center);
-    // Where the centre is so near to a plane, dual points are too far apart to tell corners.
-    if (!(reach > 0x1p-300)) return {};
+    // Where the centre is so near to a plane, dual points are too far away to reckon with.
+    if (!(reach > kDualMinReach)) return {};
     dual.push_back({plane.normal / reach, plane.farthest});
   }
   const auto less = [](const Vector& a, const Vector& b) {
@@ -175,8 +178,8 @@ std::vector<Enclosure::Corner> Enclosure::CornersOf(std::span<const Plane> plane
     const Vector& on_facet = hull->vertices()[facet[0]];
     const Vector normal = AreaNormal(hull->vertices(), facet).stableNormalized();
     const Vector corner = normal / normal.dot(on_facet);
-    // A facet of the dual through the origin has its corner at infinity.
-    if (!(LargestComponent(corner) < 0x1p20)) return {};
+    // The corner of a facet of the dual that passes through the origin is at infinity.
+    if (!(LargestComponent(corner) < kFarthestCorner)) return {};
     const size_t place =
         std::lower_bound(points.begin(), points.end(), on_facet, less) - points.begin();
     corners.push_back({corner, dual[place].near});

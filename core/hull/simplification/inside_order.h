@@ -26,7 +26,7 @@ class InsideOrder {
   // The fewest vertices that this order begins with.
   size_t least() const { return least_; }
   // How many of the first vertices bring the error within `error`; `most` if that is not reached
-  // before. Requires most >= least(). Not less than least().
+  // before. Not less than least(). Requires most >= least().
   size_t CountFor(double error, size_t most);
   // Proven: no point of the hull is farther than this from the hull of the first `count` vertices.
   // The caller's length unit. Requires least() <= count <= the hull's vertices.

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/numeric/vector.h"
 
 namespace hulld {
@@ -14,7 +15,10 @@ namespace hulld {
 class UnitScale {
  public:
   // Requires a finite length >= 0. Points whose coordinates are at most that come to at most 1.
-  explicit UnitScale(double largest) { std::frexp(largest, &exponent_); }
+  explicit UnitScale(double largest) {
+    HULLD_CHECK(std::isfinite(largest) && largest >= 0);
+    std::frexp(largest, &exponent_);
+  }
 
   // Exact but for components that become subnormal, which err by at most 2^-1075 each: see
   // kLeastPositive.

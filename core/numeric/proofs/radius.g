@@ -1,4 +1,4 @@
-# Radii, spheres and gauges about centres: factors close to 1 that round up.
+# Radii, spheres and gauges about centres, and slopes of planes: factors close to 1 that round up.
 #
 # radius: the computed |v - c|^2 is the sum of three squares, each of a rounded difference, with
 # one rounding and at most two sums: by hand, as all are positive, |v - c|^2 times factors of d1
@@ -17,9 +17,13 @@ needed = r + 0x1.bb67bp0 * kMinkowskiErrorFactor;
 # gauges: (g_A g_B) factor < g_A + g_B as computed implies it without rounding.
 gauges = (1 + d1) * kCenterProductRoundUp * (1 + d2) / (1 + d3);
 
+# slopes: |e||f| rounds once, once more with the factor, and then to a float.
+slopes = (1 + d1) * kPlaneSlopeRoundUp * (1 + d2) * (1 + to_float);
+
 { |d1| <= kUnitRoundoff /\ |d2| <= kUnitRoundoff /\ |d3| <= kUnitRoundoff /\ |d4| <= kUnitRoundoff
   /\ |d5| <= kUnitRoundoff /\ |d6| <= kUnitRoundoff /\ r in [0, 4]
-  -> radius >= 1 /\ squares >= 1 /\ reach - needed >= 0 /\ gauges >= 1 }
+  /\ |to_float| <= 1b-24
+  -> radius >= 1 /\ squares >= 1 /\ reach - needed >= 0 /\ gauges >= 1 /\ slopes >= 1 }
 
 reach - needed -> (r * (d1 + d3 + d1 * d3))
   + (kSphereErrorFactor * (1 + d2) * (1 + d3) - 0x1.bb67bp0 * kMinkowskiErrorFactor);
@@ -28,3 +32,4 @@ reach - needed -> (r * (d1 + d3 + d1 * d3))
 # Refused: kSphereSquareRoundUp = 0x1.0000000000002p0
 # Refused: kSphereErrorFactor * 0.85
 # Refused: kCenterProductRoundUp = 0x1.0000000000001p0
+# Refused: kPlaneSlopeRoundUp = 0x1.000001p0

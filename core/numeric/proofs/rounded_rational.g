@@ -4,6 +4,19 @@
 needed = 1 / ((1 + c) * (1 + d)) - 1;
 bound = kRoundedRelativeError * (1 + d2);
 
-{ |c| <= 1b-60 /\ |d| <= kUnitRoundoff /\ |d2| <= kUnitRoundoff -> |needed / bound| <= 1 }
+# The distance of a plane in units of the exact one, for its offset and components within 2^-52: by
+# hand, as squares are positive, |n|^2 times a component's factor twice, and roundings of a square
+# and two sums. Then what two such distances, of which the larger is 1 as computed, differ by at
+# most when they are equal, with the rounding of their difference.
+key = (1 + h) / (sqrt((1 + e) * (1 + e) * (1 + d3) * (1 + d4) * (1 + d5)) * (1 + d6)) * (1 + d7);
+apart = 2 * (1 / key - 1) + d8 * (1 + kDepthKeyErrorFactor);
+slack = kDepthKeyErrorFactor * (1 + d9);
+
+{ |c| <= 1b-60 /\ |d| <= kUnitRoundoff /\ |d2| <= kUnitRoundoff
+  /\ |h| <= 1b-52 /\ |e| <= 1b-52 /\ |d3| <= kUnitRoundoff /\ |d4| <= kUnitRoundoff
+  /\ |d5| <= kUnitRoundoff /\ |d6| <= kUnitRoundoff /\ |d7| <= kUnitRoundoff
+  /\ |d8| <= kUnitRoundoff /\ |d9| <= kUnitRoundoff
+  -> |needed / bound| <= 1 /\ |apart / slack| <= 1 }
 
 # Refused: kRoundedRelativeError * 0.5
+# Refused: kDepthKeyErrorFactor * 0.0018

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/base/check.h"
 #include "core/query/body/query_body.h"
 #include "core/query/box_tree.h"
 #include "core/query/placed/placed_hull.h"
@@ -16,7 +17,9 @@ namespace hulld {
 class PlacedBody {
  public:
   // `body` must outlive the result. Requires a valid pose (ValidatePose).
-  PlacedBody(const QueryBody& body, const Pose& X_WB) : body_(&body), X_WB_(X_WB) {}
+  PlacedBody(const QueryBody& body, const Pose& X_WB) : body_(&body), X_WB_(X_WB) {
+    HULLD_DCHECK(IsValidPose(X_WB));
+  }
 
   const QueryBody& body() const { return *body_; }
   const Pose& X_WB() const { return X_WB_; }
@@ -31,6 +34,7 @@ class PlacedPiece {
  public:
   // Requires an index of a piece. The hull of the piece must outlive the result.
   PlacedPiece(const PlacedBody& body, uint32_t index) {
+    HULLD_DCHECK(index < body.body().pieces().size());
     const BodyPiece& piece = body.body().pieces()[index];
     if (body.body().is_hull()) {
       placed_.emplace(*piece.hull, body.X_WB());

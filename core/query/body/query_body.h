@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/check.h"
 #include "core/query/box_tree.h"
 #include "core/query/placed/query_hull.h"
 #include "core/query/terms/pose.h"
@@ -24,7 +25,8 @@ struct BodyPiece {
 // it may be kept as long as the points of the hulls stay the same. Immutable.
 class PieceBoxes {
  public:
-  // Requires valid poses (ValidatePose). Cost: O(n log n) and six support points for each piece.
+  // Requires valid poses (ValidatePose; PlacedHull checks them). Cost: O(n log n) and six support
+  // points for each piece.
   explicit PieceBoxes(std::span<const BodyPiece> pieces);
 
   // By the index of the piece; the boxes of empty hulls are empty.
@@ -46,9 +48,12 @@ class PieceBoxes {
 class QueryBody {
  public:
   // A body of these pieces, perhaps none. Requires valid poses, and boxes that were made of the
-  // same pieces, or of others with the same hulls as point sets.
+  // same pieces, or of others with the same hulls as point sets (unchecked but for the size: only
+  // making the boxes again would tell).
   QueryBody(std::vector<BodyPiece> pieces, std::shared_ptr<const PieceBoxes> boxes)
-      : is_hull_(false), pieces_(std::move(pieces)), boxes_(std::move(boxes)) {}
+      : is_hull_(false), pieces_(std::move(pieces)), boxes_(std::move(boxes)) {
+    HULLD_DCHECK(boxes_ != nullptr && boxes_->tree().empty() == pieces_.empty());
+  }
   // The same; makes the boxes.
   explicit QueryBody(std::vector<BodyPiece> pieces);
   // A hull. Cost: six support points.

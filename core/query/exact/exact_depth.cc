@@ -11,15 +11,13 @@
 
 #include "core/base/check.h"
 #include "core/base/stop_poll.h"
+#include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/rational.h"
 #include "core/query/floating/expanding_surface.h"
 
 namespace hulld {
 namespace {
-
-// Keys this close, relatively, are compared exactly: some 2^-50 of error each.
-constexpr double kRelativeKeyError = 0x1p-40;
 
 // The plane n.w = offset of a facet, n outward; `key` is its signed distance from the origin in
 // floating point, in units of a common power of two.
@@ -168,7 +166,7 @@ class ExactExpansion {
 
   static bool IsNearer(const Plane& f, const Plane& g) {
     const double slack =
-        kRelativeKeyError * std::max(std::abs(f.key), std::abs(g.key)) + kDepthKeyMin;
+        kDepthKeyErrorFactor * std::max(std::abs(f.key), std::abs(g.key)) + kDepthKeyMin;
     if (f.key < g.key - slack) return true;
     if (f.key > g.key + slack) return false;
     return CompareDistance(f, g) < 0;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "core/base/check.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/integer.h"
 
@@ -25,6 +26,7 @@ int BitWidth(Int128 magnitude) {
 
 // |x| < 2^exponent. Requires x finite.
 int ExponentAbove(double x) {
+  HULLD_DCHECK(std::isfinite(x));
   const BinaryDouble d = Decompose(x);
   return d.exponent + static_cast<int>(std::bit_width(d.magnitude));
 }
@@ -53,6 +55,7 @@ int RotatedBits(const SmallFrame::Side& side, int norm_bits, int exponent) {
 }  // namespace
 
 bool FindSmallRotation(const std::array<double, 4>& q, SmallRotation& rotation) {
+  HULLD_DCHECK(IsValidPose({q, Vector::Zero()}));
   int exponent = kAboveAllExponents;
   int above = -kAboveAllExponents - 60;
   for (const double component : q) {

@@ -70,7 +70,7 @@ class LiveHull {
   Mark Now() const;
 
   // The hull as it was at `mark`, for questions. Requires a mark of this object, or one up to which
-  // it was copied. Cost: O(1).
+  // it was copied (unchecked: a mark does not tell whose it is). Cost: O(1).
   std::shared_ptr<const QueryHull> VersionAt(const Mark& mark) const;
   // At least the vertices of the hull at `mark`, and no point outside it. Cost: O(n).
   std::vector<Vector> PointsAt(const Mark& mark) const;
@@ -100,7 +100,8 @@ class LiveHull {
  private:
   using Parts = std::shared_ptr<const LiveParts>;
 
-  // What serves a mark best. Requires the mutex.
+  // What serves a mark best. Requires the mutex (unchecked: a std::mutex does not tell who holds
+  // it).
   const Parts& PartsFor(const Mark& mark) const;
   LiveParts Prepared(const LiveParts& before, const Mark& mark);
   static void AddShared(const LiveParts& parts, std::vector<Shared>& shared);

@@ -60,28 +60,40 @@ class QueryHull {
   double radius() const { return radius_; }
   // Every non-zero coordinate is a multiple of 2^exponent; kAboveAllExponents when there is none.
   int exponent() const { return exponent_; }
-  // Points that span the hull: one more than its dimension, affinely independent.
-  std::span<const uint32_t> spanning() const { return base_->spanning(); }
+  // Points that span the hull: one more than its dimension, affinely independent. Requires a hull
+  // that is not empty.
+  std::span<const uint32_t> spanning() const {
+    HULLD_DCHECK(!empty());
+    return base_->spanning();
+  }
   // Points, with repetitions, whose mean is in the relative interior of the hull and not near its
-  // boundary unless the hull is flat or a needle.
-  std::span<const uint32_t> inner_points() const { return base_->inner(); }
+  // boundary unless the hull is flat or a needle. Requires a hull that is not empty.
+  std::span<const uint32_t> inner_points() const {
+    HULLD_DCHECK(!empty());
+    return base_->inner();
+  }
 
   // A point farthest along n: its computed value is the largest of all but for the rounding of two
   // values. Requires a hull that is not empty. Cost: SupportMap's, for each of a few maps.
   SupportPoint Farthest(const PlainVector& n) const {
+    HULLD_DCHECK(!empty());
     const SupportPoint found = base_->support().Farthest(n);
     return growth_ == nullptr ? found : FartherInGrowth(n, found);
   }
   // All points, ascending, that may be exactly farthest along a direction whose components differ
   // from those of n by up to `error`, when two values are ordered rightly if they differ by more
-  // than `slack`.
+  // than `slack`. Requires a hull that is not empty.
   std::vector<uint32_t> Candidates(const PlainVector& n, double error, double slack) const;
 
-  // About center(), of the base alone; BoundsAt tells of the whole hull.
-  const CenterBounds& center_bounds() const { return base_->center_bounds(); }
+  // About center(), of the base alone; BoundsAt tells of the whole hull. Both require a hull that
+  // is not empty.
+  const CenterBounds& center_bounds() const {
+    HULLD_DCHECK(!empty());
+    return base_->center_bounds();
+  }
   // Upper bounds as CenterBounds gives them, of the whole hull, along n at its place.
   CenterBounds::Bounds BoundsAt(const CenterBounds::Place& place, const PlainVector& n) const {
-    const CenterBounds::Bounds bounds = base_->center_bounds().At(place);
+    const CenterBounds::Bounds bounds = center_bounds().At(place);
     return growth_ == nullptr ? bounds : BoundsWithGrowth(bounds, n);
   }
 

@@ -34,9 +34,10 @@ constexpr int64_t kNone = std::numeric_limits<int64_t>::max();
   values = (x * px + y * py) + z * pz;
 }
 
-// The farthest of whole blocks; the first of equal ones. Requires one block.
+// The farthest of whole blocks; the first of equal ones. Requires at least one block.
 [[gnu::always_inline]] inline SupportPoint ScanWhole(std::span<const SupportBlock> blocks,
                                                      const PlainVector& n) {
+  HULLD_DCHECK(!blocks.empty());
   Lanes x, y, z, best, values;
   Broadcast(n.x, x);
   Broadcast(n.y, y);

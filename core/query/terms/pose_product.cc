@@ -33,9 +33,17 @@ Quaternion Scaled(const Quaternion& q) {
   return scaled;
 }
 
-// Hamilton's product, each component rounded once but for terms of the size of u^2. Requires both
-// scaled.
+// Whether its largest component is in [1/2, 1).
+bool IsScaled(const Quaternion& q) {
+  double largest = 0;
+  for (const double component : q) largest = std::max(largest, std::abs(component));
+  return largest >= 0.5 && largest < 1;
+}
+
+// Hamilton's product, each component rounded once but for terms of the size of u^2. Requires that
+// both are scaled.
 Quaternion Product(const Quaternion& p, const Quaternion& q) {
+  HULLD_DCHECK(IsScaled(p) && IsScaled(q));
   const auto sum = [](DoubleDouble a, DoubleDouble b, DoubleDouble c, DoubleDouble d) {
     return ((a + b) + (c + d)).high;
   };
@@ -46,8 +54,9 @@ Quaternion Product(const Quaternion& p, const Quaternion& q) {
           sum(times(0, 3), times(1, 2), -times(2, 1), times(3, 0))};
 }
 
-// R(q) v / |q|^2 for a scaled q.
+// R(q) v / |q|^2. Requires that q is scaled.
 std::array<DoubleDouble, 3> Rotated(const Quaternion& q, const Vector& v) {
+  HULLD_DCHECK(IsScaled(q));
   const auto times = [&](int i, int j) { return ExactProduct(q[i], q[j]); };
   const auto twice = [](const DoubleDouble& x) { return DoubleDouble{2 * x.high, 2 * x.low}; };
   const DoubleDouble ww = times(0, 0), xx = times(1, 1), yy = times(2, 2), zz = times(3, 3);

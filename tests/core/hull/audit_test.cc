@@ -247,6 +247,20 @@ TEST(AuditContainment, NamesThePointOutside) {
   EXPECT_NE(std::string(status.message()).find("13"), std::string::npos) << status;
 }
 
+// A normal of 2^63 times such differences exceeds the largest double, so the filter must leave
+// these to integers: one product is -infinity, which would put the point far below the facet.
+TEST(AuditContainment, NamesThePointOutsideWhereProductsOverflow) {
+  constexpr double kSize = 0x1p965;
+  const std::vector<Vector> corners = {Vector(-1.5, 2.5, -1) * kSize, Vector(-1, -1, 2) * kSize,
+                                       Vector(2, -1, -1) * kSize, Vector(-1.5, -1, -1) * kSize};
+  const Hull hull = BuildHull(corners);
+  const std::vector<Vector> inside = {corners[0] + Vector(0.7, -1.5, 0.7) * 0x1p962};
+  EXPECT_TRUE(AuditContainment(hull, inside).ok());
+  // Above the plane x + y + z = 0 of the first three.
+  const std::vector<Vector> outside = {corners[0] + Vector(0.7, -1.35, 0.7) * 0x1p962};
+  EXPECT_FALSE(AuditContainment(hull, outside).ok());
+}
+
 TEST(AuditContainment, IsExactForFlatHulls) {
   const std::vector<Vector> segment = {{0, 0, 0}, {3, 3, 3}};
   const Hull hull = BuildHull(segment);

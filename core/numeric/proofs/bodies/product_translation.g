@@ -1,7 +1,7 @@
 # A component of R(q) p / |q|^2 + t in double-double arithmetic (double_double.h), in units of the
 # largest component of p plus that of t, of which the parts are P and 1 - P; |q| = 1. An operation
-# errs by d of its result: 3 u^2 a sum, 5 u^2 a product, 15 u^2 a quotient, with 0.01 u^2 for higher
-# powers of u (Joldes, Muller and Popescu 2017).
+# errs by d of its result: 3 u^2 a sum, 5 u^2 a product, 17 u^2 a quotient, with 0.01 u^2 for higher
+# powers of u; double_double.h says whose theorems these are.
 #
 # By hand: a numerator n is a sum of four exact products of components of q whose sizes sum to at
 # most 1, added two by two, so it errs by two roundings of sums: 6.1 u^2; the squared norm, a sum of
@@ -23,7 +23,7 @@ exact = exact_turned + t;
   /\ |R1| <= 1 /\ |R2| <= 1 /\ |R3| <= 1
   /\ |n1| <= 0x6.2p-106 /\ |n2| <= 0x6.2p-106 /\ |n3| <= 0x6.2p-106
   /\ |m1| <= 0x3.03p-106 /\ |m2| <= 0x3.03p-106 /\ |i| <= 0x6.2p-106
-  /\ |q1| <= 0xf.03p-106 /\ |q2| <= 0xf.03p-106 /\ |q3| <= 0xf.03p-106
+  /\ |q1| <= 0x11.03p-106 /\ |q2| <= 0x11.03p-106 /\ |q3| <= 0x11.03p-106
   /\ |p1| <= 0x5.03p-106 /\ |p2| <= 0x5.03p-106 /\ |p3| <= 0x5.03p-106
   /\ |a1| <= 0x3.03p-106 /\ |a2| <= 0x3.03p-106 /\ |a3| <= 0x3.03p-106
   -> |inverse - 1| <= 0x6.2p-106 /\ |sum - exact| <= kProductTranslationError }
