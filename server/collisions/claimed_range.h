@@ -9,10 +9,10 @@
 
 namespace hulld::server {
 
-// A range of work, [0, count), that several threads claim block by block, from its end. Unlike
-// SharedLoop nobody waits: whoever gives back the last block goes on with what comes after, and a
-// thread that comes when all is claimed finds nothing, also once the next range has begun or this
-// one's owner has ended its work. Any thread may claim at any time.
+// A range of work, [0, count), that several threads claim block by block, from its end. Unlike in
+// SharedLoop nobody waits: the thread that gives back the last block goes on with what comes after,
+// and a thread that comes when all is claimed finds nothing, even when the next range has begun or
+// this one's owner has ended its work. Any thread may claim at any time.
 class ClaimedRange {
  public:
   struct Block {
@@ -22,8 +22,8 @@ class ClaimedRange {
     bool empty() const { return begin == end; }
   };
 
-  // Begins a range. Whoever claims of it sees what was written before. Requires that the range
-  // before was given back.
+  // Begins a range. A thread that claims a block of it sees what was written before. Requires that
+  // the range before was given back.
   void Begin(uint32_t count) {
     HULLD_CHECK(left_.load(std::memory_order_relaxed) == 0);
     left_.store(count, std::memory_order_relaxed);
@@ -32,6 +32,7 @@ class ClaimedRange {
 
   // The next block, of `most` at most; empty when all is claimed. Requires most > 0.
   Block Claim(uint32_t most) {
+    HULLD_CHECK(most > 0);
     uint32_t end = unclaimed_.load(std::memory_order_acquire);
     // Nothing that was read before counts: where a range has begun meanwhile, the exchange shows it
     // whole, and the block is one of it.
