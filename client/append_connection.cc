@@ -1,8 +1,8 @@
 #include "client/append_connection.h"
 
-#include <grpc/support/log.h>
-
 #include <utility>
+
+#include "client/check.h"
 
 namespace hulld {
 
@@ -36,7 +36,7 @@ void AppendConnection::Write(std::shared_ptr<const v1::AppendPointsRequest> requ
   const v1::AppendPointsRequest* message = request.get();
   {
     const std::lock_guard lock(mutex_);
-    GPR_ASSERT(writing_ == nullptr);
+    HULLD_CLIENT_CHECK(writing_ == nullptr);
     writing_ = std::move(request);
   }
   StartWrite(message);
@@ -66,7 +66,7 @@ bool AppendConnection::ended() {
 }
 
 grpc::Status AppendConnection::Close() {
-  GPR_ASSERT(ended());
+  HULLD_CLIENT_CHECK(ended());
   ReleaseHold();
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return done_; });
@@ -75,7 +75,7 @@ grpc::Status AppendConnection::Close() {
 
 const grpc::ClientContext& AppendConnection::context() {
   const std::lock_guard lock(mutex_);
-  GPR_ASSERT(done_);
+  HULLD_CLIENT_CHECK(done_);
   return context_;
 }
 

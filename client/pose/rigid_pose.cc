@@ -2,14 +2,12 @@
 
 #include <cmath>
 
+#include "client/pose/vector3.h"
+
 namespace hulld {
 namespace {
 
 using Vector = std::array<double, 3>;
-
-Vector Cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 // p turned by the quaternion w + v, of any length: p + 2 (w v x p + v x (v x p)) / |q|^2.
 Vector Turn(double w, const Vector& v, const Vector& p) {

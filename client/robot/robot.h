@@ -84,11 +84,13 @@ std::vector<double> AllJointValues(const Robot& robot, std::span<const double> f
 std::vector<double> RestValues(const Robot& robot);
 
 // X_WL of each link, where the root stands at X_WB. In floating point: each joint on the way adds
-// an error of a few units of roundoff. Requires a value for each joint, as AllJointValues gives.
+// an error of a few units of roundoff. Requires a value for each joint (unchecked: callers pass on
+// what AllJointValues gives).
 std::vector<RigidPose> LinkPoses(const Robot& robot, const RigidPose& X_WB,
                                  std::span<const double> joint_values);
 
 // What is wrong with the values for the limits of the joints, a sentence each; empty: nothing.
+// Requires the same.
 std::vector<std::string> LimitProblems(const Robot& robot, std::span<const double> joint_values);
 
 }  // namespace hulld

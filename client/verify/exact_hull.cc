@@ -7,6 +7,8 @@
 #include <cmath>
 #include <string>
 
+#include "client/check.h"
+
 namespace hulld {
 namespace {
 
@@ -94,6 +96,7 @@ BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& length
 // p_W = R(q) p / |q|^2 + t, and for a piece R(q_B) (R(q_P) p / |q_P|^2 + t_P) / |q_B|^2 + t_B.
 ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const CommonExponent& lengths)
     : xyz(hull.xyz), vertices(std::move(given)) {
+  HULLD_CLIENT_CHECK(vertices != nullptr && vertices->size() == xyz.size() / 3);
   const BigRotation outer = ToIntegers(Rotation(hull.pose));
   const BigVector t = ToIntegers(Translation(hull.pose), lengths);
   if (hull.in_body == nullptr) {
@@ -112,6 +115,7 @@ ExactHull::ExactHull(const PlacedVertices& hull, BigVertices given, const Common
 BigVector ExactHull::World(size_t i) const { return Product(rows, (*vertices)[i]) + shift; }
 
 std::pair<BigInteger, BigInteger> ExactHull::Extent(const BigVector& n) const {
+  HULLD_CLIENT_CHECK(!vertices->empty());
   const BigVector turned = Combination(n, rows);
   BigInteger least = Dot(turned, vertices->front());
   BigInteger greatest = least;

@@ -38,7 +38,8 @@ BigVertices ToIntegers(std::span<const double> xyz, const CommonExponent& length
 // A hull in the world, exactly: p_W = (rows p + shift) / scale in integers, all lengths at one
 // power of two. That of a quaternion cancels.
 struct ExactHull {
-  // Requires CheckPlacement and, of the same exponent that serves it, its vertices.
+  // Requires CheckPlacement, an exponent that serves it (IncludeLengths), and its vertices in that
+  // exponent (their number is checked, their values are not: only making them again would tell).
   ExactHull(const PlacedVertices& hull, BigVertices vertices, const CommonExponent& lengths);
 
   // scale p_W of vertex i.

@@ -1,9 +1,9 @@
 #include "client/verify/exact_vector.h"
 
-#include <absl/base/macros.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "client/check.h"
 
 namespace hulld {
 namespace {
@@ -53,14 +53,14 @@ bool IsInTriangle(const BigVector& a, const BigVector& b, const BigVector& c) {
 }  // namespace
 
 void CommonExponent::Include(double number) {
-  ABSL_ASSERT(std::isfinite(number));
+  HULLD_CLIENT_CHECK(std::isfinite(number));
   if (number != 0) exponent_ = std::min(exponent_, Split(number).exponent);
 }
 
 BigInteger CommonExponent::ToInteger(double number) const {
   const Parts parts = Split(number);
   if (parts.mantissa == 0) return 0;
-  ABSL_ASSERT(parts.exponent >= exponent_);
+  HULLD_CLIENT_CHECK(parts.exponent >= exponent_);
   return BigInteger(parts.mantissa) << (parts.exponent - exponent_);
 }
 

@@ -32,13 +32,12 @@ inline bool IsZero(const BigVector& a) { return a[0] == 0 && a[1] == 0 && a[2] =
 // Numbers as integers times a common power of two.
 class CommonExponent {
  public:
-  // Widens the exponent so that it serves this number, too. Requires that it is finite
-  // (checked in debug builds).
+  // Widens the exponent so that it serves this number, too. Requires that it is finite.
   void Include(double number);
   void Include(std::span<const double> numbers) {
     for (const double number : numbers) Include(number);
   }
-  // number / 2^exponent. Requires that it was included (checked in debug builds).
+  // number / 2^exponent. Requires that it was included.
   BigInteger ToInteger(double number) const;
   int exponent() const { return exponent_; }
 

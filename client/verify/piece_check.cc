@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/check.h"
 #include "client/verify/certificate_check.h"
 
 namespace hulld {
@@ -109,8 +110,9 @@ class ExactPieces {
     return absl::OkStatus();
   }
 
-  // Requires a piece that is not empty, and an exponent that serves all.
+  // Requires a piece that is not empty, and an exponent that serves all (CommonExponent checks it).
   const ExactHull& At(size_t i, const CommonExponent& lengths) {
+    HULLD_CLIENT_CHECK(!empty(i));
     if (exact_[i]) return *exact_[i];
     const std::span<const double> xyz = pieces_[i].xyz;
     BigVertices& vertices = vertices_[xyz.data()];

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "client/check.h"
+#include "client/pose/vector3.h"
+
 namespace hulld {
 namespace {
 
@@ -13,12 +16,7 @@ constexpr double kSlack = 0x1p-40;
 // Farther than any two points of a unit box.
 constexpr double kFar = 2;
 
-Point3 Minus(const Point3& a, const Point3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double Dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double Norm(const Point3& a) { return std::sqrt(Dot(a, a)); }
-Point3 Cross(const Point3& a, const Point3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 double DistanceToBox(const Point3& low, const Point3& high, const Point3& p) {
   Point3 gap;
@@ -51,6 +49,7 @@ bool MeetsBox(const Point3& low, const Point3& high, const Point3& apex, const P
 }  // namespace
 
 UnitBox::UnitBox(std::span<const double> xyz) {
+  HULLD_CLIENT_CHECK(xyz.size() >= 3);
   double largest = 0;
   for (const double x : xyz) largest = std::max(largest, std::abs(x));
   std::frexp(largest, &exponent_);
@@ -80,6 +79,9 @@ double UnitBox::LengthToUnit(double length) const { return std::ldexp(length, -e
 
 TriangleTree::TriangleTree(std::span<const Point3> points, std::span<const Triangle> triangles)
     : points_(points), triangles_(triangles), order_(triangles.size()) {
+  for (const Triangle& triangle : triangles) {
+    HULLD_CLIENT_CHECK(*std::max_element(triangle.begin(), triangle.end()) < points.size());
+  }
   std::iota(order_.begin(), order_.end(), 0);
   if (!order_.empty()) Build(0, static_cast<uint32_t>(order_.size()));
 }

@@ -53,7 +53,8 @@ class TriangleTree {
   // the question; whether one did.
   bool AnyNear(const Point3& p, double distance, const Visitor& settles) const;
   // The same of the triangles that the ray from `apex` through p meets at p or beyond. Requires
-  // that they are apart by much more than the slack, 2^-40.
+  // that the two are apart by much more than the slack, 2^-40 (unchecked: replies may hold points
+  // that are not; then a triangle may be left out, and what depends on it is not shown).
   bool AnyBeyond(const Point3& apex, const Point3& p, const Visitor& settles) const;
 
  private:

@@ -293,8 +293,7 @@ absl::StatusOr<Answer> TextbookCheck::Finish() {
 
 absl::StatusOr<Answer> CheckCollision(const PlacedHull& a, const PlacedHull& b,
                                       const QueryOptions& options, PairCache* cache) {
-  const bool valid = options.tolerance >= 0 && !options.max_error.has_value();
-  if (valid && options.WantsRelationOnly() && !a.empty() && !b.empty()) {
+  if (IsValidRelationOnly(options) && !a.empty() && !b.empty()) {
     return RelationOnly(a, b, options, cache);
   }
   return AnswerAny(a, b, options, cache);

@@ -43,7 +43,8 @@ class UnaryCall : public grpc::ServerUnaryReactor {
     return call;
   }
 
-  // Ends the call with what `work` gives, on `pool`. Requires that it did not end.
+  // Ends the call with what `work` gives, on `pool`. Requires that it has not ended (unchecked: a
+  // call that has ended may be gone).
   template <typename Work>
   void EndOn(WorkerPool& pool, Work work) {
     pool.Submit(

@@ -88,7 +88,7 @@ absl::StatusOr<bool> BatchStream::ResolveHulls(bool may_wait) {
 }
 
 absl::Status BatchStream::Prepare() {
-  is_plain_ = options_.WantsRelationOnly() && !table_.has_bodies();
+  is_plain_ = AsksRelationsOfHulls(options_, table_);
   return absl::OkStatus();
 }
 

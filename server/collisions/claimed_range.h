@@ -32,6 +32,7 @@ class ClaimedRange {
 
   // The next block, of `most` at most; empty when all is claimed. Requires most > 0.
   Block Claim(uint32_t most) {
+    HULLD_CHECK(most > 0);
     uint32_t end = unclaimed_.load(std::memory_order_acquire);
     // Nothing that was read before counts: where a range has begun meanwhile, the exchange shows it
     // whole, and the block is one of it.

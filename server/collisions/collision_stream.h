@@ -17,6 +17,7 @@
 #include "server/call/pulled_stream.h"
 #include "server/collisions/claimed_range.h"
 #include "server/collisions/placed/placement_table.h"
+#include "server/collisions/placed/query_settings.h"
 #include "server/process/task_pool.h"
 #include "server/process/worker_pool.h"
 #include "server/shards/shards.h"
@@ -75,8 +76,7 @@ class CollisionStream
   void OnSent() override;
 
   bool IsQuick() const;
-  // Whether every pair is one of hulls, and the relation is all that is wanted.
-  bool IsPlain() const { return options_.WantsRelationOnly() && !table_.has_bodies(); }
+  bool IsPlain() const { return AsksRelationsOfHulls(options_, table_); }
   void Handle();
   absl::Status HandleMessage();
   absl::Status OfMessage(const absl::Status& status) const;

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <utility>
 
+#include "core/base/check.h"
 #include "server/process/synchronization.h"
 #include "server/process/worker_pool.h"
 
@@ -23,6 +24,7 @@ class SharedLoop {
   // several threads at a time. Requires step > 0.
   static void Run(WorkerPool& helpers, size_t most_helpers, size_t count, size_t step,
                   std::function<void(size_t begin, size_t end)> work) {
+    HULLD_CHECK(step > 0);
     const auto loop = std::make_shared<SharedLoop>(count, step, std::move(work));
     const size_t steps = (count + step - 1) / step;
     for (size_t i = 1; i < steps && i <= most_helpers; ++i) {

@@ -41,7 +41,7 @@ class WorkerPool {
   };
 
   void Work();
-  // Requires the mutex.
+  // Requires the mutex (unchecked: a Mutex does not tell).
   void NoteWaiting();
 
   std::optional<PoolMetrics> metrics_;

@@ -3,6 +3,7 @@
 #include <iterator>
 #include <utility>
 
+#include "core/base/check.h"
 #include "server/contract/stopped_call.h"
 #include "server/shards/shards.h"
 
@@ -34,6 +35,7 @@ bool WaitingCalls::Wait::EndIfStopped() {
 }
 
 WaitingCalls::~WaitingCalls() {
+  HULLD_CHECK(count() == 0);
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client/hullctl/picture/mesh_thinning.h"
+#include "client/pose/vector3.h"
 
 namespace hulld {
 namespace {
@@ -25,14 +26,6 @@ constexpr size_t kMaxTriangles = 7000;
 constexpr int kShades = 24;
 
 using Point = std::array<double, 3>;
-
-double Dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Point Cross(const Point& a, const Point& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-Point Minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 
 Point Normalized(const Point& a) {
   const double length = std::sqrt(Dot(a, a));

@@ -451,12 +451,8 @@ ExitCode Check(const Invocation& run, const CheckArguments& arguments) {
   return RobotCheck(run, arguments, *std::move(model)).Run();
 }
 
-}  // namespace
-
-void AddRobotCheckCommand(Command robot, Invocation* invocation) {
-  auto arguments = std::make_shared<CheckArguments>();
-  Command command = robot.AddCommand("check", "Ask what collides on a robot, and with a scene");
-  AddRobotArguments(command, &arguments->robot);
+// Which pairs of links are asked about.
+void AddPairOptions(Command command, CheckArguments* arguments) {
   command
       .AddText(
           "--srdf", &arguments->srdf,
@@ -465,6 +461,10 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
       .Completes(ValueKind::kFile);
   command.AddFlag("--adjacent", &arguments->adjacent,
                   "Without --srdf: ask about links that a joint connects, too");
+}
+
+// How the robot stands, once or many times.
+void AddWaypointOptions(Command command, const std::shared_ptr<CheckArguments>& arguments) {
   command
       .AddText(
           "--joints", &arguments->joints,
@@ -485,6 +485,10 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
           },
           "Where the robot stands: [w,x,y,z,]x,y,z (default: the origin)")
       .ValueName("POSE");
+}
+
+// What stands around the robot.
+void AddSceneOptions(Command command, CheckArguments* arguments) {
   command
       .AddText(
           "--scene", &arguments->scene,
@@ -495,8 +499,9 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
       .AddRepeated("--ignore", &arguments->ignored,
                    "Leave out two links, or a link and a placement; may be given again")
       .ValueName("NAME,NAME");
-  command.AddFlag("--first", &arguments->first, "End at the first waypoint in contact");
-  AddWantedOptions(command, &arguments->wishes);
+}
+
+void DescribeRobotCheck(Command command) {
   command.SetDetails(
       std::string(kRobotHelp) +
       "\nPairs of shapes on one link are never asked about. Without --srdf, links that a joint\n"
@@ -515,6 +520,20 @@ void AddRobotCheckCommand(Command robot, Invocation* invocation) {
         "hullctl robot check arm.urdf --joints path.csv --scene cell.yaml --ignore "
         "base_link,floor"},
        {"Until the first contact", "hullctl robot check arm.urdf --joints path.csv --first"}});
+}
+
+}  // namespace
+
+void AddRobotCheckCommand(Command robot, Invocation* invocation) {
+  auto arguments = std::make_shared<CheckArguments>();
+  Command command = robot.AddCommand("check", "Ask what collides on a robot, and with a scene");
+  AddRobotArguments(command, &arguments->robot);
+  AddPairOptions(command, arguments.get());
+  AddWaypointOptions(command, arguments);
+  AddSceneOptions(command, arguments.get());
+  command.AddFlag("--first", &arguments->first, "End at the first waypoint in contact");
+  AddWantedOptions(command, &arguments->wishes);
+  DescribeRobotCheck(command);
   command.OnGiven([=] { invocation->action = [=] { return Check(*invocation, *arguments); }; });
 }
 

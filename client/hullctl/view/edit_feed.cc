@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "client/check.h"
 #include "client/hullctl/printing/json.h"
 #include "client/point_messages.h"
 
@@ -57,6 +58,7 @@ bool EditQueue::Add(ViewEdit edit) {
 }
 
 ViewEdit EditQueue::Take() {
+  HULLD_CLIENT_CHECK(!empty());
   const auto last = last_.find(edits_.front().hull_id);
   if (last->second == edits_.begin()) last_.erase(last);
   ViewEdit edit = std::move(edits_.front());

@@ -132,7 +132,7 @@ class Lookout {
       if (IsInTetrahedron(t, o_)) return true;
       double farthest = 0;
       int off = -1;
-      Vector outwards;
+      Vector outwards = Vector::Zero();
       for (int i = 0; i < 4; ++i) {
         const Vector& p = t[(i + 1) % 4];
         n = (t[(i + 2) % 4] - p).cross(t[(i + 3) % 4] - p);

@@ -102,48 +102,61 @@ struct Square {
          (square.half_s * std::abs(a) + square.half_t * std::abs(b));
 }
 
+// Directions (s, t) in the middle of a square, in all lanes.
+struct Middle {
+  [[gnu::always_inline]] explicit Middle(const Square& square) {
+    Broadcast(square.s, s);
+    Broadcast(square.t, t);
+  }
+  [[gnu::always_inline]] void Evaluate(const FacePoints& points, size_t i, Lanes& values) const {
+    Lanes a, b, c;
+    Load(&points.a[i], a);
+    Load(&points.b[i], b);
+    Load(&points.c[i], c);
+    values = c + (s * a + t * b);
+  }
+  Lanes s;
+  Lanes t;
+};
+
+// The first of the points that are farthest along the middle.
+[[gnu::always_inline]] inline size_t FarthestAlong(const Middle& middle, const FacePoints& points) {
+  Lanes best, values;
+  Broadcast(-INFINITY, best);
+  for (size_t i = 0; i < points.size; i += 4) {
+    middle.Evaluate(points, i, values);
+    best = values > best ? values : best;
+  }
+  const double largest = std::max(std::max(best[0], best[1]), std::max(best[2], best[3]));
+  Lanes wanted;
+  Broadcast(largest, wanted);
+  for (size_t i = 0; i < points.size; i += 4) {
+    middle.Evaluate(points, i, values);
+    const auto same = values >= wanted;
+    if ((same[0] | same[1] | same[2] | same[3]) != 0) {
+      return i + (same[0] != 0 ? 0 : same[1] != 0 ? 1 : same[2] != 0 ? 2 : 3);
+    }
+  }
+  return 0;
+}
+
 // Keeps those points of `from` that may be farthest along a direction in the square. `bound`: what
 // a lead may err.
 [[gnu::always_inline]] inline void FilterWith(const FacePoints& from, const Square& square,
                                               double bound, FacePoints& to) {
-  Lanes s, t, half_s, half_t, a, b, c, least;
-  Broadcast(square.s, s);
-  Broadcast(square.t, t);
+  const Middle middle(square);
+  const size_t q = FarthestAlong(middle, from);
+  Lanes half_s, half_t, least, q_a, q_b, q_c;
   Broadcast(square.half_s, half_s);
   Broadcast(square.half_t, half_t);
   Broadcast(-bound, least);
-  // The point to compare with is the farthest along the middle.
-  Lanes best;
-  Broadcast(-INFINITY, best);
-  for (size_t i = 0; i < from.size; i += 4) {
-    Load(&from.a[i], a);
-    Load(&from.b[i], b);
-    Load(&from.c[i], c);
-    const Lanes value = c + (s * a + t * b);
-    best = value > best ? value : best;
-  }
-  const double largest = std::max(std::max(best[0], best[1]), std::max(best[2], best[3]));
-  size_t q = 0;
-  Lanes wanted;
-  Broadcast(largest, wanted);
-  for (size_t i = 0; i < from.size; i += 4) {
-    Load(&from.a[i], a);
-    Load(&from.b[i], b);
-    Load(&from.c[i], c);
-    const Lanes value = c + (s * a + t * b);
-    const auto same = value >= wanted;
-    if ((same[0] | same[1] | same[2] | same[3]) != 0) {
-      q = i + (same[0] != 0 ? 0 : same[1] != 0 ? 1 : same[2] != 0 ? 2 : 3);
-      break;
-    }
-  }
-  Lanes q_a, q_b, q_c;
   Broadcast(from.a[q], q_a);
   Broadcast(from.b[q], q_b);
   Broadcast(from.c[q], q_c);
   to.Reserve(from.size);
   size_t size = 0;
   for (size_t i = 0; i < from.size; i += 4) {
+    Lanes a, b, c;
     Load(&from.a[i], a);
     Load(&from.b[i], b);
     Load(&from.c[i], c);
@@ -154,7 +167,7 @@ struct Square {
     Lanes size_b = b;
     Absolute(size_a);
     Absolute(size_b);
-    const Lanes lead = (c + (s * a + t * b)) + (half_s * size_a + half_t * size_b);
+    const Lanes lead = (c + (middle.s * a + middle.t * b)) + (half_s * size_a + half_t * size_b);
     const auto keep = lead > least;
     if ((keep[0] | keep[1] | keep[2] | keep[3]) == 0) continue;
     for (size_t k = i; k < i + 4; ++k) {

@@ -73,6 +73,13 @@ struct OptionNames {
 // NaN, or a tolerance > 0 beside what needs the exact relation.
 absl::Status ValidateOptions(const QueryOptions& options, const OptionNames& names = {});
 
+// Whether these want the relation alone and are such as ValidateOptions passes; false where that is
+// not seen at once. Cost: a few comparisons, so that most pairs need no status.
+inline bool IsValidRelationOnly(const QueryOptions& options) {
+  // Nothing that needs the exact relation is wanted, so any tolerance of at least 0 will do.
+  return options.tolerance >= 0 && !options.max_error.has_value() && options.WantsRelationOnly();
+}
+
 }  // namespace hulld
 
 #endif  // HULLD_CORE_QUERY_TERMS_QUERY_OPTIONS_H_

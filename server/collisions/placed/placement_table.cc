@@ -225,6 +225,7 @@ absl::Status PlacementTable::ResolveFrom(Shards& shards, KnownPlaced& known,
 
 absl::Status PlacementTable::ResolveSome(Shards& shards, const QueryOptions& options,
                                          std::span<const size_t> hulls) {
+  HULLD_CHECK(by_hull_begin_.size() == ids_.size() + 1);
   std::vector<std::string> ids;
   ids.reserve(hulls.size());
   for (const size_t k : hulls) ids.push_back(ids_[k]);
@@ -361,7 +362,9 @@ PlacedHull PlacementTable::Place(size_t i) const {
 }
 
 const absl::Status& PlacementTable::problem(size_t i) const {
-  return IsMalformed(i) ? malformed_.at(i) : hulls_[hull_of_[i]].status();
+  if (IsMalformed(i)) return malformed_.at(i);
+  HULLD_CHECK(hull_of_[i] < hulls_.size());
+  return hulls_[hull_of_[i]].status();
 }
 
 bool PlacementTable::hull_changed(size_t i) const { return HasHull(i) && changed_[hull_of_[i]]; }
@@ -376,6 +379,7 @@ void PlacementTable::Move(size_t i, const Pose& X_WH) {
 }
 
 void PlacementTable::SetPose(size_t i, const Pose& X_WH) {
+  HULLD_DCHECK(IsValidPose(X_WH));
   if (!HasHull(i)) return;
   WritePose(X_WH, i, &poses_);
   malformed_.erase(i);
@@ -434,6 +438,7 @@ void PlacementTable::EncodeHull(size_t k, v1::HullVersion* version) const {
 
 void PlacementTable::EncodeProblem(size_t i, v1::PlacementProblem* message) const {
   const absl::Status& status = problem(i);
+  HULLD_CHECK(!status.ok());
   message->set_placement(static_cast<uint32_t>(i));
   message->set_code(ToGrpc(status.code()));
   message->set_message(std::string(status.message()));

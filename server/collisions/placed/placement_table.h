@@ -108,7 +108,7 @@ class PlacementTable {
   absl::Status ResolveSome(Shards& shards, const QueryOptions& options,
                            std::span<const size_t> hulls);
 
-  // Requires a valid pose.
+  // Requires a valid pose (ValidatePose).
   void Move(size_t i, const Pose& X_WH);
   // The same in two steps. Several threads at a time may place different placements again.
   void SetPose(size_t i, const Pose& X_WH);
@@ -117,11 +117,15 @@ class PlacementTable {
   // The hulls; each once, but one that packed placements name several times.
   std::span<const std::string> hull_ids() const { return ids_; }
   // What hull k is, or why there is none. Requires that it was resolved.
-  const absl::StatusOr<HullView>& hull(size_t k) const { return hulls_[k]; }
+  const absl::StatusOr<HullView>& hull(size_t k) const {
+    HULLD_DCHECK(k < hulls_.size());
+    return hulls_[k];
+  }
   // Lists the placements by their hull, for placements_of and ResolveSome. Cost: O(n).
   void SortByHull();
   // The placements of hull k. Requires SortByHull.
   std::span<const uint32_t> placements_of(size_t k) const {
+    HULLD_DCHECK(k + 1 < by_hull_begin_.size());
     return std::span(by_hull_).subspan(by_hull_begin_[k],
                                        by_hull_begin_[k + 1] - by_hull_begin_[k]);
   }

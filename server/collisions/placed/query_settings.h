@@ -6,6 +6,7 @@
 #include "core/query/collision.h"
 #include "hulld/v1/collision.pb.h"
 #include "server/call/call_lifetime.h"
+#include "server/collisions/placed/placement_table.h"
 #include "server/settings/config.h"
 
 namespace hulld::server {
@@ -19,6 +20,12 @@ absl::StatusOr<QueryOptions> MakeQueryOptions(v1::Method method, const v1::Wante
 
 // OK, or INVALID_ARGUMENT naming the field: what is for pairs of hulls alone.
 absl::Status ValidateForBodies(const QueryOptions& options);
+
+// Whether all that is wanted are relations, and all that is placed are hulls: the most frequent
+// call, which has a path of its own.
+inline bool AsksRelationsOfHulls(const QueryOptions& options, const PlacementTable& table) {
+  return options.WantsRelationOnly() && !table.has_bodies();
+}
 
 // Whether the relation of this hull and another such takes no longer than moving the bytes of the
 // question and of the answer does, so that one of gRPC's threads may find it.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "server/contract/status_map.h"
+#include "server/contract/stopped_call.h"
 #include "server/process/random_id.h"
 #include "server/store/postgres/batch_statements.h"
 #include "server/store/postgres/postgres_store.h"
@@ -130,7 +131,7 @@ absl::StatusOr<Counted> CountAll(Session& session, const char* statement,
   Counted all;
   std::string last;
   for (uint64_t counted = kCountedAtOnce; counted == kCountedAtOnce;) {
-    if (should_stop && should_stop()) {
+    if (Stopped(should_stop)) {
       return absl::CancelledError("told to end before all was counted; nothing was changed");
     }
     const absl::StatusOr<Rows> part =
@@ -290,7 +291,7 @@ absl::Status PostgresStore::BeginPatiently() {
     has_begun = status.ok() || has_begun;
     if (status.ok()) status = OpenFirstReaders();
     if (!IsLost(status) || std::chrono::steady_clock::now() + pause >= deadline) return status;
-    if (options_.should_stop && options_.should_stop()) {
+    if (Stopped(options_.should_stop)) {
       return absl::CancelledError("told to end before the database took it");
     }
     std::this_thread::sleep_for(pause);
@@ -349,7 +350,7 @@ absl::StatusOr<Rows> PostgresStore::RunPatiently(Session& session, const std::st
     absl::StatusOr<Rows> rows = session.Run(sql);
     if (SqlState(rows.status()) != kLockNotAvailable) return rows;
     if (is_first) spdlog::info("another hulld changes the tables: this one waits until that ends");
-    if (options_.should_stop && options_.should_stop()) {
+    if (Stopped(options_.should_stop)) {
       return absl::CancelledError("told to end before another hulld had changed the tables");
     }
   }
@@ -500,7 +501,7 @@ absl::Status PostgresStore::WaitForTurn() {
           owner.ok() && !owner->empty() ? *owner : "it just starts",
           options_.shared ? "" : "; with --take-over it would not");
     }
-    if (options_.should_stop && options_.should_stop()) {
+    if (Stopped(options_.should_stop)) {
       return absl::CancelledError("told to end before its turn came");
     }
     std::this_thread::sleep_for(pause);
