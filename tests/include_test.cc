@@ -75,6 +75,7 @@ constexpr std::string_view kRooms[] = {
     "core/base",
     "core/numeric",
     "core/hull",
+    "core/hull/surface",
     "core/hull/growth",
     "core/hull/simplification",
     "core/query/terms",

@@ -5,8 +5,8 @@
 #include <span>
 
 #include "core/base/stop_poll.h"
-#include "core/hull/growth/surface.h"
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/surface.h"
+#include "core/hull/surface/vertex_table.h"
 
 namespace hulld {
 

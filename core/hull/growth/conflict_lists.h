@@ -10,8 +10,8 @@
 #include "core/base/scratch_list.h"
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/point_blocks.h"
-#include "core/hull/growth/surface.h"
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/surface.h"
+#include "core/hull/surface/vertex_table.h"
 
 namespace hulld {
 

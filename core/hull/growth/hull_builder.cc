@@ -14,10 +14,10 @@
 #include "core/base/stop_poll.h"
 #include "core/hull/growth/block_insertion.h"
 #include "core/hull/growth/canonical_snapshot.h"
-#include "core/hull/growth/kept_before.h"
 #include "core/hull/growth/polygon_boundary.h"
-#include "core/hull/growth/surface.h"
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/kept_before.h"
+#include "core/hull/surface/surface.h"
+#include "core/hull/surface/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <vector>
 
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/vertex_table.h"
 #include "core/numeric/orientation.h"
 
 namespace hulld {

@@ -1,11 +1,11 @@
-#ifndef HULLD_CORE_HULL_GROWTH_SURFACE_CHECK_H_
-#define HULLD_CORE_HULL_GROWTH_SURFACE_CHECK_H_
+#ifndef HULLD_CORE_HULL_SURFACE_SURFACE_CHECK_H_
+#define HULLD_CORE_HULL_SURFACE_SURFACE_CHECK_H_
 
 #include <span>
 
 #include "core/base/check.h"
-#include "core/hull/growth/surface.h"
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/surface.h"
+#include "core/hull/surface/vertex_table.h"
 
 namespace hulld {
 
@@ -46,4 +46,4 @@ inline void DcheckStar([[maybe_unused]] const Surface& surface,
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_HULL_GROWTH_SURFACE_CHECK_H_
+#endif  // HULLD_CORE_HULL_SURFACE_SURFACE_CHECK_H_

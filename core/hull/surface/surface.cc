@@ -1,11 +1,11 @@
-#include "core/hull/growth/surface.h"
+#include "core/hull/surface/surface.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "core/base/check.h"
-#include "core/hull/growth/surface_check.h"
+#include "core/hull/surface/surface_check.h"
 #include "core/numeric/error_bounds.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/orientation.h"

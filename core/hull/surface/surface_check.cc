@@ -1,4 +1,4 @@
-#include "core/hull/growth/surface_check.h"
+#include "core/hull/surface/surface_check.h"
 
 #include <cmath>
 #include <cstddef>

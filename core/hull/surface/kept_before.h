@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_HULL_GROWTH_KEPT_BEFORE_H_
-#define HULLD_CORE_HULL_GROWTH_KEPT_BEFORE_H_
+#ifndef HULLD_CORE_HULL_SURFACE_KEPT_BEFORE_H_
+#define HULLD_CORE_HULL_SURFACE_KEPT_BEFORE_H_
 
 #include <memory>
 #include <utility>
@@ -43,4 +43,4 @@ class KeptBefore {
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_HULL_GROWTH_KEPT_BEFORE_H_
+#endif  // HULLD_CORE_HULL_SURFACE_KEPT_BEFORE_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_HULL_GROWTH_CHUNKED_VECTOR_H_
-#define HULLD_CORE_HULL_GROWTH_CHUNKED_VECTOR_H_
+#ifndef HULLD_CORE_HULL_SURFACE_CHUNKED_VECTOR_H_
+#define HULLD_CORE_HULL_SURFACE_CHUNKED_VECTOR_H_
 
 #include <algorithm>
 #include <array>
@@ -147,4 +147,4 @@ class ChunkedVector {
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_HULL_GROWTH_CHUNKED_VECTOR_H_
+#endif  // HULLD_CORE_HULL_SURFACE_CHUNKED_VECTOR_H_

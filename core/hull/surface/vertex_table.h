@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_HULL_GROWTH_VERTEX_TABLE_H_
-#define HULLD_CORE_HULL_GROWTH_VERTEX_TABLE_H_
+#ifndef HULLD_CORE_HULL_SURFACE_VERTEX_TABLE_H_
+#define HULLD_CORE_HULL_SURFACE_VERTEX_TABLE_H_
 
 #include <algorithm>
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/base/check.h"
-#include "core/hull/growth/chunked_vector.h"
+#include "core/hull/surface/chunked_vector.h"
 #include "core/numeric/vector.h"
 
 namespace hulld {
@@ -186,4 +186,4 @@ class VertexTable {
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_HULL_GROWTH_VERTEX_TABLE_H_
+#endif  // HULLD_CORE_HULL_SURFACE_VERTEX_TABLE_H_

@@ -1,4 +1,4 @@
-#include "core/hull/growth/direction_map.h"
+#include "core/hull/surface/direction_map.h"
 
 #include <gtest/gtest.h>
 

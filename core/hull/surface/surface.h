@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_HULL_GROWTH_SURFACE_H_
-#define HULLD_CORE_HULL_GROWTH_SURFACE_H_
+#ifndef HULLD_CORE_HULL_SURFACE_SURFACE_H_
+#define HULLD_CORE_HULL_SURFACE_SURFACE_H_
 
 #include <array>
 #include <cmath>
@@ -12,10 +12,10 @@
 #include "core/base/check.h"
 #include "core/base/scratch_list.h"
 #include "core/base/stop_poll.h"
-#include "core/hull/growth/chunked_vector.h"
-#include "core/hull/growth/direction_map.h"
-#include "core/hull/growth/kept_before.h"
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/chunked_vector.h"
+#include "core/hull/surface/direction_map.h"
+#include "core/hull/surface/kept_before.h"
+#include "core/hull/surface/vertex_table.h"
 #include "core/numeric/exponent_limits.h"
 #include "core/numeric/vector.h"
 
@@ -379,4 +379,4 @@ class Surface {
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_HULL_GROWTH_SURFACE_H_
+#endif  // HULLD_CORE_HULL_SURFACE_SURFACE_H_

@@ -1,4 +1,4 @@
-#include "core/hull/growth/surface_check.h"
+#include "core/hull/surface/surface_check.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/hull/growth/surface.h"
-#include "core/hull/growth/vertex_table.h"
+#include "core/hull/surface/surface.h"
+#include "core/hull/surface/vertex_table.h"
 #include "tests/core/checks/point_sets.h"
 
 namespace hulld {

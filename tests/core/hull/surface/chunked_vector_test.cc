@@ -1,4 +1,4 @@
-#include "core/hull/growth/chunked_vector.h"
+#include "core/hull/surface/chunked_vector.h"
 
 #include <gtest/gtest.h>
 

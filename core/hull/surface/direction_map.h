@@ -1,5 +1,5 @@
-#ifndef HULLD_CORE_HULL_GROWTH_DIRECTION_MAP_H_
-#define HULLD_CORE_HULL_GROWTH_DIRECTION_MAP_H_
+#ifndef HULLD_CORE_HULL_SURFACE_DIRECTION_MAP_H_
+#define HULLD_CORE_HULL_SURFACE_DIRECTION_MAP_H_
 
 #include <algorithm>
 #include <array>
@@ -163,4 +163,4 @@ class DirectionMap {
 
 }  // namespace hulld
 
-#endif  // HULLD_CORE_HULL_GROWTH_DIRECTION_MAP_H_
+#endif  // HULLD_CORE_HULL_SURFACE_DIRECTION_MAP_H_
