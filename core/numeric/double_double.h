@@ -10,8 +10,8 @@ namespace hulld {
 // of the upper. What each operation errs by, in relation to its result, stands above it, with u the
 // unit roundoff. It holds as long as nothing overflows or underflows. Sources: Joldes, Muller and
 // Popescu 2017, Tight and Rigorous Error Bounds for Basic Building Blocks of Double-Word Arithmetic
-// (JMP), and Muller and Rideau 2022, Formalization of Double-Word Arithmetic, and Comments on it
-// (MR), who checked its theorems by a proof assistant.
+// (JMP); Muller and Rideau 2022, Formalization of Double-Word Arithmetic (MR), who checked the
+// theorems of JMP by a proof assistant.
 struct DoubleDouble {
   double high = 0;
   double low = 0;
@@ -19,7 +19,7 @@ struct DoubleDouble {
   DoubleDouble operator-() const { return {-high, -low}; }
 };
 
-// 3 u^2 + 13 u^3. Algorithm 6 and theorem 3.1 of JMP.
+// 3 u^2 + 13 u^3. Algorithm 6 of JMP, and its theorem.
 inline DoubleDouble operator+(const DoubleDouble& x, const DoubleDouble& y) {
   const SumWithError s = TwoSum(x.high, y.high);
   const SumWithError t = TwoSum(x.low, y.low);
@@ -30,8 +30,8 @@ inline DoubleDouble operator+(const DoubleDouble& x, const DoubleDouble& y) {
 
 inline DoubleDouble operator-(const DoubleDouble& x, const DoubleDouble& y) { return x + -y; }
 
-// 5 u^2. Algorithm 10 of JMP, whose theorem 5.1 has 7 u^2; MR show 5 u^2. Where y is one double, so
-// that its lower part is 0, the steps are those of algorithm 8: 3 u^2 (theorem 4.2).
+// 5 u^2. Algorithm 10 of JMP, who show 7 u^2; MR show 5 u^2. Where y is one double, so that its
+// lower part is 0, the steps are those of algorithm 8: 3 u^2.
 inline DoubleDouble operator*(const DoubleDouble& x, const DoubleDouble& y) {
   const SumWithError c = TwoProduct(x.high, y.high);
   const SumWithError z = FastTwoSum(c.sum, c.error + (x.high * y.low + x.low * y.high));
