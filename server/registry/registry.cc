@@ -11,7 +11,7 @@
 #include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/settings/cpu_limit.h"
 #include "server/settings/memory_limit.h"
 

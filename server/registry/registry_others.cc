@@ -7,7 +7,7 @@
 
 #include "core/base/check.h"
 #include "server/contract/stopped_call.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

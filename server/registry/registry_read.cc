@@ -11,8 +11,8 @@
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/stopped_call.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/registry/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "server/contract/error_info.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

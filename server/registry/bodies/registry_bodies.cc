@@ -10,8 +10,8 @@
 #include "core/base/check.h"
 #include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
-#include "server/registry/body.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/body.h"
+#include "server/registry/catalog/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
-#define HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_TYPES_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_TYPES_H_
 
 #include <absl/status/statusor.h>
 
@@ -271,4 +271,4 @@ using Reply = std::function<void(absl::StatusOr<T>)>;
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_REGISTRY_TYPES_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_REGISTRY_TYPES_H_

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
-#define HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_
 
 #include <absl/status/statusor.h>
 
@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/registry/registry_types.h"
 
 namespace hulld::server {
 
@@ -131,4 +131,4 @@ class KnownHulls {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_KNOWN_HULLS_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_KNOWN_HULLS_H_

@@ -1,11 +1,11 @@
-#include "server/registry/change_feed.h"
+#include "server/registry/catalog/change_feed.h"
 
 #include <algorithm>
 #include <mutex>
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/registry/registered_hull.h"
+#include "server/registry/catalog/registered_hull.h"
 
 namespace hulld::server {
 namespace {

@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
-#define HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_CHANGE_FEED_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_CHANGE_FEED_H_
 
 #include <chrono>
 #include <cstdint>
@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "server/process/synchronization.h"
-#include "server/registry/body.h"
+#include "server/registry/catalog/body.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
-#include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 #include "server/store/store.h"
 
@@ -253,4 +253,4 @@ class ChangeFeed {
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_CHANGE_FEED_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_CHANGE_FEED_H_

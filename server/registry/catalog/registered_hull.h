@@ -1,5 +1,5 @@
-#ifndef HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
-#define HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
+#ifndef HULLD_SERVER_REGISTRY_CATALOG_REGISTERED_HULL_H_
+#define HULLD_SERVER_REGISTRY_CATALOG_REGISTERED_HULL_H_
 
 #include <absl/status/status.h>
 #include <absl/status/statusor.h>
@@ -17,11 +17,11 @@
 #include "core/hull/growth/hull_builder.h"
 #include "core/query/placed/live_hull.h"
 #include "server/process/synchronization.h"
-#include "server/registry/hull_state.h"
+#include "server/registry/catalog/hull_state.h"
+#include "server/registry/catalog/registry_types.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/memory/served_hull.h"
-#include "server/registry/registry_types.h"
 #include "server/store/hull_record.h"
 
 namespace hulld::server {
@@ -207,4 +207,4 @@ absl::Status RevisionMismatch(const HullRecord& record, uint64_t if_revision);
 
 }  // namespace hulld::server
 
-#endif  // HULLD_SERVER_REGISTRY_REGISTERED_HULL_H_
+#endif  // HULLD_SERVER_REGISTRY_CATALOG_REGISTERED_HULL_H_
