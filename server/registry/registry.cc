@@ -23,14 +23,6 @@ Limits WithMemoryLimit(Limits limits) {
   return limits;
 }
 
-// A sixteenth of the limit, beside what it holds of points.
-size_t MostRecords(uint64_t memory_limit) {
-  return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
-}
-
-// Of the limit, what bodies that nobody uses may take: one in so many.
-constexpr uint64_t kBodiesShare = 16;
-
 // The rest is for writers, whose hulls stay in memory where no store keeps them.
 uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
   return memory_limit / (store.keeps_hulls() ? 2 : 4);
@@ -41,17 +33,12 @@ uint64_t ReadersShare(uint64_t memory_limit, const Store& store) {
 Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
                    std::optional<PoolMetrics> preparers, std::optional<PoolMetrics> loaders)
     : store_(store),
-      is_cache_(store.finds_records()),
       limits_(WithMemoryLimit(limits)),
       writers_(writers),
       memory_(limits_.memory_limit, ReadersShare(limits_.memory_limit, store), mutex_),
-      hulls_(store.keeps_hulls(), memory_),
+      catalog_(store, limits_, memory_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_) {
-  if (is_cache_) {
-    hulls_.KeepAtMost(MostRecords(limits_.memory_limit));
-    bodies_.KeepAtMost(limits_.memory_limit / kBodiesShare);
-  }
   preparers_.emplace(1, preparers);
   loaders_.emplace(std::max(1, DefaultThreads() - 1), loaders);
   if (!store.is_shared()) return;
@@ -72,31 +59,29 @@ Registry::~Registry() {
   loaders_.reset();
   // Closed sessions may hold hulls for longer.
   const std::lock_guard lock(mutex_);
-  for (const auto& [id, hull] : hulls_.entries()) {
+  for (const auto& [id, hull] : catalog_.hulls().entries()) {
     if (hull.awake() != nullptr) hull.awake()->account.Close();
   }
 }
 
 absl::Status Registry::Load() {
   Locked locked(mutex_);
-  HULLD_CHECK(hulls_.size() == 0 && revision_ == 0);
-  revision_ = store_.revision();
-  feed_.Begin(revision_);
+  catalog_.Begin(store_.revision());
+  feed_.Begin(catalog_.revision());
   absl::Status status;
-  if (is_cache_) {
-    kept_hulls_ = store_.totals().hulls;
-    vertex_count_ = store_.totals().vertices;
-    kept_bodies_ = store_.totals().bodies;
+  if (catalog_.is_cache()) {
+    catalog_.SetTotals(store_.totals());
   } else {
     status = store_.ForEachHull([this](const std::string& id, absl::StatusOr<StoredHull> stored) {
-      AddStored(id, stored);
+      catalog_.AddStored(id, stored);
     });
   }
-  if (cache_.damaged > 0) {
-    spdlog::error("{} of {} hulls are damaged", cache_.damaged, hulls_.size());
+  if (catalog_.statistics().damaged > 0) {
+    spdlog::error("{} of {} hulls are damaged", catalog_.statistics().damaged,
+                  catalog_.hulls().size());
   }
   if (!status.ok()) return status;
-  if (!is_cache_) status = LoadBodies(locked);
+  if (!catalog_.is_cache()) status = LoadBodies(locked);
   if (!status.ok() || !store_.is_shared()) return status;
   // What was read was not of one moment.
   const SteadyClock::time_point asked = SteadyClock::now();
@@ -107,67 +92,29 @@ absl::Status Registry::Load() {
   return followed;
 }
 
-Registry::HullPointer Registry::Find(const std::string& id) {
-  std::optional<HullPointer> hull = hulls_.Ask(id);
-  HULLD_CHECK(hull.has_value() || bodies_.contains(id));
-  return std::move(hull).value_or(nullptr);
-}
-
-Registry::HullPointer Registry::FindVisible(const std::string& id) {
-  HullPointer hull = Find(id);
-  return hull != nullptr && hull->state.visible() ? hull : nullptr;
-}
-
-// Takes a hull that is gone out of sight and out of memory, and tells its sessions why.
-void Registry::Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason) {
-  HULLD_CHECK(hull->state.gone());
-  hulls_.Erase(hull);
-  for (auto& [number, on_gone] : hull->watches) {
-    locked.Afterwards([on_gone = std::move(on_gone), reason] { on_gone(reason); });
-  }
-  hull->watches.clear();
-  hull->DiscardAll(locked);
-  hull->account.Close();
-}
-
-absl::Status Registry::CheckHullCount() const {
-  const uint64_t elsewhere = held_elsewhere_ ? held_elsewhere_() : 0;
-  const uint64_t hulls = HullCount();
-  const uint64_t bodies = BodyCount();
-  if (hulls + bodies + elsewhere < limits_.max_hulls) return absl::OkStatus();
-  std::string held = absl::StrCat("the store holds ", hulls, " hulls");
-  if (bodies > 0) absl::StrAppend(&held, " and ", bodies, " bodies");
-  if (elsewhere > 0) absl::StrAppend(&held, ", and other shards ", elsewhere);
-  return LimitExceeded(held, limits_.max_hulls, "max-hulls");
-}
-
-void Registry::Publish(uint64_t revision) {
-  HULLD_CHECK(revision > revision_);
-  revision_ = revision;
-}
-
 void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
   WhenFresh(done, [=, this](Locked& locked) { CreateLocked(locked, id, if_absent, done); });
 }
 
 void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                             const Reply<CreateResult>& done) {
-  if (!IsKnown(id)) {
+  if (!catalog_.IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
   }
-  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+  if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
     body->waiting.push_back([=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
     return;
   }
-  const HullPointer existing = Find(id);
+  const HullPointer existing = catalog_.Find(id);
   if (existing == nullptr) {
     return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
       if (Committer::IsSuperseded(hull.status())) {
         return Again(later, [=, this](Locked& again) { CreateLocked(again, id, if_absent, done); });
       }
       if (!hull.ok()) return Answer<CreateResult>(later, done, hull.status());
-      Answer<CreateResult>(later, done, CreateResult{revision_, (*hull)->committed.record, true});
+      Answer<CreateResult>(later, done,
+                           CreateResult{catalog_.revision(), (*hull)->committed.record, true});
     });
   }
   if (existing->state.changing_life()) {
@@ -182,31 +129,31 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
   } else if (existing->state.damaged()) {
     Answer<CreateResult>(locked, done, existing->state.damage());
   } else {
-    Answer<CreateResult>(locked, done, CreateResult{revision_, existing->committed.record, false});
+    Answer<CreateResult>(locked, done,
+                         CreateResult{catalog_.revision(), existing->committed.record, false});
   }
 }
 
 // There must be no such hull, which Insert checks.
 void Registry::CreateNew(Locked& locked, const std::string& id,
                          const std::function<void(Locked&, absl::StatusOr<HullPointer>)>& done) {
-  if (bodies_.contains(id)) return done(locked, BodyExists(id));
-  if (absl::Status s = CheckHullCount(); !s.ok()) return done(locked, s);
+  if (catalog_.bodies().contains(id)) return done(locked, BodyExists(id));
+  if (absl::Status s = catalog_.CheckHullCount(); !s.ok()) return done(locked, s);
   Change change;
   change.begins = true;
   change.hull.record.hull_id = id;
-  const HullPointer hull = hulls_.Insert(change.hull, HullState::Creating());
-  ++creating_;
+  const HullPointer hull = catalog_.hulls().Insert(change.hull, HullState::Creating());
+  catalog_.BeginCreatingHull();
   Submit(locked, hull, std::move(change),
          [this, hull, done](Locked& later, const absl::Status& status, const Change& creation) {
-           --creating_;
+           catalog_.EndCreatingHull(status.ok());
            if (!status.ok()) {
-             Forget(later, hull, status);
+             catalog_.Forget(later, hull, status);
              return done(later, status);
            }
            hull->SetStored(creation.hull);
-           ++kept_hulls_;
-           Publish(hull->committed.record.revision);
-           NoteChange(*hull);
+           catalog_.Publish(hull->committed.record.revision);
+           catalog_.NoteChange(*hull);
            feed_.NoteCreated(later, hull);
            done(later, hull);
          });
@@ -219,12 +166,12 @@ void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision
 
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
-  if (!IsKnown(id)) {
+  if (!catalog_.IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
   }
-  const HullPointer hull = Find(id);
-  if (hull == nullptr) return Answer<uint64_t>(locked, done, NoSuchHull(id));
+  const HullPointer hull = catalog_.Find(id);
+  if (hull == nullptr) return Answer<uint64_t>(locked, done, catalog_.NoSuchHull(id));
   if (!hull->state.quiet()) {
     hull->exclusive.push_back(
         [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
@@ -247,12 +194,12 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
            }
            if (!status.ok()) return Answer<uint64_t>(later, done, status);
            const uint64_t revision = deletion.revision;
-           Publish(revision);
-           vertex_count_ -= hull->committed.record.vertex_count;
-           --kept_hulls_;
-           NoteChange(*hull);
+           catalog_.Publish(revision);
+           catalog_.NoteVertices(hull->committed.record.vertex_count, 0);
+           catalog_.NoteHullEnded();
+           catalog_.NoteChange(*hull);
            feed_.NoteDeleted(later, hull->committed.record, revision);
-           Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
+           catalog_.Forget(later, hull, Gone(hull->committed.record.hull_id, "deleted"));
            Answer<uint64_t>(later, done, revision);
          });
 }
@@ -270,15 +217,15 @@ void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
 void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                              const Reply<ReplaceResult>& done) {
   const std::string& id = replacement->hull_id;
-  if (!IsKnown(id)) {
+  if (!catalog_.IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
   }
-  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+  if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
     body->waiting.push_back([=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
     return;
   }
-  const HullPointer former = Find(id);
+  const HullPointer former = catalog_.Find(id);
   if (former != nullptr && !former->state.quiet()) {
     former->exclusive.push_back(
         [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
@@ -308,9 +255,9 @@ absl::Status Registry::CheckReplacement(const RegisteredHull* former,
         v1::ERROR_REASON_REVISION_MISMATCH,
         {{"hull_id", id}, {"if_revision", *if_revision}, {"current_revision", uint64_t{0}}});
   }
-  if (!replacement.create_if_absent) return NoSuchHull(id);
-  if (bodies_.contains(id)) return BodyExists(id);
-  return CheckHullCount();
+  if (!replacement.create_if_absent) return catalog_.NoSuchHull(id);
+  if (catalog_.bodies().contains(id)) return BodyExists(id);
+  return catalog_.CheckHullCount();
 }
 
 // former: null when there is none. Takes the replacement's vertices.
@@ -338,8 +285,8 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
   Change change = MakeChange(former.get(), *replacement);
   HullPointer hull;
   if (former == nullptr) {
-    hull = hulls_.Insert(change.hull, HullState::Creating());
-    ++creating_;
+    hull = catalog_.hulls().Insert(change.hull, HullState::Creating());
+    catalog_.BeginCreatingHull();
   } else {
     // Unknown to others until it takes the place of the former.
     hull = std::make_shared<RegisteredHull>(change.hull, HullState::Creating(),
@@ -378,19 +325,18 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
   if (status.ok()) hull->SetStored(change.hull);
   const HullRecord& record = hull->committed.record;
   if (former == nullptr) {
-    --creating_;
-    if (!status.ok()) Forget(locked, hull, status);
+    catalog_.EndCreatingHull(status.ok());
+    if (!status.ok()) catalog_.Forget(locked, hull, status);
   } else if (status.ok()) {
     hull->state.Commit();
-    vertex_count_ -= former->committed.record.vertex_count;
-    Forget(locked, former, Gone(record.hull_id, "replaced"));
-    hulls_.Insert(hull);
+    catalog_.NoteVertices(former->committed.record.vertex_count, 0);
+    catalog_.Forget(locked, former, Gone(record.hull_id, "replaced"));
+    catalog_.hulls().Insert(hull);
   }
   if (!status.ok()) return status;
-  vertex_count_ += record.vertex_count;
-  if (former == nullptr) ++kept_hulls_;
-  Publish(record.revision);
-  NoteChange(*hull);
+  catalog_.NoteVertices(0, record.vertex_count);
+  catalog_.Publish(record.revision);
+  catalog_.NoteChange(*hull);
   if (former == nullptr) {
     feed_.NoteCreated(locked, hull);
   } else {
@@ -398,7 +344,7 @@ absl::StatusOr<ReplaceResult> Registry::FinishReplacement(Locked& locked, const 
   }
   hull->NoteUse();
   memory_.Evict(locked);
-  return ReplaceResult{revision_, record, former == nullptr};
+  return ReplaceResult{catalog_.revision(), record, former == nullptr};
 }
 
 // Submits a change that follows all changes of its hull submitted before; `hull` is in the state
@@ -426,7 +372,7 @@ void Registry::Submit(Locked& locked, const HullPointer& hull, Change change,
                         memory_.Evict(later);
                       }
                       Advance(later, hull);
-                      hulls_.RestSome();
+                      catalog_.hulls().RestSome();
                     });
 }
 
@@ -455,31 +401,6 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   writers_.Submit([this, hull] { RunNextChunk(hull); }, next.session.client);
 }
 
-void Registry::NoteChange(const RegisteredHull& hull) {
-  recent_changes_.Note(hull.committed.record.hull_id);
-}
-
-// Adds what the store holds under an ID of which no hull is here: at rest, or as damaged.
-void Registry::AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored) {
-  if (stored.ok()) {
-    hulls_.AddResting(*stored);
-    if (!is_cache_) vertex_count_ += stored->record.vertex_count;
-    return;
-  }
-  spdlog::error("{}", std::string(stored.status().message()));
-  StoredHull nothing;
-  nothing.record.hull_id = id;
-  MarkDamaged(*hulls_.Insert(nothing, HullState::Present()), stored.status());
-}
-
-// Several threads may find the same damage.
-void Registry::MarkDamaged(RegisteredHull& hull, const absl::Status& damage) {
-  if (hull.state.damaged() || hull.state.life() != HullState::Life::kPresent) return;
-  hull.state.Damage(damage);
-  NoteChange(hull);
-  ++cache_.damaged;
-}
-
 HoldStatistics Registry::Holds() const {
   const std::lock_guard lock(mutex_);
   return mutex_.Statistics();
@@ -487,13 +408,13 @@ HoldStatistics Registry::Holds() const {
 
 RegistrySizes Registry::Sizes() const {
   const std::lock_guard lock(mutex_);
-  return {revision_, HullCount() - creating_, vertex_count_, kept_bodies_};
+  return catalog_.Sizes();
 }
 
 CacheStatistics Registry::Cache() const {
   const std::lock_guard lock(mutex_);
   const MemoryStatistics memory = memory_.Statistics();
-  CacheStatistics cache = cache_;
+  CacheStatistics cache = catalog_.statistics();
   cache.bytes = memory.bytes;
   cache.reading_bytes = memory.reading;
   cache.writing_bytes = memory.writing;

@@ -19,10 +19,9 @@
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/catalog/body.h"
-#include "server/registry/catalog/body_table.h"
+#include "server/registry/catalog/catalog.h"
 #include "server/registry/catalog/change_feed.h"
 #include "server/registry/catalog/hull_state.h"
-#include "server/registry/catalog/hull_table.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/commit/committer.h"
@@ -105,8 +104,8 @@ class Registry {
   // Of a store that finds records, how many of hulls, and small ones of bodies, are kept in memory
   // while nobody uses them, instead of what a part of --memory-limit holds. Before Load; for tests.
   void KeepRecords(size_t most) {
-    hulls_.KeepAtMost(most);
-    bodies_.KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
+    catalog_.hulls().KeepAtMost(most);
+    catalog_.bodies().KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
   }
 
   const Store& store() const { return store_; }
@@ -153,7 +152,7 @@ class Registry {
   // The same, but nullopt, at once, where the store would have to be read.
   std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids);
   // Whether there may be a body. Takes no lock.
-  bool has_bodies() const { return BodyCount() > 0; }
+  bool has_bodies() const { return catalog_.BodyCount() > 0; }
 
   // At most `page_size` hulls whose IDs start with `prefix` and come after `after`, in byte order.
   // Where the store finds records, it is asked, hence not for gRPC's threads then. UNAVAILABLE: it
@@ -187,10 +186,10 @@ class Registry {
   // Hulls and bodies of other registries, which count against --max-hulls with those that are here.
   // Called under the mutex, and takes none. Before any other call.
   void CountAlso(std::function<uint64_t()> held_elsewhere) {
-    held_elsewhere_ = std::move(held_elsewhere);
+    catalog_.CountAlso(std::move(held_elsewhere));
   }
   // How many hulls and bodies are here. Takes no lock.
-  uint64_t held() const { return HullCount() + BodyCount(); }
+  uint64_t held() const { return catalog_.HullCount() + catalog_.BodyCount(); }
 
   RegistrySizes Sizes() const;
   // How long, and for how much, the mutex of the records was held.
@@ -281,20 +280,6 @@ class Registry {
   using HullPointer = std::shared_ptr<RegisteredHull>;
   using Refusal = std::function<void(const absl::Status&)>;
 
-  // The hull, which must be known (IsKnown), as in HullTable.
-  HullPointer Find(const std::string& id);
-  HullPointer FindVisible(const std::string& id);
-  void Forget(Locked& locked, const HullPointer& hull, const absl::Status& reason);
-  absl::Status CheckHullCount() const;
-  // Those whose creation is in flight included. Takes no lock.
-  uint64_t HullCount() const {
-    return is_cache_ ? kept_hulls_.load(std::memory_order_relaxed) +
-                           creating_.load(std::memory_order_relaxed)
-                     : hulls_.size();
-  }
-  // The revision that the store gave the last change becomes visible.
-  void Publish(uint64_t revision);
-
   void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                     const Reply<CreateResult>& done);
   void CreateNew(Locked& locked, const std::string& id,
@@ -313,20 +298,7 @@ class Registry {
                                                   const absl::Status& status, const Change& change);
   static void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement);
 
-  absl::Status NoSuchHull(const std::string& id) const;
-  // Those whose creation is in flight included. Takes no lock.
-  uint64_t BodyCount() const {
-    return kept_bodies_.load(std::memory_order_relaxed) +
-           creating_bodies_.load(std::memory_order_relaxed);
-  }
   absl::Status LoadBodies(Locked& locked);
-  // The committed body; null when there is none. The ID must be known.
-  std::shared_ptr<const Body> FindBody(const std::string& id);
-  // Null where no change of it is submitted. Otherwise what is under the ID is not known before
-  // that is committed or refused, so who depends on it waits.
-  BodyTable::Entry* BodyInFlight(const std::string& id);
-  void AddBody(Locked& locked, const std::string& id, const absl::StatusOr<StoredBody>& stored);
-  void EraseBody(Locked& locked, const std::string& id);
   FoundBodies FindBodies(Locked& locked, std::span<const std::string> ids,
                          const std::function<bool()>& should_stop, bool may_wait);
   void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
@@ -412,10 +384,6 @@ class Registry {
   static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);
   void Prepare(Locked& locked, RegisteredHull& hull);
   void SchedulePreparing(const HullPointer& hull);
-  void AddStored(const std::string& id, const absl::StatusOr<StoredHull>& stored);
-  void MarkDamaged(RegisteredHull& hull, const absl::Status& damage);
-  // Readers are given something else of it from now on.
-  void NoteChange(const RegisteredHull& hull);
 
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
@@ -436,10 +404,6 @@ class Registry {
   // Told with the mutex held, once what was found is of no later moment than what is known here.
   using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
 
-  // For whom a body that was read is held.
-  MemoryUse UseOfRead() const { return is_cache_ ? MemoryUse::kReading : MemoryUse::kWriting; }
-  // Whether it is known what there is under an ID. Cost: O(log n).
-  bool IsKnown(const std::string& id) const { return hulls_.Knows(id) || bodies_.contains(id); }
   // Has the record of an ID that is not known read, and goes on with `next`, which must look anew
   // whether it is known then; or refuses.
   void WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
@@ -475,8 +439,6 @@ class Registry {
   absl::Status TakePresentFound(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
 
   Store& store_;
-  // Whether the table is a cache of what the store finds.
-  const bool is_cache_;
   // Where the making of canonical snapshots is timed, if anywhere.
   prometheus::Histogram* snapshot_seconds_ = nullptr;
   // With the memory limit in force.
@@ -487,34 +449,15 @@ class Registry {
   // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
   // builder that a thread owns.
   mutable FairMutex mutex_;
-  // The last one that is committed and visible.
-  uint64_t revision_ = 0;
-  uint64_t vertex_count_ = 0;
   uint64_t last_watch_ = 0;
-  HullTable hulls_;
-  // No ID is in both.
-  BodyTable bodies_;
+  Catalog catalog_;
   // What goes on once all that other servers did is taken over.
   std::vector<std::function<void(Locked&)>> after_others_;
-  // May be empty.
-  std::function<uint64_t()> held_elsewhere_;
-  // How many bodies the store holds at revision_, and those whose creation is not committed yet.
-  // Changed under the mutex.
-  std::atomic<uint64_t> kept_bodies_ = 0;
-  std::atomic<uint64_t> creating_bodies_ = 0;
-  // Those of hulls_ whose creation is not committed yet. Changed under the mutex.
-  std::atomic<uint64_t> creating_ = 0;
-  // Where hulls_ is a cache: how many the store holds at revision_. Changed under the mutex.
-  std::atomic<uint64_t> kept_hulls_ = 0;
   // Those that are not over, by ID; of these the ones that no thread has taken yet; and threads
   // that take them.
   std::map<std::string, std::shared_ptr<Reading>> readings_;
   Readings due_readings_;
   size_t reading_threads_ = 0;
-  // For readers that look up hulls in slices, or again.
-  RecentChanges recent_changes_;
-  // Hits, misses, loads and damaged; the rest is the budget's.
-  CacheStatistics cache_;
   // Nothing more is prepared.
   bool ending_ = false;
   // The store is being asked for reads to come.

@@ -120,22 +120,22 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   };
   const std::string& id = request->hull_id;
   const HullPointer known = std::exchange(request->known, nullptr);
-  if (!IsKnown(id)) {
+  if (!catalog_.IsKnown(id)) {
     return WhenKnown(locked, id, request->done, [this, request](Locked& later) {
-      const bool is_known = IsKnown(request->hull_id);
-      if (is_known) request->known = Find(request->hull_id);
+      const bool is_known = catalog_.IsKnown(request->hull_id);
+      if (is_known) request->known = catalog_.Find(request->hull_id);
       // Where there is none, nothing of the store is to be read any more.
       if (is_known && request->known == nullptr) return OpenLocked(later, request);
       RunOpen(request);
     });
   }
-  if (BodyTable::Entry* const body = BodyInFlight(id); body != nullptr) {
+  if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
     body->waiting.push_back([this, request](Locked&) { RunOpen(request); });
     return;
   }
-  const HullPointer hull = Find(id);
+  const HullPointer hull = catalog_.Find(id);
   if (hull == nullptr) {
-    if (!request->create_if_absent) return refuse(locked, NoSuchHull(request->hull_id));
+    if (!request->create_if_absent) return refuse(locked, catalog_.NoSuchHull(request->hull_id));
     // The session opens at the very moment of the creation: the hull may be gone right after.
     return CreateNew(
         locked, request->hull_id,
@@ -166,7 +166,7 @@ void Registry::OpenSession(Locked& locked, const HullPointer& hull,
   HULLD_CHECK(hull->state.visible());
   OpenResult result;
   hull->watches.emplace(++last_watch_, std::move(request->on_gone));
-  result.store_revision = revision_;
+  result.store_revision = catalog_.revision();
   result.hull = hull->committed.record;
   result.last_sequence = last_sequence;
   result.session = {hull, request->writer_id, request->created_hull, last_watch_, request->client};
@@ -273,8 +273,9 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
   if (!verdict.ok()) return AnswerChunk(locked, pending.done, sequence, verdict.status());
   if (*verdict == Verdict::kAlreadyApplied) {
     const HullRecord& record = hull->committed.record;
-    return AnswerChunk(locked, pending.done, sequence,
-                       ChunkResult{revision_, true, record.revision, record.vertex_count, {}});
+    return AnswerChunk(
+        locked, pending.done, sequence,
+        ChunkResult{catalog_.revision(), true, record.revision, record.vertex_count, {}});
   }
   absl::StatusOr<BuiltChunk> built = Build(locked, *hull, pending);
   if (Committer::IsSuperseded(built.status())) {
@@ -398,7 +399,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   if (hull.live != nullptr) return hull.live;
   if (!loaded.ok()) return loaded.status();
   hull.SetLive(*std::move(loaded));
-  ++cache_.loads;
+  ++catalog_.statistics().loads;
   hull.NoteUse();
   hull.changed.notify_all();
   return hull.live;
@@ -442,7 +443,7 @@ absl::StatusOr<PointCounts> Registry::AddPoints(
 
 // What a writer is told when AddPoints failed.
 absl::Status Registry::WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause) {
-  if (absl::IsDataLoss(cause)) MarkDamaged(hull, cause);
+  if (absl::IsDataLoss(cause)) catalog_.MarkDamaged(hull, cause);
   if (!absl::IsResourceExhausted(cause)) return cause;
   return LimitExceeded(
       absl::StrCat(QuotedHull(hull.head.record.hull_id), " would hold too many vertices"),
@@ -493,8 +494,9 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk
     hull->points_since_prepared += counts.outside;
     if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
     const HullRecord& record = change.hull.record;
-    AnswerChunk(later, done, sequence,
-                ChunkResult{revision_, false, record.revision, record.vertex_count, counts});
+    AnswerChunk(
+        later, done, sequence,
+        ChunkResult{catalog_.revision(), false, record.revision, record.vertex_count, counts});
   };
   hull->state.Submit();
   Submit(locked, hull, std::move(built.change), finish);
@@ -508,10 +510,10 @@ void Registry::CommitChunk(Locked& locked, const HullPointer& hull, const Stored
   *hull->revisions = RevisionsOf(after);
   SetRevisions(*hull->revisions, &hull->head);
   hull->SetCommittedMark(locked, mark);
-  NoteChange(*hull);
+  catalog_.NoteChange(*hull);
   if (after.record.revision != before.revision) {
-    Publish(after.record.revision);
-    vertex_count_ += after.record.vertex_count - before.vertex_count;
+    catalog_.Publish(after.record.revision);
+    catalog_.NoteVertices(before.vertex_count, after.record.vertex_count);
     hull->DiscardServed(locked);
     locked.Discard(std::exchange(hull->canonical, nullptr));
     feed_.NoteChanged(locked, hull);

@@ -95,8 +95,8 @@ std::vector<HullGrowth> Registry::GrownHulls(const OtherChanges& others) const {
   uint64_t points = 0;
   for (const auto& [id, other] : others.by_id) {
     if (!other.hull.has_value() || !other.hull->ok()) continue;
-    const auto found = hulls_.entries().find(id);
-    if (found == hulls_.entries().end() || found->second.awake() == nullptr) continue;
+    const auto found = catalog_.hulls().entries().find(id);
+    if (found == catalog_.hulls().entries().end() || found->second.awake() == nullptr) continue;
     const RegisteredHull& hull = *found->second.awake();
     const StoredHull& stored = **other.hull;
     if (!hull.GrewInto(stored)) continue;
@@ -113,20 +113,16 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
   in_order.reserve(others.by_id.size());
   for (const auto& [id, other] : others.by_id) in_order.emplace_back(other.revision, &id);
   std::ranges::sort(in_order);
-  const uint64_t since = revision_;
+  const uint64_t since = catalog_.revision();
   for (const auto& [revision, id] : in_order) {
     TakeOver(locked, *id, others.by_id.at(*id), since);
     EndReadingOf(*id);
-    hulls_.RestSome();
-    bodies_.DropSome(locked);
+    catalog_.hulls().RestSome();
+    catalog_.bodies().DropSome(locked);
   }
-  if (is_cache_ && others.revision > 0) {
-    kept_hulls_ = others.totals.hulls;
-    vertex_count_ = others.totals.vertices;
-    kept_bodies_ = others.totals.bodies;
-  }
-  if (others.revision > revision_) {
-    Publish(others.revision);
+  if (catalog_.is_cache() && others.revision > 0) catalog_.SetTotals(others.totals);
+  if (others.revision > catalog_.revision()) {
+    catalog_.Publish(others.revision);
     feed_.NoteOther(locked, others.revision);
   }
   memory_.Evict(locked);
@@ -138,32 +134,32 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
                         uint64_t since) {
   const std::optional<BodyRecord> former_body = FormerBody(id, other, since);
   // What was not known to be here is told from what others say of it.
-  const bool was_known = IsKnown(id);
+  const bool was_known = catalog_.IsKnown(id);
   const bool has_ended = !was_known && other.former_began != 0 && other.former_began <= since;
   // Not what was read when the store was loaded.
-  const bool is_news = other.revision > revision_;
-  if (is_news) Publish(other.revision);
+  const bool is_news = other.revision > catalog_.revision();
+  if (is_news) catalog_.Publish(other.revision);
   // Also of what came and went, for who has to know that there was nothing all the while.
-  if (is_news) recent_changes_.Note(id);
-  const HullPointer former = hulls_.Find(id);
+  if (is_news) catalog_.recent_changes().Note(id);
+  const HullPointer former = catalog_.hulls().Find(id);
   if (former != nullptr && TakeOverVersion(locked, former, other, is_news)) {
     return AdvanceLater(former);
   }
   if (former != nullptr) {
-    if (!is_cache_) vertex_count_ -= former->committed.record.vertex_count;
-    NoteChange(*former);
+    if (!catalog_.is_cache()) catalog_.NoteVertices(former->committed.record.vertex_count, 0);
+    catalog_.NoteChange(*former);
     former->state.Vanish();
     ++former->supersessions;
-    Forget(locked, former, Gone(id, other.hull.has_value() ? "replaced" : "deleted"));
+    catalog_.Forget(locked, former, Gone(id, other.hull.has_value() ? "replaced" : "deleted"));
     AdvanceLater(former);
   }
   TakeOverBody(locked, id, other);
-  const std::shared_ptr<const Body> body = FindBody(id);
+  const std::shared_ptr<const Body> body = catalog_.FindBody(id);
   HullPointer hull;
   if (other.hull.has_value()) {
-    AddStored(id, *other.hull);
-    hull = hulls_.Find(id);
-    NoteChange(*hull);
+    catalog_.AddStored(id, *other.hull);
+    hull = catalog_.hulls().Find(id);
+    catalog_.NoteChange(*hull);
   }
   if (!is_news) return;
   const bool is_deletion = !other.body.has_value() && other.ended_at == other.revision;
@@ -206,8 +202,8 @@ void Registry::TakeOver(Locked& locked, const std::string& id, const OtherChange
 // The body that there was when everything was taken over up to `since`, if there was one.
 std::optional<BodyRecord> Registry::FormerBody(const std::string& id, const OtherChange& other,
                                                uint64_t since) {
-  if (IsKnown(id)) {
-    const std::shared_ptr<const Body> body = FindBody(id);
+  if (catalog_.IsKnown(id)) {
+    const std::shared_ptr<const Body> body = catalog_.FindBody(id);
     return body == nullptr ? std::nullopt : std::optional(body->record());
   }
   if (other.former_was_body && other.former_began <= since) {
@@ -226,25 +222,27 @@ bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const Ot
   const HullRecord& before = hull->committed.record;
   if (before.create_revision != stored.record.create_revision) return false;
   // Also where the record is the same: an empty chunk counts in the sequences of its writer.
-  if (!is_cache_) vertex_count_ += stored.record.vertex_count - before.vertex_count;
+  if (!catalog_.is_cache()) {
+    catalog_.NoteVertices(before.vertex_count, stored.record.vertex_count);
+  }
   const bool grew =
       hull->Supersede(locked, stored, other.growth.has_value() ? &*other.growth : nullptr);
-  cache_.grown += grew;
+  catalog_.statistics().grown += grew;
   if (grew && !ending_ && hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
-  NoteChange(*hull);
+  catalog_.NoteChange(*hull);
   if (is_news) feed_.NoteChanged(locked, hull);
   return true;
 }
 
 void Registry::TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other) {
-  const BodyTable::Entry* const entry = bodies_.Find(id);
+  const BodyTable::Entry* const entry = catalog_.bodies().Find(id);
   HULLD_CHECK(entry == nullptr || !entry->in_flight);
   if (other.body.has_value()) {
-    if (!is_cache_ && entry == nullptr) ++kept_bodies_;
-    AddBody(locked, id, *other.body);
+    if (!catalog_.is_cache() && entry == nullptr) catalog_.NoteBodyFound();
+    catalog_.AddBody(locked, id, *other.body);
   } else if (entry != nullptr) {
-    if (!is_cache_) --kept_bodies_;
-    EraseBody(locked, id);
+    if (!catalog_.is_cache()) catalog_.NoteBodyEnded();
+    catalog_.EraseBody(locked, id);
   }
 }
 

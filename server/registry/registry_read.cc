@@ -48,7 +48,7 @@ struct Registry::HullsRead {
 std::optional<std::chrono::nanoseconds> Registry::TryFresh(Locked& locked,
                                                            const Freshness& freshness) {
   using std::chrono::nanoseconds;
-  if (revision_ < freshness.at_least_revision) return std::nullopt;
+  if (catalog_.revision() < freshness.at_least_revision) return std::nullopt;
   if (!store_.is_shared()) return nanoseconds(0);
   const std::optional<SteadyClock::time_point> caught_up = committer_.caught_up(locked);
   if (!caught_up.has_value()) return std::nullopt;
@@ -72,8 +72,8 @@ absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
   if (store_.is_shared()) {
     if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
   }
-  if (revision_ >= freshness.at_least_revision) return std::chrono::nanoseconds(0);
-  return FutureRevision(freshness.at_least_revision, revision_);
+  if (catalog_.revision() >= freshness.at_least_revision) return std::chrono::nanoseconds(0);
+  return FutureRevision(freshness.at_least_revision, catalog_.revision());
 }
 
 std::optional<std::chrono::nanoseconds> Registry::TryFresh(const Freshness& freshness) {
@@ -109,16 +109,16 @@ absl::Status Registry::LookUpDue(Locked& locked, const HullsRead& read) {
 
 absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
-  if (!known.next_change_.has_value()) known.next_change_ = recent_changes_.end();
+  if (!known.next_change_.has_value()) known.next_change_ = catalog_.recent_changes().end();
   while (true) {
     uint64_t& next = *known.next_change_;
-    if (!recent_changes_.Knows(next)) {
-      next = recent_changes_.end();
+    if (!catalog_.recent_changes().Knows(next)) {
+      next = catalog_.recent_changes().end();
       locked.Unlock();
       known.ForgetAll();
       locked.Lock();
-    } else if (next < recent_changes_.end()) {
-      known.NoteChange(recent_changes_.at(next++));
+    } else if (next < catalog_.recent_changes().end()) {
+      known.NoteChange(catalog_.recent_changes().at(next++));
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
       const absl::Status status = LookUp(locked, read, known.due_.back());
@@ -164,15 +164,15 @@ absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k)
   bool was_missing = false;
   while (true) {
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
-    if (*found == nullptr || (*found)->state.gone()) found = hulls_.Ask(id);
-    if (!found.has_value() && !bodies_.contains(id)) {
+    if (*found == nullptr || (*found)->state.gone()) found = catalog_.hulls().Ask(id);
+    if (!found.has_value() && !catalog_.bodies().contains(id)) {
       const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
       if (!is_over.ok() || *is_over) return is_over.status();
       continue;
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
-      known.view = NoSuchHull(id);
+      known.view = catalog_.NoSuchHull(id);
       return absl::OkStatus();
     }
     if (hull->state.damaged()) {
@@ -183,7 +183,7 @@ absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k)
       // It was looked up, prepared, and dropped since. To read it again, and prepare it again, may
       // drop another one of the same read, and so on for ever.
       if (IsHeld(known, *hull)) {
-        ++cache_.hits;
+        ++catalog_.statistics().hits;
         return absl::OkStatus();
       }
       const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
@@ -233,7 +233,7 @@ absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read
   KnownHulls& hulls = read.known;
   if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
   if (!std::exchange(was_missing, true)) {
-    ++cache_.misses;
+    ++catalog_.statistics().misses;
     LoadMany(locked, read, k);
     if (Stopped(read.should_stop)) return Cancelled();
     return false;
@@ -269,14 +269,14 @@ void Registry::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hul
                         bool was_missing) {
   KnownHulls::Known& known = hulls.hulls_[k];
   const bool was_loaded = std::exchange(known.is_loaded, false);
-  if (!was_missing) ++(was_loaded ? cache_.misses : cache_.hits);
+  if (!was_missing) ++(was_loaded ? catalog_.statistics().misses : catalog_.statistics().hits);
   known.view = HullView{hull->committed.record, hull->Serve()};
   known.bytes = hull->SharedBytes();
   // One that was just loaded was noted then, and Serve counted the rest.
   if (!was_loaded) hull->NoteUse();
   if (was_missing || was_loaded) {
     memory_.Evict(locked);
-    hulls_.RestSome();
+    catalog_.hulls().RestSome();
   }
 }
 
@@ -318,7 +318,7 @@ bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
     locked.NoteLookup();
     const KnownHulls::Known& known = hulls.hulls_[k];
     const std::string& id = read.ids[known.first];
-    const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
+    const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
     if (hull == nullptr || hull->state.damaged() || hull->IsReady() || hull->loading ||
         hull->state.life() == HullState::Life::kEnding || IsHeld(known, *hull)) {
       --end;
@@ -361,7 +361,7 @@ void Registry::EndLoading(Locked& locked, const HullsRead& read) {
     const bool is_current = hull.committed.record.revision == revision;
     if (!loaded[i].ok() || !is_current || hull.live != nullptr || hull.state.gone()) continue;
     hull.SetLive(*std::move(loaded[i]));
-    ++cache_.loads;
+    ++catalog_.statistics().loads;
     hull.NoteUse();
     known.is_loaded = true;
     known.found = loading.found[i];
@@ -392,7 +392,7 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
     resolved.staleness = *staleness;
     const absl::Status status = LookUpDue(locked, {ids, known, should_stop, plan});
     if (!status.ok()) return status;
-    resolved.store_revision = revision_;
+    resolved.store_revision = catalog_.revision();
     memory_.Evict(locked);
   }
   resolved.hulls = known.Views(ids);
@@ -412,7 +412,7 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
     resolved.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
     if (!LookUpDue(locked, read).ok()) return std::nullopt;
-    resolved.store_revision = revision_;
+    resolved.store_revision = catalog_.revision();
   }
   resolved.hulls = known.Views(ids);
   return resolved;
@@ -441,10 +441,10 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
   Locked locked(mutex_);
   const std::string& id = view.record.hull_id;
   // What is not known any more has nothing to be noted of.
-  const HullPointer hull = IsKnown(id) ? FindVisible(id) : nullptr;
+  const HullPointer hull = catalog_.IsKnown(id) ? catalog_.FindVisible(id) : nullptr;
   const bool is_current =
       hull != nullptr && hull->committed.record.revision == view.record.revision;
-  if (is_current && absl::IsDataLoss(status)) MarkDamaged(*hull, status);
+  if (is_current && absl::IsDataLoss(status)) catalog_.MarkDamaged(*hull, status);
   if (is_current) hull->NoteUse();
   memory_.Evict(locked);
   if (!status.ok()) return status;
@@ -492,7 +492,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     }
     if (loaded.ok()) {
       hull.SetLive(*std::move(loaded));
-      ++cache_.loads;
+      ++catalog_.statistics().loads;
       hull.NoteUse();
       return absl::OkStatus();
     }
@@ -500,7 +500,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     // tells whether they are damaged.
     failed = true;
     if (hull.state.life() == HullState::Life::kEnding) continue;
-    if (absl::IsDataLoss(loaded.status())) MarkDamaged(hull, loaded.status());
+    if (absl::IsDataLoss(loaded.status())) catalog_.MarkDamaged(hull, loaded.status());
     return loaded.status();
   }
   return absl::OkStatus();
@@ -527,7 +527,7 @@ void Registry::Prepare(Locked& locked, RegisteredHull& hull) {
   // Nothing came after: the mark lets go of what there was before.
   if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
   hull.DiscardServed(locked);
-  NoteChange(hull);
+  catalog_.NoteChange(hull);
   hull.NoteUse();
 }
 
@@ -547,11 +547,11 @@ void Registry::SchedulePreparing(const HullPointer& hull) {
 absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
                                         size_t page_size,
                                         const std::function<bool()>& should_stop) {
-  if (is_cache_) return ListFoundHulls(prefix, after, page_size, should_stop);
+  if (catalog_.is_cache()) return ListFoundHulls(prefix, after, page_size, should_stop);
   HullPage page;
   const std::lock_guard lock(mutex_);
-  page.store_revision = revision_;
-  const HullTable::Entries& all = hulls_.entries();
+  page.store_revision = catalog_.revision();
+  const HullTable::Entries& all = catalog_.hulls().entries();
   auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
   for (; next != all.end() && next->first.starts_with(prefix); ++next) {
     if (!next->second.visible()) continue;

@@ -19,7 +19,8 @@ absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarg
   std::shared_ptr<ChangeWatch> watch = feed_.Open(target, std::move(on_ready));
   if (!start.tell_present) return watch;
   const bool resumes = start.after_revision > 0;
-  const bool can_resume = start.store_id == store_.id() && start.after_revision <= revision_ &&
+  const bool can_resume = start.store_id == store_.id() &&
+                          start.after_revision <= catalog_.revision() &&
                           feed_.Remembers(start.after_revision);
   watch->stage = ChangeWatch::Stage::kPresent;
   watch->is_exact = false;
@@ -44,15 +45,16 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
   piece.revision = watch.after_revision;
   const bool tells_bodies = ChangeFeed::TargetOf(watch).bodies;
   const auto is_there = [this, tells_bodies](const std::string& id) {
-    if (bodies_.contains(id)) return tells_bodies && FindBody(id) != nullptr;
-    return hulls_.Knows(id) ? hulls_.IsVisible(id) : feed_.BeganAnew(id, tells_bodies);
+    if (catalog_.bodies().contains(id)) return tells_bodies && catalog_.FindBody(id) != nullptr;
+    return catalog_.hulls().Knows(id) ? catalog_.hulls().IsVisible(id)
+                                      : feed_.BeganAnew(id, tells_bodies);
   };
   switch (watch.stage) {
     case ChangeWatch::Stage::kDeletions:
       if (!feed_.TakeDeletions(watch, is_there, &piece)) watch.stage = ChangeWatch::Stage::kPresent;
       break;
     case ChangeWatch::Stage::kPresent:
-      if (!is_cache_) {
+      if (!catalog_.is_cache()) {
         TakePresent(watch, &piece);
       } else if (absl::Status s = TakePresentFound(locked, watch, &piece); !s.ok()) {
         return s;
@@ -81,10 +83,10 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   const auto begin_of = [&](const auto& all) {
     return watch.last_id.empty() ? all.lower_bound(prefix) : all.upper_bound(watch.last_id);
   };
-  auto hull = begin_of(hulls_.entries());
-  const auto hulls_end = hulls_.entries().end();
-  const auto bodies_end = bodies_.entries().end();
-  auto body = target.bodies ? begin_of(bodies_.entries()) : bodies_end;
+  auto hull = begin_of(catalog_.hulls().entries());
+  const auto hulls_end = catalog_.hulls().entries().end();
+  const auto bodies_end = catalog_.bodies().entries().end();
+  auto body = target.bodies ? begin_of(catalog_.bodies().entries()) : bodies_end;
   for (size_t looked_at = 0;; ++looked_at) {
     const bool has_hull = hull != hulls_end && is_watched(hull->first);
     const bool has_body = body != bodies_end && is_watched(body->first);
@@ -106,7 +108,7 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
     }
   }
   watch.stage = ChangeWatch::Stage::kChanges;
-  watch.synced_at = revision_;
+  watch.synced_at = catalog_.revision();
 }
 
 void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,

@@ -41,39 +41,13 @@ absl::Status HullHasTheId(const std::string& id) {
 absl::Status Registry::LoadBodies(Locked& locked) {
   return store_.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
     // Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
-    if (hulls_.contains(id)) {
+    if (catalog_.hulls().contains(id)) {
       spdlog::error("the store holds a body under the ID of hull \"{}\"; it is left alone", id);
       return;
     }
-    AddBody(locked, id, stored);
-    ++kept_bodies_;
+    catalog_.AddBody(locked, id, stored);
+    catalog_.NoteBodyFound();
   });
-}
-
-// What the store holds, in the place of what was known.
-void Registry::AddBody(Locked& locked, const std::string& id,
-                       const absl::StatusOr<StoredBody>& stored) {
-  if (!stored.ok()) {
-    spdlog::error("{}", std::string(stored.status().message()));
-    ++cache_.damaged;
-  }
-  bodies_.Add(id);
-  bodies_.Set(locked, id, std::make_shared<const Body>(id, stored, memory_, UseOfRead()));
-  hulls_.ForgetAbsent(id);
-}
-
-// There is none any more.
-void Registry::EraseBody(Locked& locked, const std::string& id) {
-  bodies_.Erase(locked, id);
-  if (is_cache_) hulls_.NoteAbsent(id);
-}
-
-// NOT_FOUND, which says so where the ID is a body's.
-absl::Status Registry::NoSuchHull(const std::string& id) const {
-  if (!bodies_.contains(id)) return HullNotFound(id);
-  return WithReason(absl::NotFoundError(absl::StrCat(
-                        "\"", id, "\" is a body, not a hull; this is for hulls alone")),
-                    v1::ERROR_REASON_HULL_NOT_FOUND, {{"hull_id", id}});
 }
 
 void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
@@ -92,29 +66,29 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
 // Whether a body may be put. OK also where it takes the place of another.
 absl::Status Registry::CheckBody(Locked&, const std::string& id,
                                  std::optional<uint64_t> if_revision) {
-  if (hulls_.contains(id)) return HullHasTheId(id);
-  const std::shared_ptr<const Body> body = FindBody(id);
+  if (catalog_.hulls().contains(id)) return HullHasTheId(id);
+  const std::shared_ptr<const Body> body = catalog_.FindBody(id);
   const uint64_t revision = body == nullptr ? 0 : body->record().revision;
   if (if_revision.has_value() && *if_revision != revision) {
     return BodyMismatch(id, revision, *if_revision);
   }
-  return body == nullptr ? CheckHullCount() : absl::OkStatus();
+  return body == nullptr ? catalog_.CheckHullCount() : absl::OkStatus();
 }
 
 void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                              std::optional<uint64_t> if_revision,
                              const Reply<PutBodyResult>& done) {
   const std::string& id = body->record().body_id;
-  if (BodyTable::Entry* const entry = BodyInFlight(id); entry != nullptr) {
+  if (BodyTable::Entry* const entry = catalog_.BodyInFlight(id); entry != nullptr) {
     entry->waiting.push_back(
         [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
     return;
   }
-  if (!IsKnown(id)) {
+  if (!catalog_.IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
   }
-  if (const HullPointer hull = Find(id); hull != nullptr && hull->state.changing_life()) {
+  if (const HullPointer hull = catalog_.Find(id); hull != nullptr && hull->state.changing_life()) {
     hull->exclusive.push_back(
         [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
     return;
@@ -122,10 +96,10 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   if (absl::Status s = CheckBody(locked, id, if_revision); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
   }
-  const bool is_new = !bodies_.contains(id);
-  const BodyTable::Entry& entry = bodies_.Add(id);
-  hulls_.ForgetAbsent(id);
-  if (is_new) ++creating_bodies_;
+  const bool is_new = !catalog_.bodies().contains(id);
+  const BodyTable::Entry& entry = catalog_.bodies().Add(id);
+  catalog_.hulls().ForgetAbsent(id);
+  if (is_new) catalog_.BeginCreatingBody();
   Change change;
   change.body = body->stored();
   uint64_t& created = change.body->record.create_revision;
@@ -133,21 +107,20 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   // One that was damaged begins anew.
   change.begins = created == 0;
   change.replaces_body = change.begins && !is_new;
-  SubmitBody(locked, std::move(change),
-             [=, this](Locked& later, const absl::Status& status, const Change&) {
-               if (is_new) --creating_bodies_;
-               if (is_new && status.ok()) ++kept_bodies_;
-               if (Committer::IsSuperseded(status)) {
-                 return Again(later, [=, this](Locked& again) {
-                   PutBodyLocked(again, body, if_revision, done);
-                 });
-               }
-               const BodyRecord& record = body->record();
-               if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
-               bodies_.Set(later, record.body_id, body);
-               Answer<PutBodyResult>(
-                   later, done, PutBodyResult{revision_, record, body->pieces().size(), is_new});
-             });
+  SubmitBody(
+      locked, std::move(change),
+      [=, this](Locked& later, const absl::Status& status, const Change&) {
+        if (is_new) catalog_.EndCreatingBody(status.ok());
+        if (Committer::IsSuperseded(status)) {
+          return Again(later,
+                       [=, this](Locked& again) { PutBodyLocked(again, body, if_revision, done); });
+        }
+        const BodyRecord& record = body->record();
+        if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
+        catalog_.bodies().Set(later, record.body_id, body);
+        Answer<PutBodyResult>(
+            later, done, PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
+      });
 }
 
 void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
@@ -157,14 +130,14 @@ void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revi
 
 void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
                                 std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
-  if (!IsKnown(id)) {
+  if (!catalog_.IsKnown(id)) {
     return WhenKnown(locked, id, done,
                      [=, this](Locked& later) { DeleteBodyLocked(later, id, if_revision, done); });
   }
-  BodyTable::Entry* const entry = bodies_.Find(id);
+  BodyTable::Entry* const entry = catalog_.bodies().Find(id);
   if (entry == nullptr) {
     const absl::Status missing =
-        hulls_.contains(id)
+        catalog_.hulls().contains(id)
             ? WithReason(absl::NotFoundError(absl::StrCat("\"", id, "\" is a hull, not a body")),
                          v1::ERROR_REASON_BODY_NOT_FOUND, {{"body_id", id}})
             : BodyNotFound(id);
@@ -190,8 +163,8 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
                  });
                }
                if (!status.ok()) return Answer<uint64_t>(later, done, status);
-               --kept_bodies_;
-               bodies_.Set(later, id, nullptr);
+               catalog_.NoteBodyEnded();
+               catalog_.bodies().Set(later, id, nullptr);
                Answer<uint64_t>(later, done, deletion.revision);
              });
 }
@@ -200,17 +173,17 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
 // body goes on.
 void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
-  HULLD_CHECK(!std::exchange(bodies_.Find(id)->in_flight, true));
+  HULLD_CHECK(!std::exchange(catalog_.bodies().Find(id)->in_flight, true));
   committer_.Submit(
       locked, std::move(change),
       [this, id, finish = std::move(finish)](Locked& later, const absl::Status& status,
                                              Change& committed) {
-        const std::shared_ptr<const Body> former = FindBody(id);
-        if (status.ok()) Publish(committed.revision);
+        const std::shared_ptr<const Body> former = catalog_.FindBody(id);
+        if (status.ok()) catalog_.Publish(committed.revision);
         // Where readers look for a hull with this ID.
-        if (status.ok()) recent_changes_.Note(id);
+        if (status.ok()) catalog_.recent_changes().Note(id);
         finish(later, status, committed);
-        BodyTable::Entry& entry = *bodies_.Find(id);
+        BodyTable::Entry& entry = *catalog_.bodies().Find(id);
         if (status.ok() && entry.committed() != nullptr) {
           const BodyRecord* const before = former == nullptr ? nullptr : &former->record();
           feed_.NoteBodyPut(later, before, entry.committed());
@@ -220,7 +193,7 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
         entry.in_flight = false;
         std::deque<std::function<void(Locked&)>> waiting = std::exchange(entry.waiting, {});
         // Nothing was there before a creation that was refused, nor is after a deletion.
-        if (entry.committed() == nullptr) EraseBody(later, id);
+        if (entry.committed() == nullptr) catalog_.EraseBody(later, id);
         for (auto& next : waiting) {
           if (Committer::IsSuperseded(status)) {
             after_others_.push_back(std::move(next));
@@ -228,28 +201,18 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
             next(later);
           }
         }
-        bodies_.DropSome(later);
+        catalog_.bodies().DropSome(later);
       });
-}
-
-std::shared_ptr<const Body> Registry::FindBody(const std::string& id) {
-  const BodyTable::Entry* const entry = bodies_.Find(id);
-  return entry == nullptr ? nullptr : entry->committed();
-}
-
-BodyTable::Entry* Registry::BodyInFlight(const std::string& id) {
-  BodyTable::Entry* const entry = bodies_.Find(id);
-  return entry != nullptr && entry->in_flight ? entry : nullptr;
 }
 
 absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const std::string& after,
                                               size_t page_size,
                                               const std::function<bool()>& should_stop) {
-  if (is_cache_) return ListFoundBodies(prefix, after, page_size, should_stop);
+  if (catalog_.is_cache()) return ListFoundBodies(prefix, after, page_size, should_stop);
   BodyPage page;
   const std::lock_guard lock(mutex_);
-  page.store_revision = revision_;
-  const BodyTable::Entries& all = bodies_.entries();
+  page.store_revision = catalog_.revision();
+  const BodyTable::Entries& all = catalog_.bodies().entries();
   auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
   for (; next != all.end() && next->first.starts_with(prefix); ++next) {
     const std::shared_ptr<const Body>& body = next->second.committed();
@@ -276,15 +239,15 @@ FoundBodies Registry::FindBodies(Locked& locked, std::span<const std::string> id
     }
     const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
     for (size_t i = first; i < end; ++i) {
-      while (found.status.ok() && !IsKnown(ids[i])) {
+      while (found.status.ok() && !catalog_.IsKnown(ids[i])) {
         found.status = ReadMissing(locked, ids.subspan(i, end - i), should_stop, may_wait);
       }
       // Also what could not be read may be known by now.
-      found.bodies[i] = FindBody(ids[i]);
+      found.bodies[i] = catalog_.FindBody(ids[i]);
       locked.NoteLookup();
     }
   }
-  found.store_revision = revision_;
+  found.store_revision = catalog_.revision();
   return found;
 }
 

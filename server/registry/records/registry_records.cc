@@ -50,7 +50,7 @@ void NoteBodyUnderHull(const std::string& id) {
 
 void Registry::WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
                          std::function<void(Locked&)> next) {
-  HULLD_CHECK(locked.Holds(mutex_) && !IsKnown(id));
+  HULLD_CHECK(locked.Holds(mutex_) && !catalog_.IsKnown(id));
   std::shared_ptr<Reading>& reading = readings_[id];
   const bool is_new = reading == nullptr;
   if (is_new) {
@@ -96,7 +96,7 @@ absl::Status Registry::AwaitKnown(Locked& locked, std::span<const std::string* c
   std::shared_ptr<Reading> awaited;
   for (const std::string* const id : ids) {
     locked.NoteLookup();
-    if (IsKnown(*id)) {
+    if (catalog_.IsKnown(*id)) {
       if (awaited == nullptr) return absl::OkStatus();
       continue;
     }
@@ -124,7 +124,7 @@ absl::Status Registry::ReadMissing(Locked& locked, std::span<const std::string> 
   if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   std::vector<const std::string*> missing;
   for (const std::string& id : ids) {
-    if (!IsKnown(id)) missing.push_back(&id);
+    if (!catalog_.IsKnown(id)) missing.push_back(&id);
   }
   const absl::Status read = AwaitKnown(locked, missing, should_stop);
   if (Stopped(should_stop)) return Cancelled();
@@ -136,7 +136,7 @@ void Registry::ReadRecords(Locked& locked, const Readings& readings) {
   std::vector<std::string> ids;
   ids.reserve(readings.size());
   for (const auto& reading : readings) ids.push_back(reading->id);
-  const uint64_t asked_at = revision_;
+  const uint64_t asked_at = catalog_.revision();
   locked.Unlock();
   absl::StatusOr<FoundRecords> found = store_.FindRecords(ids);
   locked.Lock();
@@ -156,7 +156,8 @@ void Registry::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<Fou
   committer_.Follow(
       locked, [this, kept, take = std::move(take)](Locked& later, const absl::Status& status) {
         if (!status.ok()) return take(later, status);
-        if (kept->revision > revision_) return take(later, IsAhead(kept->revision, revision_));
+        if (kept->revision > catalog_.revision())
+          return take(later, IsAhead(kept->revision, catalog_.revision()));
         take(later, *kept);
       });
 }
@@ -164,8 +165,8 @@ void Registry::WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<Fou
 void Registry::TakeRecords(Locked& locked, const Readings& readings,
                            const absl::StatusOr<FoundRecords>& found) {
   // Before, so that what comes now is there for who waits for it.
-  for (size_t i = 0; i < readings.size(); ++i) hulls_.RestSome();
-  bodies_.DropSome(locked);
+  for (size_t i = 0; i < readings.size(); ++i) catalog_.hulls().RestSome();
+  catalog_.bodies().DropSome(locked);
   Readings open;
   for (const auto& reading : readings) {
     if (reading->is_over) continue;
@@ -176,13 +177,14 @@ void Registry::TakeRecords(Locked& locked, const Readings& readings,
 }
 
 void Registry::TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found) {
-  HULLD_CHECK(!IsKnown(id));
+  HULLD_CHECK(!catalog_.IsKnown(id));
   const auto hull = found.hulls.find(id);
   const auto body = found.bodies.find(id);
-  if (hull == found.hulls.end() && body == found.bodies.end()) return hulls_.NoteAbsent(id);
-  if (hull == found.hulls.end()) return AddBody(locked, id, body->second);
+  if (hull == found.hulls.end() && body == found.bodies.end())
+    return catalog_.hulls().NoteAbsent(id);
+  if (hull == found.hulls.end()) return catalog_.AddBody(locked, id, body->second);
   if (body != found.bodies.end()) NoteBodyUnderHull(id);
-  AddStored(id, hull->second);
+  catalog_.AddStored(id, hull->second);
 }
 
 void Registry::EndReading(Locked& locked, Reading& reading, const absl::Status& status) {
@@ -203,7 +205,7 @@ void Registry::EndReadingOf(const std::string& id) {
   const auto found = readings_.find(id);
   if (found == readings_.end()) return;
   const std::shared_ptr<Reading> reading = found->second;
-  if (!IsKnown(id)) hulls_.NoteAbsent(id);
+  if (!catalog_.IsKnown(id)) catalog_.hulls().NoteAbsent(id);
   reading->is_over = true;
   reading->over.notify_all();
   readings_.erase(found);
@@ -225,9 +227,9 @@ void Registry::LetOthersPass(Locked& locked) {
 // changed no vertex take none.
 bool Registry::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const {
   if (!stored.ok()) return false;
-  const auto known = hulls_.entries().find(id);
-  const bool is_same =
-      known != hulls_.entries().end() && known->second.revision() == stored->record.revision;
+  const auto known = catalog_.hulls().entries().find(id);
+  const bool is_same = known != catalog_.hulls().entries().end() &&
+                       known->second.revision() == stored->record.revision;
   if (!is_same) return false;
   return known->second.Describe(id).record.counts.received < stored->record.counts.received;
 }
@@ -235,7 +237,7 @@ bool Registry::IsBehind(const std::string& id, const absl::StatusOr<StoredHull>&
 // Whether what was found is of a later moment than what is known here: committed, perhaps by
 // others, and not taken over yet. Who tells it would be followed by one who tells what is here.
 bool Registry::IsBehind(const FoundRecords& found) const {
-  if (found.revision > revision_) return true;
+  if (found.revision > catalog_.revision()) return true;
   return std::ranges::any_of(
       found.hulls, [this](const auto& hull) { return IsBehind(hull.first, hull.second); });
 }
@@ -248,20 +250,20 @@ absl::StatusOr<FoundRecords> Registry::ListFound(const std::string& prefix,
   uint64_t asked_at = 0;
   {
     const std::lock_guard lock(mutex_);
-    asked_at = revision_;
+    asked_at = catalog_.revision();
   }
   absl::StatusOr<FoundRecords> found = store_.ListRecords(prefix, after, page_size, kinds);
   if (!found.ok()) return found;
   if (found->revision < asked_at) return WentBack(found->revision, asked_at);
   Locked locked(mutex_);
-  bool is_behind = found->revision > revision_;
+  bool is_behind = found->revision > catalog_.revision();
   for (auto hull = found->hulls.begin(); !is_behind && hull != found->hulls.end(); ++hull) {
     LetOthersPass(locked);
     is_behind = IsBehind(hull->first, hull->second);
   }
   if (!is_behind) return found;
   if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
-  if (found->revision > revision_) return IsAhead(found->revision, revision_);
+  if (found->revision > catalog_.revision()) return IsAhead(found->revision, catalog_.revision());
   return found;
 }
 
@@ -309,8 +311,8 @@ HullChange Registry::DescribeFound(const std::string& id,
   } else {
     change.record.hull_id = id;
   }
-  const auto known = hulls_.entries().find(id);
-  if (known == hulls_.entries().end() || !known->second.visible()) return change;
+  const auto known = catalog_.hulls().entries().find(id);
+  if (known == catalog_.hulls().entries().end() || !known->second.visible()) return change;
   HullChange described = known->second.Describe(id);
   return described.record == change.record ? described : change;
 }
@@ -322,8 +324,9 @@ void Registry::ReadPresent(Locked& locked, ChangeWatch& watch) {
   const WatchTarget& target = ChangeFeed::TargetOf(watch);
   watch.is_reading = true;
   loaders_->Submit(
-      [this, kept = watch.shared_from_this(), reading = ++watch.readings, asked_at = revision_,
-       after = watch.last_id, prefix = target.prefix, ids = target.ids, bodies = target.bodies] {
+      [this, kept = watch.shared_from_this(), reading = ++watch.readings,
+       asked_at = catalog_.revision(), after = watch.last_id, prefix = target.prefix,
+       ids = target.ids, bodies = target.bodies] {
         absl::StatusOr<FoundRecords> found =
             ids.empty() ? store_.ListRecords(prefix, after, ChangeFeed::kMostPerPiece,
                                              {.hulls = true, .bodies = bodies})
@@ -376,7 +379,7 @@ absl::Status Registry::TakePresentFound(Locked& locked, ChangeWatch& watch, Watc
   }
   if (found.more) return absl::OkStatus();
   watch.stage = ChangeWatch::Stage::kChanges;
-  watch.synced_at = revision_;
+  watch.synced_at = catalog_.revision();
   return absl::OkStatus();
 }
 
