@@ -38,9 +38,13 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       memory_(limits_.memory_limit, ReadersShare(limits_.memory_limit, store), mutex_),
       catalog_(store, limits_, memory_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
-      committer_(store, mutex_) {
-  preparers_.emplace(1, preparers);
-  loaders_.emplace(std::max(1, DefaultThreads() - 1), loaders);
+      committer_(store, mutex_),
+      preparers_(std::in_place, 1, preparers),
+      loaders_(std::in_place, std::max(1, DefaultThreads() - 1), loaders),
+      freshness_(store, mutex_, catalog_, committer_),
+      gate_(mutex_, catalog_, committer_, freshness_),
+      records_(store, mutex_, catalog_, memory_, gate_, *loaders_),
+      lister_(store, mutex_, catalog_, memory_, feed_, gate_, *loaders_) {
   if (!store.is_shared()) return;
   committer_.SetOthers(
       [this](Locked& locked, const OtherChanges& others) { TakeOver(locked, others); },
@@ -93,14 +97,15 @@ absl::Status Registry::Load() {
 }
 
 void Registry::Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
-  WhenFresh(done, [=, this](Locked& locked) { CreateLocked(locked, id, if_absent, done); });
+  freshness_.WhenFresh(done,
+                       [=, this](Locked& locked) { CreateLocked(locked, id, if_absent, done); });
 }
 
 void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                             const Reply<CreateResult>& done) {
   if (!catalog_.IsKnown(id)) {
-    return WhenKnown(locked, id, done,
-                     [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
   }
   if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
     body->waiting.push_back([=, this](Locked& later) { CreateLocked(later, id, if_absent, done); });
@@ -110,7 +115,8 @@ void Registry::CreateLocked(Locked& locked, const std::string& id, bool if_absen
   if (existing == nullptr) {
     return CreateNew(locked, id, [=, this](Locked& later, const absl::StatusOr<HullPointer>& hull) {
       if (Committer::IsSuperseded(hull.status())) {
-        return Again(later, [=, this](Locked& again) { CreateLocked(again, id, if_absent, done); });
+        return later.AfterwardsLocked(
+            [=, this](Locked& again) { CreateLocked(again, id, if_absent, done); });
       }
       if (!hull.ok()) return Answer<CreateResult>(later, done, hull.status());
       Answer<CreateResult>(later, done,
@@ -161,14 +167,15 @@ void Registry::CreateNew(Locked& locked, const std::string& id,
 
 void Registry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
                       Reply<uint64_t> done) {
-  WhenFresh(done, [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
+  freshness_.WhenFresh(done,
+                       [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
 }
 
 void Registry::DeleteLocked(Locked& locked, const std::string& id,
                             std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
   if (!catalog_.IsKnown(id)) {
-    return WhenKnown(locked, id, done,
-                     [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
   }
   const HullPointer hull = catalog_.Find(id);
   if (hull == nullptr) return Answer<uint64_t>(locked, done, catalog_.NoSuchHull(id));
@@ -189,8 +196,8 @@ void Registry::DeleteLocked(Locked& locked, const std::string& id,
   Submit(locked, hull, std::move(change),
          [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
            if (Committer::IsSuperseded(status)) {
-             return Again(later,
-                          [=, this](Locked& again) { DeleteLocked(again, id, if_revision, done); });
+             return later.AfterwardsLocked(
+                 [=, this](Locked& again) { DeleteLocked(again, id, if_revision, done); });
            }
            if (!status.ok()) return Answer<uint64_t>(later, done, status);
            const uint64_t revision = deletion.revision;
@@ -211,15 +218,15 @@ void Registry::Replace(Replacement replacement, Reply<ReplaceResult> done) {
   replacement.live =
       std::make_shared<LiveHull>(std::move(vertices), replacement.builder->dimension());
   const auto shared = std::make_shared<Replacement>(std::move(replacement));
-  WhenFresh(done, [=, this](Locked& locked) { ReplaceLocked(locked, shared, done); });
+  freshness_.WhenFresh(done, [=, this](Locked& locked) { ReplaceLocked(locked, shared, done); });
 }
 
 void Registry::ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
                              const Reply<ReplaceResult>& done) {
   const std::string& id = replacement->hull_id;
   if (!catalog_.IsKnown(id)) {
-    return WhenKnown(locked, id, done,
-                     [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
   }
   if (BodyTable::Entry* const body = catalog_.BodyInFlight(id); body != nullptr) {
     body->waiting.push_back([=, this](Locked& later) { ReplaceLocked(later, replacement, done); });
@@ -303,8 +310,8 @@ void Registry::CommitReplacement(Locked& locked, const HullPointer& former,
            absl::StatusOr<ReplaceResult> result =
                FinishReplacement(later, former, hull, status, replaced);
            if (!again) return Answer(later, done, std::move(result));
-           Again(later,
-                 [=, this](Locked& once_more) { ReplaceLocked(once_more, replacement, done); });
+           later.AfterwardsLocked(
+               [=, this](Locked& once_more) { ReplaceLocked(once_more, replacement, done); });
          });
 }
 

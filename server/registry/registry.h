@@ -27,6 +27,10 @@
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
+#include "server/registry/others/freshness_gate.h"
+#include "server/registry/records/record_gate.h"
+#include "server/registry/records/record_lister.h"
+#include "server/registry/records/record_reader.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
@@ -41,7 +45,7 @@ struct PendingChunk;
 //
 // Where the store finds records, hulls are not read when a server starts: the table holds records
 // of those that were asked for lately, and what is not in it is not known until it is read
-// (records/registry_records.cc). So whatever depends on what there is under an ID first makes that
+// (records/record_reader.h). So whatever depends on what there is under an ID first makes that
 // known, and looks again when it is done with waiting. So it is with bodies, which have a table of
 // their own; an ID of which it is known that there is neither is in that of hulls.
 //
@@ -85,9 +89,6 @@ struct PendingChunk;
 // takes the budget's mutex alone.
 class Registry {
  public:
-  // Some 50 us.
-  static constexpr uint64_t kMostLookupsPerHold = 128;
-
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
   // no chunk be pending when it is destroyed. preparers, loaders: where to report what waits to be
   // prepared, and to be read from the store.
@@ -164,20 +165,30 @@ class Registry {
   // call is taken over: before what does not do so itself (List, FindBodies, ListBodies). Not for
   // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
   // question to the store, one for all who wait; nothing where it is not shared.
-  absl::Status AwaitOthers(const std::function<bool()>& should_stop);
+  absl::Status AwaitOthers(const std::function<bool()>& should_stop) {
+    return freshness_.AwaitOthers(should_stop);
+  }
   // Waits until what is here is as fresh as this, in the same way, and tells how stale it may be:
   // before what does not do so itself. FAILED_PRECONDITION: the store has not given that revision.
   // Otherwise as AwaitOthers. Cost: a question to the store only where it is not.
   absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(const Freshness& freshness,
-                                                      const std::function<bool()>& should_stop);
+                                                      const std::function<bool()>& should_stop) {
+    return freshness_.AwaitFresh(freshness, should_stop);
+  }
   // The same, but nullopt, at once, where it would have to wait.
-  std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness);
+  std::optional<std::chrono::nanoseconds> TryFresh(const Freshness& freshness) {
+    return freshness_.TryFresh(freshness);
+  }
   // Has what other servers had committed by now taken over, and calls `done` then, once, on this
   // or another thread, without any lock: for who asks several registries at once. UNAVAILABLE: as
   // AwaitOthers. Cost: as that, but nobody waits.
-  void StartFollow(std::function<void(const absl::Status&)> done);
+  void StartFollow(std::function<void(const absl::Status&)> done) {
+    freshness_.StartFollow(std::move(done));
+  }
   // The same where what is here is not as fresh as this; false, and nothing, where it is.
-  bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done);
+  bool StartFresh(const Freshness& freshness, std::function<void(const absl::Status&)> done) {
+    return freshness_.StartFresh(freshness, std::move(done));
+  }
 
   // Has nothing committed here for a while (Committer::Hold). What is resolved meanwhile of what is
   // here (Freshness::OfWhatIsHere) is what the store holds all the while.
@@ -278,7 +289,6 @@ class Registry {
   struct BuiltChunk;
   enum class Verdict;
   using HullPointer = std::shared_ptr<RegisteredHull>;
-  using Refusal = std::function<void(const absl::Status&)>;
 
   void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
                     const Reply<CreateResult>& done);
@@ -299,8 +309,8 @@ class Registry {
   static void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement);
 
   absl::Status LoadBodies(Locked& locked);
-  FoundBodies FindBodies(Locked& locked, std::span<const std::string> ids,
-                         const std::function<bool()>& should_stop, bool may_wait);
+  std::optional<FoundBodies> FindBodies(Locked& locked, std::span<const std::string> ids,
+                                        const std::function<bool()>& should_stop, bool may_wait);
   void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
                      std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
   absl::Status CheckBody(Locked& locked, const std::string& id,
@@ -309,19 +319,7 @@ class Registry {
                         const Reply<uint64_t>& done);
   void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
 
-  // Whether what is here needs no comparing with what others did.
-  bool IsAlwaysFresh(const Freshness& freshness) const {
-    return !store_.is_shared() && freshness.at_least_revision == 0;
-  }
-  std::optional<std::chrono::nanoseconds> TryFresh(Locked& locked, const Freshness& freshness);
-  absl::StatusOr<std::chrono::nanoseconds> AwaitFresh(Locked& locked, const Freshness& freshness,
-                                                      const std::function<bool()>& should_stop);
-  void AskAhead(Locked& locked);
-
   // Other servers (registry_others.cc).
-  absl::Status AwaitOthers(Locked& locked, const std::function<bool()>& should_stop);
-  void WhenFresh(Refusal refuse, std::function<void(Locked&)> next);
-  void Again(Locked& locked, std::function<void(Locked&)> task);
   void AdvanceLater(const HullPointer& hull);
   // Hulls that are advanced at a time by what other servers added, and the points of all of them:
   // some milliseconds under the mutex.
@@ -387,57 +385,6 @@ class Registry {
 
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
-  // Records of a store that finds them (records/registry_records.cc).
-  //
-  // IDs whose record is being read from the store, which one thread at a time does for each. Who
-  // depends on one waits until it is over; what was read is in the table then, or was and is
-  // dropped again.
-  struct Reading {
-    std::string id;
-    bool is_over = false;
-    // Why it could not be read.
-    absl::Status status;
-    ConditionVariable over;
-    std::vector<std::pair<Refusal, std::function<void(Locked&)>>> waiting;
-  };
-  using Readings = std::vector<std::shared_ptr<Reading>>;
-  // Told with the mutex held, once what was found is of no later moment than what is known here.
-  using FoundTaker = std::function<void(Locked&, const absl::StatusOr<FoundRecords>&)>;
-
-  // Has the record of an ID that is not known read, and goes on with `next`, which must look anew
-  // whether it is known then; or refuses.
-  void WhenKnown(Locked& locked, const std::string& id, Refusal refuse,
-                 std::function<void(Locked&)> next);
-  absl::Status AwaitKnown(Locked& locked, std::span<const std::string* const> ids,
-                          const std::function<bool()>& should_stop);
-  absl::Status ReadMissing(Locked& locked, std::span<const std::string> ids,
-                           const std::function<bool()>& should_stop, bool may_wait);
-  void ReadDue();
-  void ReadRecords(Locked& locked, const Readings& readings);
-  void WhenReached(Locked& locked, uint64_t asked_at, absl::StatusOr<FoundRecords> found,
-                   FoundTaker take);
-  void TakeRecords(Locked& locked, const Readings& readings,
-                   const absl::StatusOr<FoundRecords>& found);
-  void TakeRecord(Locked& locked, const std::string& id, const FoundRecords& found);
-  void EndReading(Locked& locked, Reading& reading, const absl::Status& status);
-  // What other servers did of it is in the table, in the place of what is being read.
-  void EndReadingOf(const std::string& id);
-  absl::StatusOr<FoundRecords> ListFound(const std::string& prefix, const std::string& after,
-                                         size_t page_size, RecordKinds kinds,
-                                         const std::function<bool()>& should_stop);
-  absl::StatusOr<HullPage> ListFoundHulls(const std::string& prefix, const std::string& after,
-                                          size_t page_size,
-                                          const std::function<bool()>& should_stop);
-  absl::StatusOr<BodyPage> ListFoundBodies(const std::string& prefix, const std::string& after,
-                                           size_t page_size,
-                                           const std::function<bool()>& should_stop);
-  HullChange DescribeFound(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  static void LetOthersPass(Locked& locked);
-  bool IsBehind(const std::string& id, const absl::StatusOr<StoredHull>& stored) const;
-  bool IsBehind(const FoundRecords& found) const;
-  void ReadPresent(Locked& locked, ChangeWatch& watch);
-  absl::Status TakePresentFound(Locked& locked, ChangeWatch& watch, WatchPiece* piece);
-
   Store& store_;
   // Where the making of canonical snapshots is timed, if anywhere.
   prometheus::Histogram* snapshot_seconds_ = nullptr;
@@ -452,24 +399,23 @@ class Registry {
   uint64_t last_watch_ = 0;
   Catalog catalog_;
   // What goes on once all that other servers did is taken over.
-  std::vector<std::function<void(Locked&)>> after_others_;
-  // Those that are not over, by ID; of these the ones that no thread has taken yet; and threads
-  // that take them.
-  std::map<std::string, std::shared_ptr<Reading>> readings_;
-  Readings due_readings_;
-  size_t reading_threads_ = 0;
+  std::vector<LockedTask> after_others_;
   // Nothing more is prepared.
   bool ending_ = false;
-  // The store is being asked for reads to come.
-  bool is_asking_ahead_ = false;
   ChangeFeed feed_;
 
-  // Last, as their threads use the rest.
+  // Their threads use all the rest, so they end before anything else does (~Registry).
   Committer committer_;
   // One thread: what it does is in nobody's way, and nobody waits for it.
   std::optional<WorkerPool> preparers_;
   // These help readers that read many hulls from the store.
   std::optional<WorkerPool> loaders_;
+
+  // The parts: what each does is told in its header.
+  FreshnessGate freshness_;
+  RecordGate gate_;
+  RecordReader records_;
+  RecordLister lister_;
 };
 
 }  // namespace hulld::server

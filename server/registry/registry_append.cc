@@ -101,7 +101,7 @@ void Registry::OpenAppend(const std::string& id, const std::string& writer_id,
       id, writer_id, create_if_absent, false, std::move(on_gone), std::move(done), client});
   // The store may have to be read.
   if (!store_.is_shared()) return RunOpen(request);
-  WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
+  freshness_.WhenFresh(request->done, [=, this](Locked&) { RunOpen(request); });
 }
 
 void Registry::RunOpen(const std::shared_ptr<OpenRequest>& request) {
@@ -121,7 +121,7 @@ void Registry::OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& re
   const std::string& id = request->hull_id;
   const HullPointer known = std::exchange(request->known, nullptr);
   if (!catalog_.IsKnown(id)) {
-    return WhenKnown(locked, id, request->done, [this, request](Locked& later) {
+    return records_.WhenKnown(locked, id, request->done, [this, request](Locked& later) {
       const bool is_known = catalog_.IsKnown(request->hull_id);
       if (is_known) request->known = catalog_.Find(request->hull_id);
       // Where there is none, nothing of the store is to be read any more.
@@ -187,7 +187,7 @@ absl::StatusOr<uint64_t> Registry::CommittedSequence(Locked& locked, RegisteredH
   locked.Lock();
   --hull.sequence_readers;
   if (absl::IsAborted(sequence.status())) {
-    if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
+    if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
     // Who asks sees that.
     if (hull.state.gone()) return 0;
     if (hull.supersessions == supersessions && hull.committed.record == record) {
@@ -262,7 +262,7 @@ void Registry::ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk&
   // What is not committed now is compared by the store.
   const bool is_new = verdict.ok() && *verdict == Verdict::kNew;
   if (!is_new && store_.is_shared()) {
-    const absl::Status fresh = AwaitOthers(locked, pending.should_stop);
+    const absl::Status fresh = freshness_.AwaitOthers(locked, pending.should_stop);
     verdict = fresh.ok() ? CheckChunk(locked, *hull, pending) : fresh;
     // One that was sent before it has to be made anew meanwhile.
     if (hull->IsQueuedBefore(pending)) {
@@ -390,7 +390,7 @@ absl::StatusOr<std::shared_ptr<LiveHull>> Registry::LiveForWriter(Locked& locked
   absl::StatusOr<std::shared_ptr<LiveHull>> loaded = LoadLive(store_, stored);
   locked.Lock();
   if (absl::IsAborted(loaded.status())) {
-    if (absl::Status s = AwaitOthers(locked, {}); !s.ok()) return s;
+    if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
     const bool is_known = hull.state.work() == HullState::Work::kReverting || hull.state.gone() ||
                           hull.state.changing_life();
     return is_known ? Superseded() : StoreDisagrees(stored.record);

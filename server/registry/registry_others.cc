@@ -6,82 +6,14 @@
 #include <utility>
 
 #include "core/base/check.h"
-#include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/registry/registry.h"
 
 namespace hulld::server {
 
-absl::Status Registry::AwaitOthers(const std::function<bool()>& should_stop) {
-  if (!store_.is_shared()) return absl::OkStatus();
-  Locked locked(mutex_);
-  return AwaitOthers(locked, should_stop);
-}
-
-// The same for who holds the mutex, which is released meanwhile.
-absl::Status Registry::AwaitOthers(Locked& locked, const std::function<bool()>& should_stop) {
-  struct Wait {
-    ConditionVariable changed;
-    std::optional<absl::Status> status;
-  };
-  const auto wait = std::make_shared<Wait>();
-  committer_.FollowNow(locked, [wait](Locked&, const absl::Status& status) {
-    wait->status = status;
-    wait->changed.notify_all();
-  });
-  // What is due does not wait meanwhile.
-  locked.Unlock();
-  locked.Lock();
-  const auto is_over = [&] { return wait->status.has_value(); };
-  while (!is_over()) {
-    locked.WaitOn([&](auto& lock) { wait->changed.wait_for(lock, kStopPoll, is_over); });
-    if (Stopped(should_stop)) return Cancelled();
-  }
-  return *wait->status;
-}
-
-void Registry::StartFollow(std::function<void(const absl::Status&)> done) {
-  Locked locked(mutex_);
-  const auto tell = [done = std::move(done)](Locked& later, const absl::Status& status) {
-    later.Afterwards([done, status] { done(status); });
-  };
-  if (!store_.is_shared()) return tell(locked, absl::OkStatus());
-  committer_.FollowNow(locked, tell);
-}
-
-bool Registry::StartFresh(const Freshness& freshness,
-                          std::function<void(const absl::Status&)> done) {
-  Locked locked(mutex_);
-  if (!store_.is_shared() || TryFresh(locked, freshness).has_value()) return false;
-  committer_.FollowNow(locked, [done = std::move(done)](Locked& later, const absl::Status& status) {
-    later.Afterwards([done, status] { done(status); });
-  });
-  return true;
-}
-
 void Registry::Hold(std::shared_ptr<CommitHold> hold) {
   const Locked locked(mutex_);
   committer_.Hold(locked, std::move(hold));
-}
-
-// Goes on with something that the answer to a call depends on, at once or once what other servers
-// had committed by now is taken over.
-void Registry::WhenFresh(Refusal refuse, std::function<void(Locked&)> next) {
-  Locked locked(mutex_);
-  if (!store_.is_shared()) return next(locked);
-  committer_.Follow(locked, [refuse = std::move(refuse), next = std::move(next)](
-                                Locked& later, const absl::Status& status) {
-    if (status.ok()) return next(later);
-    later.Afterwards([refuse, status] { refuse(status); });
-  });
-}
-
-// A change that another server superseded is made anew, of what there is by then.
-void Registry::Again(Locked& locked, std::function<void(Locked&)> task) {
-  locked.Afterwards([this, task = std::move(task)] {
-    Locked again(mutex_);
-    task(again);
-  });
 }
 
 void Registry::AdvanceLater(const HullPointer& hull) {
@@ -116,7 +48,7 @@ void Registry::TakeOver(Locked& locked, const OtherChanges& others) {
   const uint64_t since = catalog_.revision();
   for (const auto& [revision, id] : in_order) {
     TakeOver(locked, *id, others.by_id.at(*id), since);
-    EndReadingOf(*id);
+    for (LockedTask& task : records_.EndReadingOf(*id)) after_others_.push_back(std::move(task));
     catalog_.hulls().RestSome();
     catalog_.bodies().DropSome(locked);
   }

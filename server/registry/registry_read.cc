@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/base/check.h"
-#include "server/contract/error_info.h"
 #include "server/contract/limit_error.h"
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
@@ -17,15 +16,6 @@
 
 namespace hulld::server {
 namespace {
-
-absl::Status FutureRevision(uint64_t wanted, uint64_t current) {
-  return WithReason(
-      absl::FailedPreconditionError(absl::StrCat(
-          "freshness.at_least_revision is ", wanted, ", but the store is at revision ", current,
-          " and nobody was told of a later one; give the revision of an answer's header")),
-      v1::ERROR_REASON_FUTURE_REVISION,
-      {{"at_least_revision", wanted}, {"current_revision", current}});
-}
 
 // Nobody is told.
 absl::Status WouldWait() { return absl::UnavailableError("it would have to wait"); }
@@ -41,53 +31,6 @@ struct Registry::HullsRead {
   // Whether it may release the mutex to read from the store, and to prepare.
   bool may_wait = true;
 };
-
-// Where what is here is as fresh as this: how stale it may be. Otherwise a question to the store
-// decides. A read that is content, but would soon not be, has that asked for those to come, so that
-// none of them waits.
-std::optional<std::chrono::nanoseconds> Registry::TryFresh(Locked& locked,
-                                                           const Freshness& freshness) {
-  using std::chrono::nanoseconds;
-  if (catalog_.revision() < freshness.at_least_revision) return std::nullopt;
-  if (!store_.is_shared()) return nanoseconds(0);
-  const std::optional<SteadyClock::time_point> caught_up = committer_.caught_up(locked);
-  if (!caught_up.has_value()) return std::nullopt;
-  const SteadyClock::time_point began =
-      freshness.began.has_value() ? *freshness.began : SteadyClock::now();
-  const nanoseconds staleness = std::max<nanoseconds>(began - *caught_up, nanoseconds(0));
-  if (!freshness.max_staleness.has_value()) return staleness;
-  if (staleness > *freshness.max_staleness) return std::nullopt;
-  if (staleness > *freshness.max_staleness / 2) AskAhead(locked);
-  return staleness;
-}
-
-void Registry::AskAhead(Locked& locked) {
-  if (std::exchange(is_asking_ahead_, true)) return;
-  committer_.Follow(locked, [this](Locked&, const absl::Status&) { is_asking_ahead_ = false; });
-}
-
-absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
-    Locked& locked, const Freshness& freshness, const std::function<bool()>& should_stop) {
-  if (const auto staleness = TryFresh(locked, freshness)) return *staleness;
-  if (store_.is_shared()) {
-    if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
-  }
-  if (catalog_.revision() >= freshness.at_least_revision) return std::chrono::nanoseconds(0);
-  return FutureRevision(freshness.at_least_revision, catalog_.revision());
-}
-
-std::optional<std::chrono::nanoseconds> Registry::TryFresh(const Freshness& freshness) {
-  if (IsAlwaysFresh(freshness)) return std::chrono::nanoseconds(0);
-  Locked locked(mutex_);
-  return TryFresh(locked, freshness);
-}
-
-absl::StatusOr<std::chrono::nanoseconds> Registry::AwaitFresh(
-    const Freshness& freshness, const std::function<bool()>& should_stop) {
-  if (IsAlwaysFresh(freshness)) return std::chrono::nanoseconds(0);
-  Locked locked(mutex_);
-  return AwaitFresh(locked, freshness, should_stop);
-}
 
 // Brings what is known of each hull up to this moment. The mutex is let go of after a number of
 // lookups; what changed by then is looked up again, so at the end all is of one moment. That comes
@@ -218,7 +161,7 @@ absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read
   for (const uint32_t due : std::span(hulls.due_).last(count)) {
     if (due != k) wanted.push_back(&read.ids[hulls.hulls_[due].first]);
   }
-  const absl::Status asked = AwaitKnown(locked, wanted, read.should_stop);
+  const absl::Status asked = records_.AwaitKnown(locked, wanted, read.should_stop);
   if (Stopped(read.should_stop)) return Cancelled();
   if (asked.ok()) return false;
   hulls.hulls_[k].view = asked;
@@ -387,7 +330,7 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
   Resolved resolved;
   {
     Locked locked(mutex_);
-    const auto staleness = AwaitFresh(locked, plan.freshness, should_stop);
+    const auto staleness = freshness_.AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
     resolved.staleness = *staleness;
     const absl::Status status = LookUpDue(locked, {ids, known, should_stop, plan});
@@ -407,7 +350,7 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
   Resolved resolved;
   {
     Locked locked(mutex_);
-    const auto staleness = TryFresh(locked, plan.freshness);
+    const auto staleness = freshness_.TryFresh(locked, plan.freshness);
     if (!staleness.has_value()) return std::nullopt;
     resolved.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
@@ -478,7 +421,7 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     hull.loading = false;
     hull.changed.notify_all();
     if (absl::IsAborted(loaded.status())) {
-      if (absl::Status s = AwaitOthers(locked, should_stop); !s.ok()) return s;
+      if (absl::Status s = freshness_.AwaitOthers(locked, should_stop); !s.ok()) return s;
       const HullRecord& now = hull.committed.record;
       if (!hull.state.gone() && now.revision == stored.record.revision) return StoreDisagrees(now);
       continue;
@@ -547,7 +490,7 @@ void Registry::SchedulePreparing(const HullPointer& hull) {
 absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
                                         size_t page_size,
                                         const std::function<bool()>& should_stop) {
-  if (catalog_.is_cache()) return ListFoundHulls(prefix, after, page_size, should_stop);
+  if (catalog_.is_cache()) return lister_.ListHulls(prefix, after, page_size, should_stop);
   HullPage page;
   const std::lock_guard lock(mutex_);
   page.store_revision = catalog_.revision();

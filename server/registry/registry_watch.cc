@@ -56,7 +56,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
     case ChangeWatch::Stage::kPresent:
       if (!catalog_.is_cache()) {
         TakePresent(watch, &piece);
-      } else if (absl::Status s = TakePresentFound(locked, watch, &piece); !s.ok()) {
+      } else if (absl::Status s = lister_.TakePresent(locked, watch, &piece); !s.ok()) {
         return s;
       }
       break;

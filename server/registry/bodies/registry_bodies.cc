@@ -54,7 +54,7 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());
   const auto shared = std::make_shared<Body>(std::move(body), memory_, MemoryUse::kWriting);
-  WhenFresh(done, [=, this](Locked& locked) {
+  freshness_.WhenFresh(done, [=, this](Locked& locked) {
     // Counted by now. What waits for others is not counted twice.
     if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
       return Answer<PutBodyResult>(locked, done, s);
@@ -85,8 +85,9 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
     return;
   }
   if (!catalog_.IsKnown(id)) {
-    return WhenKnown(locked, id, done,
-                     [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+    return records_.WhenKnown(locked, id, done, [=, this](Locked& later) {
+      PutBodyLocked(later, body, if_revision, done);
+    });
   }
   if (const HullPointer hull = catalog_.Find(id); hull != nullptr && hull->state.changing_life()) {
     hull->exclusive.push_back(
@@ -107,32 +108,34 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   // One that was damaged begins anew.
   change.begins = created == 0;
   change.replaces_body = change.begins && !is_new;
-  SubmitBody(
-      locked, std::move(change),
-      [=, this](Locked& later, const absl::Status& status, const Change&) {
-        if (is_new) catalog_.EndCreatingBody(status.ok());
-        if (Committer::IsSuperseded(status)) {
-          return Again(later,
-                       [=, this](Locked& again) { PutBodyLocked(again, body, if_revision, done); });
-        }
-        const BodyRecord& record = body->record();
-        if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
-        catalog_.bodies().Set(later, record.body_id, body);
-        Answer<PutBodyResult>(
-            later, done, PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
-      });
+  SubmitBody(locked, std::move(change),
+             [=, this](Locked& later, const absl::Status& status, const Change&) {
+               if (is_new) catalog_.EndCreatingBody(status.ok());
+               if (Committer::IsSuperseded(status)) {
+                 return later.AfterwardsLocked(
+                     [=, this](Locked& again) { PutBodyLocked(again, body, if_revision, done); });
+               }
+               const BodyRecord& record = body->record();
+               if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
+               catalog_.bodies().Set(later, record.body_id, body);
+               Answer<PutBodyResult>(
+                   later, done,
+                   PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
+             });
 }
 
 void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
                           Reply<uint64_t> done) {
-  WhenFresh(done, [=, this](Locked& locked) { DeleteBodyLocked(locked, id, if_revision, done); });
+  freshness_.WhenFresh(
+      done, [=, this](Locked& locked) { DeleteBodyLocked(locked, id, if_revision, done); });
 }
 
 void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
                                 std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
   if (!catalog_.IsKnown(id)) {
-    return WhenKnown(locked, id, done,
-                     [=, this](Locked& later) { DeleteBodyLocked(later, id, if_revision, done); });
+    return records_.WhenKnown(locked, id, done, [=, this](Locked& later) {
+      DeleteBodyLocked(later, id, if_revision, done);
+    });
   }
   BodyTable::Entry* const entry = catalog_.bodies().Find(id);
   if (entry == nullptr) {
@@ -158,9 +161,8 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
   SubmitBody(locked, std::move(change),
              [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
                if (Committer::IsSuperseded(status)) {
-                 return Again(later, [=, this](Locked& again) {
-                   DeleteBodyLocked(again, id, if_revision, done);
-                 });
+                 return later.AfterwardsLocked(
+                     [=, this](Locked& again) { DeleteBodyLocked(again, id, if_revision, done); });
                }
                if (!status.ok()) return Answer<uint64_t>(later, done, status);
                catalog_.NoteBodyEnded();
@@ -208,7 +210,7 @@ void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion f
 absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const std::string& after,
                                               size_t page_size,
                                               const std::function<bool()>& should_stop) {
-  if (catalog_.is_cache()) return ListFoundBodies(prefix, after, page_size, should_stop);
+  if (catalog_.is_cache()) return lister_.ListBodies(prefix, after, page_size, should_stop);
   BodyPage page;
   const std::lock_guard lock(mutex_);
   page.store_revision = catalog_.revision();
@@ -226,10 +228,12 @@ absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const s
   return page;
 }
 
-// kMostLookupsPerHold at a time. Of those what is not known is read, all at once; who reads much
-// may drop it again meanwhile, so what was found before is not looked for again.
-FoundBodies Registry::FindBodies(Locked& locked, std::span<const std::string> ids,
-                                 const std::function<bool()>& should_stop, bool may_wait) {
+// kMostLookupsPerHold at a time. Of those what is not known is read, all at once; a reader of much
+// may drop it again meanwhile, so what was found before is not looked for again. nullopt: it would
+// have to wait, and may not.
+std::optional<FoundBodies> Registry::FindBodies(Locked& locked, std::span<const std::string> ids,
+                                                const std::function<bool()>& should_stop,
+                                                bool may_wait) {
   FoundBodies found;
   found.bodies.resize(ids.size());
   for (size_t first = 0; first < ids.size(); first += kMostLookupsPerHold) {
@@ -240,7 +244,8 @@ FoundBodies Registry::FindBodies(Locked& locked, std::span<const std::string> id
     const size_t end = std::min<size_t>(first + kMostLookupsPerHold, ids.size());
     for (size_t i = first; i < end; ++i) {
       while (found.status.ok() && !catalog_.IsKnown(ids[i])) {
-        found.status = ReadMissing(locked, ids.subspan(i, end - i), should_stop, may_wait);
+        if (!may_wait) return std::nullopt;
+        found.status = records_.AwaitMissing(locked, ids.subspan(i, end - i), should_stop);
       }
       // Also what could not be read may be known by now.
       found.bodies[i] = catalog_.FindBody(ids[i]);
@@ -254,13 +259,12 @@ FoundBodies Registry::FindBodies(Locked& locked, std::span<const std::string> id
 FoundBodies Registry::FindBodies(std::span<const std::string> ids,
                                  const std::function<bool()>& should_stop) {
   Locked locked(mutex_);
-  return FindBodies(locked, ids, should_stop, true);
+  return *FindBodies(locked, ids, should_stop, true);
 }
 
 std::optional<FoundBodies> Registry::TryFindBodies(std::span<const std::string> ids) {
   Locked locked(mutex_);
-  FoundBodies found = FindBodies(locked, ids, {}, false);
-  return found.status.ok() ? std::optional(std::move(found)) : std::nullopt;
+  return FindBodies(locked, ids, {}, false);
 }
 
 }  // namespace hulld::server

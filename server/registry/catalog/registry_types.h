@@ -268,6 +268,8 @@ struct WatchStart {
 // Called once with the answer.
 template <typename T>
 using Reply = std::function<void(absl::StatusOr<T>)>;
+// Called once with why there is none. A Reply is one.
+using Refusal = std::function<void(const absl::Status&)>;
 
 }  // namespace hulld::server
 

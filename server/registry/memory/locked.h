@@ -16,6 +16,9 @@
 
 namespace hulld::server {
 
+// Hulls and bodies that are looked up within one hold of the registry's mutex, at most: some 50 us.
+inline constexpr uint64_t kMostLookupsPerHold = 128;
+
 // How long a mutex was held at once, and for how much work.
 struct HoldStatistics {
   // The longest hold within this minute and the one before. Waiting on a condition is none.
@@ -137,7 +140,24 @@ class Locked {
   void NoteLookup() { ++mutex_.lookups_; }
   uint64_t lookups() const { return mutex_.lookups_; }
 
+  // Before a lookup that is one of many: counts it, and lets others have the mutex after
+  // kMostLookupsPerHold of them.
+  void LetOthersPass() {
+    if (lookups() == kMostLookupsPerHold) {
+      Unlock();
+      Lock();
+    }
+    NoteLookup();
+  }
+
   void Afterwards(std::function<void()> task) { afterwards_.push_back(std::move(task)); }
+  // The same for a task that needs the mutex, which is taken anew for it.
+  void AfterwardsLocked(std::function<void(Locked&)> task) {
+    Afterwards([&mutex = mutex_, task = std::move(task)] {
+      Locked again(mutex);
+      task(again);
+    });
+  }
   template <typename T>
   void Discard(std::unique_ptr<T> object) {
     if (object != nullptr) Discard(std::shared_ptr<T>(std::move(object)));
@@ -152,6 +172,9 @@ class Locked {
   bool is_held_ = false;
   std::vector<std::function<void()>> afterwards_;
 };
+
+// Something that is done with the mutex held.
+using LockedTask = std::function<void(Locked&)>;
 
 }  // namespace hulld::server
 
