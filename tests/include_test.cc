@@ -92,6 +92,7 @@ constexpr std::string_view kRooms[] = {
     "server/registry/catalog",
     "server/registry/others",
     "server/registry/records",
+    "server/registry/read",
     "server/registry",
     "server/registry/bodies",
     "server/access",

@@ -39,12 +39,14 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       catalog_(store, limits_, memory_),
       feed_(mutex_, memory_, Config::kWatchMarkInterval),
       committer_(store, mutex_),
-      preparers_(std::in_place, 1, preparers),
+      preparer_(mutex_, catalog_, memory_, preparers),
       loaders_(std::in_place, std::max(1, DefaultThreads() - 1), loaders),
       freshness_(store, mutex_, catalog_, committer_),
       gate_(mutex_, catalog_, committer_, freshness_),
       records_(store, mutex_, catalog_, memory_, gate_, *loaders_),
-      lister_(store, mutex_, catalog_, memory_, feed_, gate_, *loaders_) {
+      lister_(store, mutex_, catalog_, memory_, feed_, gate_, *loaders_),
+      reader_(store, limits_, mutex_, catalog_, memory_, freshness_, records_, preparer_,
+              *loaders_) {
   if (!store.is_shared()) return;
   committer_.SetOthers(
       [this](Locked& locked, const OtherChanges& others) { TakeOver(locked, others); },
@@ -55,11 +57,11 @@ Registry::~Registry() {
   store_.OnOthers(nullptr);
   {
     const std::lock_guard lock(mutex_);
-    ending_ = true;
+    preparer_.Stop();
   }
   // Its thread takes over what other servers did, into what is closed here.
   committer_.End();
-  preparers_.reset();
+  preparer_.End();
   loaders_.reset();
   // Closed sessions may hold hulls for longer.
   const std::lock_guard lock(mutex_);
@@ -406,6 +408,44 @@ void Registry::Advance(Locked& locked, const HullPointer& hull) {
   if (hull->state.in_flight() > 0 && (repeated || next.chunk.if_revision.has_value())) return;
   hull->state.Schedule();
   writers_.Submit([this, hull] { RunNextChunk(hull); }, next.session.client);
+}
+
+absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
+                                           const std::function<bool()>& should_stop,
+                                           const ReadPlan& plan) {
+  KnownHulls known;
+  return reader_.Refresh(ids, known, should_stop, plan);
+}
+
+absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
+    const std::string& id, const std::function<bool()>& should_stop, const Freshness& freshness) {
+  absl::StatusOr<Resolved> resolved =
+      Resolve(std::span(&id, 1), should_stop, {.freshness = freshness});
+  if (!resolved.ok()) return resolved.status();
+  absl::StatusOr<HullView>& hull = resolved->hulls.front();
+  if (!hull.ok()) return hull.status();
+  return std::pair(resolved->as_of(), *std::move(hull));
+}
+
+absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
+                                        size_t page_size,
+                                        const std::function<bool()>& should_stop) {
+  if (catalog_.is_cache()) return lister_.ListHulls(prefix, after, page_size, should_stop);
+  HullPage page;
+  const std::lock_guard lock(mutex_);
+  page.store_revision = catalog_.revision();
+  const HullTable::Entries& all = catalog_.hulls().entries();
+  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
+  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
+    if (!next->second.visible()) continue;
+    if (page.hulls.size() == page_size) {
+      page.more = true;
+      break;
+    }
+    HullChange hull = next->second.Describe(next->first);
+    page.hulls.push_back({std::move(hull.record), hull.damaged});
+  }
+  return page;
 }
 
 HoldStatistics Registry::Holds() const {

@@ -28,6 +28,8 @@
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
 #include "server/registry/others/freshness_gate.h"
+#include "server/registry/read/hull_reader.h"
+#include "server/registry/read/preparer.h"
 #include "server/registry/records/record_gate.h"
 #include "server/registry/records/record_lister.h"
 #include "server/registry/records/record_reader.h"
@@ -209,7 +211,7 @@ class Registry {
   CommitStatistics Commits() const { return committer_.Statistics(); }
   // Where each batch is timed and counted; set before the first change, and outlives this.
   void SetMetrics(StoreMetrics& metrics) {
-    snapshot_seconds_ = &metrics.snapshot_seconds;
+    reader_.SetMetrics(metrics.snapshot_seconds);
     committer_.SetMetrics(metrics);
   }
   // RESOURCE_EXHAUSTED: more is held for this use than its share of --memory-limit.
@@ -225,12 +227,16 @@ class Registry {
                                    const std::function<bool()>& should_stop,
                                    const ReadPlan& plan = {});
   // The same, but nullopt, at once, where it would have to ask or read the store, or to prepare.
-  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {});
-  // As Resolve, for who asks for the same hulls again and again: `known` is kept in between, and
-  // only what changed since is looked up.
+  std::optional<Resolved> TryResolve(std::span<const std::string> ids, const ReadPlan& plan = {}) {
+    return reader_.TryResolve(ids, plan);
+  }
+  // As Resolve, for a caller that asks for the same hulls again and again: `known` is kept in
+  // between, and only what changed since is looked up.
   absl::StatusOr<Resolved> Refresh(std::span<const std::string> ids, KnownHulls& known,
                                    const std::function<bool()>& should_stop,
-                                   const ReadPlan& plan = {});
+                                   const ReadPlan& plan = {}) {
+    return reader_.Refresh(ids, known, should_stop, plan);
+  }
   // The same for one hull; NOT_FOUND and DATA_LOSS are the status.
   absl::StatusOr<std::pair<AsOf, HullView>> Resolve(const std::string& id,
                                                     const std::function<bool()>& should_stop,
@@ -241,7 +247,9 @@ class Registry {
   // said so. RESOURCE_EXHAUSTED: it is not made yet, and readers hold more than their share of
   // --memory-limit. Cost: that of building the hull.
   absl::StatusOr<const Hull*> Canonical(const HullView& view,
-                                        const std::function<bool()>& should_stop);
+                                        const std::function<bool()>& should_stop) {
+    return reader_.Canonical(view, should_stop);
+  }
 
   // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
   // thread, with the reason when the hull is deleted or replaced before the session is closed.
@@ -361,33 +369,9 @@ class Registry {
                    const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
   void Revert(Locked& locked, RegisteredHull& hull);
 
-  struct HullsRead;
-  absl::Status LookUpDue(Locked& locked, const HullsRead& read);
-  absl::Status LookUpAll(Locked& locked, const HullsRead& read);
-  absl::Status LookUp(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::StatusOr<bool> AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k);
-  absl::StatusOr<bool> AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                   RegisteredHull& hull, bool& was_missing);
-  absl::Status PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull);
-  static bool IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull);
-  void NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
-                bool was_missing);
-  void LoadMany(Locked& locked, const HullsRead& read, uint32_t k);
-  bool BeginLoading(Locked& locked, const HullsRead& read);
-  void EndLoading(Locked& locked, const HullsRead& read);
-  void EndAllLoading(Locked& locked, const HullsRead& read);
-  absl::Status CheckReaders(Locked& locked, const KnownHulls& known);
-  absl::Status LoadForReaders(Locked& locked, RegisteredHull& hull,
-                              const std::function<bool()>& should_stop);
-  static bool WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions);
-  void Prepare(Locked& locked, RegisteredHull& hull);
-  void SchedulePreparing(const HullPointer& hull);
-
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
   Store& store_;
-  // Where the making of canonical snapshots is timed, if anywhere.
-  prometheus::Histogram* snapshot_seconds_ = nullptr;
   // With the memory limit in force.
   const Limits limits_;
   WorkerPool& writers_;
@@ -400,14 +384,11 @@ class Registry {
   Catalog catalog_;
   // What goes on once all that other servers did is taken over.
   std::vector<LockedTask> after_others_;
-  // Nothing more is prepared.
-  bool ending_ = false;
   ChangeFeed feed_;
 
   // Their threads use all the rest, so they end before anything else does (~Registry).
   Committer committer_;
-  // One thread: what it does is in nobody's way, and nobody waits for it.
-  std::optional<WorkerPool> preparers_;
+  Preparer preparer_;
   // These help readers that read many hulls from the store.
   std::optional<WorkerPool> loaders_;
 
@@ -416,6 +397,7 @@ class Registry {
   RecordGate gate_;
   RecordReader records_;
   RecordLister lister_;
+  HullReader reader_;
 };
 
 }  // namespace hulld::server

@@ -492,7 +492,7 @@ void Registry::SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk
     }
     CommitChunk(later, hull, change.hull, mark, writer_id, sequence);
     hull->points_since_prepared += counts.outside;
-    if (hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
+    preparer_.ScheduleIfWorn(hull);
     const HullRecord& record = change.hull.record;
     AnswerChunk(
         later, done, sequence,

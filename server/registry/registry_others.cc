@@ -160,7 +160,7 @@ bool Registry::TakeOverVersion(Locked& locked, const HullPointer& hull, const Ot
   const bool grew =
       hull->Supersede(locked, stored, other.growth.has_value() ? &*other.growth : nullptr);
   catalog_.statistics().grown += grew;
-  if (grew && !ending_ && hull->HoldsMuchElse() && !hull->preparing) SchedulePreparing(hull);
+  if (grew) preparer_.ScheduleIfWorn(hull);
   catalog_.NoteChange(*hull);
   if (is_news) feed_.NoteChanged(locked, hull);
   return true;

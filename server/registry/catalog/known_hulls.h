@@ -68,7 +68,7 @@ class KnownHulls {
   uint64_t lookups() const { return lookups_; }
 
  private:
-  friend class Registry;
+  friend class HullReader;
 
   struct Known {
     // Where the ID is among those asked for.

@@ -1,5 +1,5 @@
-// Readers: hulls that are ready to be served, all current at one revision.
-#include <absl/status/status.h>
+#include "server/registry/read/hull_reader.h"
+
 #include <absl/strings/str_cat.h>
 
 #include <algorithm>
@@ -12,18 +12,11 @@
 #include "server/contract/stopped_call.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/registry/memory/hull_loader.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
-namespace {
-
-// Nobody is told.
-absl::Status WouldWait() { return absl::UnavailableError("it would have to wait"); }
-
-}  // namespace
 
 // A read of several hulls.
-struct Registry::HullsRead {
+struct HullReader::HullsRead {
   std::span<const std::string> ids;
   KnownHulls& known;
   const std::function<bool()>& should_stop;
@@ -32,25 +25,22 @@ struct Registry::HullsRead {
   bool may_wait = true;
 };
 
-// Brings what is known of each hull up to this moment. The mutex is let go of after a number of
-// lookups; what changed by then is looked up again, so at the end all is of one moment. That comes
-// to an end, since a commit takes longer than a lookup. Releases the mutex also to read from the
-// store and to prepare; where it may not, UNAVAILABLE says that it would have to. CANCELLED:
-// should_stop said so.
-absl::Status Registry::LookUpDue(Locked& locked, const HullsRead& read) {
-  absl::Status status = LookUpAll(locked, read);
-  // Nothing is left where that is OK, so that the mutex is held all the while.
-  if (!status.ok()) {
+// Brings what is known of each hull up to this moment. Releases the mutex after a number of
+// lookups, and to read from the store and to prepare, where it may. CANCELLED: should_stop said so.
+absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpDue(Locked& locked, const HullsRead& read) {
+  const absl::StatusOr<LookUpEnd> end = LookUpAll(locked, read);
+  // Nothing is left where it is done, so that the mutex is held all the while.
+  if (!end.ok() || *end != LookUpEnd::kDone) {
     KnownHulls& known = read.known;
     const std::function<bool()> stop = [] { return true; };
     EndAllLoading(locked, {read.ids, known, stop, read.plan});
     const size_t first = std::min(known.ahead_end_, known.due_.size());
     for (const uint32_t k : std::span(known.due_).subspan(first)) known.hulls_[k].found = nullptr;
   }
-  return status;
+  return end;
 }
 
-absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
+absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUpAll(Locked& locked, const HullsRead& read) {
   KnownHulls& known = read.known;
   if (!known.next_change_.has_value()) known.next_change_ = catalog_.recent_changes().end();
   while (true) {
@@ -64,15 +54,15 @@ absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
       known.NoteChange(catalog_.recent_changes().at(next++));
     } else if (!known.due_.empty()) {
       KnownHulls::Known& due = known.hulls_[known.due_.back()];
-      const absl::Status status = LookUp(locked, read, known.due_.back());
-      if (!status.ok()) return status;
+      const absl::StatusOr<LookUpEnd> end = LookUp(locked, read, known.due_.back());
+      if (!end.ok() || *end != LookUpEnd::kDone) return end;
       due.is_due = false;
       known.due_.pop_back();
       ++known.lookups_;
     } else if (!known.ahead_.empty()) {
       EndAllLoading(locked, read);
     } else {
-      return absl::OkStatus();
+      return LookUpEnd::kDone;
     }
     locked.NoteLookup();
     if (locked.lookups() < kMostLookupsPerHold) continue;
@@ -85,10 +75,10 @@ absl::Status Registry::LookUpAll(Locked& locked, const HullsRead& read) {
 }
 
 // Whether readers may hold more.
-absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
+absl::Status HullReader::CheckReaders(Locked& locked, const KnownHulls& known) {
   if (!memory_.IsOver(MemoryUse::kReading)) return absl::OkStatus();
   const uint64_t share = memory_.share(MemoryUse::kReading);
-  // Trying again does not help who holds most of it.
+  // Trying again does not help a read that holds most of it.
   if (const uint64_t bytes = known.HullBytes(); bytes > share / 2) {
     return LimitExceeded(
         absl::StrCat("the hulls that the call names take ", bytes,
@@ -100,7 +90,8 @@ absl::Status Registry::CheckReaders(Locked& locked, const KnownHulls& known) {
 }
 
 // What readers are given of one hull now, or why there is nothing.
-absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k) {
+absl::StatusOr<HullReader::LookUpEnd> HullReader::LookUp(Locked& locked, const HullsRead& read,
+                                                         uint32_t k) {
   KnownHulls::Known& known = read.known.hulls_[k];
   const std::string& id = read.ids[known.first];
   const ReadPlan& plan = read.plan;
@@ -109,48 +100,51 @@ absl::Status Registry::LookUp(Locked& locked, const HullsRead& read, uint32_t k)
     std::optional<HullPointer> found = std::exchange(known.found, nullptr);
     if (*found == nullptr || (*found)->state.gone()) found = catalog_.hulls().Ask(id);
     if (!found.has_value() && !catalog_.bodies().contains(id)) {
+      if (!read.may_wait) return LookUpEnd::kWouldWait;
       const absl::StatusOr<bool> is_over = AwaitRecord(locked, read, k);
-      if (!is_over.ok() || *is_over) return is_over.status();
+      if (!is_over.ok()) return is_over.status();
+      if (*is_over) return LookUpEnd::kDone;
       continue;
     }
     const HullPointer hull = std::move(found).value_or(nullptr);
     if (hull == nullptr || !hull->state.visible()) {
       known.view = catalog_.NoSuchHull(id);
-      return absl::OkStatus();
+      return LookUpEnd::kDone;
     }
     if (hull->state.damaged()) {
       known.view = hull->state.damage();
-      return absl::OkStatus();
+      return LookUpEnd::kDone;
     }
     if (!hull->IsReady()) {
       // It was looked up, prepared, and dropped since. To read it again, and prepare it again, may
       // drop another one of the same read, and so on for ever.
       if (IsHeld(known, *hull)) {
         ++catalog_.statistics().hits;
-        return absl::OkStatus();
+        return LookUpEnd::kDone;
       }
+      if (!read.may_wait) return LookUpEnd::kWouldWait;
       const absl::StatusOr<bool> is_over = AwaitPoints(locked, read, k, *hull, was_missing);
-      if (!is_over.ok() || *is_over) return is_over.status();
+      if (!is_over.ok()) return is_over.status();
+      if (*is_over) return LookUpEnd::kDone;
       continue;
     }
-    const bool prepare = WantsPreparing(*hull, plan.expected_questions);
+    const bool prepare = Preparer::IsWanted(*hull, plan.expected_questions);
     if (prepare && plan.prepare_first) {
-      if (!read.may_wait) return WouldWait();
+      if (!read.may_wait) return LookUpEnd::kWouldWait;
       if (!std::exchange(known.is_prepared, true)) {
         if (absl::Status s = PrepareFirst(locked, read, *hull); !s.ok()) return s;
         continue;
       }
     }
-    if (prepare) SchedulePreparing(hull);
+    if (prepare) preparer_.Schedule(hull);
     NoteView(locked, hull, read.known, k, was_missing);
-    return absl::OkStatus();
+    return LookUpEnd::kDone;
   }
 }
 
 // Finds out from the store whether there is this hull, and some of those that are due next. False:
 // look again; true: it could not be found out, which is noted. Releases the mutex.
-absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
-  if (!read.may_wait) return WouldWait();
+absl::StatusOr<bool> HullReader::AwaitRecord(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   if (!hulls.ahead_.empty()) {
     EndAllLoading(locked, read);
@@ -170,9 +164,8 @@ absl::StatusOr<bool> Registry::AwaitRecord(Locked& locked, const HullsRead& read
 
 // Reads the points of this hull, and at first of those that are due next as well. False: look
 // again; true: they cannot be read, which is noted. Releases the mutex.
-absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
-                                           RegisteredHull& hull, bool& was_missing) {
-  if (!read.may_wait) return WouldWait();
+absl::StatusOr<bool> HullReader::AwaitPoints(Locked& locked, const HullsRead& read, uint32_t k,
+                                             RegisteredHull& hull, bool& was_missing) {
   KnownHulls& hulls = read.known;
   if (absl::Status s = CheckReaders(locked, hulls); !s.ok()) return s;
   if (!std::exchange(was_missing, true)) {
@@ -185,7 +178,7 @@ absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read
     EndAllLoading(locked, read);
     return false;
   }
-  const absl::Status loaded = LoadForReaders(locked, hull, read.should_stop);
+  const absl::Status loaded = LoadOne(locked, hull, read.should_stop);
   if (Stopped(read.should_stop) || absl::IsCancelled(loaded)) return Cancelled();
   if (loaded.ok() || hull.state.gone()) return false;
   hulls.hulls_[k].view = loaded;
@@ -193,23 +186,23 @@ absl::StatusOr<bool> Registry::AwaitPoints(Locked& locked, const HullsRead& read
 }
 
 // Prepares what questions look through, before the first of them. Releases the mutex.
-absl::Status Registry::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
+absl::Status HullReader::PrepareFirst(Locked& locked, const HullsRead& read, RegisteredHull& hull) {
   if (!read.known.ahead_.empty()) {
     EndAllLoading(locked, read);
-    if (!WantsPreparing(hull, read.plan.expected_questions)) return absl::OkStatus();
+    if (!Preparer::IsWanted(hull, read.plan.expected_questions)) return absl::OkStatus();
   }
-  Prepare(locked, hull);
+  preparer_.Prepare(locked, hull);
   return Stopped(read.should_stop) ? Cancelled() : absl::OkStatus();
 }
 
 // Whether a reader holds what is committed of a hull.
-bool Registry::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
+bool HullReader::IsHeld(const KnownHulls::Known& known, const RegisteredHull& hull) {
   return known.view.ok() && known.view->record == hull.committed.record;
 }
 
 // Notes what readers are given of a hull that is ready. was_missing: its points were read for that.
-void Registry::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
-                        bool was_missing) {
+void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hulls, uint32_t k,
+                          bool was_missing) {
   KnownHulls::Known& known = hulls.hulls_[k];
   const bool was_loaded = std::exchange(known.is_loaded, false);
   if (!was_missing) ++(was_loaded ? catalog_.statistics().misses : catalog_.statistics().hits);
@@ -228,7 +221,7 @@ void Registry::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& hul
 // hulls are looked up, others read the next. Who waits for others meanwhile ends all that first,
 // since others may wait for it. Releases the mutex. What cannot be read, or was left behind by a
 // writer, stays missing.
-void Registry::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
+void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   const bool& is_ahead = hulls.hulls_[k].is_ahead;
   if (!is_ahead) hulls.ahead_end_ = hulls.due_.size();
@@ -237,7 +230,7 @@ void Registry::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
 }
 
 // Whether there are some that are worth it.
-bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
+bool HullReader::BeginLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   // At some 200 bytes a point, a twentieth of what all may hold: until each is looked up, nobody
   // asks whether readers hold too much.
@@ -281,13 +274,13 @@ bool Registry::BeginLoading(Locked& locked, const HullsRead& read) {
     next.found[i]->loading = true;
     hulls.hulls_[next.hulls[i]].is_ahead = true;
   }
-  next.job = LoadJob::Start(store_, std::move(stored), *loaders_);
+  next.job = LoadJob::Start(store_, std::move(stored), loaders_);
   hulls.ahead_.push_back(std::move(next));
   return true;
 }
 
 // Waits for the first of those that are read.
-void Registry::EndLoading(Locked& locked, const HullsRead& read) {
+void HullReader::EndLoading(Locked& locked, const HullsRead& read) {
   KnownHulls& hulls = read.known;
   const KnownHulls::Loading loading = std::move(hulls.ahead_.front());
   hulls.ahead_.pop_front();
@@ -311,20 +304,13 @@ void Registry::EndLoading(Locked& locked, const HullsRead& read) {
   }
 }
 
-void Registry::EndAllLoading(Locked& locked, const HullsRead& read) {
+void HullReader::EndAllLoading(Locked& locked, const HullsRead& read) {
   while (!read.known.ahead_.empty()) EndLoading(locked, read);
 }
 
-absl::StatusOr<Resolved> Registry::Resolve(std::span<const std::string> ids,
-                                           const std::function<bool()>& should_stop,
-                                           const ReadPlan& plan) {
-  KnownHulls known;
-  return Refresh(ids, known, should_stop, plan);
-}
-
-absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, KnownHulls& known,
-                                           const std::function<bool()>& should_stop,
-                                           const ReadPlan& plan) {
+absl::StatusOr<Resolved> HullReader::Refresh(std::span<const std::string> ids, KnownHulls& known,
+                                             const std::function<bool()>& should_stop,
+                                             const ReadPlan& plan) {
   known.Begin(ids);
   known.BeginLookup();
   Resolved resolved;
@@ -333,8 +319,9 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
     const auto staleness = freshness_.AwaitFresh(locked, plan.freshness, should_stop);
     if (!staleness.ok()) return staleness.status();
     resolved.staleness = *staleness;
-    const absl::Status status = LookUpDue(locked, {ids, known, should_stop, plan});
-    if (!status.ok()) return status;
+    const auto end = LookUpDue(locked, {ids, known, should_stop, plan});
+    if (!end.ok()) return end.status();
+    HULLD_CHECK(*end == LookUpEnd::kDone);
     resolved.store_revision = catalog_.revision();
     memory_.Evict(locked);
   }
@@ -342,8 +329,8 @@ absl::StatusOr<Resolved> Registry::Refresh(std::span<const std::string> ids, Kno
   return resolved;
 }
 
-std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
-                                             const ReadPlan& plan) {
+std::optional<Resolved> HullReader::TryResolve(std::span<const std::string> ids,
+                                               const ReadPlan& plan) {
   KnownHulls known;
   known.Begin(ids);
   const std::function<bool()> should_stop;
@@ -354,27 +341,22 @@ std::optional<Resolved> Registry::TryResolve(std::span<const std::string> ids,
     if (!staleness.has_value()) return std::nullopt;
     resolved.staleness = *staleness;
     const HullsRead read = {ids, known, should_stop, plan, false};
-    if (!LookUpDue(locked, read).ok()) return std::nullopt;
+    const auto end = LookUpDue(locked, read);
+    // A refusal is told by Refresh, as it may be over by then.
+    if (!end.ok() || *end != LookUpEnd::kDone) return std::nullopt;
     resolved.store_revision = catalog_.revision();
   }
   resolved.hulls = known.Views(ids);
   return resolved;
 }
 
-absl::StatusOr<std::pair<AsOf, HullView>> Registry::Resolve(
-    const std::string& id, const std::function<bool()>& should_stop, const Freshness& freshness) {
-  absl::StatusOr<Resolved> resolved =
-      Resolve(std::span(&id, 1), should_stop, {.freshness = freshness});
-  if (!resolved.ok()) return resolved.status();
-  absl::StatusOr<HullView>& hull = resolved->hulls.front();
-  if (!hull.ok()) return hull.status();
-  return std::pair(resolved->as_of(), *std::move(hull));
-}
-
-absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
-                                                const std::function<bool()>& should_stop) {
+absl::StatusOr<const Hull*> HullReader::Canonical(const HullView& view,
+                                                  const std::function<bool()>& should_stop) {
   if (const Hull* made = view.served->canonical(); made != nullptr) return made;
-  if (absl::Status s = CheckMemory(MemoryUse::kReading); !s.ok()) return s;
+  {
+    Locked locked(mutex_);
+    if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
+  }
   const auto start = std::chrono::steady_clock::now();
   const absl::Status status = view.served->MakeCanonical(view.record, should_stop);
   if (snapshot_seconds_ != nullptr) {
@@ -396,8 +378,8 @@ absl::StatusOr<const Hull*> Registry::Canonical(const HullView& view,
 
 // Reads a hull's points from the store, unless they are in memory or the hull is gone. Releases the
 // mutex meanwhile.
-absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
-                                      const std::function<bool()>& should_stop) {
+absl::Status HullReader::LoadOne(Locked& locked, RegisteredHull& hull,
+                                 const std::function<bool()>& should_stop) {
   bool failed = false;
   while (!hull.IsReady() && !hull.state.gone()) {
     if (hull.state.damaged()) return hull.state.damage();
@@ -447,65 +429,6 @@ absl::Status Registry::LoadForReaders(Locked& locked, RegisteredHull& hull,
     return loaded.status();
   }
   return absl::OkStatus();
-}
-
-// Whether questions have paid for preparing what they look through, and nobody does it yet.
-bool Registry::WantsPreparing(const RegisteredHull& hull, uint64_t expected_questions) {
-  return !hull.preparing && hull.live != nullptr && hull.state.visible() &&
-         hull.live->WantsPreparing(hull.committed_mark, expected_questions);
-}
-
-// Prepares what is committed of a hull. Releases the mutex meanwhile.
-void Registry::Prepare(Locked& locked, RegisteredHull& hull) {
-  HULLD_CHECK(!hull.preparing && hull.live != nullptr);
-  hull.preparing = true;
-  hull.points_since_prepared = 0;
-  const std::shared_ptr<LiveHull> live = hull.live;
-  const LiveHull::Mark mark = hull.committed_mark;
-  locked.Unlock();
-  live->Prepare(mark);
-  locked.Lock();
-  hull.preparing = false;
-  if (hull.live != live) return;
-  // Nothing came after: the mark lets go of what there was before.
-  if (hull.state.quiet() && !hull.state.damaged()) hull.SetCommittedMark(locked, live->Now());
-  hull.DiscardServed(locked);
-  catalog_.NoteChange(hull);
-  hull.NoteUse();
-}
-
-// Has another thread do it.
-void Registry::SchedulePreparing(const HullPointer& hull) {
-  HULLD_CHECK(!hull->preparing);
-  hull->preparing = true;
-  preparers_->Submit([this, hull] {
-    Locked locked(mutex_);
-    hull->preparing = false;
-    if (ending_ || hull->live == nullptr) return;
-    Prepare(locked, *hull);
-    memory_.Evict(locked);
-  });
-}
-
-absl::StatusOr<HullPage> Registry::List(const std::string& prefix, const std::string& after,
-                                        size_t page_size,
-                                        const std::function<bool()>& should_stop) {
-  if (catalog_.is_cache()) return lister_.ListHulls(prefix, after, page_size, should_stop);
-  HullPage page;
-  const std::lock_guard lock(mutex_);
-  page.store_revision = catalog_.revision();
-  const HullTable::Entries& all = catalog_.hulls().entries();
-  auto next = after.empty() ? all.lower_bound(prefix) : all.upper_bound(after);
-  for (; next != all.end() && next->first.starts_with(prefix); ++next) {
-    if (!next->second.visible()) continue;
-    if (page.hulls.size() == page_size) {
-      page.more = true;
-      break;
-    }
-    HullChange hull = next->second.Describe(next->first);
-    page.hulls.push_back({std::move(hull.record), hull.damaged});
-  }
-  return page;
 }
 
 }  // namespace hulld::server
