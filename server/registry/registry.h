@@ -18,15 +18,21 @@
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
+#include "server/registry/bodies/body_registry.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/catalog.h"
 #include "server/registry/catalog/change_feed.h"
 #include "server/registry/catalog/hull_state.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
+#include "server/registry/changes/hull_appender.h"
+#include "server/registry/changes/hull_changes.h"
+#include "server/registry/changes/hull_lifecycle.h"
+#include "server/registry/changes/takeover.h"
 #include "server/registry/commit/committer.h"
 #include "server/registry/memory/locked.h"
 #include "server/registry/memory/memory_budget.h"
+#include "server/registry/others/after_others.h"
 #include "server/registry/others/freshness_gate.h"
 #include "server/registry/read/hull_reader.h"
 #include "server/registry/read/preparer.h"
@@ -37,8 +43,6 @@
 #include "server/store/store.h"
 
 namespace hulld::server {
-
-struct PendingChunk;
 
 // Keeps hulls by ID, and bodies, whose IDs are of the same namespace: of a body all that is known,
 // which is its pieces (registry_bodies.cc). Keeps for each hull its record, and, while it is in use
@@ -120,40 +124,57 @@ class Registry {
   // thread. Requires a valid ID (unchecked: CheckHullId checks it where the call arrives).
   // ALREADY_EXISTS; RESOURCE_EXHAUSTED: --max-hulls, or the disk is full; UNAVAILABLE: the store
   // cannot be written.
-  void Create(const std::string& id, bool if_absent, Reply<CreateResult> done);
+  void Create(const std::string& id, bool if_absent, Reply<CreateResult> done) {
+    lifecycle_.Create(id, if_absent, std::move(done));
+  }
 
   // Removes a hull; its sessions hear of it. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
-  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  void Delete(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done) {
+    lifecycle_.Delete(id, if_revision, std::move(done));
+  }
 
   // Puts a hull in the place of another, at once for all readers. It is a new incarnation: sessions
   // of the former one end. Replies as above. Requires a builder. Copies the vertices, hence not for
   // gRPC's threads.
   // NOT_FOUND, unless create_if_absent; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
   // --max-hulls, or the disk is full; UNAVAILABLE: as above.
-  void Replace(Replacement replacement, Reply<ReplaceResult> done);
+  void Replace(Replacement replacement, Reply<ReplaceResult> done) {
+    lifecycle_.Replace(std::move(replacement), std::move(done));
+  }
 
   // Puts a body in the place of another or of none, at once for all readers; its revisions are
   // given here. Replies as above. Requires valid IDs and poses (unchecked), and pieces, at most
   // --max-pieces-per-body. The hulls of the pieces need not exist.
   // ALREADY_EXISTS: a hull has the ID; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED:
   // --max-hulls, --memory-limit, or the disk is full; UNAVAILABLE: as above.
-  void PutBody(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done);
+  void PutBody(StoredBody body, std::optional<uint64_t> if_revision, Reply<PutBodyResult> done) {
+    bodies_.Put(std::move(body), if_revision, std::move(done));
+  }
   // Removes a body. Replies with the store's revision, as above.
   // NOT_FOUND; ABORTED: if_revision does not match; RESOURCE_EXHAUSTED, UNAVAILABLE: as above.
-  void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision, Reply<uint64_t> done);
+  void DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
+                  Reply<uint64_t> done) {
+    bodies_.Delete(id, if_revision, std::move(done));
+  }
   // As List. A page may hold less than page_size although there are more.
   absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
                                       size_t page_size,
-                                      const std::function<bool()>& should_stop = {});
+                                      const std::function<bool()>& should_stop = {}) {
+    return bodies_.List(prefix, after, page_size, should_stop);
+  }
   // What is not known is read from the store, hence not for gRPC's threads. The status:
   // UNAVAILABLE: it cannot be read; CANCELLED: should_stop said so; RESOURCE_EXHAUSTED: it would
   // have to be, and readers hold more than their share of --memory-limit. Cost: O(log n) each, and
   // a question to the store for each kMostLookupsPerHold; others pass in between.
   FoundBodies FindBodies(std::span<const std::string> ids,
-                         const std::function<bool()>& should_stop = {});
+                         const std::function<bool()>& should_stop = {}) {
+    return bodies_.Find(ids, should_stop);
+  }
   // The same, but nullopt, at once, where the store would have to be read.
-  std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids);
+  std::optional<FoundBodies> TryFindBodies(std::span<const std::string> ids) {
+    return bodies_.TryFind(ids);
+  }
   // Whether there may be a body. Takes no lock.
   bool has_bodies() const { return catalog_.BodyCount() > 0; }
 
@@ -257,9 +278,12 @@ class Registry {
   // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: who takes turns with others for a thread.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
                   std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
-                  ClientId client = kNoClient);
+                  ClientId client = kNoClient) {
+    appender_.OpenAppend(id, writer_id, create_if_absent, std::move(on_gone), std::move(done),
+                         client);
+  }
 
-  void CloseAppend(const AppendSession& session);
+  void CloseAppend(const AppendSession& session) { appender_.CloseAppend(session); }
 
   // Queues a chunk. `on_built`, which may be empty, is called once its points are no longer held:
   // the next one may be queued then. `done` is called once it is committed or refused. Both come
@@ -271,7 +295,10 @@ class Registry {
   // --memory-limit, or the disk is full; UNAVAILABLE: the store cannot be written; DATA_LOSS: the
   // store is damaged; CANCELLED: should_stop said so.
   void Append(const AppendSession& session, Chunk chunk, std::function<bool()> should_stop,
-              std::function<void()> on_built, Reply<ChunkResult> done);
+              std::function<void()> on_built, Reply<ChunkResult> done) {
+    appender_.Append(session, std::move(chunk), std::move(should_stop), std::move(on_built),
+                     std::move(done));
+  }
 
   // Begins to tell of changes (ChangeFeed). `on_ready` is called on the feed's thread, once after
   // each piece that waits. RESOURCE_EXHAUSTED: --memory-limit.
@@ -293,97 +320,18 @@ class Registry {
   void EndWatches();
 
  private:
-  struct OpenRequest;
-  struct BuiltChunk;
-  enum class Verdict;
-  using HullPointer = std::shared_ptr<RegisteredHull>;
-
-  void CreateLocked(Locked& locked, const std::string& id, bool if_absent,
-                    const Reply<CreateResult>& done);
-  void CreateNew(Locked& locked, const std::string& id,
-                 const std::function<void(Locked&, absl::StatusOr<HullPointer>)>& done);
-  void DeleteLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
-                    const Reply<uint64_t>& done);
-  void ReplaceLocked(Locked& locked, const std::shared_ptr<Replacement>& replacement,
-                     const Reply<ReplaceResult>& done);
-  absl::Status CheckReplacement(const RegisteredHull* former, const Replacement& replacement) const;
-  Change MakeChange(const RegisteredHull* former, Replacement& replacement);
-  void CommitReplacement(Locked& locked, const HullPointer& former,
-                         const std::shared_ptr<Replacement>& replacement,
-                         const Reply<ReplaceResult>& done);
-  absl::StatusOr<ReplaceResult> FinishReplacement(Locked& locked, const HullPointer& former,
-                                                  const HullPointer& hull,
-                                                  const absl::Status& status, const Change& change);
-  static void TakeBack(RegisteredHull& hull, Change& change, Replacement& replacement);
-
-  absl::Status LoadBodies(Locked& locked);
-  std::optional<FoundBodies> FindBodies(Locked& locked, std::span<const std::string> ids,
-                                        const std::function<bool()>& should_stop, bool may_wait);
-  void PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
-                     std::optional<uint64_t> if_revision, const Reply<PutBodyResult>& done);
-  absl::Status CheckBody(Locked& locked, const std::string& id,
-                         std::optional<uint64_t> if_revision);
-  void DeleteBodyLocked(Locked& locked, const std::string& id, std::optional<uint64_t> if_revision,
-                        const Reply<uint64_t>& done);
-  void SubmitBody(Locked& locked, Change change, Committer::Completion finish);
-
-  // Other servers (registry_others.cc).
-  void AdvanceLater(const HullPointer& hull);
-  // Hulls that are advanced at a time by what other servers added, and the points of all of them:
-  // some milliseconds under the mutex.
-  static constexpr size_t kMostGrownHulls = 1 << 10;
-  static constexpr uint64_t kMostGrowth = 1 << 16;
-  std::vector<HullGrowth> GrownHulls(const OtherChanges& others) const;
-  void TakeOver(Locked& locked, const OtherChanges& others);
-  void TakeOver(Locked& locked, const std::string& id, const OtherChange& other, uint64_t since);
-  bool TakeOverVersion(Locked& locked, const HullPointer& hull, const OtherChange& other,
-                       bool is_news);
-  void TakeOverBody(Locked& locked, const std::string& id, const OtherChange& other);
-  std::optional<BodyRecord> FormerBody(const std::string& id, const OtherChange& other,
-                                       uint64_t since);
-
-  void Submit(Locked& locked, const HullPointer& hull, Change change, Committer::Completion finish);
-  void Advance(Locked& locked, const HullPointer& hull);
-
-  void RunOpen(const std::shared_ptr<OpenRequest>& request);
-  void OpenLocked(Locked& locked, const std::shared_ptr<OpenRequest>& request);
-  void OpenSession(Locked& locked, const HullPointer& hull,
-                   const std::shared_ptr<OpenRequest>& request, uint64_t last_sequence);
-  absl::StatusOr<uint64_t> CommittedSequence(Locked& locked, RegisteredHull& hull,
-                                             const std::string& writer_id);
-  void RunNextChunk(const HullPointer& hull);
-  void RefuseChunks(const HullPointer& hull);
-  void ApplyChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending);
-  absl::StatusOr<Verdict> CheckChunk(Locked& locked, RegisteredHull& hull,
-                                     const PendingChunk& pending);
-  absl::StatusOr<BuiltChunk> Build(Locked& locked, RegisteredHull& hull, PendingChunk& pending);
-  absl::StatusOr<std::shared_ptr<LiveHull>> LiveForWriter(Locked& locked, RegisteredHull& hull);
-  absl::StatusOr<PointCounts> AddPoints(PendingChunk& pending, const LiveHull::Mark& committed,
-                                        std::span<const Vector> builder_lacks, LiveHull& live,
-                                        std::unique_ptr<HullBuilder>& builder, BuiltChunk& built);
-  absl::Status WhyNotBuilt(RegisteredHull& hull, const absl::Status& cause);
-  void FillChange(const RegisteredHull& hull, const PointCounts& added, Change& change);
-  void SubmitChunk(Locked& locked, const HullPointer& hull, PendingChunk& pending,
-                   BuiltChunk built);
-  void CommitChunk(Locked& locked, const HullPointer& hull, const StoredHull& after,
-                   const LiveHull::Mark& mark, const std::string& writer_id, uint64_t sequence);
-  void Revert(Locked& locked, RegisteredHull& hull);
-
   void TakePresent(ChangeWatch& watch, WatchPiece* piece);
 
   Store& store_;
   // With the memory limit in force.
   const Limits limits_;
-  WorkerPool& writers_;
   MemoryBudget memory_;
 
   // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
   // builder that a thread owns.
   mutable FairMutex mutex_;
-  uint64_t last_watch_ = 0;
   Catalog catalog_;
-  // What goes on once all that other servers did is taken over.
-  std::vector<LockedTask> after_others_;
+  AfterOthers after_others_;
   ChangeFeed feed_;
 
   // Their threads use all the rest, so they end before anything else does (~Registry).
@@ -398,6 +346,11 @@ class Registry {
   RecordReader records_;
   RecordLister lister_;
   HullReader reader_;
+  BodyRegistry bodies_;
+  HullChanges changes_;
+  HullLifecycle lifecycle_;
+  HullAppender appender_;
+  Takeover takeover_;
 };
 
 }  // namespace hulld::server

@@ -1,6 +1,5 @@
-// Bodies: which there are, and how they begin, change and end. A body is small beside the hulls of
-// its pieces, so what is known of one is all of it, counted as what calls hold for long is.
-#include <absl/status/status.h>
+#include "server/registry/bodies/body_registry.h"
+
 #include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
@@ -12,7 +11,6 @@
 #include "server/contract/limit_error.h"
 #include "server/registry/catalog/body.h"
 #include "server/registry/catalog/registered_hull.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 namespace {
@@ -38,7 +36,7 @@ absl::Status HullHasTheId(const std::string& id) {
 
 }  // namespace
 
-absl::Status Registry::LoadBodies(Locked& locked) {
+absl::Status BodyRegistry::Load(Locked& locked) {
   return store_.ForEachBody([&](const std::string& id, const absl::StatusOr<StoredBody>& stored) {
     // Two records of one ID are not written; the hull is kept, as its vertices cannot be had again.
     if (catalog_.hulls().contains(id)) {
@@ -50,7 +48,7 @@ absl::Status Registry::LoadBodies(Locked& locked) {
   });
 }
 
-void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
+void BodyRegistry::Put(StoredBody body, std::optional<uint64_t> if_revision,
                        Reply<PutBodyResult> done) {
   HULLD_CHECK(!body.pieces.empty());
   const auto shared = std::make_shared<Body>(std::move(body), memory_, MemoryUse::kWriting);
@@ -59,13 +57,12 @@ void Registry::PutBody(StoredBody body, std::optional<uint64_t> if_revision,
     if (absl::Status s = memory_.Check(locked, MemoryUse::kWriting); !s.ok()) {
       return Answer<PutBodyResult>(locked, done, s);
     }
-    PutBodyLocked(locked, shared, if_revision, done);
+    PutLocked(locked, shared, if_revision, done);
   });
 }
 
 // Whether a body may be put. OK also where it takes the place of another.
-absl::Status Registry::CheckBody(Locked&, const std::string& id,
-                                 std::optional<uint64_t> if_revision) {
+absl::Status BodyRegistry::CheckPut(const std::string& id, std::optional<uint64_t> if_revision) {
   if (catalog_.hulls().contains(id)) return HullHasTheId(id);
   const std::shared_ptr<const Body> body = catalog_.FindBody(id);
   const uint64_t revision = body == nullptr ? 0 : body->record().revision;
@@ -75,26 +72,26 @@ absl::Status Registry::CheckBody(Locked&, const std::string& id,
   return body == nullptr ? catalog_.CheckHullCount() : absl::OkStatus();
 }
 
-void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
+void BodyRegistry::PutLocked(Locked& locked, const std::shared_ptr<Body>& body,
                              std::optional<uint64_t> if_revision,
                              const Reply<PutBodyResult>& done) {
   const std::string& id = body->record().body_id;
   if (BodyTable::Entry* const entry = catalog_.BodyInFlight(id); entry != nullptr) {
     entry->waiting.push_back(
-        [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+        [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
     return;
   }
   if (!catalog_.IsKnown(id)) {
-    return records_.WhenKnown(locked, id, done, [=, this](Locked& later) {
-      PutBodyLocked(later, body, if_revision, done);
-    });
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
   }
-  if (const HullPointer hull = catalog_.Find(id); hull != nullptr && hull->state.changing_life()) {
+  const Catalog::HullPointer hull = catalog_.Find(id);
+  if (hull != nullptr && hull->state.changing_life()) {
     hull->exclusive.push_back(
-        [=, this](Locked& later) { PutBodyLocked(later, body, if_revision, done); });
+        [=, this](Locked& later) { PutLocked(later, body, if_revision, done); });
     return;
   }
-  if (absl::Status s = CheckBody(locked, id, if_revision); !s.ok()) {
+  if (absl::Status s = CheckPut(id, if_revision); !s.ok()) {
     return Answer<PutBodyResult>(locked, done, s);
   }
   const bool is_new = !catalog_.bodies().contains(id);
@@ -108,34 +105,33 @@ void Registry::PutBodyLocked(Locked& locked, const std::shared_ptr<Body>& body,
   // One that was damaged begins anew.
   change.begins = created == 0;
   change.replaces_body = change.begins && !is_new;
-  SubmitBody(locked, std::move(change),
-             [=, this](Locked& later, const absl::Status& status, const Change&) {
-               if (is_new) catalog_.EndCreatingBody(status.ok());
-               if (Committer::IsSuperseded(status)) {
-                 return later.AfterwardsLocked(
-                     [=, this](Locked& again) { PutBodyLocked(again, body, if_revision, done); });
-               }
-               const BodyRecord& record = body->record();
-               if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
-               catalog_.bodies().Set(later, record.body_id, body);
-               Answer<PutBodyResult>(
-                   later, done,
-                   PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
-             });
+  Submit(locked, std::move(change),
+         [=, this](Locked& later, const absl::Status& status, const Change&) {
+           if (is_new) catalog_.EndCreatingBody(status.ok());
+           if (Committer::IsSuperseded(status)) {
+             return later.AfterwardsLocked(
+                 [=, this](Locked& again) { PutLocked(again, body, if_revision, done); });
+           }
+           const BodyRecord& record = body->record();
+           if (!status.ok()) return Answer<PutBodyResult>(later, done, status);
+           catalog_.bodies().Set(later, record.body_id, body);
+           Answer<PutBodyResult>(
+               later, done,
+               PutBodyResult{catalog_.revision(), record, body->pieces().size(), is_new});
+         });
 }
 
-void Registry::DeleteBody(const std::string& id, std::optional<uint64_t> if_revision,
+void BodyRegistry::Delete(const std::string& id, std::optional<uint64_t> if_revision,
                           Reply<uint64_t> done) {
-  freshness_.WhenFresh(
-      done, [=, this](Locked& locked) { DeleteBodyLocked(locked, id, if_revision, done); });
+  freshness_.WhenFresh(done,
+                       [=, this](Locked& locked) { DeleteLocked(locked, id, if_revision, done); });
 }
 
-void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
+void BodyRegistry::DeleteLocked(Locked& locked, const std::string& id,
                                 std::optional<uint64_t> if_revision, const Reply<uint64_t>& done) {
   if (!catalog_.IsKnown(id)) {
-    return records_.WhenKnown(locked, id, done, [=, this](Locked& later) {
-      DeleteBodyLocked(later, id, if_revision, done);
-    });
+    return records_.WhenKnown(
+        locked, id, done, [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
   }
   BodyTable::Entry* const entry = catalog_.bodies().Find(id);
   if (entry == nullptr) {
@@ -148,7 +144,7 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
   }
   if (entry->in_flight) {
     entry->waiting.push_back(
-        [=, this](Locked& later) { DeleteBodyLocked(later, id, if_revision, done); });
+        [=, this](Locked& later) { DeleteLocked(later, id, if_revision, done); });
     return;
   }
   const std::shared_ptr<const Body> body = entry->committed();
@@ -158,58 +154,63 @@ void Registry::DeleteBodyLocked(Locked& locked, const std::string& id,
   Change change;
   change.deleted = true;
   change.body = body->stored();
-  SubmitBody(locked, std::move(change),
-             [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
-               if (Committer::IsSuperseded(status)) {
-                 return later.AfterwardsLocked(
-                     [=, this](Locked& again) { DeleteBodyLocked(again, id, if_revision, done); });
-               }
-               if (!status.ok()) return Answer<uint64_t>(later, done, status);
-               catalog_.NoteBodyEnded();
-               catalog_.bodies().Set(later, id, nullptr);
-               Answer<uint64_t>(later, done, deletion.revision);
-             });
+  Submit(locked, std::move(change),
+         [=, this](Locked& later, const absl::Status& status, const Change& deletion) {
+           if (Committer::IsSuperseded(status)) {
+             return later.AfterwardsLocked(
+                 [=, this](Locked& again) { DeleteLocked(again, id, if_revision, done); });
+           }
+           if (!status.ok()) return Answer<uint64_t>(later, done, status);
+           catalog_.NoteBodyEnded();
+           catalog_.bodies().Set(later, id, nullptr);
+           Answer<uint64_t>(later, done, deletion.revision);
+         });
 }
 
 // finish: called once the change is committed and visible, or refused, before what waits for the
 // body goes on.
-void Registry::SubmitBody(Locked& locked, Change change, Committer::Completion finish) {
+void BodyRegistry::Submit(Locked& locked, Change change, Committer::Completion finish) {
   const std::string id = change.body->record.body_id;
   HULLD_CHECK(!std::exchange(catalog_.bodies().Find(id)->in_flight, true));
-  committer_.Submit(
-      locked, std::move(change),
-      [this, id, finish = std::move(finish)](Locked& later, const absl::Status& status,
-                                             Change& committed) {
-        const std::shared_ptr<const Body> former = catalog_.FindBody(id);
-        if (status.ok()) catalog_.Publish(committed.revision);
-        // Where readers look for a hull with this ID.
-        if (status.ok()) catalog_.recent_changes().Note(id);
-        finish(later, status, committed);
-        BodyTable::Entry& entry = *catalog_.bodies().Find(id);
-        if (status.ok() && entry.committed() != nullptr) {
-          const BodyRecord* const before = former == nullptr ? nullptr : &former->record();
-          feed_.NoteBodyPut(later, before, entry.committed());
-        } else if (status.ok()) {
-          feed_.NoteBodyDeleted(later, former->record(), committed.revision);
-        }
-        entry.in_flight = false;
-        std::deque<std::function<void(Locked&)>> waiting = std::exchange(entry.waiting, {});
-        // Nothing was there before a creation that was refused, nor is after a deletion.
-        if (entry.committed() == nullptr) catalog_.EraseBody(later, id);
-        for (auto& next : waiting) {
-          if (Committer::IsSuperseded(status)) {
-            after_others_.push_back(std::move(next));
-          } else {
-            next(later);
-          }
-        }
-        catalog_.bodies().DropSome(later);
-      });
+  committer_.Submit(locked, std::move(change),
+                    [this, id, finish = std::move(finish)](
+                        Locked& later, const absl::Status& status, Change& committed) {
+                      Complete(later, id, finish, status, committed);
+                    });
 }
 
-absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const std::string& after,
-                                              size_t page_size,
-                                              const std::function<bool()>& should_stop) {
+void BodyRegistry::Complete(Locked& locked, const std::string& id,
+                            const Committer::Completion& finish, const absl::Status& status,
+                            Change& change) {
+  const std::shared_ptr<const Body> former = catalog_.FindBody(id);
+  if (status.ok()) catalog_.Publish(change.revision);
+  // Where readers look for a hull with this ID.
+  if (status.ok()) catalog_.recent_changes().Note(id);
+  finish(locked, status, change);
+  BodyTable::Entry& entry = *catalog_.bodies().Find(id);
+  if (status.ok() && entry.committed() != nullptr) {
+    const BodyRecord* const before = former == nullptr ? nullptr : &former->record();
+    feed_.NoteBodyPut(locked, before, entry.committed());
+  } else if (status.ok()) {
+    feed_.NoteBodyDeleted(locked, former->record(), change.revision);
+  }
+  entry.in_flight = false;
+  std::deque<LockedTask> waiting = std::exchange(entry.waiting, {});
+  // Nothing was there before a creation that was refused, nor is after a deletion.
+  if (entry.committed() == nullptr) catalog_.EraseBody(locked, id);
+  for (LockedTask& next : waiting) {
+    if (Committer::IsSuperseded(status)) {
+      after_others_.Add(std::move(next));
+    } else {
+      next(locked);
+    }
+  }
+  catalog_.bodies().DropSome(locked);
+}
+
+absl::StatusOr<BodyPage> BodyRegistry::List(const std::string& prefix, const std::string& after,
+                                            size_t page_size,
+                                            const std::function<bool()>& should_stop) {
   if (catalog_.is_cache()) return lister_.ListBodies(prefix, after, page_size, should_stop);
   BodyPage page;
   const std::lock_guard lock(mutex_);
@@ -231,9 +232,9 @@ absl::StatusOr<BodyPage> Registry::ListBodies(const std::string& prefix, const s
 // kMostLookupsPerHold at a time. Of those what is not known is read, all at once; a reader of much
 // may drop it again meanwhile, so what was found before is not looked for again. nullopt: it would
 // have to wait, and may not.
-std::optional<FoundBodies> Registry::FindBodies(Locked& locked, std::span<const std::string> ids,
-                                                const std::function<bool()>& should_stop,
-                                                bool may_wait) {
+std::optional<FoundBodies> BodyRegistry::Find(Locked& locked, std::span<const std::string> ids,
+                                              const std::function<bool()>& should_stop,
+                                              bool may_wait) {
   FoundBodies found;
   found.bodies.resize(ids.size());
   for (size_t first = 0; first < ids.size(); first += kMostLookupsPerHold) {
@@ -256,15 +257,15 @@ std::optional<FoundBodies> Registry::FindBodies(Locked& locked, std::span<const 
   return found;
 }
 
-FoundBodies Registry::FindBodies(std::span<const std::string> ids,
-                                 const std::function<bool()>& should_stop) {
+FoundBodies BodyRegistry::Find(std::span<const std::string> ids,
+                               const std::function<bool()>& should_stop) {
   Locked locked(mutex_);
-  return *FindBodies(locked, ids, should_stop, true);
+  return *Find(locked, ids, should_stop, true);
 }
 
-std::optional<FoundBodies> Registry::TryFindBodies(std::span<const std::string> ids) {
+std::optional<FoundBodies> BodyRegistry::TryFind(std::span<const std::string> ids) {
   Locked locked(mutex_);
-  return FindBodies(locked, ids, {}, false);
+  return Find(locked, ids, {}, false);
 }
 
 }  // namespace hulld::server
