@@ -95,6 +95,7 @@ constexpr std::string_view kRooms[] = {
     "server/registry/read",
     "server/registry/changes",
     "server/registry/bodies",
+    "server/registry/watch",
     "server/registry",
     "server/access",
     "server/shards",

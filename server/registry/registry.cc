@@ -1,16 +1,12 @@
-// IDs: which hulls there are, and how they begin and end.
 #include "server/registry/registry.h"
 
 #include <absl/status/status.h>
-#include <absl/strings/str_cat.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
-#include "core/base/check.h"
-#include "server/contract/error_info.h"
-#include "server/contract/limit_error.h"
 #include "server/registry/catalog/registered_hull.h"
 #include "server/settings/cpu_limit.h"
 #include "server/settings/memory_limit.h"
@@ -52,7 +48,8 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
       lifecycle_(store, catalog_, memory_, feed_, freshness_, records_, changes_),
       appender_(store, limits_, writers, mutex_, catalog_, memory_, feed_, freshness_, records_,
                 preparer_, lifecycle_, changes_),
-      takeover_(catalog_, memory_, feed_, after_others_, records_, preparer_, changes_) {
+      takeover_(catalog_, memory_, feed_, after_others_, records_, preparer_, changes_),
+      watches_(store, mutex_, catalog_, memory_, feed_, lister_) {
   if (!store.is_shared()) return;
   committer_.SetOthers(
       [this](Locked& locked, const OtherChanges& others) { takeover_.Take(locked, others); },

@@ -3,26 +3,21 @@
 
 #include <absl/status/statusor.h>
 
-#include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "server/process/metrics.h"
 #include "server/process/worker_pool.h"
 #include "server/registry/bodies/body_registry.h"
-#include "server/registry/catalog/body.h"
 #include "server/registry/catalog/catalog.h"
 #include "server/registry/catalog/change_feed.h"
-#include "server/registry/catalog/hull_state.h"
 #include "server/registry/catalog/known_hulls.h"
 #include "server/registry/catalog/registry_types.h"
 #include "server/registry/changes/hull_appender.h"
@@ -39,60 +34,49 @@
 #include "server/registry/records/record_gate.h"
 #include "server/registry/records/record_lister.h"
 #include "server/registry/records/record_reader.h"
+#include "server/registry/watch/watches.h"
 #include "server/settings/config.h"
 #include "server/store/store.h"
 
 namespace hulld::server {
 
-// Keeps hulls by ID, and bodies, whose IDs are of the same namespace: of a body all that is known,
-// which is its pieces (registry_bodies.cc). Keeps for each hull its record, and, while it is in use
-// or memory allows, a builder and its points as a LiveHull, of which readers are given versions.
-// What is not in memory is read back from the store at first use.
+// Keeps hulls by ID, and bodies, whose IDs are of the same namespace, and answers from one revision
+// at a time. This class puts its parts together and passes each call to the one whose job it is:
 //
-// Where the store finds records, hulls are not read when a server starts: the table holds records
-// of those that were asked for lately, and what is not in it is not known until it is read
-// (records/record_reader.h). So whatever depends on what there is under an ID first makes that
-// known, and looks again when it is done with waiting. So it is with bodies, which have a table of
-// their own; an ID of which it is known that there is neither is in that of hulls.
+//   Catalog        what is known: tables of hulls and bodies, the revision, how many there are
+//   RecordReader   makes known what is under an ID, where the store finds records; RecordLister
+//                  lists what is not known; RecordGate keeps both from mixing revisions
+//   FreshnessGate  lets a call go on once what is here is as fresh as it asks
+//   HullReader     gives readers hulls of one moment; Preparer makes what is asked often faster
+//   HullLifecycle  begins and ends hulls; HullAppender lets them grow; HullChanges brings both to
+//   the
+//                  Committer, in order
+//   BodyRegistry   puts, deletes, finds and lists bodies
+//   Takeover       puts what other servers committed in the place of what was known
+//   Watches        tells watches what is there, and what changes, as ChangeFeed notes it
+//   MemoryBudget   says what is dropped
 //
-// The registry owns IDs, revisions and the rules of change: what may follow what, and what readers
-// see. HullState says what a hull can be in, the Committer brings changes to the store, and the
-// MemoryBudget says what is dropped.
+// A change is made in two steps. It is decided, or built, and submitted to the committer; only when
+// the store has kept it does it become visible, as a whole and in the order of submission, and is
+// answered. Chunks of one hull may be in flight together, each built on those before it. Creation,
+// deletion, replacement and chunks with a condition on the revision wait until no change of their
+// hull is in flight, since what they find must be committed. Where another server was first, a
+// change is made anew of what there is by then, so callers do not hear of it.
 //
-// Changes are made in two steps. A chunk is built first; the change that it makes is then submitted
-// to the committer. Only when that is kept does a change become visible, as a whole and in the
-// order of submission, and is answered. Meanwhile the next chunk of the same hull may be built on
-// it: if the batch fails, so do all changes that follow it, and the hull returns to its last
-// committed state. Creation, deletion, replacement and chunks with a condition on the revision wait
-// until no change of their hull is in flight, since what they find must be committed.
+// Readers and writers never wait for each other. A writer appends to a LiveHull, without the mutex;
+// a mark says up to where that is committed, and readers get the version at the mark. What is not
+// in memory is read back from the store at first use. Where the store finds records, not even the
+// records are read when a server starts: a call that depends on what there is under an ID first
+// makes that known, and looks again when it is done with waiting.
 //
-// Readers and writers never wait for each other. One mutex guards all records and is held for
-// moments only: a reader of many hulls looks up kMostLookupsPerHold at a time, lets others pass,
-// and at the end looks again for those that changed meanwhile, so that all are of one revision.
-// A chunk is built without it, by the one thread that owns the builder, which then
-// appends what became vertices to the LiveHull. How far that is committed is a mark in the record;
-// the first reader after a commit makes the version at that mark, in O(1) under the mutex, and it
-// is served until the next commit. A reader waits for the store at most, when the hull is not in
-// memory, and then many read it once. A refused batch puts in its place a copy of the LiveHull up
-// to the mark; whoever still builds on the former one drops it. Chunks of one hull queue up and
-// occupy no thread meanwhile.
+// One mutex, of this class, guards the state of all parts and is held for moments only
+// (kMostLookupsPerHold). A Locked, which is passed along, shows that it is held.
 //
-// Once questions about a hull have paid for preparing it (LiveHull::WantsPreparing), that is done
-// by a thread of its own, or by a reader that expects to ask that much. The same thread prepares
-// hulls that would otherwise come to hold many points that are no vertices any more. The canonical
-// snapshot of a version is made by the first reader that needs it, without the mutex. Thread-safe.
-//
-// Where other servers commit to the same store, changes first learn what those did, and reads that
-// are to be fresher than what is known here; it takes the place of that, and a hull in memory that
-// only grew is given the points that came. A change that another one preceded is refused by the
-// committer, and made anew of what there is by then, so callers do not hear of it
-// (registry_others.cc). A chunk is kept for that until it is committed.
-//
-// Lock order: first the mutex of the records; then that of the committer's queue, of the budget, of
-// a pool or within a LiveHull. None of the latter is held while another lock is taken. Callbacks
-// run without any. The committer completes each batch under the mutex of the records (its header
-// says why); the budget evicts under it, since what it drops belongs to the records; a MemoryCharge
-// takes the budget's mutex alone.
+// Lock order: first that mutex; then that of the committer's queue, of the budget, of a pool or
+// within a LiveHull. None of the latter is held while another lock is taken. Callbacks run without
+// any. The committer completes each batch under the mutex (its header says why); the budget evicts
+// under it, since what it drops belongs to hulls; a MemoryCharge takes the budget's mutex alone.
+// Thread-safe.
 class Registry {
  public:
   // Chunks are applied on `writers`. Store and pool must outlive this; no call may be running and
@@ -304,31 +288,33 @@ class Registry {
   // each piece that waits. RESOURCE_EXHAUSTED: --memory-limit.
   absl::StatusOr<std::shared_ptr<ChangeWatch>> OpenWatch(const WatchTarget& target,
                                                          const WatchStart& start,
-                                                         std::function<void()> on_ready);
+                                                         std::function<void()> on_ready) {
+    return watches_.Open(target, start, std::move(on_ready));
+  }
   // What is to be told next; may be nothing. UNAVAILABLE once EndWatches was called. Requires that
   // the watch does not wait. Cost: O(kMostPerPiece).
-  absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch);
+  absl::StatusOr<WatchPiece> TakeChanges(ChangeWatch& watch) { return watches_.Take(watch); }
   // What changes of `added` from now on is told, too, and what changes of `dropped`, which were
   // added before, no more. Requires a target that varies. Cost: a hash for each ID.
   void WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
-                 std::span<const std::string> dropped);
+                 std::span<const std::string> dropped) {
+    watches_.Extend(watch, added, dropped);
+  }
   // The watch waits no more than until its on_ready is called, although nothing changed.
-  void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch);
+  void NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Nudge(watch); }
   // An on_ready that is due by then still comes.
-  void CloseWatch(const std::shared_ptr<ChangeWatch>& watch);
+  void CloseWatch(const std::shared_ptr<ChangeWatch>& watch) { watches_.Close(watch); }
   // Every watch is to end: nudges them all.
-  void EndWatches();
+  void EndWatches() { watches_.EndAll(); }
 
  private:
-  void TakePresent(ChangeWatch& watch, WatchPiece* piece);
-
   Store& store_;
   // With the memory limit in force.
   const Limits limits_;
   MemoryBudget memory_;
 
-  // What is guarded by mutex_: the rest but the committer, and all of a RegisteredHull but a
-  // builder that a thread owns.
+  // Guards the rest, but what is thread-safe by itself (the budget, the committer, pools), and all
+  // of a RegisteredHull but a builder that a thread owns.
   mutable FairMutex mutex_;
   Catalog catalog_;
   AfterOthers after_others_;
@@ -337,10 +323,10 @@ class Registry {
   // Their threads use all the rest, so they end before anything else does (~Registry).
   Committer committer_;
   Preparer preparer_;
-  // These help readers that read many hulls from the store.
+  // These read records, and help readers that read many hulls from the store.
   std::optional<WorkerPool> loaders_;
 
-  // The parts: what each does is told in its header.
+  // In the order in which they build on each other.
   FreshnessGate freshness_;
   RecordGate gate_;
   RecordReader records_;
@@ -351,6 +337,7 @@ class Registry {
   HullLifecycle lifecycle_;
   HullAppender appender_;
   Takeover takeover_;
+  Watches watches_;
 };
 
 }  // namespace hulld::server

@@ -1,5 +1,4 @@
-// Watches: what is there, then what changes.
-#include <absl/status/status.h>
+#include "server/registry/watch/watches.h"
 
 #include <algorithm>
 #include <mutex>
@@ -7,13 +6,12 @@
 
 #include "server/contract/error_info.h"
 #include "server/registry/catalog/registered_hull.h"
-#include "server/registry/registry.h"
 
 namespace hulld::server {
 
-absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarget& target,
-                                                                 const WatchStart& start,
-                                                                 std::function<void()> on_ready) {
+absl::StatusOr<std::shared_ptr<ChangeWatch>> Watches::Open(const WatchTarget& target,
+                                                           const WatchStart& start,
+                                                           std::function<void()> on_ready) {
   Locked locked(mutex_);
   if (absl::Status s = memory_.Check(locked, MemoryUse::kReading); !s.ok()) return s;
   std::shared_ptr<ChangeWatch> watch = feed_.Open(target, std::move(on_ready));
@@ -32,7 +30,7 @@ absl::StatusOr<std::shared_ptr<ChangeWatch>> Registry::OpenWatch(const WatchTarg
   return watch;
 }
 
-absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
+absl::StatusOr<WatchPiece> Watches::Take(ChangeWatch& watch) {
   Locked locked(mutex_);
   if (feed_.has_ended()) return Draining();
   if (feed_.IsLost(watch)) {
@@ -68,7 +66,7 @@ absl::StatusOr<WatchPiece> Registry::TakeChanges(ChangeWatch& watch) {
 }
 
 // Some of what is there. What changes behind the walk is told after it.
-void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
+void Watches::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   // What changed before the first step need not be told twice.
   if (watch.last_id.empty() && watch.after_revision == 0) feed_.SkipChanges(watch);
   const WatchTarget& target = ChangeFeed::TargetOf(watch);
@@ -111,8 +109,8 @@ void Registry::TakePresent(ChangeWatch& watch, WatchPiece* piece) {
   watch.synced_at = catalog_.revision();
 }
 
-void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
-                         std::span<const std::string> dropped) {
+void Watches::Extend(ChangeWatch& watch, std::span<const std::string> added,
+                     std::span<const std::string> dropped) {
   // Others pass in between.
   const auto in_slices = [this](std::span<const std::string> ids, const auto& take) {
     while (!ids.empty()) {
@@ -126,17 +124,17 @@ void Registry::WatchAlso(ChangeWatch& watch, std::span<const std::string> added,
   in_slices(dropped, [&](std::span<const std::string> ids) { feed_.WatchAlso(watch, {}, ids); });
 }
 
-void Registry::NudgeWatch(const std::shared_ptr<ChangeWatch>& watch) {
+void Watches::Nudge(const std::shared_ptr<ChangeWatch>& watch) {
   Locked locked(mutex_);
   feed_.Nudge(locked, watch);
 }
 
-void Registry::CloseWatch(const std::shared_ptr<ChangeWatch>& watch) {
+void Watches::Close(const std::shared_ptr<ChangeWatch>& watch) {
   const std::lock_guard lock(mutex_);
   feed_.Close(watch);
 }
 
-void Registry::EndWatches() {
+void Watches::EndAll() {
   Locked locked(mutex_);
   feed_.End(locked);
 }
