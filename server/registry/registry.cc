@@ -59,8 +59,8 @@ Registry::Registry(Store& store, const Limits& limits, WorkerPool& writers,
 Registry::~Registry() {
   store_.OnOthers(nullptr);
   {
-    const std::lock_guard lock(mutex_);
-    preparer_.Stop();
+    const Locked locked(mutex_);
+    preparer_.Stop(locked);
   }
   // Its thread takes over what other servers did, into what is closed here.
   committer_.End();

@@ -41,6 +41,11 @@ void Preparer::Schedule(const HullPointer& hull) {
   });
 }
 
+void Preparer::Stop(const Locked& locked) {
+  HULLD_CHECK(locked.Holds(mutex_));
+  is_stopped_ = true;
+}
+
 void Preparer::ScheduleIfWorn(const HullPointer& hull) {
   if (!is_stopped_ && hull->HoldsMuchElse() && !hull->preparing) Schedule(hull);
 }

@@ -43,9 +43,8 @@ class Preparer {
   // The same where most points of the hull are no vertices any more, unless somebody does it.
   void ScheduleIfWorn(const HullPointer& hull);
 
-  // Nothing more is prepared from now on. Requires the mutex (unchecked: it may be held without a
-  // Locked).
-  void Stop() { is_stopped_ = true; }
+  // Nothing more is prepared from now on.
+  void Stop(const Locked& locked);
   // Ends the thread. After Stop, without the mutex.
   void End() { thread_.reset(); }
 
