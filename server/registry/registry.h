@@ -92,8 +92,9 @@ class Registry {
   // Reads the records of all hulls and bodies that the store holds, unless it finds records; before
   // any other call. Damaged ones are logged, and answered with DATA_LOSS later.
   absl::Status Load();
-  // Of a store that finds records, how many of hulls, and small ones of bodies, are kept in memory
-  // while nobody uses them, instead of what a part of --memory-limit holds. Before Load; for tests.
+  // How many records of hulls, and small ones of bodies, a registry over a store that finds them
+  // keeps in memory while nobody uses them, instead of what a part of --memory-limit holds. Before
+  // Load; for tests.
   void KeepRecords(size_t most) {
     catalog_.hulls().KeepAtMost(most);
     catalog_.bodies().KeepAtMost(most * 2 * BodyTable::kBytesOfEntry);
@@ -171,7 +172,7 @@ class Registry {
   // Where the store is shared, waits until all that other servers had committed by the time of the
   // call is taken over: before what does not do so itself (List, FindBodies, ListBodies). Not for
   // gRPC's threads. CANCELLED: should_stop said so. UNAVAILABLE: the store cannot be asked. Cost: a
-  // question to the store, one for all who wait; nothing where it is not shared.
+  // question to the store, one for all that wait; nothing where it is not shared.
   absl::Status AwaitOthers(const std::function<bool()>& should_stop) {
     return freshness_.AwaitOthers(should_stop);
   }
@@ -187,8 +188,8 @@ class Registry {
     return freshness_.TryFresh(freshness);
   }
   // Has what other servers had committed by now taken over, and calls `done` then, once, on this
-  // or another thread, without any lock: for who asks several registries at once. UNAVAILABLE: as
-  // AwaitOthers. Cost: as that, but nobody waits.
+  // or another thread, without any lock: for a caller that asks several registries at once.
+  // UNAVAILABLE: as AwaitOthers. Cost: as that, but nobody waits.
   void StartFollow(std::function<void(const absl::Status&)> done) {
     freshness_.StartFollow(std::move(done));
   }
@@ -259,7 +260,7 @@ class Registry {
   // Opens a session; `done` is called on this or another thread. `on_gone` is called once, on any
   // thread, with the reason when the hull is deleted or replaced before the session is closed.
   // NOT_FOUND; with create_if_absent as Create; DATA_LOSS: the store is damaged;
-  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: who takes turns with others for a thread.
+  // RESOURCE_EXHAUSTED: --max-writers-per-hull. client: takes turns with others for a thread.
   void OpenAppend(const std::string& id, const std::string& writer_id, bool create_if_absent,
                   std::function<void(const absl::Status&)> on_gone, Reply<OpenResult> done,
                   ClientId client = kNoClient) {

@@ -20,7 +20,7 @@ size_t MostRecords(uint64_t memory_limit) {
   return std::max<uint64_t>(1 << 12, memory_limit / 16 / HullTable::kBytesOfRecord);
 }
 
-// Of the limit, what bodies that nobody uses may take: one in so many.
+// Bodies that nobody uses may take one part in so many of the limit.
 constexpr uint64_t kBodiesShare = 16;
 
 }  // namespace

@@ -42,7 +42,7 @@ class Catalog {
  public:
   using HullPointer = std::shared_ptr<RegisteredHull>;
 
-  // Of a limit in force. Store and budget must outlive this.
+  // limits: those in force. Store and budget must outlive this.
   Catalog(const Store& store, const Limits& limits, MemoryBudget& budget);
   Catalog(const Catalog&) = delete;
   Catalog& operator=(const Catalog&) = delete;

@@ -209,7 +209,7 @@ absl::StatusOr<uint64_t> HullAppender::CommittedSequence(Locked& locked, Registe
   --hull.sequence_readers;
   if (absl::IsAborted(sequence.status())) {
     if (absl::Status s = freshness_.AwaitOthers(locked, {}); !s.ok()) return s;
-    // Who asks sees that.
+    // Each caller looks for that.
     if (hull.state.gone()) return 0;
     if (hull.supersessions == supersessions && hull.committed.record == record) {
       return StoreDisagrees(record);

@@ -218,9 +218,9 @@ void HullReader::NoteView(Locked& locked, const HullPointer& hull, KnownHulls& h
 
 // Reads the points of this hull, which is due, and of those that are due next from the store, as
 // far as they are missing and nobody else reads them, by several threads at a time. While these
-// hulls are looked up, others read the next. Who waits for others meanwhile ends all that first,
-// since others may wait for it. Releases the mutex. What cannot be read, or was left behind by a
-// writer, stays missing.
+// hulls are looked up, others read the next. A read that waits for others meanwhile
+// ends all that first, since others may wait for it. Releases the mutex. What cannot be read, or
+// was left behind by a writer, stays missing.
 void HullReader::LoadMany(Locked& locked, const HullsRead& read, uint32_t k) {
   KnownHulls& hulls = read.known;
   const bool& is_ahead = hulls.hulls_[k].is_ahead;

@@ -41,7 +41,7 @@ class RecordLister {
   RecordLister& operator=(const RecordLister&) = delete;
 
   // As Registry::List and ListBodies. Ask the store on this thread. Require that the mutex is not
-  // held (unchecked: a mutex does not tell who holds it).
+  // held (unchecked: a mutex does not tell which thread holds it).
   absl::StatusOr<HullPage> ListHulls(const std::string& prefix, const std::string& after,
                                      size_t page_size, const std::function<bool()>& should_stop);
   absl::StatusOr<BodyPage> ListBodies(const std::string& prefix, const std::string& after,
